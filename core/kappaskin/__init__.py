@@ -1,0 +1,32 @@
+"""Kappaskin: shape and contact from curvature-sensing tactile skins, live and with error bars."""
+
+from kappaskin.bases import SineBasis as SineBasis
+from kappaskin.effects import GaussianNoise as GaussianNoise
+from kappaskin.effects import UniformNoise as UniformNoise
+from kappaskin.errors import RankDeficient as RankDeficient
+from kappaskin.errors import Refusal as Refusal
+from kappaskin.errors import SourceError as SourceError
+from kappaskin.fit import Fit as Fit
+from kappaskin.fit import LeastSquares as LeastSquares
+from kappaskin.frames import COMPONENTS as COMPONENTS
+from kappaskin.frames import Estimate as Estimate
+from kappaskin.frames import Frame as Frame
+from kappaskin.frames import Touch as Touch
+from kappaskin.frames import Truth as Truth
+from kappaskin.layout import SensorLayout as SensorLayout
+from kappaskin.mechanics import LineLoad as LineLoad
+from kappaskin.mechanics import Plate as Plate
+from kappaskin.mechanics import PointLoad as PointLoad
+from kappaskin.patch import Patch as Patch
+from kappaskin.pipeline import Pipeline as Pipeline
+from kappaskin.pipeline import Setup as Setup
+from kappaskin.scene import SCENES as SCENES
+from kappaskin.scene import Orbit as Orbit
+from kappaskin.scene import Scene as Scene
+from kappaskin.scene import load_scene as load_scene
+from kappaskin.sensor import Sensor as Sensor
+from kappaskin.simulate import Simulator as Simulator
+from kappaskin.touch import PointContact as PointContact
+from kappaskin.transduction import Converter as Converter
+from kappaskin.transduction import HalfBridge as HalfBridge
+from kappaskin.transduction import Transduction as Transduction

@@ -1,0 +1,324 @@
+"""The live process: source to pipeline to ring, away from whatever draws."""
+
+import math
+import multiprocessing
+import os
+import signal
+import time
+from collections import deque
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import cast
+
+import numpy as np
+
+from kappaskin.errors import Refusal, SourceError
+from kappaskin.frames import Estimate
+from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.ring import Ring, slot_type
+from kappaskin.scene import Scene
+from kappaskin.sensor import Sensor
+from kappaskin.sources import SimulatedSource, Source, open_source
+from kappaskin.sources.wire import Accounting
+
+OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
+
+_READ = 0.02  # s a read may wait, and so a command
+_REPORT = 0.1  # s between two statuses
+_GAPS = 4096  # gaps between reads that the percentile is taken over
+
+
+@dataclass(frozen=True)
+class Status:
+    """How the engine is doing.
+
+    `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
+    `message` says why. `refusal` says why the setup asked for last was not taken. `rate` in
+    frames/s, `reader_gap` the 99th percentile of the time between two reads in s, `last_frame`
+    and `reported` on the monotonic clock.
+    """
+
+    state: str = OFF
+    source: str = ""
+    message: str = ""
+    refusal: str = ""
+    sensor: Sensor | None = None
+    setup: Setup = field(default_factory=Setup)
+    generation: int = 0
+    slot: "np.dtype[np.void] | None" = None
+    accounting: Accounting = field(default_factory=Accounting)
+    rate: float = 0.0
+    reader_gap: float = math.nan
+    last_frame: float = -math.inf
+    reported: float = -math.inf
+
+
+@dataclass(frozen=True)
+class Connect:
+    source: str
+
+
+@dataclass(frozen=True)
+class Disconnect:
+    pass
+
+
+Request = Connect | Disconnect | Setup | Scene
+
+
+class _Loop:
+    """The engine's own side: takes requests, reads, computes, writes, reports."""
+
+    def __init__(self, requests: "Connection[Request, Request]", ring: Ring) -> None:
+        self._requests, self._ring = requests, ring
+        self._source: Source | None = None
+        self._scene: Scene | None = None
+        self._pipeline: Pipeline | None = None
+        self._status = Status()
+        self._gaps: deque[float] = deque(maxlen=_GAPS)
+        self._times: deque[float] = deque(maxlen=1024)
+        self._last_read = math.nan
+
+    def run(self) -> None:
+        """Serve until the parent closes its end, or is gone."""
+        with suppress(EOFError):
+            while True:
+                wait = 0.05 if self._source is None else 0.0
+                while self._requests.poll(wait):
+                    self._take(self._requests.recv())
+                    wait = 0.0
+                if self._source is not None:
+                    self._read(self._source)
+                if time.monotonic() - self._status.reported >= _REPORT:
+                    self._report()
+        self._close()
+
+    def _take(self, request: Request) -> None:
+        if isinstance(request, Setup):
+            self._set_up(request)
+        elif isinstance(request, Scene):
+            self._scene = request
+            self._play()
+        else:
+            self._close()
+            self._scene = None
+            self._status = replace(
+                self._status,
+                state=OFF,
+                source="",
+                message="",
+                sensor=None,
+                accounting=Accounting(),
+                last_frame=-math.inf,
+            )
+            if isinstance(request, Connect):
+                self._open(request.source)
+        self._report()
+
+    def _open(self, name: str) -> None:
+        self._status = replace(self._status, state=WAITING, source=name)
+        try:
+            self._source = open_source(name)
+        except Refusal as refusal:
+            self._status = replace(self._status, state=LOST, message=str(refusal))
+
+    def _play(self) -> None:
+        if isinstance(self._source, SimulatedSource) and self._scene is not None:
+            self._source.play(self._scene)
+
+    def _close(self) -> None:
+        if self._source is not None:
+            self._source.close()
+        self._source, self._pipeline = None, None
+        self._gaps.clear()
+        self._times.clear()
+        self._last_read = math.nan
+
+    def _set_up(self, setup: Setup) -> None:
+        """Swap the whole pipeline, or keep the one there is and say why."""
+        sensor = self._status.sensor
+        if sensor is None:
+            self._status = replace(self._status, setup=setup, refusal="")
+            return
+        generation = self._status.generation + 1
+        try:
+            pipeline = Pipeline(sensor, setup, generation)
+            slot = slot_type(pipeline)
+            self._ring.lay_out(generation, slot)
+        except Refusal as refusal:
+            self._status = replace(self._status, refusal=str(refusal))
+            return
+        self._pipeline = pipeline
+        self._status = replace(
+            self._status, setup=setup, refusal="", generation=generation, slot=slot
+        )
+
+    def _read(self, source: Source) -> None:
+        try:
+            frames = source.read(_READ)
+        except SourceError as error:
+            accounting, last = source.accounting(), self._status.last_frame
+            self._close()
+            self._status = replace(
+                self._status,
+                state=LOST,
+                message=str(error),
+                accounting=accounting,
+                last_frame=last,
+                rate=0.0,
+            )
+            self._report()
+            return
+        if source.sensor is not self._status.sensor:
+            self._meet(source.sensor)
+        now = time.monotonic()
+        if frames:
+            self._gaps.append(now - self._last_read)
+            self._last_read = now
+        if self._pipeline is None:
+            return
+        for frame in frames:
+            self._ring.write(self._pipeline(frame))
+            self._times.append(frame.host_time)
+
+    def _meet(self, sensor: Sensor | None) -> None:
+        """A device said what it is: make the pipeline for it."""
+        self._pipeline = None
+        self._status = replace(self._status, state=STREAMING, sensor=sensor)
+        self._play()
+        self._set_up(self._status.setup)
+
+    def _report(self) -> None:
+        now, source, status = time.monotonic(), self._source, self._status
+        if source is not None:
+            gaps = np.array(self._gaps)[1:]
+            recent = [t for t in self._times if t > now - 1.0]
+            status = replace(
+                status,
+                accounting=source.accounting(),
+                rate=len(recent) / min(1.0, max(now - recent[0], 1e-3)) if recent else 0.0,
+                reader_gap=float(np.percentile(gaps, 99)) if len(gaps) else math.nan,
+                last_frame=self._times[-1] if self._times else -math.inf,
+            )
+        self._status = replace(status, reported=now)
+        self._ring.write_status(self._status)
+
+
+def _serve(requests: "Connection[Request, Request]", name: str) -> None:
+    """What the child process does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
+    ring = Ring.attach(name)
+    try:
+        _Loop(requests, ring).run()
+    finally:
+        ring.close()
+
+
+@contextmanager
+def _one_thread_per_process() -> Generator[None]:
+    # Small products lose by threading, and the threads would take the cores from whoever draws.
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+    was = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in was.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+class Engine:
+    """The live process, seen from the one that shows; no call here waits for it.
+
+    It ends when `close` is called, or within a second when this process is gone.
+    """
+
+    def __init__(self, setup: Setup | None = None) -> None:
+        self._ring = Ring.create()
+        self._setup = setup or Setup()
+        self._process: BaseProcess | None = None
+        self._requests: Connection[Request, Request] | None = None
+        self._start()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        theirs, ours = context.Pipe(duplex=False)
+        self._requests = cast("Connection[Request, Request]", ours)
+        with _one_thread_per_process():
+            self._process = context.Process(
+                target=_serve, args=(theirs, self._ring.name), name="kappaskin-engine", daemon=True
+            )
+            self._process.start()
+        theirs.close()
+        self._send(self._setup)
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid if self._process else None
+
+    @property
+    def alive(self) -> bool:
+        return self._process is not None and self._process.is_alive()
+
+    def _send(self, request: Request) -> None:
+        if self._requests is not None:
+            with suppress(OSError):  # the process died: `status` says so
+                self._requests.send(request)
+
+    def connect(self, source: str) -> None:
+        """Take frames from `source` instead of the present one; starts a dead process anew."""
+        if not self.alive:
+            self._end()
+            self._start()
+        self._send(Connect(source))
+
+    def disconnect(self) -> None:
+        self._send(Disconnect())
+
+    def set_up(self, setup: Setup) -> None:
+        """Compute with another setup; a refused one leaves the present one, `status` says why."""
+        self._setup = setup
+        self._send(setup)
+
+    def play(self, scene: Scene) -> None:
+        """Let the simulated source, if that is what there is, go on with `scene`."""
+        self._send(scene)
+
+    def status(self) -> Status:
+        status = self._ring.read_status() or Status()
+        if not self.alive:
+            return replace(
+                status,
+                state=LOST,
+                rate=0.0,
+                message="the engine process ended unexpectedly; connect again to restart it",
+            )
+        return status
+
+    def latest(self, status: Status) -> Estimate | None:
+        """The newest estimate of the generation that `status` tells of."""
+        if status.slot is None:
+            return None
+        return self._ring.read(status.generation, status.slot)
+
+    def _end(self) -> None:
+        if self._requests is not None:
+            self._requests.close()
+        if self._process is not None:
+            self._process.join(timeout=2.0)
+            if self._process.is_alive():
+                self._process.kill()
+                self._process.join()
+            self._process.close()
+        self._process, self._requests = None, None
+
+    def close(self) -> None:
+        """End the process and give the memory back."""
+        self._end()
+        self._ring.destroy()

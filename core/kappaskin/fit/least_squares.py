@@ -1,0 +1,230 @@
+"""Least squares, factored once: curvature to the coefficients of the shape, with error bars."""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg
+
+from kappaskin.bases import SineBasis
+from kappaskin.errors import RankDeficient, Refusal
+from kappaskin.frames import Array, Mask
+from kappaskin.layout import SensorLayout
+
+_REMEMBERED = 8  # sets of missing readings whose operators are kept
+_REFACTOR = 1e-6  # below this share of a direction left, updating loses digits: factor anew
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """The shape that answers the readings best, of one frame or of T (leading axis).
+
+    `coefficients` and their standard deviations `sd` (..., Ni, Nj) in m; `residual` (..., 3, P) in
+    1/m, NaN where a reading is missing; `noise` (...) the standard deviation of a reading in 1/m
+    as the residual tells it, NaN when every reading was spent on a coefficient, 1 when the fit was
+    made with `sigma`.
+    """
+
+    estimator: "LeastSquares"
+    coefficients: Array
+    sd: Array
+    residual: Array
+    noise: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients, in m^2; made on demand."""
+        missing = np.isnan(self.residual)
+        units = [
+            self.estimator.unit_covariance(gone)
+            for gone in missing.reshape(-1, *missing.shape[-2:])
+        ]
+        N = self.estimator.basis.size
+        return self.noise[..., None, None] ** 2 * np.reshape(units, (*self.noise.shape, N, N))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solver:
+    """The operator (N, R) for R of the readings, `used` (3 P,), and its unit covariance."""
+
+    used: Mask
+    operator: Array
+    covariance: Array
+    sd: Array
+
+
+class LeastSquares:
+    """`fit = LeastSquares(basis, layout)`; `fit(curvature)` is the least-squares shape (Eq. 6).
+
+    The normal equations of Eq. 6 square the condition number, so they are never formed: the
+    columns of M are scaled to unit length and factored, M = Q R by Householder reflections and
+    R = U S V^T, once. Missing readings (NaN) are taken out by an update of that factorisation.
+
+    `sigma`, a scalar or (3, P) in 1/m, is the standard deviation of each reading; without it all
+    readings weigh the same and their noise is estimated from the residual. An infinite sigma
+    leaves a reading out. Raises `RankDeficient` when the readings do not decide the coefficients.
+    """
+
+    def __init__(
+        self, basis: SineBasis, layout: SensorLayout, sigma: ArrayLike | None = None
+    ) -> None:
+        self.basis, self.layout = basis, layout
+        self._sigma_known = sigma is not None
+        self._weight = self._weights(1.0 if sigma is None else sigma)
+        self.M = layout.curvature_operator(basis)
+        """The curvature operator (3 P, Ni Nj) (Eq. 2)."""
+        used = layout.live.ravel() & (self._weight > 0)
+        self._factor(used)
+        self._solver = _Solver(used, self._root @ self._U.T, *self._spread(self._root))
+        self._reduced: OrderedDict[bytes, _Solver] = OrderedDict()
+
+    def _weights(self, sigma: ArrayLike) -> Array:
+        sigma = np.asarray(sigma, float)
+        if sigma.shape not in ((), (3, len(self.layout))):
+            raise Refusal(
+                f"expected sigma to be one number or (3, {len(self.layout)}), got {sigma.shape}"
+            )
+        if not np.all(sigma > 0):
+            raise Refusal("expected every sigma above zero in 1/m, got zero, less or NaN")
+        return np.broadcast_to(1 / sigma, (3, len(self.layout))).ravel()
+
+    def _factor(self, used: Mask) -> None:
+        """U (R, N) orthonormal and root (N, N) with operator = root U^T, for the readings used."""
+        A = self._weight[used, None] * self.M[used]
+        rank, N = 0, self.basis.size
+        if len(A) >= N:
+            length = np.linalg.norm(A, axis=0)
+            length[length == 0] = 1
+            Q, R = cast("tuple[Array, Array]", linalg.qr(A / length, mode="economic"))
+            U, s, Vt = linalg.svd(R)
+            rank = int(np.sum(s > s[0] * max(A.shape) * np.finfo(float).eps))
+            if rank == N:
+                self._U = Q @ U
+                self._root = (Vt.T / s) / length[:, None]
+                self.condition = float(s[0] / s[-1])
+                """Condition number of M with its columns scaled to unit length."""
+                return
+        else:
+            rank = int(np.linalg.matrix_rank(A)) if len(A) else 0
+        raise RankDeficient(self._refusal(len(A), rank))
+
+    def _refusal(self, readings: int, rank: int) -> str:
+        (Ni, Nj), N, layout = self.basis.shape, self.basis.size, self.layout
+        what = f"{layout} with {readings} readings determine {rank} of the {N} coefficients of a "
+        what += f"{Ni} x {Nj} basis"
+        if readings == 0:
+            return f"{what}: no readings are left; check the connection and the dead elements"
+        missing = 3 * len(layout) - readings
+        if layout.shape and not missing:
+            m, n = layout.shape
+            # Along each direction, mode m + q looks like m - q at the cell centres.
+            return (
+                f"{what}: functions beyond the elements look like lower ones; "
+                f"use at most {min(Ni, m)} x {min(Nj, n)} functions, or more elements"
+            )
+        why = (
+            f"{missing} of {3 * len(layout)} readings are missing"
+            if missing
+            else ("the elements do not tell these functions apart")
+        )
+        return f"{what}: {why}; use a smaller basis (at most {rank} functions), or more elements"
+
+    def _spread(self, root: Array) -> tuple[Array, Array]:
+        covariance = root @ root.T
+        return covariance, np.sqrt(np.diag(covariance)).reshape(self.basis.shape)
+
+    def unit_covariance(self, missing: Mask | None = None) -> Array:
+        """Covariance (N, N) for unit noise, without the readings `missing` (3, P)."""
+        if missing is None:
+            return self._solver.covariance
+        return self._without(missing.ravel()).covariance
+
+    @property
+    def information(self) -> Array:
+        """M^T W M (N, N) of the readings in use: the inverse of the unit covariance."""
+        A = self._weight[self._solver.used, None] * self.M[self._solver.used]
+        return A.T @ A
+
+    def _without(self, missing: Mask) -> _Solver:
+        """The solver without the readings `missing` (3 P,), remembered for the next frames."""
+        if not missing[self._solver.used].any():
+            return self._solver
+        key = missing.tobytes()
+        if key not in self._reduced:
+            self._reduced[key] = self._downdate(missing)
+            if len(self._reduced) > _REMEMBERED:
+                self._reduced.popitem(last=False)
+        return self._reduced[key]
+
+    def _downdate(self, missing: Mask) -> _Solver:
+        # With the rows U_k of U taken out, U_r^T U_r = I - U_k^T U_k, whose inverse is
+        # I + U_k^T G^-1 U_k with the small G = I - U_k U_k^T. An eigenvalue of G is the share of
+        # a direction that the readings left still see.
+        was, root = self._solver.used, self._root
+        gone = missing[was]
+        U_k, U_r = self._U[gone], self._U[~gone]
+        G = np.eye(len(U_k)) - U_k @ U_k.T
+        if len(U_r) < self.basis.size or np.linalg.eigvalsh(G)[0] < _REFACTOR:
+            weight = np.where(missing, 0.0, self._weight)
+            sigma = np.divide(1.0, weight, where=weight > 0, out=np.full(len(weight), np.inf))
+            fresh = LeastSquares(self.basis, self.layout, sigma.reshape(3, -1))
+            return fresh._solver
+        inverse = np.eye(self.basis.size) + U_k.T @ np.linalg.solve(G, U_k)
+        covariance = root @ inverse @ root.T
+        sd = np.sqrt(np.diag(covariance)).reshape(self.basis.shape)
+        return _Solver(was & ~missing, root @ inverse @ U_r.T, covariance, sd)
+
+    def __call__(self, curvature: ArrayLike) -> Fit:
+        """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading."""
+        K = np.asarray(curvature, float)
+        if K.ndim not in (2, 3) or K.shape[-2:] != (3, len(self.layout)):
+            raise Refusal(
+                f"expected curvature of shape (3, {len(self.layout)}) or (T, 3, "
+                f"{len(self.layout)}), got {K.shape}"
+            )
+        flat = K.reshape(*K.shape[:-2], -1)
+        missing = ~np.isfinite(flat)
+        if not missing.any():
+            return self._solve(self._solver, flat)
+        if K.ndim == 2:
+            return self._solve(self._without(missing), flat)
+        patterns, which = np.unique(missing, axis=0, return_inverse=True)
+        fits = [self._solve(self._without(p), flat[which == t]) for t, p in enumerate(patterns)]
+        return self._gather(fits, np.argsort(np.argsort(which.ravel(), kind="stable")))
+
+    def _gather(self, fits: list[Fit], order: NDArray[np.intp]) -> Fit:
+        """One fit of T frames from the fits of their groups."""
+
+        def joined(name: str) -> Array:
+            return np.concatenate([getattr(fit, name) for fit in fits])[order]
+
+        return Fit(self, *(joined(name) for name in ("coefficients", "sd", "residual", "noise")))
+
+    def _solve(self, solver: _Solver, flat: Array) -> Fit:
+        """Fit readings (..., 3 P) that share one set of missing ones."""
+        used, shape = solver.used, self.basis.shape
+        complete = bool(used.all())
+        kept = flat if complete else flat[..., used]
+        weight = self._weight if complete else self._weight[used]
+        weighted = kept * weight if self._sigma_known else kept
+        c = weighted @ solver.operator.T
+        residual = flat - c @ self.M.T
+        if not complete:
+            residual[..., ~used] = np.nan
+        spare = kept.shape[-1] - self.basis.size
+        if self._sigma_known:
+            noise = np.ones(flat.shape[:-1])
+        elif spare:
+            left = residual if complete else residual[..., used]
+            noise = np.sqrt(np.einsum("...r,...r->...", left, left) / spare)
+        else:
+            noise = np.full(flat.shape[:-1], np.nan)
+        return Fit(
+            self,
+            c.reshape(*c.shape[:-1], *shape),
+            np.asarray(noise)[..., None, None] * solver.sd,
+            residual.reshape(*flat.shape[:-1], 3, -1),
+            np.asarray(noise),
+        )

@@ -1,0 +1,75 @@
+"""Where the elements are and what they sense."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kappaskin.bases import SineBasis
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Mask
+from kappaskin.patch import Patch
+
+
+@dataclass(frozen=True, eq=False)
+class SensorLayout:
+    """P elements at `positions` (P, 2) in m; each senses curvature xx, yy and xy.
+
+    `live` (3, P) is False for the channels that are dead. `shape` is (m, n) for a regular grid,
+    with element `p + m q` in column p (along x) and row q (along y), and None otherwise.
+    """
+
+    patch: Patch
+    positions: Array
+    live: Mask
+    shape: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        P = self.positions
+        if P.ndim != 2 or P.shape[1] != 2 or len(P) == 0:
+            raise Refusal(f"expected positions of shape (P, 2) with P >= 1, got {P.shape}")
+        if self.live.shape != (3, len(P)):
+            raise Refusal(f"expected live of shape (3, {len(P)}), got {self.live.shape}")
+        outside = np.flatnonzero(~self.patch.contains(P))  # NaN counts as outside
+        if outside.size:
+            p, (x, y) = int(outside[0]), P[outside[0]]
+            raise Refusal(
+                f"{outside.size} of {len(P)} elements lie outside the patch of {self.patch.a:g} x "
+                f"{self.patch.b:g} m: element {p} is at ({x:g}, {y:g}) m; positions are in metres "
+                "from the corner x = y = 0"
+            )
+
+    @classmethod
+    def regular(cls, patch: Patch, m: int, n: int) -> "SensorLayout":
+        """Elements at the centres of an m x n tiling."""
+        x, y = patch.cell_centres(m, n)
+        positions = np.column_stack([np.tile(x, n), np.repeat(y, m)])
+        return cls(patch, positions, np.ones((3, m * n), bool), (m, n))
+
+    @classmethod
+    def scattered(cls, patch: Patch, positions: ArrayLike) -> "SensorLayout":
+        """Elements at `positions` (P, 2) in m, anywhere on the patch."""
+        points = np.array(positions, float)
+        return cls(patch, points, np.ones((3, len(points)), bool))
+
+    def without(self, elements: Iterable[int]) -> "SensorLayout":
+        """The same layout with all three channels of `elements` dead."""
+        live = self.live.copy()
+        dead = list(elements)
+        if any(not 0 <= p < len(self) for p in dead):
+            raise Refusal(f"expected dead elements between 0 and {len(self) - 1}, got {dead}")
+        live[:, dead] = False
+        return SensorLayout(self.patch, self.positions, live, self.shape)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __str__(self) -> str:
+        return "{} x {} elements".format(*self.shape) if self.shape else f"{len(self)} elements"
+
+    def curvature_operator(self, basis: SineBasis) -> Array:
+        """M (3 P, Ni Nj): `M @ coefficients.ravel()` is curvature (3, P) flattened (Eqs. 2-5)."""
+        if basis.patch != self.patch:
+            raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
+        return np.vstack([basis.at(self.positions, *order) for order in ((2, 0), (0, 2), (1, 1))])

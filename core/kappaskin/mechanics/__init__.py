@@ -1,0 +1,6 @@
+"""What shape a load makes."""
+
+from kappaskin.mechanics.loads import LineLoad as LineLoad
+from kappaskin.mechanics.loads import Load as Load
+from kappaskin.mechanics.loads import PointLoad as PointLoad
+from kappaskin.mechanics.plate import Plate as Plate

@@ -1,0 +1,110 @@
+"""Loads on a patch, as what each basis function feels of them."""
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Protocol
+
+import numpy as np
+
+from kappaskin.bases import SineBasis
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.patch import Patch
+
+
+class Load(Protocol):
+    """A force in N somewhere on a patch; positive pushes along the normal."""
+
+    @property
+    def force(self) -> float: ...
+
+    def centre(self) -> Array:
+        """Its point of application (2,) in m."""
+        ...
+
+    def check(self, patch: Patch) -> None:
+        """Refuse a load that does not lie on `patch`."""
+        ...
+
+    def shifted(self, dx: float, dy: float) -> "Load":
+        """The same load moved by `dx`, `dy` in m."""
+        ...
+
+    def scaled(self, factor: float) -> "Load":
+        """The same load with `factor` times the force."""
+        ...
+
+    def modal(self, basis: SineBasis) -> Array:
+        """The force times each function's mean under the load, (Ni, Nj) in N."""
+        ...
+
+
+def _check(load: Load, patch: Patch, *points: tuple[float, float]) -> None:
+    if not math.isfinite(load.force):
+        raise Refusal(f"expected a finite force in N, got {load.force}")
+    if not patch.contains(np.array(points)).all():
+        raise Refusal(
+            f"expected a load on the patch of {patch.a:g} x {patch.b:g} m, got {load}; "
+            "positions are in metres from the corner x = y = 0"
+        )
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """A force in N at (x, y) in m."""
+
+    x: float
+    y: float
+    force: float = 1.0
+
+    def centre(self) -> Array:
+        return np.array([self.x, self.y])
+
+    def check(self, patch: Patch) -> None:
+        _check(self, patch, (self.x, self.y))
+
+    def shifted(self, dx: float, dy: float) -> "PointLoad":
+        return replace(self, x=self.x + dx, y=self.y + dy)
+
+    def scaled(self, factor: float) -> "PointLoad":
+        return replace(self, force=self.force * factor)
+
+    def modal(self, basis: SineBasis) -> Array:
+        ki, kj = basis.wavenumbers
+        return self.force * np.multiply.outer(np.sin(ki * self.x), np.sin(kj * self.y))
+
+
+@dataclass(frozen=True)
+class LineLoad:
+    """A force in N spread evenly along the line from (x0, y0) to (x1, y1) in m."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    force: float = 1.0
+
+    def centre(self) -> Array:
+        return np.array([self.x0 + self.x1, self.y0 + self.y1]) / 2
+
+    def check(self, patch: Patch) -> None:
+        _check(self, patch, (self.x0, self.y0), (self.x1, self.y1))
+
+    def shifted(self, dx: float, dy: float) -> "LineLoad":
+        x0, y0, x1, y1, force = (getattr(self, f.name) for f in fields(self))
+        return LineLoad(x0 + dx, y0 + dy, x1 + dx, y1 + dy, force)
+
+    def scaled(self, factor: float) -> "LineLoad":
+        return replace(self, force=self.force * factor)
+
+    def modal(self, basis: SineBasis) -> Array:
+        # The mean over s in [0, 1] of sin(A + B s) sin(C + F s): the product is half a difference
+        # of cosines, and the mean of a cosine is its value at the middle times a sinc.
+        ki, kj = basis.wavenumbers
+        A, B = ki[:, None] * self.x0, ki[:, None] * (self.x1 - self.x0)
+        C, F = kj[None, :] * self.y0, kj[None, :] * (self.y1 - self.y0)
+
+        def mean_cosine(phase: Array, turn: Array) -> Array:
+            return np.cos(phase + turn / 2) * np.sinc(turn / (2 * np.pi))
+
+        return self.force / 2 * (mean_cosine(A - C, B - F) - mean_cosine(A + C, B + F))

@@ -1,0 +1,111 @@
+"""A frame of counts to an estimate of shape and contact; everything it can is computed once."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kappaskin.bases import GridMap, SineBasis
+from kappaskin.errors import RankDeficient
+from kappaskin.fit import Fit, LeastSquares
+from kappaskin.frames import Array, Estimate, Frame, Touch, Truth
+from kappaskin.mechanics import Plate
+from kappaskin.sensor import Sensor
+from kappaskin.touch import NO_TOUCH, PointContact
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points."""
+
+    Ni: int = 8
+    Nj: int = 8
+    nx: int = 65
+    ny: int = 65
+
+
+class Pipeline:
+    """Counts to curvature, coefficients, surface and contact; `pipeline(frame)` is the estimate.
+
+    Raises `RankDeficient` when made for a basis that the sensor's readings do not decide. A frame
+    that lacks too many readings for it gives an estimate whose shape is NaN.
+    """
+
+    def __init__(
+        self,
+        sensor: Sensor,
+        setup: Setup,
+        generation: int = 0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
+        self.basis = SineBasis(sensor.layout.patch, setup.Ni, setup.Nj)
+        self.fit = LeastSquares(self.basis, sensor.layout)
+        self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
+        self._surface = self.basis.on_grid(self._x, self._y)
+        self._touch = PointContact(Plate(sensor.layout.patch, sensor.rigidity), self.fit)
+        self._dead = ~sensor.layout.live.ravel()
+        self._any_dead = bool(self._dead.any())
+        self._no_shape = np.full(self.basis.shape, np.nan)
+        self._unknown = np.full((setup.ny, setup.nx), np.nan)
+        self._truths: dict[tuple[int, ...], tuple[SineBasis, GridMap]] = {}
+
+    def curvature(self, frame: Frame) -> Array:
+        """Curvature (3, P) in 1/m; NaN where a channel is dead, unscanned or on a rail."""
+        flat = np.full(self.sensor.channels, np.nan)
+        flat[frame.channels] = self.sensor.transduction.curvature(frame.counts)
+        if self._any_dead:
+            flat[self._dead] = np.nan
+        return flat.reshape(3, -1)
+
+    def _fitted(self, curvature: Array) -> Fit:
+        try:
+            return self.fit(curvature)
+        except RankDeficient:
+            nothing, unknown = self._no_shape, np.full_like(curvature, np.nan)
+            return Fit(self.fit, nothing, nothing, unknown, np.array(math.nan))
+
+    def __call__(self, frame: Frame) -> Estimate:
+        curvature = self.curvature(frame)
+        fit = self._fitted(curvature)
+        surface = self._surface(fit.coefficients)
+        noise = float(fit.noise)
+        return Estimate(
+            self.generation,
+            frame.sequence,
+            frame.device_time,
+            frame.host_time,
+            self._clock(),
+            curvature,
+            fit.residual,
+            fit.coefficients,
+            surface,
+            noise,
+            self._touched(fit.coefficients, noise),
+            *self._compared(surface, fit.coefficients, frame.truth),
+        )
+
+    def _touched(self, coefficients: Array, noise: float) -> Touch:
+        return self._touch(coefficients, noise) if math.isfinite(noise) else NO_TOUCH
+
+    def _compared(
+        self, surface: Array, coefficients: Array, truth: Truth | None
+    ) -> tuple[Array, Array, float, float]:
+        """True surface, true contact, error at the load and RMS; NaN without a truth."""
+        if truth is None:
+            return self._unknown, self._unknown[0, :2], math.nan, math.nan
+        shape = truth.coefficients.shape
+        if shape not in self._truths:
+            basis = SineBasis(self.basis.patch, *shape)
+            self._truths[shape] = basis, basis.on_grid(self._x, self._y)
+        basis, true_map = self._truths[shape]
+        true_surface = true_map(truth.coefficients)
+        rms = math.sqrt(float(np.mean((surface - true_surface) ** 2)))
+        here = truth.contact[None]
+        at_load = float(
+            self.basis.at(here)[0] @ coefficients.ravel()
+            - basis.at(here)[0] @ truth.coefficients.ravel()
+        )
+        return true_surface, truth.contact, at_load, rms

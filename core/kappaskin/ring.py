@@ -1,0 +1,188 @@
+"""Estimates and status from the engine's process to another, through shared memory.
+
+One block, owned by the process that shows: a status of any kind, then as many slots of equal size
+as fit, written round and round. Neither side ever waits: each value carries a count that the
+writer makes odd, or changes, while it writes, and a reader that saw it change reads again.
+"""
+
+import pickle
+from collections.abc import Callable
+from multiprocessing.shared_memory import SharedMemory
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate, Touch
+from kappaskin.pipeline import Pipeline
+
+_SIZE = 96 * 2**20  # pages that are never written cost no memory
+_STATUS_SIZE = 2 * 2**20
+_HEADER = 64
+_MOST_SLOTS = 64
+_TRIES = 100
+
+_TOUCH = [
+    ("position", "f8", 2),
+    ("position_sd", "f8", 2),
+    ("force", "f8"),
+    ("force_sd", "f8"),
+    ("displacement", "f8"),
+    ("displacement_sd", "f8"),
+]
+
+
+def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
+    """The record of one estimate: the fields of `Estimate` between two tickets."""
+    setup, P = pipeline.setup, len(pipeline.sensor.layout)
+    surface = ("f8", (setup.ny, setup.nx))
+    return np.dtype(
+        [
+            ("opened", "u8"),
+            ("generation", "i8"),
+            ("sequence", "i8"),
+            ("device_time", "f8"),
+            ("host_time", "f8"),
+            ("ready_time", "f8"),
+            ("curvature", "f8", (3, P)),
+            ("residual", "f8", (3, P)),
+            ("coefficients", "f8", (setup.Ni, setup.Nj)),
+            ("surface", *surface),
+            ("noise", "f8"),
+            ("touch", _TOUCH),
+            ("true_surface", *surface),
+            ("true_contact", "f8", 2),
+            ("error_at_load", "f8"),
+            ("error_rms", "f8"),
+            ("closed", "u8"),
+        ]
+    )
+
+
+def _estimate(record: Any) -> Estimate:
+    """The estimate in a copied record; its arrays are views of the copy."""
+
+    def values(owner: Any, names: tuple[str, ...]) -> list[Any]:
+        return [v if (v := owner[name]).shape else v.item() for name in names]
+
+    names = tuple(name for name in record.dtype.names if name not in ("opened", "closed"))
+    before, after = names[: names.index("touch")], names[names.index("touch") + 1 :]
+    touch = record["touch"]
+    fields = [*values(record, before), Touch(*values(touch, touch.dtype.names))]
+    return Estimate(*fields, *values(record, after))
+
+
+class Ring:
+    """The block of memory: one process writes, another reads and owns it."""
+
+    def __init__(self, memory: SharedMemory) -> None:
+        self._memory = memory
+        buffer = cast("memoryview", memory.buf)
+        self._header: NDArray[np.uint64] = np.frombuffer(buffer, np.uint64, _HEADER // 8)
+        self._status: NDArray[np.uint8] = np.frombuffer(
+            buffer, np.uint8, _STATUS_SIZE, offset=_HEADER
+        )
+        self._area: NDArray[np.uint8] = np.frombuffer(
+            buffer, np.uint8, offset=_HEADER + _STATUS_SIZE
+        )
+        self._slots: Any = None
+        self._generation = 0
+
+    # The header: status count, status length, generation of the slots, slots written.
+    _COUNT, _LENGTH, _GENERATION, _WRITTEN = range(4)
+
+    @classmethod
+    def create(cls) -> "Ring":
+        return cls(SharedMemory(create=True, size=_SIZE))
+
+    @classmethod
+    def attach(cls, name: str) -> "Ring":
+        return cls(SharedMemory(name))
+
+    @property
+    def name(self) -> str:
+        return self._memory.name
+
+    def write_status(self, status: object) -> None:
+        data = pickle.dumps(status)
+        if len(data) > _STATUS_SIZE:
+            raise Refusal(f"expected a status of at most {_STATUS_SIZE} bytes, got {len(data)}")
+        self._header[self._COUNT] += 1
+        self._status[: len(data)] = np.frombuffer(data, np.uint8)
+        self._header[self._LENGTH] = len(data)
+        self._header[self._COUNT] += 1
+
+    def read_status(self) -> Any:
+        """The status last written whole, None before the first or while one is written."""
+
+        def copied() -> bytes | None:
+            count = int(self._header[self._COUNT])
+            data = bytes(self._status[: int(self._header[self._LENGTH])])
+            unchanged = count == int(self._header[self._COUNT])
+            return data if count and not count % 2 and unchanged else None
+
+        data = _tried(copied)
+        # Written by our own engine into memory that only this user may open.
+        return pickle.loads(data) if data else None
+
+    def _map(self, slot: np.dtype[np.void]) -> None:
+        count = min(_MOST_SLOTS, len(self._area) // slot.itemsize)
+        if count < 2:
+            raise Refusal(f"an estimate of {slot.itemsize} bytes is too large; use a smaller basis")
+        self._slots = self._area[: count * slot.itemsize].view(slot)
+
+    def lay_out(self, generation: int, slot: np.dtype[np.void]) -> None:
+        """Writer: begin anew with slots for estimates of `generation` (above zero)."""
+        self._header[self._GENERATION] = 0
+        self._map(slot)
+        self._slots["opened"] = self._slots["closed"] = 0
+        self._header[self._WRITTEN] = 0
+        self._header[self._GENERATION] = generation
+
+    def write(self, estimate: Estimate) -> None:
+        """Writer: put one estimate into the next slot."""
+        written = int(self._header[self._WRITTEN])
+        slot = self._slots[written % len(self._slots)]
+        slot["opened"] = written + 1
+        for name in slot.dtype.names[1:-1]:
+            if name != "touch":
+                slot[name] = getattr(estimate, name)
+        for name, *_ in _TOUCH:
+            slot["touch"][name] = getattr(estimate.touch, name)
+        slot["closed"] = written + 1
+        self._header[self._WRITTEN] = written + 1
+
+    def read(self, generation: int, slot: np.dtype[np.void]) -> Estimate | None:
+        """Reader: the latest estimate of `generation`, None when there is none yet."""
+        if generation != self._generation:
+            self._map(slot)
+            self._generation = generation
+
+        def copied() -> Any:
+            written = int(self._header[self._WRITTEN])
+            if not written:
+                return None
+            record = self._slots[(written - 1) % len(self._slots)].copy()
+            whole = record["opened"] == record["closed"] == written
+            return record if whole and self._header[self._GENERATION] == generation else None
+
+        if self._header[self._GENERATION] != generation:
+            return None
+        record = _tried(copied)
+        return _estimate(record) if record is not None else None
+
+    def close(self) -> None:
+        """Let go of the memory."""
+        del self._header, self._status, self._area, self._slots
+        self._memory.close()
+
+    def destroy(self) -> None:
+        """Owner: let go of the memory and give it back."""
+        self.close()
+        self._memory.unlink()
+
+
+def _tried(copied: Callable[[], Any]) -> Any:
+    """The first value that was copied whole, None when a writer was always in the way."""
+    return next((value for _ in range(_TRIES) if (value := copied()) is not None), None)

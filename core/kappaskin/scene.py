@@ -1,0 +1,131 @@
+"""What is in a scene: a skin, what touches it, and what spoils its readings."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kappaskin.bases import SineBasis
+from kappaskin.effects import Effect, UniformNoise
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.layout import SensorLayout
+from kappaskin.mechanics import LineLoad, Load, Plate, PointLoad
+from kappaskin.patch import Patch
+from kappaskin.sensor import Sensor
+from kappaskin.transduction import Transduction
+
+TABLE_1_NOISE = 0.40 / math.sqrt(3)
+"""RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A motion in a circle: loads go round by `radius` m once every `period` s."""
+
+    radius: float
+    period: float
+
+    def __post_init__(self) -> None:
+        if not (self.radius >= 0 and self.period > 0):
+            raise Refusal(f"expected a radius >= 0 m and a period > 0 s, got {self}")
+
+    def offset(self, time: float) -> tuple[float, float]:
+        angle = 2 * math.pi * time / self.period
+        return self.radius * math.cos(angle), self.radius * math.sin(angle)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A simulated skin and what happens to it; `loads` and `effects` may be empty.
+
+    `reference` is the number of functions (Ri, Rj) of the true shape: Table 1 defines its truth
+    with 15 x 15, since the curvature under a point load grows with every further function.
+    """
+
+    name: str
+    plate: Plate
+    layout: SensorLayout
+    loads: tuple[Load, ...] = ()
+    motion: Orbit | None = None
+    effects: tuple[Effect, ...] = ()
+    transduction: Transduction = field(default_factory=Transduction)
+    rate: float = 500.0
+    seed: int = 0
+    reference: tuple[int, int] = (15, 15)
+
+    def __post_init__(self) -> None:
+        turns = [0.0] if self.motion is None else [self.motion.period * q / 4 for q in range(4)]
+        for load in (load for time in turns for load in self.loads_at(time)):
+            load.check(self.plate.patch)
+
+    @property
+    def basis(self) -> SineBasis:
+        return SineBasis(self.plate.patch, *self.reference)
+
+    def sensor(self) -> Sensor:
+        """What the simulated device says it is."""
+        return Sensor(
+            self.layout,
+            self.transduction,
+            self.plate.rigidity,
+            self.rate,
+            name=f"Simulated skin: {self.name}",
+            serial_number="SIM-0001",
+            firmware="kappaskin simulator",
+            simulated=True,
+        )
+
+    def loads_at(self, time: float) -> tuple[Load, ...]:
+        """The loads where they are at `time` in s."""
+        if self.motion is None:
+            return self.loads
+        dx, dy = self.motion.offset(time)
+        return tuple(load.shifted(dx, dy) for load in self.loads)
+
+
+def scaled_to(plate: Plate, load: Load, displacement: float, basis: SineBasis) -> Load:
+    """The load whose point of application moves by `displacement` in m."""
+    at = basis.at(load.centre()[None])[0] @ plate.deflection([load], basis).ravel()
+    return load.scaled(displacement / float(at))
+
+
+def contact_of(loads: tuple[Load, ...]) -> Array:
+    """The centre of force (2,) in m of `loads`; NaN when there is none."""
+    total = sum(abs(load.force) for load in loads)
+    if not total:
+        return np.full(2, np.nan)
+    return np.sum([abs(load.force) * load.centre() for load in loads], axis=0) / total
+
+
+def _table_1(name: str, load: Load, displacement: float) -> Scene:
+    patch = Patch(0.1, 0.1)
+    plate = Plate(patch)
+    load = scaled_to(plate, load, displacement, SineBasis(patch, 15, 15))
+    layout = SensorLayout.regular(patch, 10, 10)
+    return Scene(name, plate, layout, (load,), effects=(UniformNoise(TABLE_1_NOISE),))
+
+
+def _circle() -> Scene:
+    still = _table_1("circle", PointLoad(0.05, 0.05), 4.70e-3)
+    return replace(still, motion=Orbit(radius=0.022, period=4.0))
+
+
+SCENES: dict[str, Callable[[], Scene]] = {
+    "circle": _circle,
+    "centre": lambda: _table_1("centre", PointLoad(0.05, 0.05), 4.70e-3),
+    "off-centre": lambda: _table_1("off-centre", PointLoad(0.02, 0.08), 4.89e-3),
+    "line": lambda: _table_1("line", LineLoad(0.01, 0.09, 0.09, 0.01), 4.68e-3),
+}
+"""Ready scenes by name: the paper's three load cases (Table 1) and a load moving in a circle."""
+
+DEFAULT_SCENE = "circle"
+
+
+def load_scene(name: str = "") -> Scene:
+    """The ready scene `name`, the default one when empty."""
+    name = name or DEFAULT_SCENE
+    if name not in SCENES:
+        raise Refusal(f"expected a scene among {', '.join(SCENES)}; got {name!r}")
+    return SCENES[name]()

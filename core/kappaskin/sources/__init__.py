@@ -1,0 +1,43 @@
+"""Where frames come from: a simulation in this process, or bytes on a line."""
+
+from typing import Protocol
+
+from kappaskin.errors import SourceError
+from kappaskin.frames import Frame
+from kappaskin.scene import load_scene
+from kappaskin.sensor import Sensor
+from kappaskin.sources.serial_line import SerialSource as SerialSource
+from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
+from kappaskin.sources.wire import Accounting
+
+SIMULATION = "sim:"
+
+
+class Source(Protocol):
+    """Yields frames; nothing after it can tell a simulated from a real one."""
+
+    @property
+    def sensor(self) -> Sensor | None:
+        """What the device says it is; None until it has said so."""
+        ...
+
+    def read(self, timeout: float) -> list[Frame]:
+        """The frames that came, after at most `timeout` s; raises `SourceError` when it ended."""
+        ...
+
+    def accounting(self) -> Accounting:
+        """What became of every byte and every sequence number."""
+        ...
+
+    def close(self) -> None: ...
+
+
+def open_source(name: str) -> Source:
+    """The source called `name`: `sim:`, `sim:SCENE`, or a port or URL that pyserial opens."""
+    if name.startswith(SIMULATION):
+        return SimulatedSource(load_scene(name.removeprefix(SIMULATION)))
+    if name.startswith("replay:"):
+        raise SourceError(f"recordings cannot be replayed yet, got {name!r}; use sim: or a port")
+    if not name.strip():
+        raise SourceError("expected a source: sim:, sim:SCENE, a port or a URL; got an empty name")
+    return SerialSource(name)

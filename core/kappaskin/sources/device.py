@@ -1,0 +1,91 @@
+"""The simulator behind the wire format on a pseudo-terminal: the other end of the line."""
+
+import os
+import select
+import time
+import tty
+from collections.abc import Callable
+
+from kappaskin.errors import SourceError
+from kappaskin.scene import Scene
+from kappaskin.simulate import Simulator
+from kappaskin.sources import information
+from kappaskin.sources.wire import encode_information, encode_samples
+
+_OUTBOX = 65536  # bytes a device holds before a frame goes unsent
+_INTRODUCTION = 0.5  # s between two information messages
+
+
+class PseudoDevice:
+    """A scene that speaks the wire format on `port`; spends a sequence number on every message.
+
+    It is quiet until someone opens the port, and again after they close it. `unsent` counts the
+    messages that found the outbox full, `spent` all of them.
+    """
+
+    def __init__(self, scene: Scene, clock: Callable[[], float] = time.monotonic) -> None:
+        self._master, slave = os.openpty()
+        tty.setraw(slave)
+        self.port = os.ttyname(slave)
+        # With no other holder of the slave end, a hang-up on the master says nobody listens.
+        os.close(slave)
+        os.set_blocking(self._master, False)
+        self._simulator, self._clock = Simulator(scene), clock
+        self._information = information.to_json(scene.sensor())
+        self._width = 2 if scene.transduction.converter.bits <= 16 else 4
+        self._outbox = bytearray()
+        self.spent = self.unsent = self.samples = 0
+
+    def serve(self, stopped: Callable[[], bool]) -> None:
+        """Send until `stopped()`; each listener gets a fresh clock and an introduction."""
+        while not stopped():
+            if self._hung_up():
+                time.sleep(0.02)
+                continue
+            self._stream(stopped)
+            self._outbox.clear()
+
+    def _hung_up(self) -> bool:
+        poll = select.poll()
+        poll.register(self._master, select.POLLOUT)
+        return any(event & select.POLLHUP for _, event in poll.poll(0))
+
+    def _stream(self, stopped: Callable[[], bool]) -> None:
+        rate = self._simulator.scene.rate
+        start, introduced = self._clock() - self.samples / rate, -_INTRODUCTION
+        while not (stopped() or self._hung_up()):
+            now = self._clock() - start
+            if now - introduced >= _INTRODUCTION:
+                introduced = now
+                self._send(encode_information(self.spent, now, self._information))
+            while self.samples / rate <= now:
+                self._send_samples()
+            self._flush()
+            wait = self.samples / rate - (self._clock() - start)
+            select.select([], [self._master] if self._outbox else [], [], max(0.0, min(wait, 0.05)))
+
+    def _send_samples(self) -> None:
+        frame = self._simulator.frame(self.samples, self._clock)
+        self.samples += 1
+        self._send(
+            encode_samples(self.spent, frame.device_time, frame.channels, frame.counts, self._width)
+        )
+
+    def _send(self, message: bytes) -> None:
+        self.spent += 1
+        if len(self._outbox) + len(message) > _OUTBOX:
+            self.unsent += 1
+        else:
+            self._outbox += message
+
+    def _flush(self) -> None:
+        try:
+            while self._outbox:
+                del self._outbox[: os.write(self._master, self._outbox[:4096])]
+        except BlockingIOError:
+            return
+        except OSError as error:
+            raise SourceError(f"{self.port}: the pseudo-terminal failed: {error}") from error
+
+    def close(self) -> None:
+        os.close(self._master)
