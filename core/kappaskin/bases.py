@@ -60,7 +60,7 @@ class SineBasis:
     @cached_property
     def wavenumbers(self) -> tuple[Array, Array]:
         """Wave numbers i pi/a (Ni,) and j pi/b (Nj,) in rad/m."""
-        i, j = np.arange(1, self.Ni + 1), np.arange(1, self.Nj + 1)
+        i, j = np.arange(1.0, self.Ni + 1), np.arange(1.0, self.Nj + 1)
         return i * np.pi / self.patch.a, j * np.pi / self.patch.b
 
     @cached_property

@@ -307,6 +307,12 @@ class Engine:
             return None
         return self._ring.read(status.generation, status.slot)
 
+    def __enter__(self) -> "Engine":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def _end(self) -> None:
         if self._requests is not None:
             self._requests.close()

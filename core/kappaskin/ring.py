@@ -69,8 +69,8 @@ def _estimate(record: Any) -> Estimate:
     names = tuple(name for name in record.dtype.names if name not in ("opened", "closed"))
     before, after = names[: names.index("touch")], names[names.index("touch") + 1 :]
     touch = record["touch"]
-    fields = [*values(record, before), Touch(*values(touch, touch.dtype.names))]
-    return Estimate(*fields, *values(record, after))
+    parts: list[Any] = [*values(record, before), Touch(*values(touch, touch.dtype.names))]
+    return Estimate(*parts, *values(record, after))
 
 
 class Ring:

@@ -2,7 +2,7 @@
 
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,8 @@ class Fit:
     as the residual tells it, NaN when every reading was spent on a coefficient, 1 when the fit was
     made with `sigma`.
     """
+
+    arrays: ClassVar = ("coefficients", "sd", "residual", "noise")
 
     estimator: "LeastSquares"
     coefficients: Array
@@ -191,8 +193,16 @@ class LeastSquares:
         if K.ndim == 2:
             return self._solve(self._without(missing), flat)
         patterns, which = np.unique(missing, axis=0, return_inverse=True)
-        fits = [self._solve(self._without(p), flat[which == t]) for t, p in enumerate(patterns)]
-        return self._gather(fits, np.argsort(np.argsort(which.ravel(), kind="stable")))
+        which = which.ravel()
+        fits: list[Fit] = []
+        for number, pattern in enumerate(patterns):
+            try:
+                solver = self._without(pattern)
+            except RankDeficient as error:
+                first = int(np.argmax(which == number))
+                raise RankDeficient(f"frame {first}: {error}") from error
+            fits.append(self._solve(solver, flat[which == number]))
+        return self._gather(fits, np.argsort(np.argsort(which, kind="stable")))
 
     def _gather(self, fits: list[Fit], order: NDArray[np.intp]) -> Fit:
         """One fit of T frames from the fits of their groups."""
@@ -200,7 +210,7 @@ class LeastSquares:
         def joined(name: str) -> Array:
             return np.concatenate([getattr(fit, name) for fit in fits])[order]
 
-        return Fit(self, *(joined(name) for name in ("coefficients", "sd", "residual", "noise")))
+        return Fit(self, *(joined(name) for name in Fit.arrays))
 
     def _solve(self, solver: _Solver, flat: Array) -> Fit:
         """Fit readings (..., 3 P) that share one set of missing ones."""

@@ -34,6 +34,7 @@ class PseudoDevice:
         self._information = information.to_json(scene.sensor())
         self._width = 2 if scene.transduction.converter.bits <= 16 else 4
         self._outbox = bytearray()
+        self.rate = scene.rate
         self.spent = self.unsent = self.samples = 0
 
     def serve(self, stopped: Callable[[], bool]) -> None:
@@ -51,7 +52,7 @@ class PseudoDevice:
         return any(event & select.POLLHUP for _, event in poll.poll(0))
 
     def _stream(self, stopped: Callable[[], bool]) -> None:
-        rate = self._simulator.scene.rate
+        rate = self.rate
         start, introduced = self._clock() - self.samples / rate, -_INTRODUCTION
         while not (stopped() or self._hung_up()):
             now = self._clock() - start

@@ -116,7 +116,9 @@ def _samples(sequence: int, time: float, payload: memoryview) -> Samples | None:
     table = np.frombuffer(payload[2:start], "<u2").reshape(runs, 2).astype(np.intp)
     if len(payload) - start != width * int(table[:, 1].sum()):
         return None
-    channels = np.concatenate([np.arange(0), *(np.arange(s, s + n) for s, n in table)])
+    starts, lengths = table[:, 0], table[:, 1]
+    within = np.arange(int(lengths.sum())) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    channels = np.repeat(starts, lengths) + within
     counts = np.frombuffer(payload[start:], f"<i{width}").astype(np.int32)
     return Samples(sequence, time, channels, counts)
 

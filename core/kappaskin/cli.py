@@ -1,0 +1,179 @@
+"""The command `kappaskin`: each subcommand in a few lines."""
+
+import json
+import signal
+import sys
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import App, CycloptsError, Parameter
+
+from kappaskin.doctor import examine
+from kappaskin.errors import Refusal
+from kappaskin.reconstruct import reconstruct as reconstructed
+from kappaskin.scene import load_scene
+from kappaskin.studies.tables import table_1
+
+REFUSED = 2
+"""Exit code of a command that cannot be done, with the reason on standard error."""
+
+app = App(
+    name="kappaskin",
+    help="Shape and contact from curvature-sensing tactile skins.",
+    version=metadata.version("kappaskin"),
+    help_format="markdown",
+)
+
+
+def _pair(text: str, what: str) -> tuple[int, int]:
+    try:
+        first, second = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise Refusal(f"expected {what} as two numbers such as 8x8, got {text!r}") from None
+    return first, second
+
+
+@app.command
+def tables(*, json: Annotated[bool, Parameter(negative="")] = False) -> None:
+    """Compute the paper's Table 1 and print it beside the printed numbers.
+
+    Example: `kappaskin tables --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    """
+    rows = table_1()
+    if json:
+        _print_json(rows)
+        return
+    print("Table 1: 10 x 10 elements, 8 x 8 functions, truth of 15 x 15; mm; paper in brackets")
+    print(f"{'case':<12}{'noise':<7}{'applied':>8}{'w max':>17}{'error at load':>25}{'RMS':>18}")
+    for row in rows:
+        paper, sd = row["paper"], row.get("e_max_sd_mm")
+        spread = f" +-{sd:.3f}" if sd is not None else ""
+        print(
+            f"{row['case']:<12}{'yes' if row['noise'] else 'no':<7}{row['w_applied_mm']:>8.2f}"
+            f"{row['w_max_mm']:>8.3f} ({paper['w_max_mm']:.2f}) "
+            f"{row['e_max_mm']:>+10.3f}{spread:<8} ({paper['e_max_mm']:+.2f}) "
+            f"{row['rms_mm']:>8.4f} ({paper['rms_mm']:.3f})"
+        )
+    print("With noise: means over 200 draws, error +- one standard deviation.")
+
+
+@app.command
+def reconstruct(readings: Path, *, out: Path, basis: str = "8x8", grid: str | None = None) -> None:
+    """Turn a file of curvature readings into a file of shapes.
+
+    READINGS is an NPZ with `size` (2,) m, `positions` (P, 2) m, `curvature` (T, 3, P) or (3, P) in
+    1/m with NaN for a missing reading, and optionally `sigma` in 1/m.
+
+    Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`
+
+    Parameters
+    ----------
+    readings
+        The NPZ to read.
+    out
+        The NPZ to write: coefficients, sd, residual and, with a grid, the surface w.
+    basis
+        Number of functions along x and y.
+    grid
+        Number of points of the surface along x and y; none when left out.
+    """
+    found = reconstructed(
+        readings, _pair(basis, "a basis"), _pair(grid, "a grid") if grid else None
+    )
+    try:
+        with out.open("wb") as file:
+            np.savez(file, **found)  # pyright: ignore[reportArgumentType]
+    except OSError as error:
+        raise Refusal(f"{out}: cannot be written ({error}); choose another place") from error
+    print(f"{out}: {len(found['coefficients'])} shapes", file=sys.stderr)
+
+
+@app.command
+def device(scene: str = "", *, rate: float | None = None) -> None:
+    """Play a simulated sensor on a pseudo-terminal, as a real one would on a serial port.
+
+    Prints one JSON line with the port, then serves until stopped (Ctrl+C); then tells on standard
+    error how many messages it spent a sequence number on and how many it could not send.
+
+    Example: `kappaskin device circle --rate 500`
+
+    Parameters
+    ----------
+    scene
+        What to simulate; the default scene when left out.
+    rate
+        Frames per second; the scene's when left out.
+    """
+    try:
+        from kappaskin.sources.device import PseudoDevice
+    except ImportError as error:
+        raise Refusal("expected a system with pseudo-terminals (Linux, macOS)") from error
+    played = load_scene(scene)
+    server = PseudoDevice(played if rate is None else replace(played, rate=rate))
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda got, _: stopped.append(got))
+    print(json.dumps({"port": server.port, "rate": server.rate}), flush=True)
+    server.serve(lambda: bool(stopped))
+    server.close()
+    print(json.dumps({"spent": server.spent, "unsent": server.unsent}), file=sys.stderr)
+
+
+@app.command
+def doctor(*, json: Annotated[bool, Parameter(negative="")] = False) -> None:
+    """Tell what this machine has, what is missing, and the line that installs it.
+
+    Example: `kappaskin doctor`
+
+    Parameters
+    ----------
+    json
+        Print one JSON object instead of text.
+    """
+    found = examine()
+    if json:
+        _print_json(found)
+        return
+    for name in ("kappaskin", "python", "system"):
+        print(f"{name:<20}{found[name]}")
+    for package, version in found["packages"].items():
+        print(f"{package:<20}{version or 'not installed'}")
+    print(f"{'display':<20}{found['display'] or 'none (a virtual one will be used)'}")
+    for port in found["serial_ports"]:
+        may = "" if port["opened"] else "  no permission: sudo usermod -aG dialout $USER"
+        print(f"{port['port']:<20}{port['description']}{may}")
+    if not found["serial_ports"]:
+        print(f"{'serial ports':<20}none found")
+    print(f"{'missing':<20}{' '.join(found['missing']) or 'nothing'}")
+    if found["install"]:
+        print(f"Install what is missing with: sudo {found['install']}")
+
+
+def _print_json(value: Any) -> None:
+    print(json.dumps(value, allow_nan=False))
+
+
+def _add_commands() -> None:
+    for entry in metadata.entry_points(group="kappaskin.commands"):
+        app.command(entry.load(), name=entry.name)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command; the exit code is 0 when done and 2 when refused."""
+    _add_commands()
+    try:
+        app(arguments, exit_on_error=False, print_error=False)
+    except (Refusal, CycloptsError) as refusal:
+        print(f"kappaskin: {refusal}", file=sys.stderr)
+        return REFUSED
+    except BrokenPipeError:
+        sys.stderr.close()  # whoever read our output has gone
+    return 0

@@ -1,0 +1,89 @@
+"""A file of curvature readings to a file of shapes."""
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.bases import SineBasis
+from kappaskin.errors import RankDeficient, Refusal
+from kappaskin.fit import Fit, LeastSquares
+from kappaskin.frames import Array
+from kappaskin.layout import SensorLayout
+from kappaskin.patch import Patch
+
+_NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
+
+
+def _read(path: Path) -> dict[str, Array]:
+    """The arrays of a readings file as numbers; nothing in it is ever executed."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise Refusal(f"{path}: expected an NPZ archive, got a single array")
+            names = [n for n in ("size", "positions", "curvature", "sigma") if n in archive]
+            found: dict[str, NDArray[Any]] = {name: archive[name] for name in names}
+    except FileNotFoundError as error:
+        raise Refusal(f"{path}: there is no such file; expected an NPZ with {_NEEDED}") from error
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
+        if isinstance(error, Refusal):
+            raise
+        raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
+    for name in ("size", "positions", "curvature"):
+        if name not in found:
+            raise Refusal(f"{path}: has no {name!r} (it has {sorted(found)}); expected {_NEEDED}")
+    for name, values in found.items():
+        if values.dtype.kind not in "fiu":
+            raise Refusal(f"{path}: expected {name} to be real numbers, got {values.dtype}")
+    return {name: values.astype(float) for name, values in found.items()}
+
+
+def _fit(basis: SineBasis, layout: SensorLayout, curvature: Array, sigma: Array | None) -> Fit:
+    """All T frames, each with its own sigma when there is one for each."""
+    if sigma is None or sigma.ndim < 3:
+        return LeastSquares(basis, layout, sigma)(curvature)
+    fits: list[Fit] = []
+    for frame, own in enumerate(sigma):
+        try:
+            fits.append(LeastSquares(basis, layout, own)(curvature[frame]))
+        except RankDeficient as error:
+            raise RankDeficient(f"frame {frame}: {error}") from error
+    stacked = [np.stack([getattr(fit, name) for fit in fits]) for name in Fit.arrays]
+    return Fit(fits[0].estimator, *stacked)
+
+
+def reconstruct(
+    readings: Path, basis: tuple[int, int], grid: tuple[int, int] | None = None
+) -> dict[str, Array]:
+    """What `kappaskin reconstruct` writes: `coefficients`, `sd`, `residual` and the surface.
+
+    `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m; with a `grid` of nx x ny
+    points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m.
+    """
+    found = _read(readings)
+    size, curvature, sigma = found["size"], found["curvature"], found.get("sigma")
+    if size.shape != (2,):
+        raise Refusal(f"{readings}: expected size of shape (2,) in m, got {size.shape}")
+    patch = Patch(float(size[0]), float(size[1]))
+    layout = SensorLayout.scattered(patch, found["positions"])
+    if curvature.ndim == 2:
+        curvature = curvature[None]
+    if curvature.shape[-2:] != (3, len(layout)) or curvature.ndim != 3 or not len(curvature):
+        raise Refusal(
+            f"{readings}: expected curvature of shape (T, 3, {len(layout)}) or "
+            f"(3, {len(layout)}) for {len(layout)} positions, got {found['curvature'].shape}"
+        )
+    if sigma is not None and sigma.ndim == 3 and sigma.shape != curvature.shape:
+        raise Refusal(
+            f"{readings}: expected sigma of shape {curvature.shape} as curvature has, or "
+            f"(3, {len(layout)}), or one number; got {sigma.shape}"
+        )
+    functions = SineBasis(patch, *basis)
+    fit = _fit(functions, layout, curvature, sigma)
+    out = {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
+    if grid is not None:
+        x, y = patch.grid(*grid)
+        out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(fit.coefficients)}
+    return out
