@@ -1,8 +1,11 @@
 """Kappaskin: shape and contact from curvature-sensing tactile skins, live and with error bars."""
 
 from kappaskin.bases import SineBasis as SineBasis
+from kappaskin.doctor import serial_ports as serial_ports
 from kappaskin.effects import GaussianNoise as GaussianNoise
 from kappaskin.effects import UniformNoise as UniformNoise
+from kappaskin.engine import Engine as Engine
+from kappaskin.engine import Status as Status
 from kappaskin.errors import RankDeficient as RankDeficient
 from kappaskin.errors import Refusal as Refusal
 from kappaskin.errors import SourceError as SourceError

@@ -1,0 +1,1 @@
+"""The desktop app: a live view of a curvature-sensing skin."""

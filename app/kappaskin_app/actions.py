@@ -1,0 +1,64 @@
+"""Every action a person can take, registered once: menus, shortcuts and palette come from here."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QMainWindow
+
+from kappaskin_app.guard import guarded
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An action with the menu it stands in."""
+
+    name: str
+    menu: str
+    action: QAction
+
+
+class Actions:
+    """The registry, by name; adding an action also puts it into its menu."""
+
+    def __init__(self, window: QMainWindow) -> None:
+        self._window = window
+        self.entries: dict[str, Entry] = {}
+
+    def add(
+        self,
+        name: str,
+        menu: str,
+        text: str,
+        act: Callable[[], None],
+        shortcut: str = "",
+        tip: str = "",
+    ) -> QAction:
+        """An action called `name` that calls `act`."""
+        action = QAction(text, self._window)
+        action.setToolTip(tip or text)
+        action.setStatusTip(tip or text)
+        if shortcut:
+            action.setShortcut(QKeySequence(shortcut))
+        action.triggered.connect(guarded(lambda *_: act()))
+        self.register(name, menu, action)
+        return action
+
+    def register(self, name: str, menu: str, action: QAction) -> None:
+        """Take in an action that Qt made (undo, redo, showing a dock)."""
+        if name in self.entries:
+            raise ValueError(f"expected a new name for an action, got {name!r} twice")
+        action.setObjectName(name)
+        self.entries[name] = Entry(name, menu, action)
+        self._menu(menu).addAction(action)
+        self._window.addAction(action)
+
+    def _menu(self, title: str):
+        bar = self._window.menuBar()
+        for action in bar.actions():
+            if action.text() == title and action.menu():
+                return action.menu()
+        return bar.addMenu(title)
+
+    def __getitem__(self, name: str) -> QAction:
+        return self.entries[name].action

@@ -1,0 +1,53 @@
+"""`kappaskin app`: opens the window. Nothing heavy is imported before it is asked for."""
+
+import os
+import sys
+from pathlib import Path
+
+from cyclopts import App
+
+from kappaskin import Refusal
+
+app = App(name="app", help_format="markdown")
+
+_SETTLE = 5.0  # s before a picture is taken when no time is given
+
+
+def _require_display() -> None:
+    shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform.startswith("linux") and not shown:
+        raise Refusal(
+            "expected a display (DISPLAY or WAYLAND_DISPLAY), found none; "
+            "`python3 packaging/start.py` opens the app on a virtual one"
+        )
+
+
+@app.default
+def run(
+    *, source: str = "sim:", seconds: float | None = None, screenshot: Path | None = None
+) -> None:
+    """Open the desktop app on a source of readings.
+
+    Example: `kappaskin app --source /dev/ttyACM0`
+
+    Parameters
+    ----------
+    source
+        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+    seconds
+        Close by itself after so long.
+    screenshot
+        Save a picture of the window just before it closes by itself.
+    """
+    if seconds is not None and not seconds > 0:
+        raise Refusal(f"expected seconds above zero, got {seconds}")
+    _require_display()
+    try:
+        from kappaskin_app.launch import launch
+    except ImportError as error:
+        raise Refusal(
+            f"the desktop app needs {error.name}; install it with: pip install 'kappaskin[app]'"
+        ) from error
+    if screenshot is not None and seconds is None:
+        seconds = _SETTLE
+    launch(source, seconds, screenshot)

@@ -1,0 +1,36 @@
+"""The one place where an exception in a slot ends, instead of in Qt."""
+
+import functools
+import logging
+from collections.abc import Callable
+from typing import Any
+
+log = logging.getLogger("kappaskin")
+
+_listeners: list[Callable[[str], None]] = []
+
+
+def on_failure(listener: Callable[[str], None]) -> None:
+    """Tell `listener` in words of every exception caught from now on."""
+    _listeners.append(listener)
+
+
+def forget(listener: Callable[[str], None]) -> None:
+    if listener in _listeners:
+        _listeners.remove(listener)
+
+
+def guarded(slot: Callable[..., Any]) -> Callable[..., Any]:
+    """`slot`, with whatever it raises logged and told rather than lost in Qt or fatal."""
+
+    @functools.wraps(slot)
+    def safe(*arguments: Any) -> Any:
+        try:
+            return slot(*arguments)
+        except Exception as error:  # a slot has no caller that could do better
+            log.exception("in %s", getattr(slot, "__qualname__", slot))
+            for listener in list(_listeners):
+                listener(f"Something went wrong: {error}")
+            return None
+
+    return safe

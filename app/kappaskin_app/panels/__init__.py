@@ -1,0 +1,1 @@
+"""Panels ask a person for settings and show what became of them; they never compute."""

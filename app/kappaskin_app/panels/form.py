@@ -1,0 +1,120 @@
+"""Editors for settings, made from what `settings` says of each."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QGroupBox,
+    QLabel,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin_app.settings import Choice, Range, Settings, Switch, ask_of
+
+
+@dataclass(frozen=True)
+class _Editor:
+    """A widget with how to show a value in it."""
+
+    widget: QWidget
+    show: Callable[[Any], None]
+
+
+def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
+    box: QSpinBox | QDoubleSpinBox
+    if how.decimals:
+        box = QDoubleSpinBox()
+        box.setDecimals(how.decimals)
+        box.setRange(how.least * how.scale, how.most * how.scale)
+        box.setSingleStep(how.step * how.scale)
+        box.valueChanged.connect(lambda value: said(value / how.scale))
+    else:
+        box = QSpinBox()
+        box.setRange(int(how.least), int(how.most))
+        box.setSingleStep(int(how.step))
+        box.valueChanged.connect(said)
+    if how.unit:
+        box.setSuffix(f" {how.unit}")
+    box.setKeyboardTracking(False)
+    box.setAlignment(Qt.AlignmentFlag.AlignRight)
+    return _Editor(box, lambda value: box.setValue(type(box.value())(value * how.scale)))
+
+
+def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:
+    box = QComboBox()
+    for value, words in how.options:
+        box.addItem(words, value)
+    box.activated.connect(lambda index: said(box.itemData(index)))
+    return _Editor(box, lambda value: box.setCurrentIndex(box.findData(value)))
+
+
+def _switch(how: Switch, said: Callable[[Any], None]) -> _Editor:
+    box = QCheckBox(how.label)
+    box.toggled.connect(said)
+    return _Editor(box, box.setChecked)
+
+
+def _editor(name: str, said: Callable[[Any], None]) -> _Editor:
+    how = ask_of(name)
+    if isinstance(how, Range):
+        return _range(how, said)
+    return _choice(how, said) if isinstance(how, Choice) else _switch(how, said)
+
+
+class Panel(QGroupBox):
+    """A titled form of some settings; `wished` says which one a person wants to be what."""
+
+    wished = Signal(str, object)
+
+    def __init__(self, title: str, names: tuple[str, ...], parent: QWidget | None = None) -> None:
+        super().__init__(title, parent)
+        self.form = QFormLayout()
+        self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
+        self.form.setVerticalSpacing(5)
+        self._message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        around = QVBoxLayout(self)
+        around.setContentsMargins(8, 6, 8, 8)
+        around.addLayout(self.form)
+        around.addWidget(self._message)
+        self._editors: dict[str, _Editor] = {}
+        for name in names:
+            self._add(name)
+
+    def _add(self, name: str) -> None:
+        how = ask_of(name)
+        editor = _editor(name, lambda value: self.wished.emit(name, value))
+        editor.widget.setToolTip(how.tip)
+        editor.widget.setObjectName(name)
+        self._editors[name] = editor
+        label = QLabel("" if isinstance(how, Switch) else how.label)
+        label.setBuddy(editor.widget)
+        label.setToolTip(how.tip)
+        self.form.addRow(label, editor.widget)
+
+    def editor(self, name: str) -> QWidget:
+        return self._editors[name].widget
+
+    def show_settings(self, settings: Settings) -> None:
+        for name, editor in self._editors.items():
+            with QSignalBlocker(editor.widget):
+                editor.show(getattr(settings, name))
+
+    def show_rows(self, names: set[str]) -> None:
+        """Show only the rows of these settings."""
+        for name, editor in self._editors.items():
+            self.form.setRowVisible(editor.widget, name in names)
+
+    def show_message(self, text: str) -> None:
+        """Say something below the form, or nothing."""
+        if text != self._message.text():
+            self._message.setText(text)
+        self._message.setVisible(bool(text))

@@ -1,0 +1,45 @@
+"""What presses on the simulated skin, and what noise its readings have."""
+
+from PySide6.QtWidgets import QWidget
+
+from kappaskin_app.panels.form import Panel
+from kappaskin_app.settings import FREE_CASES, TWO_ENDED, Settings
+
+_REAL = "A real sensor is connected; this belongs to the simulation."
+
+
+class LoadPanel(Panel):
+    """Asks for the load case; a free one has its place and its force."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        names = ("load_case", "force", "x", "y", "x_end", "y_end")
+        super().__init__("Load", names, parent)
+
+    def show_settings(self, settings: Settings) -> None:
+        super().show_settings(settings)
+        free, two = settings.load_case in FREE_CASES, settings.load_case in TWO_ENDED
+        rows = {"load_case"} | ({"force", "x", "y"} if free else set())
+        self.show_rows(rows | ({"x_end", "y_end"} if two else set()))
+
+    def show_simulating(self, simulating: bool) -> None:
+        self.editor("load_case").setEnabled(simulating)
+        for name in ("force", "x", "y", "x_end", "y_end"):
+            self.editor(name).setEnabled(simulating)
+        self.show_message("" if simulating else _REAL)
+
+
+class NoisePanel(Panel):
+    """Asks for the noise of the simulated readings."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Noise", ("noise_kind", "noise_rms", "noise_seed"), parent)
+
+    def show_settings(self, settings: Settings) -> None:
+        super().show_settings(settings)
+        noisy = settings.noise_kind != "none"
+        self.show_rows({"noise_kind"} | ({"noise_rms", "noise_seed"} if noisy else set()))
+
+    def show_simulating(self, simulating: bool) -> None:
+        for name in ("noise_kind", "noise_rms", "noise_seed"):
+            self.editor(name).setEnabled(simulating)
+        self.show_message("" if simulating else _REAL)

@@ -1,0 +1,13 @@
+"""How the skin is shown."""
+
+from PySide6.QtWidgets import QWidget
+
+from kappaskin_app.panels.form import Panel
+
+
+class ViewPanel(Panel):
+    """Asks for colours, height and what is drawn beside the skin."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        names = ("colour_by", "exaggeration", "show_elements", "show_truth", "theme")
+        super().__init__("View", names, parent)

@@ -1,0 +1,119 @@
+"""Between the window and the engine: settings go down, what came of them comes up."""
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from kappaskin import Engine, Estimate, Setup, SineBasis, Status
+from kappaskin_app.guard import guarded
+from kappaskin_app.history import History
+from kappaskin_app.settings import LOAD_CASES, Settings
+from kappaskin_app.simulation import scene_of
+from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE
+
+Array = NDArray[np.float64]
+
+STALE_AFTER = 0.5  # s without a frame
+_TICK = 4  # ms between two looks for a new estimate
+_STATUS = 0.05  # s between two looks at the status
+_DERIVATIVES = {"displacement": (0, 0), "xx": (2, 0), "yy": (0, 2), "xy": (1, 1)}
+
+
+def _setup_of(settings: Settings) -> Setup:
+    return Setup(settings.functions_x, settings.functions_y)
+
+
+class Session(QObject):
+    """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick."""
+
+    estimated = Signal(Estimate)
+    reported = Signal(Status)
+
+    def __init__(self, history: History, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._history = history
+        self._settings = history.settings
+        self.engine = Engine(_setup_of(history.settings))
+        self.status = Status()
+        self.estimate: Estimate | None = None
+        self.source = ""
+        self._next_status = 0.0
+        self._shown: tuple[int, int] = (0, -1)
+        self._values_of: tuple[object, ...] = ()
+        history.changed.connect(guarded(self._follow))
+        self._timer = QTimer(self, interval=_TICK, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(guarded(self.tick))
+        self._timer.start()
+
+    @property
+    def simulating(self) -> bool:
+        """Whether the loads and the noise are ours to choose."""
+        return self.source.startswith("sim:")
+
+    def connect_to(self, source: str) -> None:
+        """Take frames from `source`; a scene named there becomes the load case."""
+        self.source = source.strip()
+        self.engine.connect(self.source)
+        scene = self.source.removeprefix("sim:")
+        if self.simulating and scene in dict(LOAD_CASES):
+            self._history.change("Load case", load_case=scene)
+        if self.simulating:
+            self.engine.play(scene_of(self._history.settings))
+
+    def disconnect_from(self) -> None:
+        self.engine.disconnect()
+
+    def _follow(self, settings: Settings) -> None:
+        was, self._settings = self._settings, settings
+        if _setup_of(settings) != _setup_of(was):
+            self.engine.set_up(_setup_of(settings))
+        scene = {"load_case", "force", "x", "y", "x_end", "y_end"}
+        noise = {"noise_kind", "noise_rms", "noise_seed"}
+        if self.simulating and any(
+            getattr(settings, name) != getattr(was, name) for name in scene | noise
+        ):
+            self.engine.play(scene_of(settings))
+
+    def tick(self) -> None:
+        """Look for news; everything that shows it hangs on the two signals."""
+        now = time.monotonic()
+        if now >= self._next_status:
+            self._next_status = now + _STATUS
+            self.status = self.engine.status()
+            self.reported.emit(self.status)
+        estimate = self.engine.latest(self.status)
+        if estimate is not None and (estimate.generation, estimate.sequence) != self._shown:
+            self._shown = estimate.generation, estimate.sequence
+            self.estimate = estimate
+            self.estimated.emit(estimate)
+
+    def badge(self) -> str:
+        """The one word that is true now."""
+        status, now = self.status, time.monotonic()
+        if status.state == "off":
+            return OFF
+        if status.state == "lost":
+            return LOST
+        last = max(status.last_frame, self.estimate.host_time if self.estimate else 0.0)
+        if status.sensor is None or now - last > STALE_AFTER:
+            return STALE
+        return SIM if status.sensor.simulated else LIVE
+
+    def surface_values(self, estimate: Estimate, colour_by: str) -> Array:
+        """Displacement in mm or a curvature in 1/m at every surface point, (ny, nx)."""
+        if colour_by == "displacement" or self.status.sensor is None:
+            return estimate.surface * 1e3
+        key = (estimate.generation, colour_by)
+        if self._values_of[:2] != key:
+            patch = self.status.sensor.layout.patch
+            basis = SineBasis(patch, *estimate.coefficients.shape)
+            ny, nx = estimate.surface.shape
+            grid = basis.on_grid(*patch.grid(nx, ny), *_DERIVATIVES[colour_by])
+            self._values_of = (*key, grid)
+        return self._values_of[2](estimate.coefficients)  # pyright: ignore
+
+    def close(self) -> None:
+        self._timer.stop()
+        self.engine.close()

@@ -1,0 +1,117 @@
+"""Colours: two palettes for the window, and the colour maps of what is measured."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtGui import QColor, QPalette
+
+Colours = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Every colour of the window, as #rrggbb."""
+
+    window: str
+    base: str
+    text: str
+    faint: str
+    line: str
+    accent: str
+    scene: str
+    scene_top: str
+    missing: str
+    good: str
+    simulated: str
+    warning: str
+    bad: str
+    off: str
+
+
+LIGHT = Theme(
+    window="#f3f4f6",
+    base="#ffffff",
+    text="#16191d",
+    faint="#5b6470",
+    line="#c6ccd4",
+    accent="#1f6fb2",
+    scene="#dfe4ea",
+    scene_top="#f8fafc",
+    missing="#9aa3ad",
+    good="#1b7f4b",
+    simulated="#1f6fb2",
+    warning="#b36b00",
+    bad="#b3261e",
+    off="#6b7480",
+)
+DARK = Theme(
+    window="#1b1f24",
+    base="#12151a",
+    text="#e8ebef",
+    faint="#a0a9b4",
+    line="#3a424c",
+    accent="#5aa9e6",
+    scene="#0f1216",
+    scene_top="#2b323b",
+    missing="#59626d",
+    good="#2f9e68",
+    simulated="#2f7fc1",
+    warning="#c27a10",
+    bad="#c8443b",
+    off="#5a636e",
+)
+THEMES = {"light": LIGHT, "dark": DARK}
+
+
+def palette(theme: Theme) -> QPalette:
+    """Fusion's palette in the theme's colours; Qt's own dark scheme needs a platform theme."""
+    roles = QPalette.ColorRole
+    made = QPalette()
+    for role, colour in {
+        roles.Window: theme.window,
+        roles.WindowText: theme.text,
+        roles.Base: theme.base,
+        roles.AlternateBase: theme.window,
+        roles.Text: theme.text,
+        roles.PlaceholderText: theme.faint,
+        roles.Button: theme.window,
+        roles.ButtonText: theme.text,
+        roles.BrightText: theme.bad,
+        roles.ToolTipBase: theme.base,
+        roles.ToolTipText: theme.text,
+        roles.Highlight: theme.accent,
+        roles.HighlightedText: theme.base,
+        roles.Link: theme.accent,
+        roles.Mid: theme.line,
+    }.items():
+        made.setColor(role, QColor(colour))
+    for role in (roles.WindowText, roles.Text, roles.ButtonText):
+        made.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.missing))
+    return made
+
+
+def _colour_map(*anchors: str) -> Colours:
+    """256 colours (256, 3) that pass evenly through `anchors`."""
+    rgb = np.array([[int(a[i : i + 2], 16) for i in (1, 3, 5)] for a in anchors], float)
+    at = np.linspace(0, len(anchors) - 1, 256)
+    return np.column_stack(
+        [np.interp(at, range(len(anchors)), rgb[:, channel]) for channel in range(3)]
+    ).astype(np.uint8)
+
+
+# Blue to white to orange: told apart in every common colour blindness, and equally dark at
+# equal distance from zero.
+DIVERGING = _colour_map(
+    "#08306b",
+    "#2166ac",
+    "#5b9fd0",
+    "#b6d5ea",
+    "#f6f6f4",
+    "#f9cfa5",
+    "#e8954a",
+    "#bd5a14",
+    "#6e2a04",
+)
+# Dark blue to yellow, brighter all the way.
+SEQUENTIAL = _colour_map("#1a2a5e", "#2c5282", "#3f7f8f", "#63a878", "#a9c95b", "#f5e663")

@@ -1,0 +1,54 @@
+"""One large word that always tells the truth about what is shown."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QWidget
+
+from kappaskin_app.theme import Theme
+
+LIVE, SIM, STALE, LOST, OFF = "LIVE", "SIM", "STALE", "LOST", "OFF"
+
+TIPS = {
+    LIVE: "Readings of a real sensor, as they come.",
+    SIM: "Readings of a simulation, not of a real sensor.",
+    STALE: "Connected, but no reading has come for half a second: what is shown is old.",
+    LOST: "The connection ended: what is shown is the last that came.",
+    OFF: "Nothing is connected.",
+}
+
+
+class Badge(QLabel):
+    """Shows one of the five states in its colour."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.setFixedWidth(112)
+        self._theme: Theme | None = None
+        self.state = ""
+
+    def show_state(self, state: str) -> None:
+        if state != self.state:
+            self.state = state
+            self.setText(state)
+            self.setToolTip(TIPS[state])
+            self._paint()
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self._paint()
+
+    def _paint(self) -> None:
+        if self._theme is None or not self.state:
+            return
+        theme = self._theme
+        colour = {
+            LIVE: theme.good,
+            SIM: theme.simulated,
+            STALE: theme.warning,
+            LOST: theme.bad,
+            OFF: theme.off,
+        }[self.state]
+        self.setStyleSheet(
+            f"background: {colour}; color: white; font-weight: 700; font-size: 20px;"
+            "border-radius: 6px; padding: 4px;"
+        )

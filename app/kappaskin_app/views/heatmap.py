@@ -1,0 +1,245 @@
+"""Curvature of every element as one cell, not interpolated, with its scale and its value."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QRectF, QSize, Signal
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+
+from kappaskin import SensorLayout
+from kappaskin_app.theme import DIVERGING, Colours, Theme
+
+Array = NDArray[np.float64]
+
+
+def coloured(values: Array, limits: tuple[float, float], colours: Colours, missing: str) -> Colours:
+    """RGB (..., 3) of `values` (...) between `limits`; NaN in the colour `missing`."""
+    low, high = limits
+    share = (values - low) / (high - low) if high > low else np.full_like(values, 0.5)
+    index = np.clip(np.nan_to_num(share) * 255, 0, 255).astype(np.uint8)
+    rgb = colours[index]
+    gone = ~np.isfinite(values)
+    if gone.any():
+        rgb[gone] = QColor(missing).getRgb()[:3]
+    return rgb
+
+
+class ColourBar(QWidget):
+    """A vertical scale of colours with its limits and unit."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._colours, self._limits, self._unit = DIVERGING, (-1.0, 1.0), "1/m"
+        self.setFixedWidth(64)
+
+    def show_scale(self, colours: Colours, limits: tuple[float, float], unit: str) -> None:
+        if (self._limits, self._unit) != (limits, unit) or self._colours is not colours:
+            self._colours, self._limits, self._unit = colours, limits, unit
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        metrics = painter.fontMetrics()
+        line = metrics.height()
+        bar = QRectF(4, line + 4, 14, max(self.height() - line - 10, 10))
+        ramp = np.ascontiguousarray(self._colours[::-1, None])
+        image = QImage(ramp.tobytes(), 1, 256, 3, QImage.Format.Format_RGB888)
+        painter.drawImage(bar, image)
+        painter.setPen(self.palette().windowText().color())
+        painter.drawText(QPointF(2, metrics.ascent()), self._unit)
+        low, high = self._limits
+        for share in (0.0, 0.5, 1.0):
+            y = bar.bottom() - share * bar.height()
+            text = f"{low + share * (high - low):.3g}".replace("-", "\N{MINUS SIGN}")
+            top = min(max(y - line / 2, bar.top()), bar.bottom() - line)
+            painter.drawText(QPointF(bar.right() + 4, top + metrics.ascent()), text)
+
+
+class _Cells(QWidget):
+    """The elements, drawn as cells that tile a regular grid or as squares where they are."""
+
+    pointed = Signal(int)
+    sized = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._layout: SensorLayout | None = None
+        self._values: Array = np.empty(0)
+        self._colours: Colours = np.empty((0, 3), np.uint8)
+        self._line = QColor("#888888")
+        self._under = -1
+        self.setMouseTracking(True)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumSize(90, 90)
+
+    def sizeHint(self) -> QSize:
+        return QSize(200, 200)
+
+    def show_layout(self, layout: SensorLayout) -> None:
+        self._layout = layout
+        self._values = np.full(len(layout), np.nan)
+        self._under = -1
+
+    def show_cells(self, rgb: Colours) -> None:
+        self._colours = rgb
+        self.update()
+
+    def show_line(self, colour: str) -> None:
+        self._line = QColor(colour)
+        self.update()
+
+    def _area(self) -> QRectF:
+        """The patch on the widget: as large as fits, in its own proportions."""
+        patch = self._layout.patch if self._layout else None
+        ratio = patch.a / patch.b if patch else 1.0
+        width, height = float(self.width() - 2), float(self.height() - 2)
+        width, height = min(width, height * ratio), min(height, width / ratio)
+        return QRectF((self.width() - width) / 2, (self.height() - height) / 2, width, height)
+
+    def _squares(self, area: QRectF) -> list[QRectF]:
+        """One square for each element that stands alone."""
+        layout = self._layout
+        if layout is None:
+            return []
+        side = 0.8 * math.sqrt(area.width() * area.height() / len(layout))
+        return [
+            QRectF(c.x() - side / 2, c.y() - side / 2, side, side)
+            for c in (self._point(area, x, y) for x, y in layout.positions)
+        ]
+
+    def _point(self, area: QRectF, x: float, y: float) -> QPointF:
+        patch = self._layout.patch if self._layout else None
+        a, b = (patch.a, patch.b) if patch else (1.0, 1.0)
+        return QPointF(area.left() + x / a * area.width(), area.bottom() - y / b * area.height())
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        area = self._area()
+        layout = self._layout
+        if layout is None or len(self._colours) != len(layout):
+            return
+        if layout.shape:
+            m, n = layout.shape
+            # y points up on the skin, down in an image.
+            rgb = np.ascontiguousarray(self._colours.reshape(n, m, 3)[::-1])
+            painter.drawImage(area, QImage(rgb.tobytes(), m, n, 3 * m, QImage.Format.Format_RGB888))
+        else:
+            for square, rgb in zip(self._squares(area), self._colours, strict=True):
+                painter.fillRect(square, QColor(*(int(v) for v in rgb)))
+        painter.setPen(QPen(self._line, 1))
+        painter.drawRect(area)
+        if self._under >= 0:
+            painter.setPen(QPen(self.palette().windowText().color(), 2))
+            painter.drawRect(self._cell(area, self._under))
+
+    def _cell(self, area: QRectF, element: int) -> QRectF:
+        if self._layout is None or not self._layout.shape:
+            return self._squares(area)[element]
+        m, n = self._layout.shape
+        q, p = divmod(element, m)
+        width, height = area.width() / m, area.height() / n
+        return QRectF(area.left() + p * width, area.bottom() - (q + 1) * height, width, height)
+
+    def _element_at(self, at: QPointF) -> int:
+        layout, area = self._layout, self._area()
+        if layout is None or not area.contains(at):
+            return -1
+        position = [
+            (at.x() - area.left()) / area.width() * layout.patch.a,
+            (area.bottom() - at.y()) / area.height() * layout.patch.b,
+        ]
+        return int(np.argmin(np.linalg.norm(layout.positions - position, axis=1)))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        self.point_at(self._element_at(event.position()))
+        self.pointed.emit(self._under)
+
+    def leaveEvent(self, event: object) -> None:
+        self.point_at(-1)
+        self.pointed.emit(-1)
+
+    def point_at(self, element: int) -> None:
+        if element != self._under:
+            self._under = element
+            self.update()
+
+
+class Heatmap(QWidget):
+    """One curvature component, element by element; says which element is pointed at."""
+
+    pointed = Signal(int)
+    lock_wanted = Signal(float)
+
+    def __init__(self, component: str, tip: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.component = component
+        self._title = QLabel(f"<b>\N{GREEK SMALL LETTER KAPPA}<sub>{component}</sub></b>")
+        self._title.setToolTip(tip)
+        self._value = QLabel()
+        self._value.setToolTip("The element under the mouse, else the largest reading.")
+        self._lock = QToolButton(checkable=True, text="Lock range")  # pyright: ignore[reportCallIssue]
+        self._lock.setToolTip("Keep the colours' range as it is now; else it follows the readings.")
+        self._lock.clicked.connect(self._ask_lock)
+        self.cells, self._bar = _Cells(), ColourBar()
+        self.cells.pointed.connect(self.pointed)
+        self._limit, self._layout, self._element = 1.0, None, -1
+        self._missing = "#888888"
+        top = QHBoxLayout()
+        top.addWidget(self._title)
+        top.addWidget(self._value, 1)
+        top.addWidget(self._lock)
+        middle = QHBoxLayout()
+        middle.addWidget(self.cells, 1)
+        middle.addWidget(self._bar)
+        around = QVBoxLayout(self)
+        around.setContentsMargins(6, 4, 4, 4)
+        around.setSpacing(3)
+        around.addLayout(top)
+        around.addLayout(middle, 1)
+
+    def _ask_lock(self, locked: bool) -> None:
+        self._lock.setChecked(not locked)  # the answer comes back through show_lock
+        self.lock_wanted.emit(self._limit if locked else 0.0)
+
+    def show_lock(self, locked: bool) -> None:
+        self._lock.setChecked(locked)
+        self._lock.setText("Locked" if locked else "Lock range")
+
+    def show_layout(self, layout: SensorLayout) -> None:
+        self._layout = layout
+        self._element = -1
+        self.cells.show_layout(layout)
+
+    def show_element(self, element: int) -> None:
+        """Point at an element here because it is pointed at elsewhere; -1 at none."""
+        self._element = element
+        self.cells.point_at(element)
+
+    def show_values(self, values: Array, limit: float) -> None:
+        """Colour `values` (P,) in 1/m from minus to plus `limit`."""
+        self._limit = limit
+        limits = (-limit, limit)
+        self.cells.show_cells(coloured(values, limits, DIVERGING, self._missing))
+        self._bar.show_scale(DIVERGING, limits, "1/m")
+
+    def show_reading(self, values: Array) -> None:
+        """Write the value of the element pointed at, else the largest."""
+        if self._layout is None or len(values) != len(self._layout):
+            return
+        element = self._element
+        if element >= 0:
+            x, y = self._layout.positions[element] * 1e3
+            reading = values[element]
+            what = f"{reading:+.2f} 1/m" if math.isfinite(reading) else "no reading"
+            text = f"{what} at ({x:.0f}, {y:.0f}) mm"
+        else:
+            finite = values[np.isfinite(values)]
+            peak = finite[np.argmax(np.abs(finite))] if len(finite) else math.nan
+            text = f"peak {peak:+.2f} 1/m" if len(finite) else "no readings"
+        self._value.setText(text.replace("-", "\N{MINUS SIGN}"))
+
+    def show_theme(self, theme: Theme) -> None:
+        self._missing = theme.missing
+        self.cells.show_line(theme.line)

@@ -1,0 +1,372 @@
+"""The skin in three dimensions: its shape, what bends it, and where it is touched."""
+
+import time
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+from pyvistaqt import QtInteractor
+
+from kappaskin import Estimate, LineLoad, Patch, PointLoad, Sensor
+from kappaskin_app.theme import Colours, Theme
+
+Array = NDArray[np.float64]
+
+MM = 1e3
+_GRAB = 28  # pixels around a load's arrow within which the mouse takes hold of it
+_STRIDE = 8  # surface lines between two lines of the true surface's wireframe
+_WAITING = 0.02  # s after which a picture asked for but not drawn is asked for again
+
+
+class MembraneView(QWidget):
+    """Shows estimates; says when a load is dragged. The skin is drawn pressed in, downwards."""
+
+    load_grabbed = Signal(float, float)
+    load_dragged = Signal(float, float)
+    load_released = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        # Multisampling would halve the rate in software; a timer of its own would draw twice.
+        self.plotter = QtInteractor(self, auto_update=False, multi_samples=0)
+        around = QVBoxLayout(self)
+        around.setContentsMargins(0, 0, 0, 0)
+        around.addWidget(self.plotter)
+        self._make_actors()
+        self._make_lights()
+        self.plotter.installEventFilter(self)
+        self.setMinimumSize(320, 240)
+        self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
+        """(when, age of its frame in s) of each drawing completed."""
+        self._host_time = float("nan")
+        self._drawn = True
+        self.plotter.renderer.AddObserver("EndEvent", self._note_drawing)
+        self._exaggeration = 1.0
+        self._layout_of: Sensor | None = None
+        self._heights: Array = np.zeros((2, 2))
+        self._handles: Array = np.empty((0, 2))
+        self._dragging = False
+        self._lost = False
+        self._theme: Theme | None = None
+
+    def _make_actors(self) -> None:
+        plotter = self.plotter
+        self._colours = pv.LookupTable()
+        self._mesh = pv.PolyData()
+        self._wire = pv.PolyData()
+        self._elements = pv.PolyData(np.zeros((1, 3)))
+        self._line = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
+        self._surface_actor: pv.Actor | None = None
+        self._wire_actor: pv.Actor | None = None
+        unlit = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
+        self._elements_actor = plotter.add_mesh(
+            self._elements, style="points", point_size=5, **unlit
+        )
+        self._line_actor = plotter.add_mesh(self._line, line_width=5, color="#e8543f", **unlit)
+        arrow = pv.Arrow(start=(0, 0, 22), direction=(0, 0, -1), scale=22, tip_length=0.35)
+        self._arrows = [
+            plotter.add_mesh(arrow, color="#e8543f", reset_camera=False, render=False)
+            for _ in range(2)
+        ]
+        self._contact = plotter.add_mesh(
+            pv.Sphere(radius=1.8), color="#1fd17a", reset_camera=False, render=False
+        )
+        self._labels = [pv.Label(size=15) for _ in range(3)]
+        for label in self._labels:
+            plotter.add_actor(label, reset_camera=False, render=False)
+
+    def _make_lights(self) -> None:
+        """One low lamp from the left for relief, and a weak one at the camera."""
+        self.plotter.remove_all_lights()
+        lamp = pv.Light(position=(-1.0, 0.4, 0.75), light_type="scene light", intensity=0.85)
+        lamp.positional = False
+        self.plotter.add_light(lamp)
+        self.plotter.add_light(pv.Light(light_type="headlight", intensity=0.35))
+
+    def _note_drawing(self, *_: object) -> None:
+        now = time.monotonic()
+        self._drawn = True
+        self.ages.append((now, now - self._host_time))
+
+    # What a skin looks like: rebuilt only when another one appears.
+
+    def show_skin(self, sensor: Sensor, nx: int, ny: int) -> None:
+        """Draw a surface of nx x ny points for the skin of `sensor`, flat until an estimate."""
+        patch = sensor.layout.patch
+        x, y = patch.grid(nx, ny)
+        points = np.zeros((ny, nx, 3))
+        points[..., 0], points[..., 1] = np.meshgrid(x * MM, y * MM)
+        index = np.arange(nx * ny).reshape(ny, nx)
+        corners = [index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]]
+        quads = np.stack([np.full_like(corners[0], 4), *corners], axis=-1)
+        self._mesh = pv.PolyData(points.reshape(-1, 3), faces=quads.ravel())
+        self._mesh.point_data["value"] = np.zeros(nx * ny)
+        self._mesh.point_data.active_normals = np.tile([0.0, 0.0, 1.0], (nx * ny, 1))
+        self._wire = self._wireframe(points)
+        self._grid = np.array([ny, nx])
+        self._cell = np.array([x[1] - x[0], y[1] - y[0]])
+        self._heights = np.zeros((ny, nx))
+        plotter = self.plotter
+        for actor in (self._surface_actor, self._wire_actor):
+            if actor is not None:
+                plotter.remove_actor(actor, render=False)
+        self._surface_actor = plotter.add_mesh(
+            self._mesh,
+            scalars="value",
+            cmap=self._colours,
+            show_scalar_bar=False,
+            smooth_shading=False,
+            reset_camera=False,
+            render=False,
+            specular=0.1,
+            ambient=0.2,
+            diffuse=0.95,
+        )
+        self._surface_actor.prop.interpolation = "Gouraud"
+        self._wire_actor = plotter.add_mesh(
+            self._wire, line_width=1, lighting=False, reset_camera=False, render=False
+        )
+        # Drawn a little nearer than it is, or half of it drowns in the surface it lies on.
+        self._wire_actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        self._wire_actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -8.0)
+        positions = np.column_stack([sensor.layout.positions * MM, np.zeros(len(sensor.layout))])
+        self._elements.points = positions
+        self._elements.verts = np.column_stack(
+            [np.ones(len(positions), int), np.arange(len(positions))]
+        ).ravel()
+        self._place_labels(patch)
+        if self._layout_of is None or self._layout_of.layout.patch != patch:
+            self.reset_camera(patch)
+        self._layout_of = sensor
+        if self._theme:
+            self.show_theme(self._theme)
+
+    @staticmethod
+    def _wireframe(points: Array) -> pv.PolyData:
+        ny, nx = points.shape[:2]
+        index = np.arange(nx * ny).reshape(ny, nx)
+        rows = [np.r_[nx, row] for row in index[::_STRIDE]]
+        columns = [np.r_[ny, column] for column in index[:, ::_STRIDE].T]
+        return pv.PolyData(points.reshape(-1, 3).copy(), lines=np.concatenate([*rows, *columns]))
+
+    def _place_labels(self, patch: Patch) -> None:
+        a, b = patch.a * MM, patch.b * MM
+        for label, text, at in zip(
+            self._labels,
+            ("0", f"x {a:g} mm", f"y {b:g} mm"),
+            ((-0.04 * a, -0.04 * b), (a, -0.06 * b), (-0.06 * a, b)),
+            strict=True,
+        ):
+            label.input = text
+            label.position = (*at, 0.0)
+
+    def reset_camera(self, patch: Patch | None = None) -> None:
+        """Look at the whole skin from the front, a little from the left."""
+        if patch is None and self._layout_of:
+            patch = self._layout_of.layout.patch
+        if patch is None:
+            return
+        a, b = patch.a * MM, patch.b * MM
+        camera = self.plotter.camera
+        camera.focal_point = (a / 2, b / 2, 0.0)
+        camera.position = (a / 2 - 0.45 * max(a, b), b / 2 - 1.1 * max(a, b), 1.0 * max(a, b))
+        camera.up = (0.0, 0.0, 1.0)
+        low = -0.25 * max(a, b)
+        self.plotter.renderer.ResetCamera(0.0, a, 0.0, b, low, 0.0)
+        camera.zoom(1.3)
+        self.plotter.update()
+
+    # What changes with every estimate.
+
+    def show_estimate(self, estimate: Estimate, values: Array, limits: tuple[float, float]) -> None:
+        """Draw a shape, coloured by `values` (ny, nx) between `limits`, in any unit."""
+        if self._surface_actor is None or estimate.surface.shape != self._heights.shape:
+            return
+        self._heights = -MM * self._exaggeration * np.nan_to_num(estimate.surface)
+        self._mesh.points[:, 2] = self._heights.ravel()
+        self._mesh.point_data.active_normals[:] = self._normals(self._heights)
+        self._mesh.point_data["value"][:] = values.ravel()
+        self._surface_actor.mapper.scalar_range = limits
+        if self._wire_actor and self._wire_actor.visibility:
+            known = bool(np.isfinite(estimate.true_surface[0, 0]))
+            true = estimate.true_surface if known else estimate.surface
+            self._wire.points[:, 2] = (-MM * self._exaggeration * np.nan_to_num(true)).ravel()
+        if self._elements_actor.visibility and self._layout_of:
+            self._elements.points[:, 2] = self._height_at(self._layout_of.layout.positions) + 0.6
+        self._place(self._contact, estimate.touch.position)
+        self._host_time = estimate.host_time
+        self._request()
+
+    def _request(self) -> None:
+        # One picture at a time: asking again while one is due only makes Qt queue them.
+        self._drawn = False
+        self.plotter.update()
+
+    @property
+    def ready(self) -> bool:
+        """Whether the picture asked for last has been drawn."""
+        return self._drawn
+
+    def _normals(self, z: Array) -> Array:
+        """Unit normals (points, 3) of the drawn surface z (ny, nx), in one pass of differences."""
+        dy, dx = np.gradient(z, self._cell[1] * MM, self._cell[0] * MM)
+        normals = np.stack([-dx, -dy, np.ones_like(z)], axis=-1)
+        normals /= np.sqrt(1 + dx**2 + dy**2)[..., None]
+        return normals.reshape(-1, 3)
+
+    def _height_at(self, positions: Array) -> Array:
+        """Drawn height (P,) in mm of the nearest surface points to `positions` (P, 2) in m."""
+        p, q = np.rint(positions / self._cell).astype(int).T
+        ny, nx = self._heights.shape
+        return self._heights[np.clip(q, 0, ny - 1), np.clip(p, 0, nx - 1)]
+
+    def _place(self, actor: pv.Actor, position: Array) -> None:
+        shown = bool(np.isfinite(position).all())
+        actor.visibility = shown
+        if shown:
+            height = float(self._height_at(position[None])[0])
+            actor.position = (position[0] * MM, position[1] * MM, height)
+
+    def show_loads(self, loads: Sequence[PointLoad | LineLoad], moving_to: Array | None) -> None:
+        """Draw the simulated loads, none for a real sensor; a moving one where it is now."""
+        moving = moving_to is not None and bool(np.isfinite(moving_to).all())
+        centres = [moving_to] if moving else [load.centre() for load in loads]
+        self._handles = np.array(centres).reshape(-1, 2)
+        for number, arrow in enumerate(self._arrows):
+            there = number < len(centres)
+            self._place(arrow, self._handles[number] if there else np.full(2, np.nan))
+        lines = [load for load in loads if isinstance(load, LineLoad)]
+        self._line_actor.visibility = bool(lines)
+        for load in lines[:1]:
+            s = np.linspace(0, 1, 41)[:, None]
+            along = (1 - s) * [load.x0, load.y0] + s * [load.x1, load.y1]
+            points = np.column_stack([along * MM, self._height_at(along) + 0.5])
+            if len(points) != self._line.n_points:
+                self._line.points = points
+                self._line.lines = [41, *range(41)]
+            self._line.points[:] = points
+
+    # How it is shown.
+
+    def show_options(self, exaggeration: float, elements: bool, truth: bool) -> None:
+        self._exaggeration = exaggeration
+        self._elements_actor.visibility = elements
+        if self._wire_actor:
+            self._wire_actor.visibility = truth
+        self.plotter.update()
+
+    def show_colours(self, colours: Colours) -> None:
+        """Colour by a map of 256 colours (256, 3)."""
+        opaque = np.full((len(colours), 1), 255, np.uint8)
+        self._colours.values = np.hstack([colours, opaque])
+
+    def show_lost(self, lost: bool) -> None:
+        """Grey the skin while what it shows is not coming in any more."""
+        if self._surface_actor is None or lost == self._lost:
+            return
+        self._lost = lost
+        self._surface_actor.mapper.scalar_visibility = not lost
+        self._contact.visibility = not lost
+        self.plotter.update()
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self.plotter.set_background(theme.scene, top=theme.scene_top)
+        self._elements_actor.prop.color = theme.text
+        for label in self._labels:
+            label.prop.color = theme.text
+        if self._surface_actor:
+            self._surface_actor.prop.color = theme.missing
+        if self._wire_actor:
+            self._wire_actor.prop.color = theme.text
+            self._wire_actor.prop.opacity = 0.75
+        self.plotter.update()
+
+    # The mouse: a load near the pointer is taken hold of, everything else turns the camera.
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if isinstance(event, QMouseEvent):
+            kind, left = event.type(), Qt.MouseButton.LeftButton
+            if kind == QEvent.Type.MouseButtonPress and event.button() == left:
+                return self._grab(event.position())
+            if kind == QEvent.Type.MouseMove:
+                return self._move(event.position())
+            if kind == QEvent.Type.MouseButtonRelease and self._dragging:
+                self._dragging = False
+                self.load_released.emit()
+                return True
+        return super().eventFilter(watched, event)
+
+    def _near_handle(self, at: QPointF) -> Array | None:
+        """The handle (2,) in m whose arrow is drawn near `at`."""
+        for handle in self._handles:
+            height = float(self._height_at(handle[None])[0])
+            tip, tail = (self._to_screen(handle, height + up) for up in (0.0, 22.0))
+            along = tail - tip
+            point = np.array([at.x(), at.y()])
+            share = np.clip((point - tip) @ along / max(along @ along, 1.0), 0, 1)
+            if np.linalg.norm(point - tip - share * along) < _GRAB / 2:
+                return handle
+        return None
+
+    def _grab(self, at: QPointF) -> bool:
+        handle = self._near_handle(at)
+        if handle is None:
+            return False
+        self._dragging = True
+        self._plane = float(self._height_at(handle[None])[0])
+        self._slip = handle - self._to_skin(at)
+        self.load_grabbed.emit(*handle)
+        return True
+
+    def _move(self, at: QPointF) -> bool:
+        if not self._dragging:
+            over = self._near_handle(at) is not None
+            shape = Qt.CursorShape.OpenHandCursor if over else Qt.CursorShape.ArrowCursor
+            self.plotter.setCursor(shape)
+            return False
+        self.plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
+        self.load_dragged.emit(*(self._to_skin(at) + self._slip))
+        return True
+
+    def _to_screen(self, position: Array, height: float) -> Array:
+        """Widget pixels (2,) of a point at `position` in m and drawn `height` in mm."""
+        renderer = self.plotter.renderer
+        renderer.SetWorldPoint(position[0] * MM, position[1] * MM, height, 1.0)
+        renderer.WorldToDisplay()
+        x, y, _ = renderer.GetDisplayPoint()
+        ratio = self.plotter.devicePixelRatioF()
+        return np.array([x / ratio, self.plotter.height() - y / ratio])
+
+    def _to_skin(self, at: QPointF) -> Array:
+        """Where the line of sight through `at` meets the plane of the load, (2,) in m."""
+        renderer, ratio = self.plotter.renderer, self.plotter.devicePixelRatioF()
+        ends = []
+        for depth in (0.0, 1.0):
+            renderer.SetDisplayPoint(
+                at.x() * ratio, (self.plotter.height() - at.y()) * ratio, depth
+            )
+            renderer.DisplayToWorld()
+            x, y, z, w = renderer.GetWorldPoint()
+            ends.append(np.array([x, y, z]) / w)
+        near, far = ends
+        fall = far[2] - near[2]
+        share = (self._plane - near[2]) / fall if abs(fall) > 1e-9 else 0.0
+        return (near + share * (far - near))[:2] / MM
+
+    def handle_on_screen(self) -> QPointF | None:
+        """Where in this view the first load's arrow ends, None without a load."""
+        if not len(self._handles):
+            return None
+        height = float(self._height_at(self._handles[:1])[0])
+        return QPointF(*self._to_screen(self._handles[0], height))
+
+    def close_plotter(self) -> None:
+        """Before the window goes: give VTK's resources back."""
+        self.plotter.removeEventFilter(self)
+        self.plotter.close()

@@ -1,0 +1,399 @@
+"""The window: builds the views and panels, wires them to the session, and nothing else."""
+
+import math
+import time
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QDockWidget,
+    QHBoxLayout,
+    QMainWindow,
+    QMessageBox,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin import COMPONENTS, Estimate, Status, serial_ports
+from kappaskin_app import guard
+from kappaskin_app.actions import Actions
+from kappaskin_app.guard import guarded
+from kappaskin_app.history import History
+from kappaskin_app.panels.basis import BasisPanel
+from kappaskin_app.panels.connection import ConnectionPanel
+from kappaskin_app.panels.load import LoadPanel, NoisePanel
+from kappaskin_app.panels.view import ViewPanel
+from kappaskin_app.scale import SteadyRange
+from kappaskin_app.session import Session
+from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.simulation import dragged, scene_of
+from kappaskin_app.theme import DIVERGING, SEQUENTIAL, THEMES, palette
+from kappaskin_app.views.badge import LOST, OFF, Badge
+from kappaskin_app.views.heatmap import ColourBar, Heatmap
+from kappaskin_app.views.membrane import MembraneView
+from kappaskin_app.views.readouts import Health, Readouts
+
+_HEATMAPS = 0.033  # s between two drawings of the heatmaps
+_NUMBERS = 0.2  # s between two readouts: faster cannot be read
+_TIPS = {
+    "xx": "Bending along x as each element reads it (Eq. 3).",
+    "yy": "Bending along y as each element reads it (Eq. 4).",
+    "xy": "Twist as each element reads it (Eq. 5).",
+}
+
+
+class MainWindow(QMainWindow):
+    """The desktop app's one window."""
+
+    def __init__(self, source: str = "sim:", settings: Settings | None = None) -> None:
+        super().__init__()
+        self.setObjectName("kappaskin")
+        self.setWindowTitle("Kappaskin")
+        self.history = History(settings or Settings(), self)
+        self.session = Session(self.history, self)
+        self.membrane, self.badge, self.readouts = MembraneView(), Badge(), Readouts()
+        self.colour_bar = ColourBar()
+        self.heatmaps = {name: Heatmap(name, _TIPS[name]) for name in COMPONENTS}
+        self.connection, self.basis = ConnectionPanel(), BasisPanel()
+        self.load, self.noise, self.view = LoadPanel(), NoisePanel(), ViewPanel()
+        self.ranges = {name: SteadyRange(0.5) for name in COMPONENTS}
+        self.ranges["displacement"] = SteadyRange(0.1)
+        self._shown_sensor: object = None
+        self._next_heatmaps = self._next_numbers = 0.0
+        self._gesture, self._grabbed_end = -1, False
+        self._drawn: deque[float] = deque(maxlen=256)
+        self.setCentralWidget(self._centre())
+        self._make_docks()
+        self.actions_by_name = Actions(self)
+        self._make_actions()
+        self._wire()
+        self._follow(self.history.settings)
+        self._find_ports()
+        self.resize(1280, 800)
+        self.connection.show_source(source)
+        self.session.connect_to(source)
+
+    def _centre(self) -> QWidget:
+        centre, top, middle = QWidget(), QHBoxLayout(), QHBoxLayout()
+        top.setContentsMargins(8, 6, 8, 2)
+        top.addWidget(self.badge)
+        top.addWidget(self.readouts, 1)
+        middle.setSpacing(0)
+        middle.addWidget(self.membrane, 1)
+        middle.addWidget(self.colour_bar)
+        around = QVBoxLayout(centre)
+        around.setContentsMargins(0, 0, 0, 0)
+        around.addLayout(top)
+        around.addLayout(middle, 1)
+        return centre
+
+    def _make_docks(self) -> None:
+        panels, stack = QWidget(), QVBoxLayout()
+        for panel in (self.connection, self.load, self.noise, self.basis, self.view):
+            stack.addWidget(panel)
+        stack.addStretch(1)
+        panels.setLayout(stack)
+        scroll = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setFrameShape(QScrollArea.Shape.NoFrame)
+        scroll.setWidget(panels)
+        scroll.setMinimumWidth(285)
+        maps, column = QWidget(), QVBoxLayout()
+        column.setContentsMargins(0, 0, 0, 0)
+        for heatmap in self.heatmaps.values():
+            column.addWidget(heatmap, 1)
+        maps.setLayout(column)
+        maps.setMinimumWidth(270)
+        self._docks = [
+            self._dock("settings", "Settings", scroll, Qt.DockWidgetArea.LeftDockWidgetArea),
+            self._dock(
+                "curvature", "Curvature, by element", maps, Qt.DockWidgetArea.RightDockWidgetArea
+            ),
+        ]
+
+    def _dock(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
+        dock = QDockWidget(title, self)
+        dock.setObjectName(name)
+        dock.setWidget(widget)
+        self.addDockWidget(area, dock)
+        return dock
+
+    def _make_actions(self) -> None:
+        actions, stack = self.actions_by_name, self.history.stack
+        actions.add(
+            "picture",
+            "&File",
+            "Save &picture",
+            self._save_picture,
+            "Ctrl+S",
+            "Save a picture of the window in the present folder.",
+        )
+        actions.add("quit", "&File", "&Quit", self.close, "Ctrl+Q")
+        undo, redo = stack.createUndoAction(self), stack.createRedoAction(self)
+        undo.setShortcut("Ctrl+Z")
+        redo.setShortcut("Ctrl+Shift+Z")
+        actions.register("undo", "&Edit", undo)
+        actions.register("redo", "&Edit", redo)
+        actions.add(
+            "reset",
+            "&Edit",
+            "&Reset settings",
+            self._reset,
+            "",
+            "Set every setting back to how it was at the start.",
+        )
+        actions.add(
+            "simulate", "&Source", "&Simulated skin", lambda: self._connect("sim:"), "Ctrl+M"
+        )
+        actions.add(
+            "connect",
+            "&Source",
+            "&Connect",
+            lambda: self._connect(self.connection.source()),
+            "Ctrl+Return",
+            "Connect to the source chosen in the Connection panel.",
+        )
+        actions.add("disconnect", "&Source", "&Disconnect", self.session.disconnect_from, "Ctrl+D")
+        actions.add("ports", "&Source", "&Look for ports", self._find_ports, "F5")
+        for number, (value, words) in enumerate(ask_of("colour_by").options, 1):  # pyright: ignore
+            actions.add(
+                f"colour-{value}",
+                "&View",
+                f"Colour by {words.lower()}",
+                lambda value=value: self._wish("colour_by", value),
+                f"Ctrl+{number}",
+            )
+        actions.add("higher", "&View", "Draw &higher", lambda: self._exaggerate(1), "Ctrl++")
+        actions.add("lower", "&View", "Draw &lower", lambda: self._exaggerate(-1), "Ctrl+-")
+        actions.add(
+            "elements",
+            "&View",
+            "Show or hide &elements",
+            lambda: self._toggle("show_elements"),
+            "E",
+        )
+        actions.add(
+            "truth",
+            "&View",
+            "Show or hide the &true surface",
+            lambda: self._toggle("show_truth"),
+            "T",
+        )
+        actions.add("camera", "&View", "Reset &camera", self.membrane.reset_camera, "R")
+        actions.add("theme", "&View", "Light or &dark", self._switch_theme, "Ctrl+T")
+        for dock in self._docks:
+            actions.register(f"dock-{dock.objectName()}", "&View", dock.toggleViewAction())
+        actions.add("shortcuts", "&Help", "&Shortcuts", self._show_shortcuts, "F1")
+
+    def _wire(self) -> None:
+        for panel in (self.load, self.noise, self.basis, self.view):
+            panel.wished.connect(guarded(self._wish))
+        self.connection.connect_wanted.connect(guarded(self._connect))
+        self.connection.disconnect_wanted.connect(guarded(self.session.disconnect_from))
+        self.connection.ports_wanted.connect(guarded(self._find_ports))
+        self.history.changed.connect(guarded(self._follow))
+        self.session.estimated.connect(guarded(self._show_estimate))
+        self.session.reported.connect(guarded(self._show_status))
+        self.membrane.load_grabbed.connect(guarded(self._grab))
+        self.membrane.load_dragged.connect(guarded(self._drag))
+        self.membrane.load_released.connect(guarded(self._release))
+        for name, heatmap in self.heatmaps.items():
+            heatmap.pointed.connect(guarded(self._point))
+            heatmap.lock_wanted.connect(
+                guarded(lambda limit, name=name: self._wish(f"range_{name}", limit))
+            )
+        guard.on_failure(self._tell)
+
+    # Wishes: a person wants something; a change of settings is always a command.
+
+    def _wish(self, name: str, value: object) -> None:
+        label = ask_of(name).label if not name.startswith("range_") else "Colour range"
+        self.history.change(label, -1, **{name: value})
+
+    def _toggle(self, name: str) -> None:
+        self._wish(name, not getattr(self.history.settings, name))
+
+    def _switch_theme(self) -> None:
+        self._wish("theme", "light" if self.history.settings.theme == "dark" else "dark")
+
+    def _exaggerate(self, step: int) -> None:
+        wanted = self.history.settings.exaggeration + step
+        self._wish("exaggeration", float(min(max(wanted, 1), 50)))
+
+    def _reset(self) -> None:
+        fresh = Settings()
+        self.history.change("Reset settings", -1, **vars(fresh))
+
+    def _connect(self, source: str) -> None:
+        self.connection.show_source(source)
+        self.session.connect_to(source)
+
+    def _find_ports(self) -> None:
+        self.connection.show_ports(
+            [
+                (found["port"], f"{found['port']}  {found['description']}")
+                for found in serial_ports()
+            ]
+        )
+
+    def _grab(self, x: float, y: float) -> None:
+        settings = self.history.settings
+        second = math.dist((x, y), (settings.x_end, settings.y_end))
+        self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
+        self._gesture = self.history.new_gesture()
+
+    def _drag(self, x: float, y: float) -> None:
+        moved = dragged(self.history.settings, x, y, self._grabbed_end)
+        self.history.change("Drag the load", self._gesture, **moved)
+
+    def _release(self) -> None:
+        self._gesture = -1
+
+    def _point(self, element: int) -> None:
+        for heatmap in self.heatmaps.values():
+            heatmap.show_element(element)
+        self._next_numbers = 0.0
+
+    # News: settings, status and estimates on their way to the views.
+
+    def _follow(self, settings: Settings) -> None:
+        for panel in (self.load, self.noise, self.basis, self.view):
+            panel.show_settings(settings)
+        for name, heatmap in self.heatmaps.items():
+            heatmap.show_lock(getattr(settings, f"range_{name}") > 0)
+        by_displacement = settings.colour_by == "displacement"
+        self.membrane.show_colours(SEQUENTIAL if by_displacement else DIVERGING)
+        self.membrane.show_options(
+            settings.exaggeration, settings.show_elements, settings.show_truth
+        )
+        self._loads = scene_of(settings).loads
+        self._moving = scene_of(settings).motion is not None
+        self._show_theme(settings.theme)
+
+    def _show_theme(self, name: str) -> None:
+        theme = THEMES[name]
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.setPalette(palette(theme))
+        for view in (self.membrane, self.badge, self.readouts, *self.heatmaps.values()):
+            view.show_theme(theme)
+
+    def _show_status(self, status: Status) -> None:
+        sensor = status.sensor
+        if sensor is not None and sensor is not self._shown_sensor:
+            self._meet(status)
+        state = self.session.badge()
+        self.badge.show_state(state)
+        self.membrane.show_lost(state in (LOST, OFF))
+        self.connection.show_status(status)
+        self.basis.show_status(status)
+        simulating = self.session.simulating
+        self.load.show_simulating(simulating)
+        self.noise.show_simulating(simulating)
+        self._show_health(status)
+
+    def _meet(self, status: Status) -> None:
+        sensor, setup = status.sensor, status.setup
+        if sensor is None:
+            return
+        self._shown_sensor = sensor
+        self.membrane.show_skin(sensor, setup.nx, setup.ny)
+        settings = self.history.settings
+        self.membrane.show_options(
+            settings.exaggeration, settings.show_elements, settings.show_truth
+        )
+        for heatmap in self.heatmaps.values():
+            heatmap.show_layout(sensor.layout)
+
+    def _show_health(self, status: Status) -> None:
+        now = time.monotonic()
+        if now < self._next_numbers:
+            return
+        self._next_numbers = now + _NUMBERS
+        recent = [age for when, age in self.membrane.ages if when > now - 1.0]
+        counts = status.accounting
+        self.readouts.show_health(
+            Health(
+                status.rate,
+                len(recent),
+                float(np.median(recent)) if recent else math.nan,
+                counts.lost,
+                counts.bytes_discarded,
+            )
+        )
+        estimate = self.session.estimate
+        self.readouts.show_estimate(estimate)
+        if estimate is not None:
+            for row, heatmap in enumerate(self.heatmaps.values()):
+                heatmap.show_reading(estimate.curvature[row])
+
+    def _limit(self, name: str, values: np.ndarray) -> float:
+        """The colour limit of a quantity: locked, or following what it shows."""
+        locked = getattr(self.history.settings, f"range_{name}", 0.0)
+        largest = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
+        return locked or self.ranges[name].follow(largest, time.monotonic())
+
+    def _show_estimate(self, estimate: Estimate) -> None:
+        if not self.membrane.ready:
+            return  # a picture is due; the next tick brings a newer estimate
+        settings = self.history.settings
+        colour = settings.colour_by
+        values = self.session.surface_values(estimate, colour)
+        now = time.monotonic()
+        due = now >= self._next_heatmaps
+        if colour == "displacement":
+            top = self._limit(colour, values)
+            limits, colours, unit = (0.0, top), SEQUENTIAL, "mm"
+        else:
+            limit = self._limit(colour, estimate.curvature[COMPONENTS.index(colour)])
+            limits, colours, unit = (-limit, limit), DIVERGING, "1/m"
+        self.membrane.show_estimate(estimate, values, limits)
+        simulated = self.session.simulating
+        self.membrane.show_loads(
+            self._loads if simulated else (), estimate.true_contact if self._moving else None
+        )
+        self.colour_bar.show_scale(colours, limits, unit)
+        if due:
+            self._next_heatmaps = now + _HEATMAPS
+            for row, (name, heatmap) in enumerate(self.heatmaps.items()):
+                readings = estimate.curvature[row]
+                heatmap.show_values(readings, self._limit(name, readings))
+
+    # Small things.
+
+    def _tell(self, text: str) -> None:
+        self.statusBar().showMessage(text, 10_000)
+
+    def picture(self, path: Path) -> bool:
+        """Save the window, 3-D picture included, as a PNG; whether it could be written."""
+        return self.grab().save(str(path), "PNG")
+
+    def _save_picture(self) -> None:
+        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png"))
+        done = self.picture(path)
+        self._tell(f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}")
+
+    def _show_shortcuts(self) -> None:
+        rows = [
+            f"<tr><td><b>{entry.action.shortcut().toString()}</b>&nbsp;&nbsp;</td>"
+            f"<td>{entry.action.text().replace('&', '')}</td></tr>"
+            for entry in self.actions_by_name.entries.values()
+            if not entry.action.shortcut().isEmpty()
+        ]
+        box = QMessageBox(self)
+        box.setWindowTitle("Shortcuts")
+        box.setText(f"<table>{''.join(rows)}</table>")
+        box.setModal(False)
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.show()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        guard.forget(self._tell)
+        self.session.close()
+        self.membrane.close_plotter()
+        super().closeEvent(event)
