@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtWidgets import QMainWindow, QMenu
 
 from kappaskin_app.guard import guarded
 
@@ -24,13 +24,14 @@ class Actions:
     def __init__(self, window: QMainWindow) -> None:
         self._window = window
         self.entries: dict[str, Entry] = {}
+        self._menus: dict[str, QMenu] = {}
 
     def add(
         self,
         name: str,
         menu: str,
         text: str,
-        act: Callable[[], None],
+        act: Callable[[], object],
         shortcut: str = "",
         tip: str = "",
     ) -> QAction:
@@ -53,12 +54,10 @@ class Actions:
         self._menu(menu).addAction(action)
         self._window.addAction(action)
 
-    def _menu(self, title: str):
-        bar = self._window.menuBar()
-        for action in bar.actions():
-            if action.text() == title and action.menu():
-                return action.menu()
-        return bar.addMenu(title)
+    def _menu(self, title: str) -> QMenu:
+        if title not in self._menus:
+            self._menus[title] = self._window.menuBar().addMenu(title)
+        return self._menus[title]
 
     def __getitem__(self, name: str) -> QAction:
         return self.entries[name].action

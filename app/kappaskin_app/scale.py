@@ -6,11 +6,11 @@ _PATIENCE = 2.0  # s that the values must stay small before the range narrows
 
 
 def round_up(value: float) -> float:
-    """The least of 1, 2, 5 times a power of ten that is at least `value`."""
+    """The least of 1, 1.5, 2, 3, 5, 7 times a power of ten that is at least `value`."""
     if not value > 0:
         return 0.0
     power = 10.0 ** math.floor(math.log10(value))
-    return next(m * power for m in (1, 2, 5, 10) if m * power >= value * (1 - 1e-12))
+    return next(m * power for m in (1, 1.5, 2, 3, 5, 7, 10) if m * power >= value * (1 - 1e-12))
 
 
 class SteadyRange:

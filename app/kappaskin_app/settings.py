@@ -58,6 +58,12 @@ LOAD_CASES = (
     ("two-points", "Two points, free"),
     ("free-line", "Line, free"),
 )
+COLOURS = (
+    ("displacement", "Displacement"),
+    ("xx", "Curvature xx"),
+    ("yy", "Curvature yy"),
+    ("xy", "Twist xy"),
+)
 FREE_CASES = ("point", "two-points", "free-line")
 TWO_ENDED = ("two-points", "free-line")
 
@@ -137,12 +143,7 @@ class Settings:
             "Colour",
             "What colours the skin: how far it moved, or how much it bends along x (xx), along y "
             "(yy) or twists (xy) (Eqs. 3 to 5).",
-            (
-                ("displacement", "Displacement"),
-                ("xx", "Curvature xx"),
-                ("yy", "Curvature yy"),
-                ("xy", "Twist xy"),
-            ),
+            COLOURS,
         ),
     )
     exaggeration: float = _ask(

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections import deque
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QMainWindow,
     QMessageBox,
     QScrollArea,
+    QToolBar,
     QVBoxLayout,
     QWidget,
 )
@@ -30,7 +31,7 @@ from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.view import ViewPanel
 from kappaskin_app.scale import SteadyRange
 from kappaskin_app.session import Session
-from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.settings import COLOURS, Settings, ask_of
 from kappaskin_app.simulation import dragged, scene_of
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, THEMES, palette
 from kappaskin_app.views.badge import LOST, OFF, Badge
@@ -66,8 +67,8 @@ class MainWindow(QMainWindow):
         self._shown_sensor: object = None
         self._next_heatmaps = self._next_numbers = 0.0
         self._gesture, self._grabbed_end = -1, False
-        self._drawn: deque[float] = deque(maxlen=256)
         self.setCentralWidget(self._centre())
+        self._make_header()
         self._make_docks()
         self.actions_by_name = Actions(self)
         self._make_actions()
@@ -79,18 +80,23 @@ class MainWindow(QMainWindow):
         self.session.connect_to(source)
 
     def _centre(self) -> QWidget:
-        centre, top, middle = QWidget(), QHBoxLayout(), QHBoxLayout()
-        top.setContentsMargins(8, 6, 8, 2)
-        top.addWidget(self.badge)
-        top.addWidget(self.readouts, 1)
-        middle.setSpacing(0)
-        middle.addWidget(self.membrane, 1)
-        middle.addWidget(self.colour_bar)
-        around = QVBoxLayout(centre)
-        around.setContentsMargins(0, 0, 0, 0)
-        around.addLayout(top)
-        around.addLayout(middle, 1)
+        centre = QWidget()
+        beside = QHBoxLayout(centre)
+        beside.setContentsMargins(0, 0, 0, 0)
+        beside.setSpacing(0)
+        beside.addWidget(self.membrane, 1)
+        beside.addWidget(self.colour_bar)
         return centre
+
+    def _make_header(self) -> None:
+        """The badge and the numbers, across the whole window."""
+        header = QToolBar("Header", self)
+        header.setObjectName("header")
+        header.setMovable(False)
+        header.toggleViewAction().setEnabled(False)
+        header.addWidget(self.badge)
+        header.addWidget(self.readouts)
+        self.addToolBar(header)
 
     def _make_docks(self) -> None:
         panels, stack = QWidget(), QVBoxLayout()
@@ -109,11 +115,11 @@ class MainWindow(QMainWindow):
             column.addWidget(heatmap, 1)
         maps.setLayout(column)
         maps.setMinimumWidth(270)
+        left = Qt.DockWidgetArea.LeftDockWidgetArea
+        right = Qt.DockWidgetArea.RightDockWidgetArea
         self._docks = [
-            self._dock("settings", "Settings", scroll, Qt.DockWidgetArea.LeftDockWidgetArea),
-            self._dock(
-                "curvature", "Curvature, by element", maps, Qt.DockWidgetArea.RightDockWidgetArea
-            ),
+            self._dock("settings", "Settings", scroll, left),
+            self._dock("curvature", "Curvature, by element", maps, right),
         ]
 
     def _dock(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
@@ -124,71 +130,34 @@ class MainWindow(QMainWindow):
         return dock
 
     def _make_actions(self) -> None:
-        actions, stack = self.actions_by_name, self.history.stack
-        actions.add(
-            "picture",
-            "&File",
-            "Save &picture",
-            self._save_picture,
-            "Ctrl+S",
-            "Save a picture of the window in the present folder.",
-        )
-        actions.add("quit", "&File", "&Quit", self.close, "Ctrl+Q")
+        add, stack = self.actions_by_name.add, self.history.stack
+        toggle = self._toggle
+        file, edit, source, view, help_ = "&File", "&Edit", "&Source", "&View", "&Help"
+        add("picture", file, "Save &picture", self._save_picture, "Ctrl+S")
+        add("quit", file, "&Quit", self.close, "Ctrl+Q")
         undo, redo = stack.createUndoAction(self), stack.createRedoAction(self)
         undo.setShortcut("Ctrl+Z")
         redo.setShortcut("Ctrl+Shift+Z")
-        actions.register("undo", "&Edit", undo)
-        actions.register("redo", "&Edit", redo)
-        actions.add(
-            "reset",
-            "&Edit",
-            "&Reset settings",
-            self._reset,
-            "",
-            "Set every setting back to how it was at the start.",
-        )
-        actions.add(
-            "simulate", "&Source", "&Simulated skin", lambda: self._connect("sim:"), "Ctrl+M"
-        )
-        actions.add(
-            "connect",
-            "&Source",
-            "&Connect",
-            lambda: self._connect(self.connection.source()),
-            "Ctrl+Return",
-            "Connect to the source chosen in the Connection panel.",
-        )
-        actions.add("disconnect", "&Source", "&Disconnect", self.session.disconnect_from, "Ctrl+D")
-        actions.add("ports", "&Source", "&Look for ports", self._find_ports, "F5")
-        for number, (value, words) in enumerate(ask_of("colour_by").options, 1):  # pyright: ignore
-            actions.add(
-                f"colour-{value}",
-                "&View",
-                f"Colour by {words.lower()}",
-                lambda value=value: self._wish("colour_by", value),
-                f"Ctrl+{number}",
-            )
-        actions.add("higher", "&View", "Draw &higher", lambda: self._exaggerate(1), "Ctrl++")
-        actions.add("lower", "&View", "Draw &lower", lambda: self._exaggerate(-1), "Ctrl+-")
-        actions.add(
-            "elements",
-            "&View",
-            "Show or hide &elements",
-            lambda: self._toggle("show_elements"),
-            "E",
-        )
-        actions.add(
-            "truth",
-            "&View",
-            "Show or hide the &true surface",
-            lambda: self._toggle("show_truth"),
-            "T",
-        )
-        actions.add("camera", "&View", "Reset &camera", self.membrane.reset_camera, "R")
-        actions.add("theme", "&View", "Light or &dark", self._switch_theme, "Ctrl+T")
+        self.actions_by_name.register("undo", edit, undo)
+        self.actions_by_name.register("redo", edit, redo)
+        add("reset", edit, "&Reset settings", self._reset)
+        add("simulate", source, "&Simulated skin", lambda: self._connect("sim:"), "Ctrl+M")
+        add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
+        add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
+        add("ports", source, "&Look for ports", self._find_ports, "F5")
+        for number, (value, words) in enumerate(COLOURS, 1):
+            colour = partial(self._wish, "colour_by", value)
+            add(f"colour-{value}", view, f"Colour by {words.lower()}", colour, f"Ctrl+{number}")
+        add("higher", view, "Draw &higher", lambda: self._exaggerate(1), "Ctrl++")
+        add("lower", view, "Draw &lower", lambda: self._exaggerate(-1), "Ctrl+-")
+        add("elements", view, "Show or hide &elements", partial(toggle, "show_elements"), "Ctrl+E")
+        add("truth", view, "Show or hide &true surface", partial(toggle, "show_truth"), "Ctrl+U")
+        add("camera", view, "Reset &camera", self.membrane.reset_camera, "Ctrl+R")
+        add("theme", view, "Light or &dark", self._switch_theme, "Ctrl+T")
         for dock in self._docks:
-            actions.register(f"dock-{dock.objectName()}", "&View", dock.toggleViewAction())
-        actions.add("shortcuts", "&Help", "&Shortcuts", self._show_shortcuts, "F1")
+            name = f"dock-{dock.objectName()}"
+            self.actions_by_name.register(name, view, dock.toggleViewAction())
+        add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
 
     def _wire(self) -> None:
         for panel in (self.load, self.noise, self.basis, self.view):
@@ -204,9 +173,7 @@ class MainWindow(QMainWindow):
         self.membrane.load_released.connect(guarded(self._release))
         for name, heatmap in self.heatmaps.items():
             heatmap.pointed.connect(guarded(self._point))
-            heatmap.lock_wanted.connect(
-                guarded(lambda limit, name=name: self._wish(f"range_{name}", limit))
-            )
+            heatmap.lock_wanted.connect(guarded(partial(self._wish, f"range_{name}")))
         guard.on_failure(self._tell)
 
     # Wishes: a person wants something; a change of settings is always a command.
@@ -233,13 +200,12 @@ class MainWindow(QMainWindow):
         self.connection.show_source(source)
         self.session.connect_to(source)
 
+    def _connect_chosen(self) -> None:
+        self._connect(self.connection.source())
+
     def _find_ports(self) -> None:
-        self.connection.show_ports(
-            [
-                (found["port"], f"{found['port']}  {found['description']}")
-                for found in serial_ports()
-            ]
-        )
+        found = [(port["port"], port["description"]) for port in serial_ports()]
+        self.connection.show_ports([(port, f"{port}  {words}") for port, words in found])
 
     def _grab(self, x: float, y: float) -> None:
         settings = self.history.settings
@@ -271,8 +237,8 @@ class MainWindow(QMainWindow):
         self.membrane.show_options(
             settings.exaggeration, settings.show_elements, settings.show_truth
         )
-        self._loads = scene_of(settings).loads
-        self._moving = scene_of(settings).motion is not None
+        scene = scene_of(settings)
+        self._loads, self._moving = scene.loads, scene.motion is not None
         self._show_theme(settings.theme)
 
     def _show_theme(self, name: str) -> None:

@@ -18,6 +18,7 @@ from kappaskin.frames import Touch as Touch
 from kappaskin.frames import Truth as Truth
 from kappaskin.layout import SensorLayout as SensorLayout
 from kappaskin.mechanics import LineLoad as LineLoad
+from kappaskin.mechanics import Load as Load
 from kappaskin.mechanics import Plate as Plate
 from kappaskin.mechanics import PointLoad as PointLoad
 from kappaskin.patch import Patch as Patch

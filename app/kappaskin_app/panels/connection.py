@@ -6,6 +6,7 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QHBoxLayout,
     QLabel,
+    QLineEdit,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -42,7 +43,9 @@ class ConnectionPanel(QGroupBox):
         self._message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
         self._message.setObjectName("connection-message")
         self._connect.clicked.connect(lambda: self.connect_wanted.emit(self.source()))
-        self._sources.lineEdit().returnPressed.connect(self._connect.click)
+        line = QLineEdit()
+        line.returnPressed.connect(self._connect.click)
+        self._sources.setLineEdit(line)
         self._disconnect.clicked.connect(self.disconnect_wanted)
         self._look.clicked.connect(self.ports_wanted)
         buttons = QHBoxLayout()

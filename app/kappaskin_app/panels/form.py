@@ -28,24 +28,31 @@ class _Editor:
     show: Callable[[Any], None]
 
 
+def _whole(how: Range, said: Callable[[Any], None]) -> _Editor:
+    box = QSpinBox()
+    box.setRange(int(how.least), int(how.most))
+    box.setSingleStep(int(how.step))
+    box.valueChanged.connect(said)
+    return _Editor(_dressed(box, how), lambda value: box.setValue(int(value)))
+
+
 def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
-    box: QSpinBox | QDoubleSpinBox
-    if how.decimals:
-        box = QDoubleSpinBox()
-        box.setDecimals(how.decimals)
-        box.setRange(how.least * how.scale, how.most * how.scale)
-        box.setSingleStep(how.step * how.scale)
-        box.valueChanged.connect(lambda value: said(value / how.scale))
-    else:
-        box = QSpinBox()
-        box.setRange(int(how.least), int(how.most))
-        box.setSingleStep(int(how.step))
-        box.valueChanged.connect(said)
+    if not how.decimals:
+        return _whole(how, said)
+    box = QDoubleSpinBox()
+    box.setDecimals(how.decimals)
+    box.setRange(how.least * how.scale, how.most * how.scale)
+    box.setSingleStep(how.step * how.scale)
+    box.valueChanged.connect(lambda value: said(value / how.scale))
+    return _Editor(_dressed(box, how), lambda value: box.setValue(value * how.scale))
+
+
+def _dressed(box: QSpinBox | QDoubleSpinBox, how: Range) -> QWidget:
     if how.unit:
         box.setSuffix(f" {how.unit}")
     box.setKeyboardTracking(False)
     box.setAlignment(Qt.AlignmentFlag.AlignRight)
-    return _Editor(box, lambda value: box.setValue(type(box.value())(value * how.scale)))
+    return box
 
 
 def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:

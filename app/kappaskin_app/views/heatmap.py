@@ -22,7 +22,8 @@ def coloured(values: Array, limits: tuple[float, float], colours: Colours, missi
     rgb = colours[index]
     gone = ~np.isfinite(values)
     if gone.any():
-        rgb[gone] = QColor(missing).getRgb()[:3]
+        grey = QColor(missing)
+        rgb[gone] = grey.red(), grey.green(), grey.blue()
     return rgb
 
 

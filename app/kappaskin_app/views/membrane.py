@@ -3,6 +3,7 @@
 import time
 from collections import deque
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -12,7 +13,7 @@ from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
-from kappaskin import Estimate, LineLoad, Patch, PointLoad, Sensor
+from kappaskin import Estimate, LineLoad, Load, Patch, Sensor
 from kappaskin_app.theme import Colours, Theme
 
 Array = NDArray[np.float64]
@@ -20,7 +21,6 @@ Array = NDArray[np.float64]
 MM = 1e3
 _GRAB = 28  # pixels around a load's arrow within which the mouse takes hold of it
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
-_WAITING = 0.02  # s after which a picture asked for but not drawn is asked for again
 
 
 class MembraneView(QWidget):
@@ -57,12 +57,13 @@ class MembraneView(QWidget):
     def _make_actors(self) -> None:
         plotter = self.plotter
         self._colours = pv.LookupTable()
-        self._mesh = pv.PolyData()
-        self._wire = pv.PolyData()
-        self._elements = pv.PolyData(np.zeros((1, 3)))
-        self._line = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
-        self._surface_actor: pv.Actor | None = None
-        self._wire_actor: pv.Actor | None = None
+        # Any: what PyVista says of its own types is too narrow to write into arrays in place.
+        self._mesh: Any = pv.PolyData()
+        self._wire: Any = pv.PolyData()
+        self._elements: Any = pv.PolyData(np.zeros((1, 3)))
+        self._line: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
+        self._surface_actor: Any = None
+        self._wire_actor: Any = None
         unlit = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
         self._elements_actor = plotter.add_mesh(
             self._elements, style="points", point_size=5, **unlit
@@ -76,7 +77,7 @@ class MembraneView(QWidget):
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=1.8), color="#1fd17a", reset_camera=False, render=False
         )
-        self._labels = [pv.Label(size=15) for _ in range(3)]
+        self._labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
         for label in self._labels:
             plotter.add_actor(label, reset_camera=False, render=False)
 
@@ -232,7 +233,7 @@ class MembraneView(QWidget):
             height = float(self._height_at(position[None])[0])
             actor.position = (position[0] * MM, position[1] * MM, height)
 
-    def show_loads(self, loads: Sequence[PointLoad | LineLoad], moving_to: Array | None) -> None:
+    def show_loads(self, loads: Sequence[Load], moving_to: Array | None) -> None:
         """Draw the simulated loads, none for a real sensor; a moving one where it is now."""
         moving = moving_to is not None and bool(np.isfinite(moving_to).all())
         centres = [moving_to] if moving else [load.centre() for load in loads]

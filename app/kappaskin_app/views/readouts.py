@@ -29,14 +29,14 @@ FIELDS = {
     "age": ("Latency", "Age of the frame when it was drawn, since its bytes were read."),
     "lost": (
         "Lost",
-        "Frames that never came (gaps in the sequence), and bytes that made no sense.",
+        "Frames that never came, and bytes that made no sense.",
     ),
     "contact": ("Contact", "Where one point load explains the readings best, with its error bar."),
     "force": ("Force", "How hard that load presses, with its error bar."),
     "depth": ("Depth", "Displacement of the skin at the contact, with its error bar."),
     "error": (
         "Error at load",
-        "Reconstructed minus true displacement at the load (simulated only).",
+        "Reconstructed minus true displacement there (simulated only).",
     ),
     "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
 }
