@@ -64,7 +64,7 @@ class MainWindow(QMainWindow):
         self.load, self.noise, self.view = LoadPanel(), NoisePanel(), ViewPanel()
         self.ranges = {name: SteadyRange(0.5) for name in COMPONENTS}
         self.ranges["displacement"] = SteadyRange(0.1)
-        self._shown_sensor: object = None
+        self._met = 0
         self._next_heatmaps = self._next_numbers = 0.0
         self._gesture, self._grabbed_end = -1, False
         self.setCentralWidget(self._centre())
@@ -250,24 +250,25 @@ class MainWindow(QMainWindow):
             view.show_theme(theme)
 
     def _show_status(self, status: Status) -> None:
-        sensor = status.sensor
-        if sensor is not None and sensor is not self._shown_sensor:
+        if status.sensor is not None and status.meetings != self._met:
             self._meet(status)
         state = self.session.badge()
         self.badge.show_state(state)
-        self.membrane.show_lost(state in (LOST, OFF))
+        lost = state in (LOST, OFF)
+        for view in (self.membrane, *self.heatmaps.values()):
+            view.show_lost(lost)
         self.connection.show_status(status)
         self.basis.show_status(status)
         simulating = self.session.simulating
         self.load.show_simulating(simulating)
         self.noise.show_simulating(simulating)
-        self._show_health(status)
+        self._show_health(status, lost)
 
     def _meet(self, status: Status) -> None:
         sensor, setup = status.sensor, status.setup
         if sensor is None:
             return
-        self._shown_sensor = sensor
+        self._met = status.meetings
         self.membrane.show_skin(sensor, setup.nx, setup.ny)
         settings = self.history.settings
         self.membrane.show_options(
@@ -276,12 +277,12 @@ class MainWindow(QMainWindow):
         for heatmap in self.heatmaps.values():
             heatmap.show_layout(sensor.layout)
 
-    def _show_health(self, status: Status) -> None:
+    def _show_health(self, status: Status, lost: bool) -> None:
         now = time.monotonic()
         if now < self._next_numbers:
             return
         self._next_numbers = now + _NUMBERS
-        recent = [age for when, age in self.membrane.ages if when > now - 1.0]
+        recent = [age for when, age in self.membrane.ages if when > now - 1.0 and not lost]
         counts = status.accounting
         self.readouts.show_health(
             Health(
@@ -292,11 +293,11 @@ class MainWindow(QMainWindow):
                 counts.bytes_discarded,
             )
         )
-        estimate = self.session.estimate
+        estimate = None if lost else self.session.estimate
         self.readouts.show_estimate(estimate)
-        if estimate is not None:
+        if self.session.estimate is not None:
             for row, heatmap in enumerate(self.heatmaps.values()):
-                heatmap.show_reading(estimate.curvature[row])
+                heatmap.show_reading(self.session.estimate.curvature[row])
 
     def _limit(self, name: str, values: np.ndarray) -> float:
         """The colour limit of a quantity: locked, or following what it shows."""

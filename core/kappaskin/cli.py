@@ -65,8 +65,14 @@ def tables(*, json: Annotated[bool, Parameter(negative="")] = False) -> None:
     print("With noise: means over 200 draws, error +- one standard deviation.")
 
 
+# A hyphen is let through so that -1x8 is refused as a basis, not as an option.
+_Pair = Annotated[str, Parameter(allow_leading_hyphen=True)]
+
+
 @app.command
-def reconstruct(readings: Path, *, out: Path, basis: str = "8x8", grid: str | None = None) -> None:
+def reconstruct(
+    readings: Path, *, out: Path, basis: _Pair = "8x8", grid: _Pair | None = None
+) -> None:
     """Turn a file of curvature readings into a file of shapes.
 
     READINGS is an NPZ with `size` (2,) m, `positions` (P, 2) m, `curvature` (T, 3, P) or (3, P) in
@@ -163,16 +169,21 @@ def _print_json(value: Any) -> None:
 
 def _add_commands() -> None:
     for entry in metadata.entry_points(group="kappaskin.commands"):
-        app.command(entry.load(), name=entry.name)
+        if entry.name not in app:
+            app.command(entry.load(), name=entry.name)
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit code is 0 when done and 2 when refused."""
     _add_commands()
     try:
-        app(arguments, exit_on_error=False, print_error=False)
-    except (Refusal, CycloptsError) as refusal:
+        app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+    except Refusal as refusal:
         print(f"kappaskin: {refusal}", file=sys.stderr)
+        return REFUSED
+    except CycloptsError as error:
+        print(f"kappaskin: {error} See `kappaskin --help`.", file=sys.stderr)
         return REFUSED
     except BrokenPipeError:
         sys.stderr.close()  # whoever read our output has gone

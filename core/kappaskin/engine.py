@@ -37,7 +37,7 @@ class Status:
 
     `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
     `message` says why. `refusal` says why the setup asked for last was not taken. `rate` in
-    frames/s, `reader_gap` the 99th percentile of the time between two reads in s, `last_frame`
+    frames/s, `meetings` counts the devices that said what they are, `reader_gap` the 99th percentile of the time between two reads in s, `last_frame`
     and `reported` on the monotonic clock.
     """
 
@@ -46,6 +46,7 @@ class Status:
     message: str = ""
     refusal: str = ""
     sensor: Sensor | None = None
+    meetings: int = 0
     setup: Setup = field(default_factory=Setup)
     generation: int = 0
     slot: "np.dtype[np.void] | None" = None
@@ -77,7 +78,7 @@ class _Loop:
         self._source: Source | None = None
         self._scene: Scene | None = None
         self._pipeline: Pipeline | None = None
-        self._status = Status()
+        self._status = ring.read_status() or Status()
         self._gaps: deque[float] = deque(maxlen=_GAPS)
         self._times: deque[float] = deque(maxlen=1024)
         self._last_read = math.nan
@@ -112,6 +113,7 @@ class _Loop:
                 message="",
                 sensor=None,
                 accounting=Accounting(),
+                rate=0.0,
                 last_frame=-math.inf,
             )
             if isinstance(request, Connect):
@@ -187,7 +189,9 @@ class _Loop:
     def _meet(self, sensor: Sensor | None) -> None:
         """A device said what it is: make the pipeline for it."""
         self._pipeline = None
-        self._status = replace(self._status, state=STREAMING, sensor=sensor)
+        self._status = replace(
+            self._status, state=STREAMING, sensor=sensor, meetings=self._status.meetings + 1
+        )
         self._play()
         self._set_up(self._status.setup)
 
@@ -247,6 +251,10 @@ class Engine:
         self._start()
 
     def _start(self) -> None:
+        # A process that takes over goes on counting, so that no generation comes twice.
+        was = self._ring.read_status() or Status()
+        fresh = Status(setup=self._setup, generation=was.generation, meetings=was.meetings)
+        self._ring.write_status(fresh)
         context = multiprocessing.get_context("spawn")
         theirs, ours = context.Pipe(duplex=False)
         self._requests = cast("Connection[Request, Request]", ours)

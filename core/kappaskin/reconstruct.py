@@ -1,6 +1,7 @@
 """A file of curvature readings to a file of shapes."""
 
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +18,38 @@ from kappaskin.patch import Patch
 _NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
 
 
+_MOST = 2**27  # numbers in one array: 1 GiB
+
+# What a damaged archive makes zipfile and NumPy raise: RuntimeError when it seems encrypted or
+# packed by a method there is not, MemoryError when it claims to be huge.
+_DAMAGES = (
+    OSError,
+    ValueError,
+    EOFError,
+    RuntimeError,
+    MemoryError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    # Opened here: np.load leaves a file that it opened itself open when the archive is damaged.
+    with path.open("rb") as file:
+        archive = np.load(file, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise ValueError("it holds a single array")
+        names = ("size", "positions", "curvature", "sigma")
+        return {name: archive[name] for name in names if name in archive}
+
+
 def _read(path: Path) -> dict[str, Array]:
     """The arrays of a readings file as numbers; nothing in it is ever executed."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise Refusal(f"{path}: expected an NPZ archive, got a single array")
-            names = [n for n in ("size", "positions", "curvature", "sigma") if n in archive]
-            found: dict[str, NDArray[Any]] = {name: archive[name] for name in names}
+        found = _arrays(path)
     except FileNotFoundError as error:
         raise Refusal(f"{path}: there is no such file; expected an NPZ with {_NEEDED}") from error
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, AttributeError) as error:
-        if isinstance(error, Refusal):
-            raise
+    except _DAMAGES as error:
         raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
     for name in ("size", "positions", "curvature"):
         if name not in found:
@@ -48,10 +68,26 @@ def _fit(basis: SineBasis, layout: SensorLayout, curvature: Array, sigma: Array 
     for frame, own in enumerate(sigma):
         try:
             fits.append(LeastSquares(basis, layout, own)(curvature[frame]))
-        except RankDeficient as error:
-            raise RankDeficient(f"frame {frame}: {error}") from error
+        except Refusal as error:
+            raise type(error)(f"frame {frame}: {error}") from error
     stacked = [np.stack([getattr(fit, name) for fit in fits]) for name in Fit.arrays]
     return Fit(fits[0].estimator, *stacked)
+
+
+def _check_sizes(basis: SineBasis, readings: int, surface: int) -> None:
+    """Refuse what would exhaust the memory before anything is computed."""
+    (Ni, Nj), N = basis.shape, basis.size
+    if readings < N:
+        raise RankDeficient(
+            f"expected at most {readings} functions for {readings} readings per frame, got "
+            f"{Ni} x {Nj} = {N}; use a smaller basis, or more elements"
+        )
+    if max(readings * N, surface) > _MOST:
+        raise Refusal(
+            f"expected at most {_MOST} numbers in one array, got {readings * N} in the operator "
+            f"of the {Ni} x {Nj} basis and {surface} in the surfaces; use a smaller basis, a "
+            "coarser grid or fewer frames"
+        )
 
 
 def reconstruct(
@@ -66,6 +102,10 @@ def reconstruct(
     size, curvature, sigma = found["size"], found["curvature"], found.get("sigma")
     if size.shape != (2,):
         raise Refusal(f"{readings}: expected size of shape (2,) in m, got {size.shape}")
+    if found["positions"].ndim != 2:
+        raise Refusal(
+            f"{readings}: expected positions of shape (P, 2) in m, got {found['positions'].shape}"
+        )
     patch = Patch(float(size[0]), float(size[1]))
     layout = SensorLayout.scattered(patch, found["positions"])
     if curvature.ndim == 2:
@@ -75,12 +115,14 @@ def reconstruct(
             f"{readings}: expected curvature of shape (T, 3, {len(layout)}) or "
             f"(3, {len(layout)}) for {len(layout)} positions, got {found['curvature'].shape}"
         )
-    if sigma is not None and sigma.ndim == 3 and sigma.shape != curvature.shape:
+    if sigma is not None and sigma.ndim > 2 and sigma.shape != curvature.shape:
         raise Refusal(
             f"{readings}: expected sigma of shape {curvature.shape} as curvature has, or "
             f"(3, {len(layout)}), or one number; got {sigma.shape}"
         )
     functions = SineBasis(patch, *basis)
+    points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
+    _check_sizes(functions, 3 * len(layout), points)
     fit = _fit(functions, layout, curvature, sigma)
     out = {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
     if grid is not None:

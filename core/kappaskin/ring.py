@@ -108,7 +108,8 @@ class Ring:
         data = pickle.dumps(status)
         if len(data) > _STATUS_SIZE:
             raise Refusal(f"expected a status of at most {_STATUS_SIZE} bytes, got {len(data)}")
-        self._header[self._COUNT] += 1
+        # Odd already when a writer was killed in the middle: |= sets it right, += would not.
+        self._header[self._COUNT] |= 1
         self._status[: len(data)] = np.frombuffer(data, np.uint8)
         self._header[self._LENGTH] = len(data)
         self._header[self._COUNT] += 1
@@ -155,7 +156,7 @@ class Ring:
 
     def read(self, generation: int, slot: np.dtype[np.void]) -> Estimate | None:
         """Reader: the latest estimate of `generation`, None when there is none yet."""
-        if generation != self._generation:
+        if generation != self._generation or slot != self._slots.dtype:
             self._map(slot)
             self._generation = generation
 
@@ -163,8 +164,10 @@ class Ring:
             written = int(self._header[self._WRITTEN])
             if not written:
                 return None
-            record = self._slots[(written - 1) % len(self._slots)].copy()
-            whole = record["opened"] == record["closed"] == written
+            here = self._slots[(written - 1) % len(self._slots)]
+            closed, record = here["closed"], here.copy()
+            # The tickets in the order opposite to the writer's, or a half may pass for a whole.
+            whole = closed == here["opened"] == written
             return record if whole and self._header[self._GENERATION] == generation else None
 
         if self._header[self._GENERATION] != generation:

@@ -71,7 +71,7 @@ class Scene:
             self.transduction,
             self.plate.rigidity,
             self.rate,
-            name=f"Simulated skin: {self.name}",
+            name="Simulated skin",
             serial_number="SIM-0001",
             firmware="kappaskin simulator",
             simulated=True,

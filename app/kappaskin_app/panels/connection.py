@@ -26,62 +26,62 @@ class ConnectionPanel(QGroupBox):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Connection", parent)
-        self._sources = QComboBox(editable=True, insertPolicy=QComboBox.InsertPolicy.NoInsert)  # pyright: ignore[reportCallIssue]
-        self._sources.setObjectName("source")
-        self._sources.setToolTip(
+        self.sources = QComboBox(editable=True, insertPolicy=QComboBox.InsertPolicy.NoInsert)  # pyright: ignore[reportCallIssue]
+        self.sources.setObjectName("source")
+        self.sources.setToolTip(
             "The simulated skin, a serial port found on this machine, or a port or URL typed here, "
             "such as /dev/ttyACM0, COM3 or socket://host:port."
         )
-        self._sources.setMinimumContentsLength(12)
-        self._look = QPushButton("Look again")
-        self._look.setToolTip("Look for serial ports again.")
-        self._connect = QPushButton("Connect")
-        self._connect.setObjectName("connect")
-        self._disconnect = QPushButton("Disconnect")
-        self._disconnect.setObjectName("disconnect")
-        self._device = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
-        self._message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
-        self._message.setObjectName("connection-message")
-        self._connect.clicked.connect(lambda: self.connect_wanted.emit(self.source()))
+        self.sources.setMinimumContentsLength(12)
+        self.look_button = QPushButton("Look again")
+        self.look_button.setToolTip("Look for serial ports again.")
+        self.connect_button = QPushButton("Connect")
+        self.connect_button.setObjectName("connect")
+        self.disconnect_button = QPushButton("Disconnect")
+        self.disconnect_button.setObjectName("disconnect")
+        self.device = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.message.setObjectName("connection-message")
+        self.connect_button.clicked.connect(lambda: self.connect_wanted.emit(self.source()))
         line = QLineEdit()
-        line.returnPressed.connect(self._connect.click)
-        self._sources.setLineEdit(line)
-        self._disconnect.clicked.connect(self.disconnect_wanted)
-        self._look.clicked.connect(self.ports_wanted)
+        line.returnPressed.connect(self.connect_button.click)
+        self.sources.setLineEdit(line)
+        self.disconnect_button.clicked.connect(self.disconnect_wanted)
+        self.look_button.clicked.connect(self.ports_wanted)
         buttons = QHBoxLayout()
-        for button in (self._connect, self._disconnect, self._look):
+        for button in (self.connect_button, self.disconnect_button, self.look_button):
             buttons.addWidget(button)
         around = QVBoxLayout(self)
         around.setContentsMargins(8, 6, 8, 8)
-        around.addWidget(self._sources)
+        around.addWidget(self.sources)
         around.addLayout(buttons)
-        around.addWidget(self._device)
-        around.addWidget(self._message)
+        around.addWidget(self.device)
+        around.addWidget(self.message)
         self.show_ports([])
 
     def source(self) -> str:
         """The name of the source chosen or typed."""
-        text = self._sources.currentText().strip()
-        index = self._sources.findText(text)
-        return str(self._sources.itemData(index)) if index >= 0 else text
+        text = self.sources.currentText().strip()
+        index = self.sources.findText(text)
+        return str(self.sources.itemData(index)) if index >= 0 else text
 
     def show_ports(self, ports: list[tuple[str, str]]) -> None:
         """Offer these (port, description) beside the simulation."""
-        chosen = self._sources.currentText()
-        with QSignalBlocker(self._sources):
-            self._sources.clear()
+        chosen = self.sources.currentText()
+        with QSignalBlocker(self.sources):
+            self.sources.clear()
             for value, words in (_SIMULATED, *ports):
-                self._sources.addItem(words, value)
+                self.sources.addItem(words, value)
             if chosen:
-                self._sources.setCurrentText(chosen)
+                self.sources.setCurrentText(chosen)
 
     def show_source(self, source: str) -> None:
-        index = self._sources.findData(source)
-        with QSignalBlocker(self._sources):
+        index = self.sources.findData(source)
+        with QSignalBlocker(self.sources):
             if index >= 0:
-                self._sources.setCurrentIndex(index)
+                self.sources.setCurrentIndex(index)
             else:
-                self._sources.setCurrentText(source)
+                self.sources.setCurrentText(source)
 
     def show_status(self, status: Status) -> None:
         sensor = status.sensor
@@ -94,10 +94,10 @@ class ConnectionPanel(QGroupBox):
             )
         elif status.state == "waiting":
             text = "Waiting for the device to say what it is\N{HORIZONTAL ELLIPSIS}"
-        if text != self._device.text():
-            self._device.setText(text)
-        self._device.setVisible(bool(text))
-        if status.message != self._message.text():
-            self._message.setText(status.message)
-        self._message.setVisible(bool(status.message))
-        self._disconnect.setEnabled(status.state != "off")
+        if text != self.device.text():
+            self.device.setText(text)
+        self.device.setVisible(bool(text))
+        if status.message != self.message.text():
+            self.message.setText(status.message)
+        self.message.setVisible(bool(status.message))
+        self.disconnect_button.setEnabled(status.state != "off")

@@ -86,12 +86,12 @@ class Panel(QGroupBox):
         self.form = QFormLayout()
         self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         self.form.setVerticalSpacing(5)
-        self._message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
-        self._message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         around = QVBoxLayout(self)
         around.setContentsMargins(8, 6, 8, 8)
         around.addLayout(self.form)
-        around.addWidget(self._message)
+        around.addWidget(self.message)
         self._editors: dict[str, _Editor] = {}
         for name in names:
             self._add(name)
@@ -122,6 +122,6 @@ class Panel(QGroupBox):
 
     def show_message(self, text: str) -> None:
         """Say something below the form, or nothing."""
-        if text != self._message.text():
-            self._message.setText(text)
-        self._message.setVisible(bool(text))
+        if text != self.message.text():
+            self.message.setText(text)
+        self.message.setVisible(bool(text))

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QWidget
 from kappaskin_app.panels.form import Panel
 from kappaskin_app.settings import FREE_CASES, TWO_ENDED, Settings
 
-_REAL = "A real sensor is connected; this belongs to the simulation."
+_REAL = "Only for the simulated skin; choose it under Connection."
 
 
 class LoadPanel(Panel):

@@ -18,7 +18,7 @@ def coloured(values: Array, limits: tuple[float, float], colours: Colours, missi
     """RGB (..., 3) of `values` (...) between `limits`; NaN in the colour `missing`."""
     low, high = limits
     share = (values - low) / (high - low) if high > low else np.full_like(values, 0.5)
-    index = np.clip(np.nan_to_num(share) * 255, 0, 255).astype(np.uint8)
+    index = (np.clip(np.nan_to_num(share), 0, 1) * 255).astype(np.uint8)
     rgb = colours[index]
     gone = ~np.isfinite(values)
     if gone.any():
@@ -32,12 +32,12 @@ class ColourBar(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._colours, self._limits, self._unit = DIVERGING, (-1.0, 1.0), "1/m"
+        self._colours, self.limits, self._unit = DIVERGING, (-1.0, 1.0), "1/m"
         self.setFixedWidth(64)
 
     def show_scale(self, colours: Colours, limits: tuple[float, float], unit: str) -> None:
-        if (self._limits, self._unit) != (limits, unit) or self._colours is not colours:
-            self._colours, self._limits, self._unit = colours, limits, unit
+        if (self.limits, self._unit) != (limits, unit) or self._colours is not colours:
+            self._colours, self.limits, self._unit = colours, limits, unit
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -50,7 +50,7 @@ class ColourBar(QWidget):
         painter.drawImage(bar, image)
         painter.setPen(self.palette().windowText().color())
         painter.drawText(QPointF(2, metrics.ascent()), self._unit)
-        low, high = self._limits
+        low, high = self.limits
         for share in (0.0, 0.5, 1.0):
             y = bar.bottom() - share * bar.height()
             text = f"{low + share * (high - low):.3g}".replace("-", "\N{MINUS SIGN}")
@@ -70,7 +70,7 @@ class _Cells(QWidget):
         self._values: Array = np.empty(0)
         self._colours: Colours = np.empty((0, 3), np.uint8)
         self._line = QColor("#888888")
-        self._under = -1
+        self._under, self._faded = -1, False
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(90, 90)
@@ -87,11 +87,16 @@ class _Cells(QWidget):
         self._colours = rgb
         self.update()
 
+    def show_faded(self, faded: bool) -> None:
+        if faded != self._faded:
+            self._faded = faded
+            self.update()
+
     def show_line(self, colour: str) -> None:
         self._line = QColor(colour)
         self.update()
 
-    def _area(self) -> QRectF:
+    def area_of_patch(self) -> QRectF:
         """The patch on the widget: as large as fits, in its own proportions."""
         patch = self._layout.patch if self._layout else None
         ratio = patch.a / patch.b if patch else 1.0
@@ -107,20 +112,21 @@ class _Cells(QWidget):
         side = 0.8 * math.sqrt(area.width() * area.height() / len(layout))
         return [
             QRectF(c.x() - side / 2, c.y() - side / 2, side, side)
-            for c in (self._point(area, x, y) for x, y in layout.positions)
+            for c in (self.pixel_of(area, x, y) for x, y in layout.positions)
         ]
 
-    def _point(self, area: QRectF, x: float, y: float) -> QPointF:
+    def pixel_of(self, area: QRectF, x: float, y: float) -> QPointF:
         patch = self._layout.patch if self._layout else None
         a, b = (patch.a, patch.b) if patch else (1.0, 1.0)
         return QPointF(area.left() + x / a * area.width(), area.bottom() - y / b * area.height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        area = self._area()
+        area = self.area_of_patch()
         layout = self._layout
         if layout is None or len(self._colours) != len(layout):
             return
+        painter.setOpacity(0.3 if self._faded else 1.0)
         if layout.shape:
             m, n = layout.shape
             # y points up on the skin, down in an image.
@@ -129,6 +135,7 @@ class _Cells(QWidget):
         else:
             for square, rgb in zip(self._squares(area), self._colours, strict=True):
                 painter.fillRect(square, QColor(*(int(v) for v in rgb)))
+        painter.setOpacity(1.0)
         painter.setPen(QPen(self._line, 1))
         painter.drawRect(area)
         if self._under >= 0:
@@ -144,7 +151,7 @@ class _Cells(QWidget):
         return QRectF(area.left() + p * width, area.bottom() - (q + 1) * height, width, height)
 
     def _element_at(self, at: QPointF) -> int:
-        layout, area = self._layout, self._area()
+        layout, area = self._layout, self.area_of_patch()
         if layout is None or not area.contains(at):
             return -1
         position = [
@@ -178,22 +185,22 @@ class Heatmap(QWidget):
         self.component = component
         self._title = QLabel(f"<b>\N{GREEK SMALL LETTER KAPPA}<sub>{component}</sub></b>")
         self._title.setToolTip(tip)
-        self._value = QLabel()
-        self._value.setToolTip("The element under the mouse, else the largest reading.")
-        self._lock = QToolButton(checkable=True, text="Lock range")  # pyright: ignore[reportCallIssue]
-        self._lock.setToolTip("Keep the colours' range as it is now; else it follows the readings.")
-        self._lock.clicked.connect(self._ask_lock)
-        self.cells, self._bar = _Cells(), ColourBar()
+        self.value = QLabel()
+        self.value.setToolTip("The element under the mouse, else the largest reading.")
+        self.lock = QToolButton(checkable=True, text="Lock range")  # pyright: ignore[reportCallIssue]
+        self.lock.setToolTip("Keep the colours' range as it is now; else it follows the readings.")
+        self.lock.clicked.connect(self._ask_lock)
+        self.cells, self.bar = _Cells(), ColourBar()
         self.cells.pointed.connect(self.pointed)
         self._limit, self._layout, self._element = 1.0, None, -1
         self._missing = "#888888"
         top = QHBoxLayout()
         top.addWidget(self._title)
-        top.addWidget(self._value, 1)
-        top.addWidget(self._lock)
+        top.addWidget(self.value, 1)
+        top.addWidget(self.lock)
         middle = QHBoxLayout()
         middle.addWidget(self.cells, 1)
-        middle.addWidget(self._bar)
+        middle.addWidget(self.bar)
         around = QVBoxLayout(self)
         around.setContentsMargins(6, 4, 4, 4)
         around.setSpacing(3)
@@ -201,12 +208,12 @@ class Heatmap(QWidget):
         around.addLayout(middle, 1)
 
     def _ask_lock(self, locked: bool) -> None:
-        self._lock.setChecked(not locked)  # the answer comes back through show_lock
+        self.lock.setChecked(not locked)  # the answer comes back through show_lock
         self.lock_wanted.emit(self._limit if locked else 0.0)
 
     def show_lock(self, locked: bool) -> None:
-        self._lock.setChecked(locked)
-        self._lock.setText("Locked" if locked else "Lock range")
+        self.lock.setChecked(locked)
+        self.lock.setText("Locked" if locked else "Lock range")
 
     def show_layout(self, layout: SensorLayout) -> None:
         self._layout = layout
@@ -223,7 +230,11 @@ class Heatmap(QWidget):
         self._limit = limit
         limits = (-limit, limit)
         self.cells.show_cells(coloured(values, limits, DIVERGING, self._missing))
-        self._bar.show_scale(DIVERGING, limits, "1/m")
+        self.bar.show_scale(DIVERGING, limits, "1/m")
+
+    def show_lost(self, lost: bool) -> None:
+        """Fade the cells while what they show is not coming in any more."""
+        self.cells.show_faded(lost)
 
     def show_reading(self, values: Array) -> None:
         """Write the value of the element pointed at, else the largest."""
@@ -239,7 +250,7 @@ class Heatmap(QWidget):
             finite = values[np.isfinite(values)]
             peak = finite[np.argmax(np.abs(finite))] if len(finite) else math.nan
             text = f"peak {peak:+.2f} 1/m" if len(finite) else "no readings"
-        self._value.setText(text.replace("-", "\N{MINUS SIGN}"))
+        self.value.setText(text.replace("-", "\N{MINUS SIGN}"))
 
     def show_theme(self, theme: Theme) -> None:
         self._missing = theme.missing

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal
+from PySide6.QtGui import QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 MM = 1e3
 _GRAB = 28  # pixels around a load's arrow within which the mouse takes hold of it
+_LIFT = 0.6  # mm of drawing above the surface, or half of a line drowns in it
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
@@ -49,9 +50,12 @@ class MembraneView(QWidget):
         self._exaggeration = 1.0
         self._layout_of: Sensor | None = None
         self._heights: Array = np.zeros((2, 2))
-        self._handles: Array = np.empty((0, 2))
+        self.handles: Array = np.empty((0, 2))
         self._dragging = False
+        self._plane, self._slip, self._held = 0.0, np.zeros(2), np.zeros(2)
         self._lost = False
+        self._fitted = True
+        self.plotter.iren.interactor.AddObserver("InteractionEvent", self._note_turning)
         self._theme: Theme | None = None
 
     def _make_actors(self) -> None:
@@ -84,7 +88,7 @@ class MembraneView(QWidget):
     def _make_lights(self) -> None:
         """One low lamp from the left for relief, and a weak one at the camera."""
         self.plotter.remove_all_lights()
-        lamp = pv.Light(position=(-1.0, 0.4, 0.75), light_type="scene light", intensity=0.85)
+        lamp = pv.Light(position=(-1.0, 0.4, 0.75), light_type="scene light", intensity=0.75)
         lamp.positional = False
         self.plotter.add_light(lamp)
         self.plotter.add_light(pv.Light(light_type="headlight", intensity=0.35))
@@ -93,6 +97,9 @@ class MembraneView(QWidget):
         now = time.monotonic()
         self._drawn = True
         self.ages.append((now, now - self._host_time))
+
+    def _note_turning(self, *_: object) -> None:
+        self._fitted = False  # the person chose this view: a new size must not undo it
 
     # What a skin looks like: rebuilt only when another one appears.
 
@@ -125,25 +132,23 @@ class MembraneView(QWidget):
             reset_camera=False,
             render=False,
             specular=0.1,
-            ambient=0.2,
-            diffuse=0.95,
+            ambient=0.45,
+            diffuse=0.75,
         )
         self._surface_actor.prop.interpolation = "Gouraud"
         self._wire_actor = plotter.add_mesh(
             self._wire, line_width=1, lighting=False, reset_camera=False, render=False
         )
-        # Drawn a little nearer than it is, or half of it drowns in the surface it lies on.
-        self._wire_actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        self._wire_actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -8.0)
         positions = np.column_stack([sensor.layout.positions * MM, np.zeros(len(sensor.layout))])
         self._elements.points = positions
         self._elements.verts = np.column_stack(
             [np.ones(len(positions), int), np.arange(len(positions))]
         ).ravel()
         self._place_labels(patch)
-        if self._layout_of is None or self._layout_of.layout.patch != patch:
-            self.reset_camera(patch)
+        another = self._layout_of is None or self._layout_of.layout.patch != patch
         self._layout_of = sensor
+        if another:
+            self.reset_camera()
         if self._theme:
             self.show_theme(self._theme)
 
@@ -165,22 +170,50 @@ class MembraneView(QWidget):
         ):
             label.input = text
             label.position = (*at, 0.0)
+            label.prop.justification_horizontal = "right" if text[0] == "y" else "left"
 
-    def reset_camera(self, patch: Patch | None = None) -> None:
-        """Look at the whole skin from the front, a little from the left."""
-        if patch is None and self._layout_of:
-            patch = self._layout_of.layout.patch
-        if patch is None:
+    def reset_camera(self) -> None:
+        """Look at the whole skin from the front, a little from the left, as large as it fits."""
+        if self._layout_of is None:
             return
+        patch, camera = self._layout_of.layout.patch, self.plotter.camera
         a, b = patch.a * MM, patch.b * MM
-        camera = self.plotter.camera
-        camera.focal_point = (a / 2, b / 2, 0.0)
-        camera.position = (a / 2 - 0.45 * max(a, b), b / 2 - 1.1 * max(a, b), 1.0 * max(a, b))
+        side, low = max(a, b), -0.2 * min(a, b)
+        camera.focal_point = (a / 2, b / 2, low / 2)
+        camera.position = (a / 2 - 0.45 * side, b / 2 - 1.1 * side, 1.0 * side)
         camera.up = (0.0, 0.0, 1.0)
-        low = -0.25 * max(a, b)
+        camera.view_angle = 30.0
         self.plotter.renderer.ResetCamera(0.0, a, 0.0, b, low, 0.0)
-        camera.zoom(1.3)
+        camera.SetWindowCenter(0.0, 0.0)
+        # Room for the labels beside the edges and the arrow above them.
+        margin = 0.06 * side
+        seen = np.array(
+            [
+                self._in_view(x, y, z)
+                for x in (-margin, a + 2.5 * margin)
+                for y in (-margin, b + margin)
+                for z in (low, 2 * margin)
+            ]
+        )
+        least, most = seen.min(axis=0), seen.max(axis=0)
+        zoom = 1.94 / float(np.max(most - least))
+        camera.zoom(zoom)
+        camera.SetWindowCenter(*(zoom * (least + most) / 2))
+        self.plotter.renderer.ResetCameraClippingRange()
+        self._fitted = True
         self.plotter.update()
+
+    def _in_view(self, x: float, y: float, z: float) -> Array:
+        """Where a point in mm is in the picture, (2,), each from -1 to 1."""
+        renderer = self.plotter.renderer
+        renderer.SetWorldPoint(x, y, z, 1.0)
+        renderer.WorldToView()
+        return np.array(renderer.GetViewPoint()[:2])
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._fitted:
+            QTimer.singleShot(0, self.reset_camera)  # after VTK has its new size
 
     # What changes with every estimate.
 
@@ -188,6 +221,8 @@ class MembraneView(QWidget):
         """Draw a shape, coloured by `values` (ny, nx) between `limits`, in any unit."""
         if self._surface_actor is None or estimate.surface.shape != self._heights.shape:
             return
+        if self._lost:
+            return  # a last one that came after the news
         self._heights = -MM * self._exaggeration * np.nan_to_num(estimate.surface)
         self._mesh.points[:, 2] = self._heights.ravel()
         self._mesh.point_data.active_normals[:] = self._normals(self._heights)
@@ -196,9 +231,11 @@ class MembraneView(QWidget):
         if self._wire_actor and self._wire_actor.visibility:
             known = bool(np.isfinite(estimate.true_surface[0, 0]))
             true = estimate.true_surface if known else estimate.surface
-            self._wire.points[:, 2] = (-MM * self._exaggeration * np.nan_to_num(true)).ravel()
+            self._wire.points[:, 2] = (
+                -MM * self._exaggeration * np.nan_to_num(true)
+            ).ravel() + _LIFT
         if self._elements_actor.visibility and self._layout_of:
-            self._elements.points[:, 2] = self._height_at(self._layout_of.layout.positions) + 0.6
+            self._elements.points[:, 2] = self._height_at(self._layout_of.layout.positions) + _LIFT
         self._place(self._contact, estimate.touch.position)
         self._host_time = estimate.host_time
         self._request()
@@ -237,16 +274,16 @@ class MembraneView(QWidget):
         """Draw the simulated loads, none for a real sensor; a moving one where it is now."""
         moving = moving_to is not None and bool(np.isfinite(moving_to).all())
         centres = [moving_to] if moving else [load.centre() for load in loads]
-        self._handles = np.array(centres).reshape(-1, 2)
+        self.handles = np.array(centres).reshape(-1, 2)
         for number, arrow in enumerate(self._arrows):
             there = number < len(centres)
-            self._place(arrow, self._handles[number] if there else np.full(2, np.nan))
+            self._place(arrow, self.handles[number] if there else np.full(2, np.nan))
         lines = [load for load in loads if isinstance(load, LineLoad)]
         self._line_actor.visibility = bool(lines)
         for load in lines[:1]:
             s = np.linspace(0, 1, 41)[:, None]
             along = (1 - s) * [load.x0, load.y0] + s * [load.x1, load.y1]
-            points = np.column_stack([along * MM, self._height_at(along) + 0.5])
+            points = np.column_stack([along * MM, self._height_at(along) + _LIFT])
             if len(points) != self._line.n_points:
                 self._line.points = points
                 self._line.lines = [41, *range(41)]
@@ -265,6 +302,11 @@ class MembraneView(QWidget):
         """Colour by a map of 256 colours (256, 3)."""
         opaque = np.full((len(colours), 1), 255, np.uint8)
         self._colours.values = np.hstack([colours, opaque])
+
+    @property
+    def greyed(self) -> bool:
+        """Whether the skin is drawn without colours."""
+        return self._surface_actor is not None and not self._surface_actor.mapper.scalar_visibility
 
     def show_lost(self, lost: bool) -> None:
         """Grey the skin while what it shows is not coming in any more."""
@@ -305,7 +347,7 @@ class MembraneView(QWidget):
 
     def _near_handle(self, at: QPointF) -> Array | None:
         """The handle (2,) in m whose arrow is drawn near `at`."""
-        for handle in self._handles:
+        for handle in self.handles:
             height = float(self._height_at(handle[None])[0])
             tip, tail = (self._to_screen(handle, height + up) for up in (0.0, 22.0))
             along = tail - tip
@@ -321,7 +363,7 @@ class MembraneView(QWidget):
             return False
         self._dragging = True
         self._plane = float(self._height_at(handle[None])[0])
-        self._slip = handle - self._to_skin(at)
+        self._slip, self._held = handle - self._to_skin(at), handle
         self.load_grabbed.emit(*handle)
         return True
 
@@ -332,7 +374,11 @@ class MembraneView(QWidget):
             self.plotter.setCursor(shape)
             return False
         self.plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
-        self.load_dragged.emit(*(self._to_skin(at) + self._slip))
+        if len(self.handles):  # the skin sinks as the load moves on it: stay at its height
+            near = self.handles[np.argmin(np.linalg.norm(self.handles - self._held, axis=1))]
+            self._plane = float(self._height_at(near[None])[0])
+        self._held = self._to_skin(at) + self._slip
+        self.load_dragged.emit(*self._held)
         return True
 
     def _to_screen(self, position: Array, height: float) -> Array:
@@ -362,10 +408,10 @@ class MembraneView(QWidget):
 
     def handle_on_screen(self) -> QPointF | None:
         """Where in this view the first load's arrow ends, None without a load."""
-        if not len(self._handles):
+        if not len(self.handles):
             return None
-        height = float(self._height_at(self._handles[:1])[0])
-        return QPointF(*self._to_screen(self._handles[0], height))
+        height = float(self._height_at(self.handles[:1])[0])
+        return QPointF(*self._to_screen(self.handles[0], height))
 
     def close_plotter(self) -> None:
         """Before the window goes: give VTK's resources back."""

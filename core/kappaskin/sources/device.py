@@ -12,7 +12,7 @@ from kappaskin.simulate import Simulator
 from kappaskin.sources import information
 from kappaskin.sources.wire import encode_information, encode_samples
 
-_OUTBOX = 65536  # bytes a device holds before a frame goes unsent
+_OUTBOX = 2**19  # bytes held before a frame goes unsent: more than a second of a full scan
 _INTRODUCTION = 0.5  # s between two information messages
 
 
@@ -24,14 +24,14 @@ class PseudoDevice:
     """
 
     def __init__(self, scene: Scene, clock: Callable[[], float] = time.monotonic) -> None:
+        self._simulator, self._clock = Simulator(scene), clock
+        self._information = information.to_json(scene.sensor())
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self.port = os.ttyname(slave)
         # With no other holder of the slave end, a hang-up on the master says nobody listens.
         os.close(slave)
         os.set_blocking(self._master, False)
-        self._simulator, self._clock = Simulator(scene), clock
-        self._information = information.to_json(scene.sensor())
         self._width = 2 if scene.transduction.converter.bits <= 16 else 4
         self._outbox = bytearray()
         self.rate = scene.rate

@@ -2,19 +2,24 @@
 
 import errno
 import os
+import re
+import select
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
+from typing import cast
 
 import serial
+from serial.urlhandler import protocol_socket
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Frame
 from kappaskin.sensor import Sensor
 from kappaskin.sources import information
-from kappaskin.sources.wire import VERSION, Accounting, Decoder, Information, Message
+from kappaskin.sources.wire import VERSION, Accounting, Decoder, Information, Message, Samples
 
 BAUD_RATE = 2_000_000
 """What a UART must run at for 300 channels at 300 frames/s; USB ports ignore it."""
@@ -27,7 +32,7 @@ _BACKLOG = 4096  # reads that may wait; beyond it bytes are thrown away, and cou
 def _open(url: str) -> serial.SerialBase:
     try:
         return serial.serial_for_url(url, baudrate=BAUD_RATE, timeout=0.1, exclusive=True)
-    except (serial.SerialException, OSError, ValueError) as error:
+    except (serial.SerialException, OSError, ValueError, LookupError, re.error) as error:
         raise SourceError(_why_not(url, error)) from error
 
 
@@ -51,6 +56,10 @@ def _why_not(url: str, error: Exception) -> str:
     )
 
 
+def _highest(samples: Samples) -> int:
+    return int(samples.channels.max(initial=-1))
+
+
 def _group(url: str) -> str:
     try:
         import grp  # not on Windows
@@ -58,6 +67,17 @@ def _group(url: str) -> str:
         return grp.getgrgid(os.stat(url).st_gid).gr_name
     except (ImportError, OSError, KeyError):
         return "dialout"
+
+
+def _arriving(port: serial.SerialBase) -> bytes:
+    """What has come, after waiting 0.1 s at most for a first byte."""
+    if isinstance(port, protocol_socket.Serial):
+        # pyserial does not say how much a socket holds, and a longer read throws away what it has
+        # when the other end closes: with no time-out it is a single `recv`.
+        port.timeout = 0
+        select.select([port], [], [], 0.1)
+        return port.read(_BLOCK)
+    return port.read(cast("serial.Serial", port).in_waiting or 1)
 
 
 class SerialSource:
@@ -71,6 +91,7 @@ class SerialSource:
         self._decoder = Decoder()
         self._opened = clock()
         self._arrived: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
+        self._messages: deque[tuple[float, Message]] = deque()
         self._overrun = 0
         self._gone = threading.Event()
         self._closing = threading.Event()
@@ -83,14 +104,9 @@ class SerialSource:
 
     def _listen(self) -> None:
         """Move bytes with the time they came, until the line is gone."""
-        port = self._port
-        # A native port says how much waits; others fill a block until the time-out.
-        native = isinstance(port, serial.Serial)
-        if not native:
-            port.timeout = 0.005
         try:
             while not self._closing.is_set():
-                data = port.read(port.in_waiting or 1) if native else port.read(_BLOCK)
+                data = _arriving(self._port)
                 if data and self._arrived.qsize() > _BACKLOG:
                     self._overrun += len(data)
                 elif data:
@@ -99,12 +115,9 @@ class SerialSource:
             self._gone.set()
 
     def read(self, timeout: float) -> list[Frame]:
-        gone, frames = self._gone.is_set(), list[Frame]()
-        with suppress(Empty):
-            arrived = self._arrived.get(timeout=0 if gone else timeout)
-            while True:
-                frames += self._frames(*arrived)
-                arrived = self._arrived.get_nowait()
+        gone = self._gone.is_set()
+        self._decode(0.0 if gone or self._messages else timeout)
+        frames = self._frames()
         if gone and not frames:
             raise SourceError(
                 f"{self.url}: the line is gone: unplugged, or the device stopped; plug it in and "
@@ -114,9 +127,26 @@ class SerialSource:
             raise SourceError(self._why_unknown())
         return frames
 
-    def _frames(self, now: float, data: bytes) -> list[Frame]:
-        found = [self._frame(message, now) for message in self._decoder.feed(data)]
-        return [frame for frame in found if frame]
+    def _decode(self, timeout: float) -> None:
+        with suppress(Empty):
+            now, data = self._arrived.get(timeout=timeout)
+            while True:
+                self._messages += [(now, message) for message in self._decoder.feed(data)]
+                now, data = self._arrived.get_nowait()
+
+    def _frames(self) -> list[Frame]:
+        """The frames before the next message that changes the sensor, or cannot be used."""
+        frames: list[Frame] = []
+        while self._messages and not (frames and self._upsets(self._messages[0][1])):
+            now, message = self._messages.popleft()
+            if frame := self._frame(message, now):
+                frames.append(frame)
+        return frames
+
+    def _upsets(self, message: Message) -> bool:
+        if isinstance(message, Information):
+            return message.text != self._information
+        return self._sensor is not None and _highest(message) >= self._sensor.channels
 
     def _frame(self, message: Message, now: float) -> Frame | None:
         if isinstance(message, Information):
@@ -126,10 +156,9 @@ class SerialSource:
             return None
         if self._sensor is None:
             return None  # counts mean nothing before the device says what they count
-        beyond = int(message.channels.max(initial=-1))
-        if beyond >= self._sensor.channels:
+        if self._upsets(message):
             raise SourceError(
-                f"{self.url}: the device sends channel {beyond} but says it has "
+                f"{self.url}: the device sends channel {_highest(message)} but says it has "
                 f"{self._sensor.channels}; its firmware and its information disagree"
             )
         return Frame(message.sequence, message.time, now, message.channels, message.counts)

@@ -10,6 +10,7 @@ from kappaskin.simulate import Simulator
 from kappaskin.sources.wire import Accounting
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
+_ROUNDING = 0  # of a frame: a clock that was slept to may stand a rounding error before it
 
 
 class SimulatedSource:
@@ -41,7 +42,7 @@ class SimulatedSource:
         if due > now:
             self._sleep(min(due - now, timeout))
             now = self._clock()
-        ready = int((now - self._start) * rate) + 1 - self._n
+        ready = int((now - self._start) * rate + _ROUNDING) + 1 - self._n
         if ready <= 0:
             return []
         skipped = max(0, ready - max(1, int(_BACKLOG * rate)))

@@ -14,6 +14,7 @@ import binascii
 import struct
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from kappaskin.frames import Counts
 VERSION = 1
 INFORMATION, SAMPLES = 1, 2
 LONGEST = 2**18
-"""Bytes after which a message without an end is given up: 65,536 channels of 4 bytes."""
+"""Bytes after which a message without an end is given up: four times 65,535 counts of 4 bytes."""
 
 _HEADER = struct.Struct("<BBIQ")
 _CHECKSUM = struct.Struct("<I")
@@ -97,10 +98,9 @@ def encode_samples(
 ) -> bytes:
     """The bytes of a samples message with `width` (2 or 4) bytes per count."""
     starts = np.flatnonzero(np.diff(channels, prepend=-2) != 1)
-    ends = [*starts[1:], len(channels)]
     if len(starts) > 255:
         raise Refusal(f"expected at most 255 runs of channels, got {len(starts)}")
-    runs = [(int(channels[s]), int(e - s)) for s, e in zip(starts, ends, strict=True)]
+    runs = [(int(channels[s]), int(e - s)) for s, e in pairwise([*starts, len(channels)])]
     payload = struct.pack("<BB", width, len(runs))
     payload += b"".join(struct.pack("<HH", *run) for run in runs)
     return _encode(SAMPLES, sequence, time, payload + counts.astype(f"<i{width}").tobytes())

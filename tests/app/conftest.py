@@ -1,0 +1,92 @@
+"""A real window on a real (virtual) display, and nothing left behind it."""
+
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication, QWidget
+
+from kappaskin_app import guard
+from kappaskin_app.window import MainWindow
+
+if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+    pytest.exit("the app's tests need a display: run `python3 packaging/start.py test`", 2)
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind(qapp: QApplication, request: pytest.FixtureRequest) -> Iterator[None]:
+    failures: list[str] = []
+    guard.on_failure(failures.append)
+    yield
+    guard.forget(failures.append)
+    qapp.processEvents()
+    left = [widget for widget in qapp.topLevelWidgets() if widget.isVisible()]
+    for widget in left:
+        widget.close()
+    assert not left
+    assert not multiprocessing.active_children()
+    assert not failures or request.node.get_closest_marker("fails_inside")
+
+
+Wait = Callable[[Callable[[], bool]], None]
+
+
+@pytest.fixture
+def until(qapp: QApplication) -> Wait:
+    """Let the window live until something holds; fail after a while."""
+
+    def wait(holds: Callable[[], bool], patience: float = 15.0) -> None:
+        end = time.monotonic() + patience
+        while not holds():
+            assert time.monotonic() < end, "it never came to hold"
+            qapp.processEvents()
+            time.sleep(0.002)
+
+    return wait
+
+
+@pytest.fixture
+def opened(qapp: QApplication) -> Iterator[Callable[[str], MainWindow]]:
+    """Opens the window on a source, and closes it whatever happens."""
+    qapp.setStyle("Fusion")
+    made: list[MainWindow] = []
+
+    def opened(source: str) -> MainWindow:
+        made.append(MainWindow(source))
+        made[-1].show()
+        made[-1].activateWindow()
+        return made[-1]
+
+    yield opened
+    for window in made:
+        window.close()
+        window.deleteLater()
+    qapp.processEvents()
+
+
+@pytest.fixture
+def window(opened: Callable[[str], MainWindow], until: Wait) -> MainWindow:
+    """The window on the default simulation, once it has drawn an estimate."""
+    window = opened("sim:")
+    until(lambda: len(window.membrane.ages) > 3 and window.session.estimate is not None)
+    return window
+
+
+@pytest.fixture
+def colours_in() -> Callable[[MainWindow, QWidget], int]:
+    """How many different colours the window's picture has where a widget is."""
+
+    def count(window: MainWindow, widget: QWidget) -> int:
+        picture = window.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+        at = widget.mapTo(window, QPoint(0, 0))
+        part = picture.copy(at.x(), at.y(), widget.width(), widget.height())
+        rows = np.frombuffer(part.constBits(), np.uint8).reshape(part.height(), -1)
+        return len(np.unique(rows[:, : 3 * part.width()].reshape(-1, 3), axis=0))
+
+    return count

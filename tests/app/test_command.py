@@ -1,0 +1,40 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from PySide6.QtGui import QImage
+
+
+def run(*arguments: str, **more: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "kappaskin", "app", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, **more)
+
+
+def test_the_app_opens_takes_its_picture_and_closes(tmp_path: Path) -> None:
+    picture = tmp_path / "window.png"
+    done = run("--source", "sim:line", "--seconds", "4", "--screenshot", str(picture))
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert QImage(str(picture)).size().toTuple() == (1280, 800)
+
+
+def test_a_picture_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    done = run("--seconds", "1", "--screenshot", str(tmp_path / "nowhere" / "a.png"))
+    assert done.returncode == 2
+    assert "cannot be written" in done.stderr
+
+
+def test_without_a_display_the_remedy_is_named() -> None:
+    bare = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = run("--seconds", "1", env=bare)
+    assert done.returncode == 2
+    assert "packaging/start.py" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_asking_for_help_loads_no_qt() -> None:
+    code = "import sys, kappaskin_app.command; print('PySide6' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.strip() == "False"

@@ -1,0 +1,91 @@
+import numpy as np
+from PySide6.QtCore import QPoint
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication
+
+from kappaskin import Patch, SensorLayout
+from kappaskin_app.theme import DARK, DIVERGING
+from kappaskin_app.views.heatmap import Heatmap, coloured
+
+
+def _heatmap(layout: SensorLayout) -> Heatmap:
+    heatmap = Heatmap("xx", "tip")
+    heatmap.resize(300, 260)
+    heatmap.show_theme(DARK)
+    heatmap.show_layout(layout)
+    return heatmap
+
+
+def _picture(heatmap: Heatmap) -> QImage:
+    return heatmap.cells.grab().toImage()
+
+
+def test_colours_are_symmetric_about_zero() -> None:
+    rgb = coloured(np.array([-2.0, 0.0, 2.0]), (-1.0, 1.0), DIVERGING, "#888888")
+    assert rgb.tolist() == [DIVERGING[0].tolist(), DIVERGING[127].tolist(), DIVERGING[255].tolist()]
+
+
+def test_a_missing_reading_has_its_own_colour() -> None:
+    rgb = coloured(np.array([np.nan, np.inf]), (-1.0, 1.0), DIVERGING, "#59626d")
+    assert rgb.tolist() == [[0x59, 0x62, 0x6D]] * 2
+
+
+def test_each_element_is_one_cell_of_one_colour(qapp: QApplication) -> None:
+    layout = SensorLayout.regular(Patch(0.1, 0.1), 4, 4)
+    heatmap = _heatmap(layout)
+    values = np.linspace(-1, 1, 16)
+    heatmap.show_values(values, 1.0)
+    picture, area = _picture(heatmap), heatmap.cells.area_of_patch()
+    for (x, y), value in zip(layout.positions, values, strict=True):
+        at = heatmap.cells.pixel_of(area, x, y).toPoint()
+        here = [
+            picture.pixelColor(at + QPoint(dx, dy)).getRgb()[:3]
+            for dx in (-9, 0, 9)
+            for dy in (-9, 9)
+        ]
+        wanted = tuple(coloured(np.array([value]), (-1.0, 1.0), DIVERGING, "#000000")[0].tolist())
+        assert set(here) == {wanted}
+
+
+def test_scattered_elements_are_drawn_where_they_are(qapp: QApplication) -> None:
+    layout = SensorLayout.scattered(Patch(0.1, 0.05), [[0.02, 0.01], [0.08, 0.04]])
+    heatmap = _heatmap(layout)
+    heatmap.show_values(np.array([-1.0, 1.0]), 1.0)
+    picture, area = _picture(heatmap), heatmap.cells.area_of_patch()
+    found = [
+        picture.pixelColor(heatmap.cells.pixel_of(area, x, y).toPoint()).getRgb()[:3]
+        for x, y in layout.positions
+    ]
+    assert found == [tuple(DIVERGING[0].tolist()), tuple(DIVERGING[255].tolist())]
+
+
+def test_the_element_under_the_mouse_is_told_and_its_value_written(
+    qapp: QApplication, qtbot
+) -> None:
+    layout = SensorLayout.regular(Patch(0.08, 0.08), 4, 4)
+    heatmap, told = _heatmap(layout), []
+    heatmap.show()
+    qtbot.waitExposed(heatmap)
+    heatmap.pointed.connect(told.append)
+    area = heatmap.cells.area_of_patch()
+    qtbot.mouseMove(heatmap.cells, heatmap.cells.pixel_of(area, *layout.positions[6]).toPoint())
+    qtbot.waitUntil(lambda: told == [6])
+    heatmap.show_element(6)
+    values = np.full(16, np.nan)
+    values[6] = -1.25
+    heatmap.show_reading(values)
+    assert heatmap.value.text() == "\N{MINUS SIGN}1.25 1/m at (50, 30) mm"
+    heatmap.show_element(5)
+    heatmap.show_reading(values)
+    assert heatmap.value.text().startswith("no reading at")
+    heatmap.close()
+
+
+def test_locking_asks_for_the_limit_shown_and_unlocking_for_none(qapp: QApplication, qtbot) -> None:
+    heatmap, asked = _heatmap(SensorLayout.regular(Patch(0.1, 0.1), 2, 2)), []
+    heatmap.lock_wanted.connect(asked.append)
+    heatmap.show_values(np.zeros(4), 3.0)
+    heatmap.lock.click()
+    heatmap.show_lock(True)
+    heatmap.lock.click()
+    assert asked == [3.0, 0.0]

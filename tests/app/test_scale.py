@@ -1,0 +1,33 @@
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin_app.scale import SteadyRange, round_up
+
+
+@given(st.floats(1e-9, 1e9))
+def test_a_rounded_limit_holds_the_value_and_little_more(value: float) -> None:
+    assert value * (1 - 1e-9) <= round_up(value) <= 1.7 * value
+
+
+def test_a_range_widens_at_once() -> None:
+    steady = SteadyRange(1.0)
+    steady.follow(1.0, now=0.0)
+    assert steady.follow(8.0, now=0.01) == 10.0
+
+
+def test_a_range_narrows_only_after_staying_small() -> None:
+    steady = SteadyRange(1.0)
+    steady.follow(8.0, now=0.0)
+    limits = [steady.follow(2.0, now=t) for t in (0.1, 1.0, 2.05, 2.2)]
+    assert limits == [10.0, 10.0, 10.0, 2.0]
+
+
+def test_a_peak_between_keeps_the_range() -> None:
+    steady = SteadyRange(1.0)
+    steady.follow(8.0, now=0.0)
+    steady.follow(2.0, now=0.1)
+    steady.follow(9.0, now=1.5)
+    assert steady.follow(2.0, now=2.5) == 10.0
+    assert not math.isnan(steady.limit)

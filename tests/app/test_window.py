@@ -1,0 +1,168 @@
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QDockWidget, QPushButton
+
+from kappaskin_app.window import MainWindow
+
+
+def test_the_simulation_is_shown_as_a_simulation(window: MainWindow, until) -> None:
+    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.readouts.text("contact").endswith(" mm"))
+    assert window.readouts.text("rms").endswith(" mm")
+    until(lambda: window.readouts.text("age").endswith(" ms"))
+    assert window.readouts.text("force").endswith(" N")
+
+
+def test_no_view_is_blank(window: MainWindow, until, colours_in) -> None:
+    until(lambda: len(window.membrane.ages) > 10)
+    assert colours_in(window, window.membrane) > 500
+    for heatmap in window.heatmaps.values():
+        assert colours_in(window, heatmap.cells) > 20
+
+
+def test_nothing_is_cut_off_at_1280_by_800(window: MainWindow) -> None:
+    assert window.minimumSizeHint().width() <= 1280
+    assert window.minimumSizeHint().height() <= 800
+    for button in window.findChildren(QPushButton):
+        if button.isVisible():
+            assert button.width() >= button.sizeHint().width()
+
+
+def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot) -> None:
+    window.history.change("Functions along x", -1, functions_x=5)
+    until(lambda: window.session.estimate.coefficients.shape == (5, 8))
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    until(lambda: window.history.settings.functions_x == 8)
+    until(lambda: window.session.estimate.coefficients.shape == (8, 8))
+
+
+def test_a_basis_the_readings_do_not_decide_is_refused_in_its_panel(
+    window: MainWindow, until
+) -> None:
+    window.history.change("Functions", -1, functions_x=12, functions_y=12)
+    message = window.basis.message
+    until(lambda: "determine 140 of the 144" in message.text())
+    assert window.session.estimate.coefficients.shape == (8, 8)
+    window.history.stack.undo()
+    until(lambda: not message.text())
+
+
+def test_noise_turned_off_leaves_only_what_the_basis_cannot_follow(
+    window: MainWindow, until
+) -> None:
+    window.history.change("Still", -1, load_case="line", noise_kind="none")
+    until(lambda: window.session.estimate.error_rms < 1.0e-6)
+    window.history.change("Noise", -1, noise_kind="gaussian", noise_rms=2.0)
+    until(lambda: window.session.estimate.error_rms > 5e-5)
+
+
+def _shown(window: MainWindow) -> bool:
+    """Whether the load is drawn where the settings have it."""
+    settings, contact = window.history.settings, window.session.estimate.true_contact
+    drawn = np.allclose(window.membrane.handles[0], [settings.x, settings.y])
+    return drawn and np.allclose(contact, [settings.x, settings.y])
+
+
+def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
+    window: MainWindow, until, qtbot
+) -> None:
+    window.history.change("Point", -1, load_case="point", x=0.05, y=0.05)
+    until(lambda: _shown(window))
+    view, count = window.membrane, window.history.stack.count()
+    start = view.handle_on_screen().toPoint() - QPoint(0, 8)
+    qtbot.mousePress(view.plotter, Qt.MouseButton.LeftButton, pos=start)
+    for step in range(1, 9):
+        qtbot.mouseMove(view.plotter, start + QPoint(9 * step, 2 * step))
+        until(lambda: _shown(window))
+    qtbot.mouseRelease(view.plotter, Qt.MouseButton.LeftButton, pos=start + QPoint(72, 16))
+    moved = window.history.settings
+    assert moved.x > 0.06
+    assert window.history.stack.count() == count + 1
+    until(lambda: _shown(window))
+    end = view.handle_on_screen().toPoint()
+    assert (end - start - QPoint(72, 24)).manhattanLength() <= 12
+    window.history.stack.undo()
+    assert window.history.settings.x == 0.05
+
+
+def test_turning_the_camera_does_not_move_the_load(window: MainWindow, qtbot) -> None:
+    settings, corner = window.history.settings, QPoint(20, 20)
+    qtbot.mousePress(window.membrane.plotter, Qt.MouseButton.LeftButton, pos=corner)
+    qtbot.mouseMove(window.membrane.plotter, corner + QPoint(60, 30))
+    qtbot.mouseRelease(
+        window.membrane.plotter, Qt.MouseButton.LeftButton, pos=corner + QPoint(60, 30)
+    )
+    assert window.history.settings == settings
+
+
+def test_an_absent_port_says_why_and_the_simulation_comes_back(window: MainWindow, until) -> None:
+    window.connection.sources.setCurrentText("/dev/ttyNOWHERE")
+    window.connection.connect_button.click()
+    until(lambda: window.badge.state == "LOST")
+    assert "there is no such port" in window.connection.message.text()
+    until(lambda: window.readouts.text("contact") == "\N{EN DASH}")
+    window.actions_by_name["simulate"].trigger()
+    until(lambda: window.badge.state == "SIM")
+    assert not window.connection.message.isVisible()
+
+
+def test_disconnecting_is_said(window: MainWindow, until) -> None:
+    window.actions_by_name["disconnect"].trigger()
+    until(lambda: window.badge.state == "OFF")
+
+
+def test_a_killed_engine_is_lost_and_connecting_starts_another(window: MainWindow, until) -> None:
+    os.kill(window.session.engine.pid, 9)
+    until(lambda: window.badge.state == "LOST")
+    assert "connect again" in window.connection.message.text()
+    window.actions_by_name["simulate"].trigger()
+    until(lambda: window.badge.state == "SIM")
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 5)
+
+
+def test_a_locked_range_stays_and_an_undone_one_follows_again(window: MainWindow, until) -> None:
+    heatmap = window.heatmaps["xx"]
+    heatmap.lock.click()
+    locked = window.history.settings.range_xx
+    assert locked > 0
+    window.history.change("More", -1, load_case="point", force=0.9)
+    until(lambda: np.nanmax(np.abs(window.session.estimate.curvature[0])) > 1.5 * locked)
+    until(lambda: heatmap.bar.limits == (-locked, locked))
+    window.history.stack.undo()
+    window.history.stack.undo()
+    assert not heatmap.lock.isChecked()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_both_themes_draw(window: MainWindow, until, colours_in, theme: str) -> None:
+    window.history.change("Theme", -1, theme=theme, colour_by="xy")
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 3)
+    assert colours_in(window, window.membrane) > 500
+
+
+def test_a_picture_is_saved(window: MainWindow, tmp_path: Path) -> None:
+    assert window.picture(tmp_path / "a.png")
+    assert not window.picture(tmp_path / "nowhere" / "a.png")
+    assert QImage(str(tmp_path / "a.png")).size() == window.size()
+
+
+def test_every_action_is_in_a_menu_and_no_shortcut_is_used_twice(window: MainWindow) -> None:
+    entries = window.actions_by_name.entries
+    shortcuts = [entry.action.shortcut().toString() for entry in entries.values()]
+    used = [shortcut for shortcut in shortcuts if shortcut]
+    assert len(used) == len(set(used))
+    in_menus = [a for menu in window.menuBar().actions() for a in menu.menu().actions()]
+    assert {e.action for e in entries.values()} == set(in_menus)
+
+
+def test_every_dock_has_a_name_for_saved_layouts(window: MainWindow) -> None:
+    names = [dock.objectName() for dock in window.findChildren(QDockWidget)]
+    assert all(names)
+    assert window.restoreState(window.saveState())
