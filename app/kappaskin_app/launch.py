@@ -18,9 +18,11 @@ def launch(source: str, seconds: float | None = None, screenshot: Path | None = 
         raise Refusal("expected a Qt application with widgets, got one without")
     application.setApplicationName("Kappaskin")
     application.setStyle("Fusion")
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl+C ends the app while Qt has the loop
     window = MainWindow(source)
     window.show()
+    # The session's timer lets Python see these within milliseconds while Qt has the loop.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: window.close())
     saved: list[bool] = []
 
     def end() -> None:

@@ -1,8 +1,12 @@
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import psutil
+import pytest
 from PySide6.QtGui import QImage
 
 
@@ -16,6 +20,24 @@ def test_the_app_opens_takes_its_picture_and_closes(tmp_path: Path) -> None:
     done = run("--source", "sim:line", "--seconds", "4", "--screenshot", str(picture))
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert QImage(str(picture)).size().toTuple() == (1280, 800)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_closes_the_app_and_leaves_nothing(number: int) -> None:
+    command = [sys.executable, "-m", "kappaskin", "app", "--seconds", "40"]
+    app = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    engine = psutil.Process(app.pid)
+    end = time.monotonic() + 30
+    while time.monotonic() < end and not any(
+        "spawn_main" in " ".join(child.cmdline()) for child in engine.children()
+    ):
+        time.sleep(0.05)
+    time.sleep(2.0)
+    children = engine.children(recursive=True)
+    app.send_signal(number)
+    told = app.communicate(timeout=20)
+    assert (app.returncode, *told) == (0, "", "")
+    assert not psutil.wait_procs(children, timeout=2)[1]
 
 
 def test_a_picture_that_cannot_be_written_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,313 @@
+"""A fresh machine, set up, and one task run on it: the app, every check, or the benchmarks.
+
+    python3 packaging/start.py                     opens the app on the simulated fingertip
+    python3 packaging/start.py app [ARGUMENTS]     opens the app, e.g. app --source sim:
+    python3 packaging/start.py test [ARGUMENTS]    runs every check; ARGUMENTS go to pytest
+    python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; ARGUMENTS go to pytest
+
+Standard library only. A second start with nothing changed installs nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import hashlib
+import importlib.util
+import json
+import os
+import platform
+import select
+import shlex
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+OLDEST = (3, 11)
+ROOT = Path(__file__).resolve().parent.parent
+CONSTRAINTS = ROOT / "packaging" / "constraints.txt"
+PICTURE = ROOT / "kappaskin-window.png"
+VENV = ROOT / ".venv"
+STAMP = VENV / "kappaskin-stamp"
+REFUSED = 2
+PATIENCE = 10.0
+"""Seconds a process is given to start or to end."""
+
+CHECKS = (
+    ("ruff", "check"),
+    ("ruff", "format", "--check"),
+    ("basedpyright",),
+    ("lint-imports",),
+    ("pytest",),
+)
+# Benchmark files are named so that plain pytest passes them by.
+BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")
+
+
+class Stop(Exception):
+    """A reason to give up: what was expected, what came, what to do."""
+
+
+def main(arguments: list[str]) -> int:
+    """Set up, run one task; the exit code is the task's, or 2 where the setup was refused."""
+    name, rest = (arguments[0], arguments[1:]) if arguments else ("app", [])
+    if name in ("-h", "--help"):
+        print(__doc__)
+        return 0
+    try:
+        if name not in TASKS:
+            raise Stop(f"expected one of {', '.join(TASKS)}, got {name!r}; --help shows examples")
+        end_orderly_on_signals()
+        set_up()
+        with display(environment()) as shown:
+            return TASKS[name](rest, shown)
+    except Stop as reason:
+        print(f"start: {reason}", file=sys.stderr)
+        return REFUSED
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
+
+
+# --- the tasks
+
+
+def app(arguments: list[str], shown: dict[str, str]) -> int:
+    """Open the app; on a virtual display for some seconds, leaving a picture."""
+    command = [tool("kappaskin"), "app", *arguments]
+    if not displayless():
+        return run(command, shown)
+    say("No display here: running on a virtual one for some seconds")
+    PICTURE.unlink(missing_ok=True)
+    for option, value in (("--seconds", "10"), ("--screenshot", str(PICTURE))):
+        if option not in [argument.split("=")[0] for argument in arguments]:
+            command += [option, value]
+    code = run(command, shown)
+    if PICTURE.exists():
+        say(f"A picture of the window: {PICTURE}")
+    return code
+
+
+def test(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run every check, whatever the others say; the exit code is the first failure's."""
+    failures: list[tuple[str, int]] = []
+    for name, *options in CHECKS:
+        extra = arguments if name == "pytest" else []
+        say(shlex.join([name, *options, *extra]))
+        if code := run([tool(name), *options, *extra], shown, cwd=ROOT):
+            failures.append((" ".join([name, *options]), code))
+    if failures:
+        say("Failed: " + ", ".join(f"{check} (exit code {code})" for check, code in failures))
+        return failures[0][1]
+    say(f"All {len(CHECKS)} checks passed")
+    return 0
+
+
+def bench(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run the benchmarks."""
+    return run([tool("pytest"), *BENCHMARKS, *arguments], shown, cwd=ROOT)
+
+
+TASKS = {"app": app, "test": test, "bench": bench}
+
+
+# --- the setup
+
+
+def set_up() -> None:
+    """Make .venv and have the system libraries, or stop with what to do."""
+    if sys.version_info[:2] < OLDEST:
+        expected = ".".join(str(part) for part in OLDEST)
+        raise Stop(
+            f"expected Python {expected} or newer, this is {platform.python_version()}; "
+            "start with a newer one, e.g. python3.12 packaging/start.py"
+        )
+    wanted, found = stamp(), STAMP.read_text("utf-8") if STAMP.exists() else ""
+    if found != wanted:
+        install(keep=found.split("\n")[0] == wanted.split("\n")[0])
+        STAMP.write_text(wanted, "utf-8")
+    have_libraries()
+
+
+def stamp() -> str:
+    """Two lines, which interpreter works where, and a hash of what it was asked to install."""
+    asked = hashlib.sha256((ROOT / "pyproject.toml").read_bytes() + CONSTRAINTS.read_bytes())
+    return f"{platform.python_version()} {sys.base_prefix} {ROOT}\n{asked.hexdigest()}\n"
+
+
+def install(*, keep: bool) -> None:
+    """Fill .venv, made anew unless the one found was complete, to `keep`, and only out of date."""
+    STAMP.unlink(missing_ok=True)  # Killed from here on, the next start begins anew.
+    if not keep:
+        if not importlib.util.find_spec("ensurepip"):
+            apt("Python's venv module is incomplete", "apt-get install -y python3-venv")
+        say(f"Making {VENV}")
+        # Started with .venv's own Python, we would clear it away under our feet.
+        base = getattr(sys, "_base_executable", sys.executable)
+        command = [base, "-m", "venv", "--clear", str(VENV)]
+        quietly(command, environment(pip=True), "repair this Python, or start with another")
+    say("Updating the packages" if keep else "Installing the packages (some minutes, 1.5 GB)")
+    command = [tool("python"), "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS)]
+    command += ["-e", f"{ROOT}[app,dev]"]
+    quietly(command, environment(pip=True), "check the network and pip's settings, start again")
+
+
+def have_libraries() -> None:
+    """Install the system libraries that Qt and VTK miss, or stop with the line that does."""
+    if line := doctor()["install"]:
+        apt("Qt and VTK need system libraries", line)
+        if still := doctor()["missing"]:
+            raise Stop(f"expected nothing missing after {line!r}, but {' '.join(still)}")
+
+
+def doctor() -> dict[str, str]:
+    """What `kappaskin doctor` found."""
+    command = [tool("kappaskin"), "doctor", "--json"]
+    told = subprocess.run(command, env=environment(), capture_output=True, text=True, check=False)
+    try:
+        return json.loads(told.stdout)
+    except json.JSONDecodeError:
+        raise Stop(
+            f"expected JSON from {shlex.join(command)}, got exit code {told.returncode} and\n"
+            f"{told.stdout}{told.stderr}\nremove {VENV} and start again if this is not your change"
+        ) from None
+
+
+def apt(why: str, line: str) -> None:
+    """Run the apt-get `line` as root on Debian; else stop with what a person has to run."""
+    if not (Path("/etc/debian_version").exists() and os.geteuid() == 0):
+        update = "sudo apt-get update && sudo "
+        raise Stop(f"{why}. Run this line (Debian, Ubuntu), then start again:\n{update}{line}")
+    say(f"{why}: {line}")
+    silent = environment(pip=True) | {"DEBIAN_FRONTEND": "noninteractive"}
+    for command in (["apt-get", "update"], shlex.split(line)):
+        quietly(command, silent, "mend apt's settings or the network, then start again")
+
+
+# --- processes
+
+
+def tool(name: str) -> str:
+    """The path of a program of .venv."""
+    return str(VENV / ("Scripts" if sys.platform == "win32" else "bin") / name)
+
+
+def environment(*, pip: bool = False) -> dict[str, str]:
+    """Our environment without another Python's paths; pip's settings only for `pip` itself."""
+    foreign = {"PYTHONHOME", "PYTHONPATH", "VIRTUAL_ENV"}
+    kept = {name: value for name, value in os.environ.items() if name not in foreign}
+    if not pip:
+        return {name: value for name, value in kept.items() if not name.startswith("PIP_")}
+    # For the isolated build too; pip before 25.3 knows the first alone. Spaces would separate.
+    pins = CONSTRAINTS.as_uri()
+    return kept | {"PIP_CONSTRAINT": pins, "PIP_BUILD_CONSTRAINT": pins}
+
+
+def run(
+    command: list[str],
+    variables: dict[str, str],
+    cwd: Path | None = None,
+    output: IO[str] | None = None,
+) -> int:
+    """The command's exit code; where we are stopped meanwhile, so is it."""
+    both = subprocess.STDOUT if output else None
+    with subprocess.Popen(command, env=variables, cwd=cwd, stdout=output, stderr=both) as child:
+        try:
+            code = child.wait()
+        except (KeyboardInterrupt, SystemExit) as reason:
+            # After Ctrl+C the terminal has told the child already.
+            end(child, ask=not isinstance(reason, KeyboardInterrupt))
+            raise
+    return code if code >= 0 else 128 - code
+
+
+def quietly(command: list[str], variables: dict[str, str], mend: str) -> None:
+    """Run a command; show what it printed only where it fails."""
+    with tempfile.TemporaryFile("w+", errors="replace") as output:
+        if code := run(command, variables, output=output):
+            output.seek(0)
+            raise Stop(f"{shlex.join(command)}\n{output.read()}exit code {code}; {mend}")
+
+
+def end(child: subprocess.Popen[bytes], *, ask: bool = True) -> None:
+    """Let a process end, then make it."""
+    if ask:
+        child.terminate()
+    try:
+        child.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
+
+
+def end_orderly_on_signals() -> None:
+    """Turn the signals that would end us at once into an exit that cleans up."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda got, _: sys.exit(128 + got))
+
+
+def say(line: str) -> None:
+    """Print a line of our own, in order with what the children print."""
+    print(f"==> {line}", flush=True)
+
+
+# --- the display
+
+
+def displayless() -> bool:
+    """Whether windows would have nowhere to go."""
+    shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return sys.platform.startswith("linux") and not shown
+
+
+@contextlib.contextmanager
+def display(variables: dict[str, str]) -> Iterator[dict[str, str]]:
+    """The environment `variables` with a display, a virtual one where there is none."""
+    if not displayless():
+        yield variables
+        return
+    with tempfile.TemporaryFile("w+", errors="replace") as log:
+        reader, writer = os.pipe()
+        # Its default, a reset whenever the last client leaves, refuses whoever comes meanwhile.
+        command = ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1920x1200x24"]
+        command += ["-nolisten", "tcp", "-noreset"]
+        server = subprocess.Popen(
+            command,
+            env=variables,
+            stdout=log,
+            stderr=log,
+            pass_fds=[writer],
+            start_new_session=True,  # Ctrl+C is for the app; the server goes last.
+            preexec_fn=end_with_parent,
+        )
+        os.close(writer)
+        try:
+            number = display_number(reader, log)
+            yield variables | {"DISPLAY": f":{number}", "QT_QPA_PLATFORM": "xcb"}
+        finally:
+            end(server)
+
+
+def end_with_parent() -> None:
+    """Have the kernel end this process with its parent, even where that is killed (Linux)."""
+    set_parent_death_signal = 1
+    ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGTERM)
+
+
+def display_number(reader: int, log: IO[str]) -> str:
+    """The number that the server writes once it is ready."""
+    with open(reader, encoding="ascii") as ready:
+        number = ready.readline().strip() if select.select([ready], [], [], PATIENCE)[0] else ""
+    if not number:
+        log.seek(0)
+        raise Stop(f"expected Xvfb to start in {PATIENCE:g} s; it printed\n{log.read()}")
+    return number
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,49 @@
+"""Benchmarks: each figure is a ratio to a named baseline of the same run, printed at the end."""
+
+import statistics
+import time
+from collections.abc import Callable
+
+import pytest
+
+Figures = list[str]
+_figures: Figures = []
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", action="store_true", help="measure for as long as the figures ask")
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    terminalreporter.section("figures")
+    for figure in _figures:
+        terminalreporter.write_line(figure)
+
+
+@pytest.fixture
+def figure() -> Callable[[str], None]:
+    """Print a line in the summary."""
+    return _figures.append
+
+
+@pytest.fixture
+def seconds(request: pytest.FixtureRequest) -> float:
+    """How long a drawing is watched."""
+    return 20.0 if request.config.getoption("--long") else 6.0
+
+
+@pytest.fixture
+def medians() -> Callable[..., list[float]]:
+    """Median seconds per call of several functions, measured turn by turn."""
+
+    def measure(*functions: Callable[[], object], turns: int = 40, calls: int = 20) -> list[float]:
+        taken: list[list[float]] = [[] for _ in functions]
+        for _ in range(turns):
+            for function, times in zip(functions, taken, strict=True):
+                start = time.perf_counter()
+                for _ in range(calls):
+                    function()
+                times.append((time.perf_counter() - start) / calls)
+        return [statistics.median(times) for times in taken]
+
+    return measure

@@ -1,0 +1,100 @@
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+CONSTRAINTS = (ROOT / "packaging" / "constraints.txt").read_text("utf-8")
+
+
+def requirements():
+    project = PROJECT["project"]
+    optional = project["optional-dependencies"].values()
+    asked = [project["dependencies"], PROJECT["build-system"]["requires"], *optional]
+    return [Requirement(text) for texts in asked for text in texts]
+
+
+def pins():
+    lines = [line for line in CONSTRAINTS.splitlines() if not line.startswith("#")]
+    return {canonicalize_name(name): version for name, version in (i.split("==") for i in lines)}
+
+
+def references_gained(value, calls, change):
+    change()  # The first call fills caches.
+    before = sys.getrefcount(value)
+    for _ in range(calls):
+        change()
+    return sys.getrefcount(value) - before
+
+
+def test_the_wheel_holds_the_three_packages_and_nothing_else(tmp_path):
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+
+    (wheel,) = tmp_path.iterdir()
+    with zipfile.ZipFile(wheel) as archive:
+        tops = {name.split("/")[0] for name in archive.namelist()}
+
+    information = f"kappaskin-{PROJECT['project']['version']}.dist-info"
+    assert tops == {"kappaskin", "kappaskin_app", "kappaskin_resources", information}
+
+
+def test_constraints_are_pins_without_an_address():
+    for line in CONSTRAINTS.splitlines():
+        assert re.fullmatch(r"#.*|[A-Za-z0-9._-]+==[A-Za-z0-9.!+]+", line), line
+    assert "://" not in CONSTRAINTS
+
+
+@pytest.mark.parametrize("requirement", requirements(), ids=str)
+def test_each_requirement_is_pinned_in_its_range(requirement):
+    version = pins()[canonicalize_name(requirement.name)]
+
+    assert requirement.specifier.contains(version)
+
+
+def test_pins_avoid_what_is_known_to_break():
+    assert pins()["pyside6-essentials"] == pins()["shiboken6"] == "6.11.3"
+    assert pins()["pyvista"].startswith("0.49.")
+
+
+def test_start_needs_the_standard_library_alone():
+    tree = ast.parse((ROOT / "packaging" / "start.py").read_text("utf-8"))
+    imported = {
+        name.split(".")[0]
+        for node in ast.walk(tree)
+        for name in (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module or "."]
+            if isinstance(node, ast.ImportFrom)
+            else []
+        )
+    }
+
+    assert "subprocess" in imported
+    assert imported <= sys.stdlib_module_names
+
+
+def test_packaging_is_a_folder_not_a_package():
+    assert not (ROOT / "packaging" / "__init__.py").exists()  # It would hide PyPI's packaging.
+
+
+def test_qt_keeps_the_references_to_none_and_true():
+    # PySide6 6.12 on Python 3.11 loses one reference a call, and aborts when none is left.
+    qtcore = pytest.importorskip("PySide6.QtCore")
+
+    class Sender(qtcore.QObject):
+        sent = qtcore.Signal(bool)
+
+    sender = Sender()
+
+    assert references_gained(None, 200, lambda: qtcore.QObject().setObjectName("x")) > -100
+    assert references_gained(True, 20, lambda: sender.sent.emit(True)) > -10
