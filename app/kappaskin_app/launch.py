@@ -20,9 +20,10 @@ def launch(source: str, seconds: float | None = None, screenshot: Path | None = 
     application.setStyle("Fusion")
     window = MainWindow(source)
     window.show()
-    # The session's timer lets Python see these within milliseconds while Qt has the loop.
+    # The session's timer lets Python see these within milliseconds while Qt has the loop; a
+    # handler may run in the middle of a drawing, so the window closes from the loop.
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: window.close())
+        signal.signal(number, lambda *_: QTimer.singleShot(0, window.close))
     saved: list[bool] = []
 
     def end() -> None:
