@@ -75,6 +75,14 @@ class SineBasis:
         X, Y = _sine(ki, positions[:, 0], dx), _sine(kj, positions[:, 1], dy)
         return (X[:, :, None] * Y[:, None, :]).reshape(len(positions), self.size)
 
+    def with_slopes(self, x: float, y: float) -> Array:
+        """Every function and its slopes along x and y at one point, (3, Ni Nj)."""
+        ki, kj = self.wavenumbers
+        X, Y = np.sin(ki * x), np.sin(kj * y)
+        slope_x, slope_y = ki * np.cos(ki * x), kj * np.cos(kj * y)
+        pairs = ((X, Y), (slope_x, Y), (X, slope_y))
+        return np.stack([np.multiply.outer(*pair).ravel() for pair in pairs])
+
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> GridMap:
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""
         ki, kj = self.wavenumbers

@@ -36,9 +36,10 @@ class Status:
     """How the engine is doing.
 
     `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
-    `message` says why. `refusal` says why the setup asked for last was not taken. `rate` in
-    frames/s, `meetings` counts the devices that said what they are, `reader_gap` the 99th percentile of the time between two reads in s, `last_frame`
-    and `reported` on the monotonic clock.
+    `message` says why. `refusal` says why the setup asked for last was not taken. `meetings`
+    counts the devices that said what they are. `rate` in frames/s, `reader_gap` the 99th
+    percentile of the time between two reads in s, `last_frame` and `reported` on the monotonic
+    clock.
     """
 
     state: str = OFF

@@ -31,6 +31,8 @@ class SensorLayout:
             raise Refusal(f"expected positions of shape (P, 2) with P >= 1, got {P.shape}")
         if self.live.shape != (3, len(P)):
             raise Refusal(f"expected live of shape (3, {len(P)}), got {self.live.shape}")
+        if self.shape and self.shape[0] * self.shape[1] != len(P):
+            raise Refusal(f"expected {self.shape[0]} x {self.shape[1]} elements, got {len(P)}")
         outside = np.flatnonzero(~self.patch.contains(P))  # NaN counts as outside
         if outside.size:
             p, (x, y) = int(outside[0]), P[outside[0]]
@@ -50,7 +52,12 @@ class SensorLayout:
     @classmethod
     def scattered(cls, patch: Patch, positions: ArrayLike) -> "SensorLayout":
         """Elements at `positions` (P, 2) in m, anywhere on the patch."""
-        points = np.array(positions, float)
+        try:
+            points = np.array(positions, float)
+        except ValueError as error:
+            raise Refusal(f"expected positions of shape (P, 2) in m, got {error}") from error
+        if points.ndim != 2:
+            raise Refusal(f"expected positions of shape (P, 2) in m, got {points.shape}")
         return cls(patch, points, np.ones((3, len(points)), bool))
 
     def without(self, elements: Iterable[int]) -> "SensorLayout":

@@ -10,7 +10,7 @@ import numpy as np
 from kappaskin.bases import GridMap, SineBasis
 from kappaskin.errors import RankDeficient
 from kappaskin.fit import Fit, LeastSquares
-from kappaskin.frames import Array, Estimate, Frame, Touch, Truth
+from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.mechanics import Plate
 from kappaskin.sensor import Sensor
 from kappaskin.touch import NO_TOUCH, PointContact
@@ -45,7 +45,7 @@ class Pipeline:
         self.fit = LeastSquares(self.basis, sensor.layout)
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         self._surface = self.basis.on_grid(self._x, self._y)
-        self._touch = PointContact(Plate(sensor.layout.patch, sensor.rigidity), self.fit)
+        self._touch = PointContact(Plate(sensor.layout.patch, sensor.rigidity), sensor.layout)
         self._dead = ~sensor.layout.live.ravel()
         self._any_dead = bool(self._dead.any())
         self._no_shape = np.full(self.basis.shape, np.nan)
@@ -83,12 +83,9 @@ class Pipeline:
             fit.coefficients,
             surface,
             noise,
-            self._touched(fit.coefficients, noise),
+            self._touch(curvature, fit) if math.isfinite(noise) else NO_TOUCH,
             *self._compared(surface, fit.coefficients, frame.truth),
         )
-
-    def _touched(self, coefficients: Array, noise: float) -> Touch:
-        return self._touch(coefficients, noise) if math.isfinite(noise) else NO_TOUCH
 
     def _compared(
         self, surface: Array, coefficients: Array, truth: Truth | None

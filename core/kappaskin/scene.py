@@ -87,8 +87,13 @@ class Scene:
 
 def scaled_to(plate: Plate, load: Load, displacement: float, basis: SineBasis) -> Load:
     """The load whose point of application moves by `displacement` in m."""
-    at = basis.at(load.centre()[None])[0] @ plate.deflection([load], basis).ravel()
-    return load.scaled(displacement / float(at))
+    at = float(basis.at(load.centre()[None])[0] @ plate.deflection([load], basis).ravel())
+    if not at / load.force > 1e-12 * plate.compliance(basis)[0, 0]:
+        raise Refusal(
+            f"expected a load that moves the skin where it presses, got {load}; the edges are "
+            "held, press further inside"
+        )
+    return load.scaled(displacement / at)
 
 
 def contact_of(loads: tuple[Load, ...]) -> Array:

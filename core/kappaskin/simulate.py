@@ -26,6 +26,7 @@ class Simulator:
         if not (same_skin and scene.basis == was.basis):
             self._basis = scene.basis
             self._operator = scene.layout.curvature_operator(self._basis)
+            self._channels = np.arange(3 * len(scene.layout))
         if (scene.seed, scene.effects) != (was.seed, was.effects):
             self._rng = np.random.default_rng(scene.seed)
 
@@ -39,7 +40,7 @@ class Simulator:
         return truth
 
     def frame(self, n: int, clock: Callable[[], float]) -> Frame:
-        """Frame `n`, taken at device time n / rate; dead channels read zero volts."""
+        """Frame `n`, taken at device time n / rate; dead channels read no curvature."""
         scene = self.scene
         time = n / scene.rate
         truth = self._truth(time)

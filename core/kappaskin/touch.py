@@ -1,79 +1,115 @@
-"""From the coefficients of a shape to the contact that made it: where and how hard."""
+"""From the readings and the shape fitted to them to the contact: where and how hard."""
 
 import math
+from collections import OrderedDict
 
 import numpy as np
 
-from kappaskin.bases import GridMap
-from kappaskin.fit import LeastSquares
-from kappaskin.frames import Array, Touch
+from kappaskin.bases import SineBasis
+from kappaskin.fit import Fit
+from kappaskin.frames import Array, Mask, Touch
+from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
 
 _SIGNIFICANT = 30.0  # drop of chi-squared below which a contact may be noise found by searching
-_FINE = 49  # points searched along each side
+_SEARCHED = 49  # points searched along each side
+_FUNCTIONS = 15  # along each side, of the shape a point load makes: Table 1's definition
+_STEPS = 2  # of Gauss-Newton, from the best point searched
+_REMEMBERED = 8  # sets of missing readings whose norms are kept
+
+_RIDGE = 1e-12 * np.eye(3)  # keeps a load on the rim, which moves nothing, solvable
 
 NO_TOUCH = Touch(np.full(2, np.nan), np.full(2, np.nan), *[math.nan] * 4)
 
 
 class PointContact:
-    """The point load on a plate that explains the coefficients best, by maximum likelihood.
+    """The point load on a plate that explains the readings best, by maximum likelihood.
 
-    A load P at (x, y) makes the coefficients P t(x, y), t = compliance times sine products
-    (Eq. 9). With the information A of the fit, the best P is t'Ac / t'At, and what it explains of
-    the readings' sum of squares is (t'Ac)^2 / t'At: searched on a grid, refined by a parabola, its
-    curvature there giving the error bar.
+    A load P at (x, y) makes the readings P T(x, y), T = M t with t = compliance times sine
+    products (Eqs. 2, 9). The best P for readings K is T'K / T'T, and what it explains of their sum
+    of squares is (T'K)^2 / T'T: searched on a grid, where T'K is one map from M'K, then refined by
+    Gauss-Newton steps in x, y and P, whose normal matrix gives the error bars.
     """
 
-    def __init__(self, plate: Plate, fit: LeastSquares) -> None:
-        self.basis = basis = fit.basis
-        self._A, self._covariance = fit.information, fit.unit_covariance()
-        self._compliance = plate.compliance(basis)
-        n = max(_FINE, 3 * max(basis.shape))
-        self._x, self._y = (side[1:-1] for side in plate.patch.grid(n + 2, n + 2))
-        self._grid: GridMap = basis.on_grid(self._x, self._y)
-        self._norm = np.stack([self._squared_length(y) for y in self._y])  # (ny, nx)
+    def __init__(self, plate: Plate, layout: SensorLayout) -> None:
+        self.basis = SineBasis(plate.patch, _FUNCTIONS, _FUNCTIONS)
+        self._compliance = plate.compliance(self.basis)
+        self._M = layout.curvature_operator(self.basis) * self._compliance.ravel()
+        self._live = layout.live.ravel()
+        self._x, self._y = (s[1:-1] for s in plate.patch.grid(_SEARCHED + 2, _SEARCHED + 2))
+        self._map = self.basis.on_grid(self._x, self._y)
+        self._points = np.stack(np.meshgrid(self._x, self._y), axis=-1).reshape(-1, 2)
+        self._functions = self.basis.at(self._points)
+        self._norms: OrderedDict[bytes, Array] = OrderedDict()
+        self._norm(self._live)
 
-    def _squared_length(self, y: float) -> Array:
-        """t'At (nx,) along one row of the grid."""
-        points = np.column_stack([self._x, np.full_like(self._x, y)])
-        t = self.basis.at(points) * self._compliance.ravel()
-        return np.einsum("gn,gn->g", t @ self._A, t)
+    def _norm(self, used: Mask) -> Array:
+        """T'T (ny, nx) on the grid for the readings `used` (3 P,), remembered."""
+        key = used.tobytes()
+        if key not in self._norms:
+            M = self._M[used]
+            squares = np.einsum("gn,gn->g", self._functions @ (M.T @ M), self._functions)
+            self._norms[key] = squares.reshape(len(self._y), len(self._x))
+            if len(self._norms) > _REMEMBERED:
+                self._norms.popitem(last=False)
+        return self._norms[key]
 
-    def __call__(self, coefficients: Array, noise: float) -> Touch:
-        """The contact for `coefficients` (Ni, Nj) in m fitted to readings of `noise` in 1/m."""
-        seen = (self._A @ coefficients.ravel()).reshape(self.basis.shape) * self._compliance
-        explained = self._grid(seen) ** 2 / self._norm
-        q, p = divmod(int(np.argmax(explained)), len(self._x))
-        if not explained[q, p] > _SIGNIFICANT * noise**2:
+    def __call__(self, curvature: Array, fit: Fit) -> Touch:
+        """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
+        used = self._live & np.isfinite(curvature).ravel()
+        K = np.where(used, curvature.ravel(), 0.0)
+        explained = self._map((K @ self._M).reshape(self.basis.shape)) ** 2 / self._norm(used)
+        best = int(np.argmax(explained))
+        spare = int(used.sum()) - fit.estimator.basis.size
+        if not explained.flat[best] > _threshold(spare) * float(fit.noise) ** 2:
             return NO_TOUCH
-        position, variance = self._refine(explained, q, p)
-        return self._touch(coefficients, seen, position, np.sqrt(variance) * noise, noise)
+        return self._refined(K, used, self._points[best], fit)
 
-    def _refine(self, explained: Array, q: int, p: int) -> tuple[Array, Array]:
-        """The top of the parabola through nine points, and its variance for unit noise."""
-        q, p = np.clip(q, 1, len(self._y) - 2), np.clip(p, 1, len(self._x) - 2)
-        s = explained[q - 1 : q + 2, p - 1 : p + 2]
-        slope = np.array([s[1, 2] - s[1, 0], s[2, 1] - s[0, 1]]) / 2
-        hxy = (s[2, 2] - s[2, 0] - s[0, 2] + s[0, 0]) / 4
-        hessian = np.array(
-            [[s[1, 2] - 2 * s[1, 1] + s[1, 0], hxy], [hxy, s[2, 1] - 2 * s[1, 1] + s[0, 1]]]
+    def _refined(self, K: Array, used: Mask, position: Array, fit: Fit) -> Touch:
+        side = np.array([self.basis.patch.a, self.basis.patch.b])
+        readings = self._readings(position, used)
+        force = float(readings[0] @ K) / float(readings[0] @ readings[0])
+        covariance = np.empty((3, 3))
+        for _ in range(_STEPS):
+            J: Array = np.stack([force * readings[1], force * readings[2], readings[0]])
+            length: Array = np.sqrt(np.einsum("ir,ir->i", J, J))
+            scale = np.outer(length, length)  # metres and newtons: scale, then solve
+            covariance: Array = np.linalg.inv(J @ J.T / scale + _RIDGE) / scale
+            step = covariance @ (J @ (K - force * readings[0]))
+            position = np.clip(position + step[:2], 1e-3 * side, (1 - 1e-3) * side)
+            force += float(step[2])
+            readings = self._readings(position, used)
+        left = K - force * readings[0]
+        # Either model may leave more than noise, never less: the smaller residual is nearer to it.
+        spread = math.sqrt(float(left @ left) / max(int(used.sum()) - 3, 1))
+        sd = min(spread, float(fit.noise)) * np.sqrt(np.diag(covariance))
+        return Touch(
+            position, sd[:2], force, float(sd[2]), *self._displacement(fit, position, force)
         )
-        step = np.array([self._x[1] - self._x[0], self._y[1] - self._y[0]])
-        here = np.array([self._x[p], self._y[q]])
-        if not (hessian[0, 0] < 0 and np.linalg.det(hessian) > 0):
-            return here, np.full(2, np.inf)  # no top inside: the contact sits on the rim
-        inverse = np.linalg.inv(hessian)
-        offset = np.clip(-inverse @ slope, -1, 1)
-        return here + offset * step, -2 * np.diag(inverse) * step**2
 
-    def _touch(
-        self, coefficients: Array, seen: Array, position: Array, position_sd: Array, noise: float
-    ) -> Touch:
-        b = self.basis.at(position[None])[0]
-        t = b * self._compliance.ravel()
-        At = self._A @ t
-        length = float(t @ At)
-        force = float(b @ seen.ravel()) / length
-        displacement = float(b @ coefficients.ravel())
-        sd = noise * math.sqrt(float(b @ self._covariance @ b))
-        return Touch(position, position_sd, force, noise / math.sqrt(length), displacement, sd)
+    def _readings(self, position: Array, used: Mask) -> Array:
+        """T and its slopes along x and y (3, 3 P) at `position`; zero where not `used`."""
+        functions = self.basis.with_slopes(float(position[0]), float(position[1]))
+        readings = np.stack([self._M @ f for f in functions])  # faster than one thin product
+        return readings if used.all() else readings * used
+
+    def _displacement(self, fit: Fit, position: Array, force: float) -> tuple[float, float]:
+        """Displacement at `position` in m, of the fitted shape, and how far it may be off.
+
+        Besides the noise, by as much as the point load's own shape disagrees: what lies between is
+        finer than the fit's functions.
+        """
+        b = fit.estimator.basis.with_slopes(float(position[0]), float(position[1]))[0]
+        fitted = float(b @ fit.coefficients.ravel())
+        variance = float(b @ fit.estimator.unit_covariance(np.isnan(fit.residual)) @ b)
+        t = self.basis.with_slopes(float(position[0]), float(position[1]))[0]
+        loaded = force * float(t**2 @ self._compliance.ravel())
+        return fitted, math.hypot(float(fit.noise) * math.sqrt(variance), fitted - loaded)
+
+
+def _threshold(spare: int) -> float:
+    """What a contact must explain, in units of the noise's variance known from `spare` readings.
+
+    The likelihood ratio spare ln(1 + F / spare) must exceed `_SIGNIFICANT`.
+    """
+    return spare * math.expm1(_SIGNIFICANT / spare) if spare > 1 else math.inf

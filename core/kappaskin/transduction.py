@@ -66,7 +66,7 @@ class Converter:
 
     def __post_init__(self) -> None:
         _require_positive(self, ("full_scale", "conversion_time"))
-        if not 8 <= self.bits <= 24:
+        if not (8 <= self.bits <= 24 and self.bits == int(self.bits)):
             raise Refusal(f"expected a converter of 8 to 24 bits, got {self.bits}")
         if not abs(self.offset) < self.full_scale:
             raise Refusal(

@@ -96,9 +96,9 @@ class LeastSquares:
         """U (R, N) orthonormal and root (N, N) with operator = root U^T, for the readings used."""
         A = self._weight[used, None] * self.M[used]
         rank, N = 0, self.basis.size
+        length = np.linalg.norm(A, axis=0)
+        length[length == 0] = 1
         if len(A) >= N:
-            length = np.linalg.norm(A, axis=0)
-            length[length == 0] = 1
             Q, R = cast("tuple[Array, Array]", linalg.qr(A / length, mode="economic"))
             U, s, Vt = linalg.svd(R)
             rank = int(np.sum(s > s[0] * max(A.shape) * np.finfo(float).eps))
@@ -108,8 +108,8 @@ class LeastSquares:
                 self.condition = float(s[0] / s[-1])
                 """Condition number of M with its columns scaled to unit length."""
                 return
-        else:
-            rank = int(np.linalg.matrix_rank(A)) if len(A) else 0
+        elif len(A):
+            rank = int(np.linalg.matrix_rank(A / length))
         raise RankDeficient(self._refusal(len(A), rank))
 
     def _refusal(self, readings: int, rank: int) -> str:
@@ -186,7 +186,7 @@ class LeastSquares:
                 f"expected curvature of shape (3, {len(self.layout)}) or (T, 3, "
                 f"{len(self.layout)}), got {K.shape}"
             )
-        flat = K.reshape(*K.shape[:-2], -1)
+        flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
         missing = ~np.isfinite(flat)
         if not missing.any():
             return self._solve(self._solver, flat)
@@ -235,6 +235,6 @@ class LeastSquares:
             self,
             c.reshape(*c.shape[:-1], *shape),
             np.asarray(noise)[..., None, None] * solver.sd,
-            residual.reshape(*flat.shape[:-1], 3, -1),
+            residual.reshape(*flat.shape[:-1], 3, len(self.layout)),
             np.asarray(noise),
         )

@@ -10,7 +10,7 @@ from kappaskin.simulate import Simulator
 from kappaskin.sources.wire import Accounting
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
-_ROUNDING = 0  # of a frame: a clock that was slept to may stand a rounding error before it
+_ROUNDING = 1e-3  # of a frame: a clock that was slept to may stand a rounding error before it
 
 
 class SimulatedSource:

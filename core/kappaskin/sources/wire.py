@@ -24,7 +24,7 @@ from kappaskin.frames import Counts
 
 VERSION = 1
 INFORMATION, SAMPLES = 1, 2
-LONGEST = 2**18
+LONGEST = 2**20
 """Bytes after which a message without an end is given up: four times 65,535 counts of 4 bytes."""
 
 _HEADER = struct.Struct("<BBIQ")

@@ -1,0 +1,63 @@
+"""What every test shares: none may leave a thread, a process or a block of memory behind."""
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from multiprocessing import resource_tracker
+from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
+
+import psutil
+import pytest
+from hypothesis import settings
+
+# Steady: a first run on a fresh machine tests what every run tests. To look for more, run
+# `pytest --hypothesis-profile=explore`.
+settings.register_profile("steady", deadline=None, derandomize=True, database=None)
+settings.register_profile("explore", deadline=None, max_examples=2000, database=None)
+settings.load_profile("steady")
+
+# As in the engine, and before NumPy is loaded: two threads that spin for two busy cores took 15 to
+# 80 s for what one does in 10. Processes that tests start inherit it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+resource_tracker.ensure_running()  # a process that stays, and is nobody's leak
+
+_PATIENCE = 2.0  # s that what was told to end may take
+
+
+def _children() -> set[int]:
+    """The processes this one started: Linux lists them, elsewhere psutil looks at all there are."""
+    if not Path("/proc/self/task").exists():
+        return {child.pid for child in psutil.Process().children()}
+    found = ""
+    for thread in Path("/proc/self/task").iterdir():
+        with suppress(OSError):  # it ended meanwhile
+            found += (thread / "children").read_text()
+    return {int(pid) for pid in found.split()}
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    blocks: list[str] = []
+    make = SharedMemory.__init__
+
+    def noted(self: SharedMemory, *args: object, **kwargs: object) -> None:
+        make(self, *args, **kwargs)  # type: ignore[arg-type]
+        blocks.append(self.name)
+
+    monkeypatch.setattr(SharedMemory, "__init__", noted)
+    threads, processes = set(threading.enumerate()), _children()
+
+    def left() -> list[object]:
+        alive: list[object] = [*(set(threading.enumerate()) - threads)]
+        alive += [f"process {pid}" for pid in _children() - processes]
+        return alive + [name for name in blocks if Path("/dev/shm", name).exists()]
+
+    yield
+    end = time.monotonic() + _PATIENCE
+    while left() and time.monotonic() < end:
+        time.sleep(0.02)
+    assert not left(), "the test left these alive"

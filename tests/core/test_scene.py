@@ -1,0 +1,141 @@
+"""Scenes: a skin, what touches it, and what spoils its readings."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kappaskin import (
+    SCENES,
+    LineLoad,
+    Orbit,
+    Patch,
+    Plate,
+    PointLoad,
+    Refusal,
+    Scene,
+    SensorLayout,
+    SineBasis,
+    load_scene,
+)
+from kappaskin.scene import contact_of, scaled_to
+
+PATCH = Patch(0.1, 0.1)
+
+
+def scene(*loads, motion=None):
+    return Scene("a scene", Plate(PATCH), SensorLayout.regular(PATCH, 4, 4), loads, motion)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_ready_scene_is_a_sensor_that_says_it_is_simulated(name):
+    sensor = load_scene(name).sensor()
+
+    assert sensor.simulated
+    assert sensor.channels == 300
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "w_applied"),
+    [
+        ("centre", (0.05, 0.05), 4.70e-3),
+        ("off-centre", (0.02, 0.08), 4.89e-3),
+        ("line", (0.05, 0.05), 4.68e-3),
+    ],
+)
+def test_table_1s_skins_move_by_w_applied_at_the_load(name, place, w_applied):
+    scene = load_scene(name)
+
+    c = scene.plate.deflection(scene.loads, SineBasis(PATCH, 15, 15))
+
+    assert scene.reference == (15, 15)
+    assert scene.basis.at(np.array([place]))[0] @ c.ravel() == pytest.approx(w_applied, rel=1e-12)
+
+
+def test_the_peak_of_the_off_centre_case_is_5_53_mm():
+    scene = load_scene("off-centre")
+
+    w = scene.basis.on_grid(*PATCH.grid(201, 201))(scene.plate.deflection(scene.loads, scene.basis))
+
+    assert 1e3 * w.max() == pytest.approx(5.53, abs=5e-3)
+
+
+def test_table_1s_noise_is_even_between_plus_and_minus_0_40():
+    (noise,) = load_scene("centre").effects
+
+    drawn = noise.apply(np.zeros(100_000), np.random.default_rng(0))
+
+    assert 0.3999 < np.abs(drawn).max() <= 0.40 + 1e-12
+
+
+def test_without_a_name_the_default_scene_is_loaded():
+    assert load_scene().name == load_scene("circle").name == "circle"
+
+
+def test_an_unknown_scene_is_refused_with_those_there_are():
+    with pytest.raises(Refusal, match=r"among circle, centre, off-centre, line; got 'moon'"):
+        load_scene("moon")
+
+
+def test_a_load_scaled_to_a_displacement_moves_its_point_that_far():
+    basis, line = SineBasis(PATCH, 9, 9), LineLoad(0.02, 0.03, 0.07, 0.05)
+
+    load = scaled_to(Plate(PATCH), line, 1.5e-3, basis)
+
+    c = Plate(PATCH).deflection([load], basis)
+    assert basis.at(np.array([[0.045, 0.04]]))[0] @ c.ravel() == pytest.approx(1.5e-3)
+
+
+def test_a_load_on_the_edge_cannot_be_scaled_to_a_displacement_and_is_refused():
+    with pytest.raises(Refusal):
+        scaled_to(Plate(PATCH), PointLoad(0.0, 0.05), 1e-3, SineBasis(PATCH, 9, 9))
+
+
+def test_the_contact_is_the_centre_of_force():
+    contact = contact_of((PointLoad(0.02, 0.03, 1.0), LineLoad(0.05, 0.03, 0.07, 0.09, -3.0)))
+
+    np.testing.assert_allclose(contact, [0.05, 0.0525])
+
+
+@pytest.mark.parametrize("loads", [(), (PointLoad(0.02, 0.03, 0.0),)])
+def test_without_force_there_is_no_contact(loads):
+    assert np.isnan(contact_of(loads)).all()
+
+
+@pytest.mark.parametrize(
+    ("time", "expected"), [(0.0, (0.07, 0.05)), (1.0, (0.05, 0.07)), (2.0, (0.03, 0.05)),
+                           (4.0, (0.07, 0.05)), (4.5, (0.0641421, 0.0641421))]
+)  # fmt: skip
+def test_a_load_on_an_orbit_goes_round_once_in_a_period(time, expected):
+    (load,) = scene(PointLoad(0.05, 0.05), motion=Orbit(0.02, 4.0)).loads_at(time)
+
+    assert (load.x, load.y) == pytest.approx(expected)
+
+
+def test_without_motion_loads_stay():
+    loads = (PointLoad(0.05, 0.05), LineLoad(0.01, 0.02, 0.03, 0.04))
+
+    assert scene(*loads).loads_at(17.0) == loads
+
+
+def test_a_load_off_the_skin_is_refused():
+    with pytest.raises(Refusal, match=r"on the patch of 0\.1 x 0\.1 m"):
+        scene(PointLoad(0.05, 0.101))
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.085, 0.05), (0.05, 0.085), (0.015, 0.05), (0.05, 0.015)])
+def test_a_load_that_will_leave_the_skin_is_refused_at_once(x, y):
+    with pytest.raises(Refusal, match=r"on the patch of 0\.1 x 0\.1 m"):
+        scene(PointLoad(x, y), motion=Orbit(0.02, 4.0))
+
+
+@pytest.mark.parametrize(("radius", "period"), [(-0.1, 1.0), (0.1, 0.0), (math.nan, 1.0)])
+def test_an_orbit_that_cannot_be_is_refused(radius, period):
+    with pytest.raises(Refusal, match="radius >= 0 m and a period > 0 s"):
+        Orbit(radius, period)
+
+
+def test_a_scene_that_is_too_fast_for_its_converter_is_no_sensor():
+    with pytest.raises(Refusal, match="lower the rate or the conversion time"):
+        replace(load_scene("centre"), rate=700.0).sensor()

@@ -1,0 +1,156 @@
+"""A scene to the counts that a real device would send, with the truth beside them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kappaskin import (
+    GaussianNoise,
+    Orbit,
+    Patch,
+    Plate,
+    PointLoad,
+    Scene,
+    SensorLayout,
+    Simulator,
+    UniformNoise,
+    load_scene,
+)
+
+PATCH = Patch(0.1, 0.1)
+QUIET = Scene(
+    "quiet", Plate(PATCH), SensorLayout.regular(PATCH, 5, 4), (PointLoad(0.03, 0.06, 0.15),)
+)
+NOISY = replace(QUIET, effects=(UniformNoise(0.2), GaussianNoise(0.1)), seed=3)
+
+
+def counts(scene, frames=4):
+    simulator = Simulator(scene)
+    return np.array([simulator.frame(n, lambda: 0.0).counts for n in range(frames)])
+
+
+def test_without_effects_the_counts_are_those_of_the_true_curvature():
+    c = QUIET.plate.deflection(QUIET.loads, QUIET.basis)
+    curvature = QUIET.layout.curvature_operator(QUIET.basis) @ c.ravel()
+
+    expected = np.rint(curvature * 0.065625 / (2.5 / 2**15))
+
+    assert np.abs(expected).max() > 1000
+    np.testing.assert_array_equal(counts(QUIET), np.tile(expected, (4, 1)))
+
+
+def test_effects_of_no_size_change_nothing():
+    without_size = replace(QUIET, effects=(UniformNoise(0.0), GaussianNoise(0.0)))
+
+    np.testing.assert_array_equal(counts(without_size), counts(QUIET))
+
+
+def test_effects_add_up():
+    noise = (counts(NOISY, 200) - counts(QUIET, 200)) * NOISY.transduction.resolution
+
+    # 200 x 60 draws: the standard error of the rms is under 1 %.
+    assert noise.std() == pytest.approx(np.hypot(0.2, 0.1), rel=0.03)
+
+
+def test_the_same_seed_gives_the_same_frames_and_another_one_others():
+    first = counts(NOISY)
+
+    np.testing.assert_array_equal(first, counts(NOISY))
+    assert (first != counts(replace(NOISY, seed=4))).mean() > 0.9
+    assert (first[0] != first[1]).mean() > 0.9
+
+
+def test_frames_carry_their_number_device_time_host_time_and_channels():
+    frame = Simulator(QUIET).frame(50, lambda: 17.5)
+
+    assert (frame.sequence, frame.device_time, frame.host_time) == (50, 0.1, 17.5)
+    np.testing.assert_array_equal(frame.channels, np.arange(60))
+    assert frame.counts.dtype == np.int32
+
+
+def test_the_sequence_number_wraps_at_32_bits_and_time_goes_on():
+    frame = Simulator(QUIET).frame(2**32 + 5, lambda: 0.0)
+
+    assert frame.sequence == 5
+    assert frame.device_time == (2**32 + 5) / 500
+
+
+def test_dead_channels_read_zero_and_the_others_as_before():
+    dead = replace(QUIET, layout=QUIET.layout.without([0, 7]))
+
+    read = counts(dead, 1).reshape(3, 20)
+
+    assert not read[:, [0, 7]].any()
+    np.testing.assert_array_equal(read[:, 8:], counts(QUIET, 1).reshape(3, 20)[:, 8:])
+
+
+def test_the_truth_travels_with_the_frame():
+    truth = Simulator(NOISY).frame(0, lambda: 0.0).truth
+
+    np.testing.assert_array_equal(truth.contact, [0.03, 0.06])
+    np.testing.assert_array_equal(
+        truth.coefficients, QUIET.plate.deflection(QUIET.loads, QUIET.basis)
+    )
+
+
+def test_the_truth_moves_with_the_load():
+    scene = replace(QUIET, motion=Orbit(0.01, 4.0))
+    simulator = Simulator(scene)
+
+    truth = simulator.frame(500, lambda: 0.0).truth
+
+    moved = PointLoad(0.03, 0.07, 0.15)
+    np.testing.assert_allclose(truth.contact, moved.centre())
+    expected = scene.plate.deflection([moved], scene.basis)
+    np.testing.assert_allclose(truth.coefficients, expected, rtol=1e-9, atol=1e-15)
+
+
+def test_a_changed_load_shows_in_the_next_frame():
+    simulator = Simulator(QUIET)
+    simulator.frame(0, lambda: 0.0)
+    other = replace(QUIET, loads=(PointLoad(0.07, 0.02, 0.1),))
+
+    simulator.change(other)
+    frame = simulator.frame(1, lambda: 0.0)
+
+    np.testing.assert_array_equal(frame.counts, counts(other)[0])
+    np.testing.assert_array_equal(frame.truth.contact, [0.07, 0.02])
+
+
+def test_changing_only_the_load_goes_on_with_the_noise():
+    simulator = Simulator(NOISY)
+    simulator.frame(0, lambda: 0.0)
+
+    simulator.change(replace(NOISY, motion=Orbit(0.0, 1.0)))
+
+    np.testing.assert_array_equal(simulator.frame(1, lambda: 0.0).counts, counts(NOISY)[1])
+
+
+def test_changed_effects_are_seeded_anew():
+    simulator = Simulator(QUIET)
+    simulator.frame(0, lambda: 0.0)
+
+    simulator.change(NOISY)
+
+    np.testing.assert_array_equal(simulator.frame(1, lambda: 0.0).counts, counts(NOISY)[0])
+
+
+def test_a_change_to_more_elements_is_answered_with_their_channels():
+    simulator = Simulator(QUIET)
+
+    simulator.change(replace(QUIET, layout=SensorLayout.regular(PATCH, 6, 6)))
+
+    frame = simulator.frame(0, lambda: 0.0)
+    assert len(frame.channels) == len(frame.counts) == 108
+
+
+def test_every_frame_of_the_moving_scene_can_be_made():
+    scene = load_scene("circle")
+    simulator = Simulator(scene)
+
+    contacts = [simulator.frame(n, lambda: 0.0).truth.contact for n in range(0, 2000, 40)]
+
+    turn = 2 * np.pi * np.arange(50) / 50  # once round in 4 s, 2000 frames
+    expected = 0.05 + 0.022 * np.column_stack([np.cos(turn), np.sin(turn)])
+    np.testing.assert_allclose(contacts, expected, rtol=1e-9)
