@@ -165,12 +165,12 @@ class MembraneView(QWidget):
         for label, text, at in zip(
             self._labels,
             ("0", f"x {a:g} mm", f"y {b:g} mm"),
-            ((-0.04 * a, -0.04 * b), (a, -0.06 * b), (-0.06 * a, b)),
+            ((-0.04 * a, -0.04 * b), (a, -0.06 * b), (0.0, 1.05 * b)),
             strict=True,
         ):
             label.input = text
             label.position = (*at, 0.0)
-            label.prop.justification_horizontal = "right" if text[0] == "y" else "left"
+            label.prop.justification_horizontal = "center" if text[0] == "y" else "left"
 
     def reset_camera(self) -> None:
         """Look at the whole skin from the front, a little from the left, as large as it fits."""
