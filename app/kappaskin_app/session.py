@@ -39,12 +39,12 @@ class Session(QObject):
         self.status = Status()
         self.estimate: Estimate | None = None
         self.source = ""
-        self._next_status = 0.0
+        self._next_status, self._closed = 0.0, False
         self._shown: tuple[int, int] = (0, -1)
         self._values_of: tuple[object, ...] = ()
         history.changed.connect(guarded(self._follow))
         self._timer = QTimer(self, interval=_TICK, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
-        self._timer.timeout.connect(guarded(self.tick))
+        self._timer.timeout.connect(self.tick)
         self._timer.start()
 
     @property
@@ -76,8 +76,11 @@ class Session(QObject):
         ):
             self.engine.play(scene_of(settings))
 
+    @guarded
     def tick(self) -> None:
         """Look for news; everything that shows it hangs on the two signals."""
+        if self._closed:
+            return  # asked for by a picture drawn while closing
         now = time.monotonic()
         if now >= self._next_status:
             self._next_status = now + _STATUS
@@ -116,4 +119,5 @@ class Session(QObject):
 
     def close(self) -> None:
         self._timer.stop()
+        self._closed = True
         self.engine.close()

@@ -39,7 +39,7 @@ from kappaskin_app.views.heatmap import ColourBar, Heatmap
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.readouts import Health, Readouts
 
-_HEATMAPS = 0.033  # s between two drawings of the heatmaps
+_HEATMAPS = 0.06  # s between two drawings of the heatmaps
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
 _TIPS = {
     "xx": "Bending along x as each element reads it (Eq. 3).",
@@ -168,6 +168,8 @@ class MainWindow(QMainWindow):
         self.history.changed.connect(guarded(self._follow))
         self.session.estimated.connect(guarded(self._show_estimate))
         self.session.reported.connect(guarded(self._show_status))
+        # Queued: the next look comes after the picture is out, and need not wait for the timer.
+        self.membrane.drawn.connect(self.session.tick, Qt.ConnectionType.QueuedConnection)
         self.membrane.load_grabbed.connect(guarded(self._grab))
         self.membrane.load_dragged.connect(guarded(self._drag))
         self.membrane.load_released.connect(guarded(self._release))
@@ -315,7 +317,8 @@ class MainWindow(QMainWindow):
         due = now >= self._next_heatmaps
         if colour == "displacement":
             top = self._limit(colour, values)
-            limits, colours, unit = (0.0, top), SEQUENTIAL, "mm"
+            pulled = float(np.nansum(values)) < 0
+            limits, colours, unit = (-top, 0.0) if pulled else (0.0, top), SEQUENTIAL, "mm"
         else:
             limit = self._limit(colour, estimate.curvature[COMPONENTS.index(colour)])
             limits, colours, unit = (-limit, limit), DIVERGING, "1/m"

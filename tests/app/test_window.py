@@ -3,9 +3,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QDockWidget, QPushButton
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QImage, QWheelEvent
+from PySide6.QtWidgets import QApplication, QDockWidget, QPushButton
 
 from kappaskin_app.window import MainWindow
 
@@ -39,6 +39,33 @@ def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     until(lambda: window.history.settings.functions_x == 8)
     until(lambda: window.session.estimate.coefficients.shape == (8, 8))
+
+
+def test_ctrl_z_works_while_an_editor_has_the_focus(window: MainWindow, qtbot) -> None:
+    box = window.basis.editor("functions_x")
+    box.setFocus()
+    qtbot.keyClick(box, Qt.Key.Key_Down)
+    assert window.history.settings.functions_x == 7
+    qtbot.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert window.history.settings.functions_x == 8
+
+
+def test_the_wheel_changes_no_editor_without_the_focus(window: MainWindow, qtbot) -> None:
+    box = window.noise.editor("noise_seed")
+    window.basis.editor("functions_x").setFocus()
+    here = QPointF(box.rect().center())
+    event = QWheelEvent(
+        here,
+        QPointF(box.mapToGlobal(here.toPoint())),
+        QPoint(0, 0),
+        QPoint(0, 120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(box, event)
+    assert window.history.settings.noise_seed == 0
 
 
 def test_a_basis_the_readings_do_not_decide_is_refused_in_its_panel(

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -12,12 +13,38 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QLabel,
+    QLineEdit,
     QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
 from kappaskin_app.settings import Choice, Range, Settings, Switch, ask_of
+
+
+class _Manners(QObject):
+    """Makes an editor leave undo to the window, and the wheel to the panel it scrolls in."""
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind, standard = event.type(), QKeySequence.StandardKey
+        if (
+            kind == QEvent.Type.ShortcutOverride
+            and isinstance(event, QKeyEvent)
+            and (event.matches(standard.Undo) or event.matches(standard.Redo))
+        ):
+            event.ignore()  # else a line edit would take it for its own text
+            return True
+        if kind == QEvent.Type.Wheel and isinstance(watched, QWidget) and not watched.hasFocus():
+            event.ignore()
+            return True
+        return False
+
+
+def _well_behaved(editor: QWidget) -> None:
+    manners = _Manners(editor)
+    editor.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    for widget in (editor, *editor.findChildren(QLineEdit)):
+        widget.installEventFilter(manners)
 
 
 @dataclass(frozen=True)
@@ -101,6 +128,7 @@ class Panel(QGroupBox):
         editor = _editor(name, lambda value: self.wished.emit(name, value))
         editor.widget.setToolTip(how.tip)
         editor.widget.setObjectName(name)
+        _well_behaved(editor.widget)
         self._editors[name] = editor
         label = QLabel("" if isinstance(how, Switch) else how.label)
         label.setBuddy(editor.widget)

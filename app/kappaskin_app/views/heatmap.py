@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVB
 
 from kappaskin import SensorLayout
 from kappaskin_app.theme import DIVERGING, Colours, Theme
+from kappaskin_app.views.line import Line
 
 Array = NDArray[np.float64]
 
@@ -185,7 +186,7 @@ class Heatmap(QWidget):
         self.component = component
         self._title = QLabel(f"<b>\N{GREEK SMALL LETTER KAPPA}<sub>{component}</sub></b>")
         self._title.setToolTip(tip)
-        self.value = QLabel()
+        self.value = Line()
         self.value.setToolTip("The element under the mouse, else the largest reading.")
         self.lock = QToolButton(checkable=True, text="Lock range")  # pyright: ignore[reportCallIssue]
         self.lock.setToolTip("Keep the colours' range as it is now; else it follows the readings.")
@@ -250,7 +251,7 @@ class Heatmap(QWidget):
             finite = values[np.isfinite(values)]
             peak = finite[np.argmax(np.abs(finite))] if len(finite) else math.nan
             text = f"peak {peak:+.2f} 1/m" if len(finite) else "no readings"
-        self.value.setText(text.replace("-", "\N{MINUS SIGN}"))
+        self.value.show_text(text.replace("-", "\N{MINUS SIGN}"))
 
     def show_theme(self, theme: Theme) -> None:
         self._missing = theme.missing

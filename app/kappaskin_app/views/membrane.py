@@ -30,6 +30,7 @@ class MembraneView(QWidget):
     load_grabbed = Signal(float, float)
     load_dragged = Signal(float, float)
     load_released = Signal()
+    drawn = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -97,6 +98,7 @@ class MembraneView(QWidget):
         now = time.monotonic()
         self._drawn = True
         self.ages.append((now, now - self._host_time))
+        self.drawn.emit()
 
     def _note_turning(self, *_: object) -> None:
         self._fitted = False  # the person chose this view: a new size must not undo it

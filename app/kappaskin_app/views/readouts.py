@@ -4,11 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import Qt
+from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from kappaskin import Estimate
 from kappaskin_app.theme import Theme
+from kappaskin_app.views.line import Line
 
 NONE = "\N{EN DASH}"
 
@@ -41,6 +42,8 @@ FIELDS = {
     "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
 }
 
+_WIDTHS = {"contact": 6, "rate": 5, "force": 5, "depth": 5, "age": 3, "error": 4, "rms": 4}
+
 
 def _with_error(value: float, sd: float, digits: int, unit: str) -> str:
     if not math.isfinite(value):
@@ -59,17 +62,19 @@ class Readouts(QWidget):
         grid.setHorizontalSpacing(16)
         grid.setVerticalSpacing(0)
         self._names: list[QLabel] = []
-        self._numbers: dict[str, QLabel] = {}
+        self._numbers: dict[str, Line] = {}
         for column, (key, (name, tip)) in enumerate(FIELDS.items()):
-            above, below = QLabel(name), QLabel(NONE)
-            for label in (above, below):
-                label.setToolTip(tip)
-                label.setAlignment(Qt.AlignmentFlag.AlignLeft)
+            above, below = QLabel(name), Line(NONE)
+            bold = below.font()
+            bold.setWeight(QFont.Weight.DemiBold)
+            below.setFont(bold)
+            for widget in (above, below):
+                widget.setToolTip(tip)
             self._names.append(above)
             self._numbers[key] = below
             grid.addWidget(above, 0, column)
             grid.addWidget(below, 1, column)
-            grid.setColumnStretch(column, 1)
+            grid.setColumnStretch(column, _WIDTHS.get(key, 4))
 
     def text(self, key: str) -> str:
         return self._numbers[key].text()
@@ -97,11 +102,8 @@ class Readouts(QWidget):
         self._write("rms", _with_error(estimate.error_rms * 1e3, math.nan, 3, "mm"))
 
     def _write(self, key: str, text: str) -> None:
-        if self._numbers[key].text() != text:
-            self._numbers[key].setText(text)
+        self._numbers[key].show_text(text)
 
     def show_theme(self, theme: Theme) -> None:
         for label in self._names:
             label.setStyleSheet(f"color: {theme.faint}; font-size: 11px;")
-        for label in self._numbers.values():
-            label.setStyleSheet("font-size: 13px; font-weight: 600;")
