@@ -61,3 +61,13 @@ class Actions:
 
     def __getitem__(self, name: str) -> QAction:
         return self.entries[name].action
+
+    def cheat_sheet(self) -> str:
+        """Every shortcut with what it does, as HTML."""
+        rows = [
+            f"<tr><td><b>{entry.action.shortcut().toString()}</b>&nbsp;&nbsp;</td>"
+            f"<td>{entry.action.text().replace('&', '')}</td></tr>"
+            for entry in self.entries.values()
+            if not entry.action.shortcut().isEmpty()
+        ]
+        return f"<table>{''.join(rows)}</table>"

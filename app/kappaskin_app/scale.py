@@ -2,6 +2,14 @@
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin import COMPONENTS
+from kappaskin_app.settings import Settings
+
+Array = NDArray[np.float64]
+
 _PATIENCE = 2.0  # s that the values must stay small before the range narrows
 
 
@@ -30,3 +38,17 @@ class SteadyRange:
         elif now - self._small_since > _PATIENCE:
             self.limit, self._small_since = wanted, math.inf
         return self.limit
+
+
+class Ranges:
+    """The colour limit of each quantity: locked by a setting, or following what is shown."""
+
+    def __init__(self) -> None:
+        self._steady = {name: SteadyRange(0.5) for name in COMPONENTS}
+        self._steady["displacement"] = SteadyRange(0.1)
+
+    def limit(self, name: str, values: Array, settings: Settings, now: float) -> float:
+        """The limit in mm or 1/m for `values` of the quantity `name`, NaN among them or not."""
+        locked = getattr(settings, f"range_{name}", 0.0)
+        largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+        return locked or self._steady[name].follow(largest, now)

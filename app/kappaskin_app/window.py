@@ -29,7 +29,7 @@ from kappaskin_app.panels.basis import BasisPanel
 from kappaskin_app.panels.connection import ConnectionPanel
 from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.view import ViewPanel
-from kappaskin_app.scale import SteadyRange
+from kappaskin_app.scale import Ranges
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings, ask_of
 from kappaskin_app.simulation import dragged, scene_of
@@ -62,8 +62,7 @@ class MainWindow(QMainWindow):
         self.heatmaps = {name: Heatmap(name, _TIPS[name]) for name in COMPONENTS}
         self.connection, self.basis = ConnectionPanel(), BasisPanel()
         self.load, self.noise, self.view = LoadPanel(), NoisePanel(), ViewPanel()
-        self.ranges = {name: SteadyRange(0.5) for name in COMPONENTS}
-        self.ranges["displacement"] = SteadyRange(0.1)
+        self.ranges = Ranges()
         self._met = 0
         self._next_heatmaps = self._next_numbers = 0.0
         self._gesture, self._grabbed_end = -1, False
@@ -170,9 +169,9 @@ class MainWindow(QMainWindow):
         self.session.reported.connect(guarded(self._show_status))
         # Queued: the next look comes after the picture is out, and need not wait for the timer.
         self.membrane.drawn.connect(self.session.tick, Qt.ConnectionType.QueuedConnection)
-        self.membrane.load_grabbed.connect(guarded(self._grab))
-        self.membrane.load_dragged.connect(guarded(self._drag))
-        self.membrane.load_released.connect(guarded(self._release))
+        self.membrane.drag.grabbed.connect(guarded(self._grab))
+        self.membrane.drag.dragged.connect(guarded(self._drag))
+        self.membrane.drag.released.connect(guarded(self._release))
         for name, heatmap in self.heatmaps.items():
             heatmap.pointed.connect(guarded(self._point))
             heatmap.lock_wanted.connect(guarded(partial(self._wish, f"range_{name}")))
@@ -301,12 +300,6 @@ class MainWindow(QMainWindow):
             for row, heatmap in enumerate(self.heatmaps.values()):
                 heatmap.show_reading(self.session.estimate.curvature[row])
 
-    def _limit(self, name: str, values: np.ndarray) -> float:
-        """The colour limit of a quantity: locked, or following what it shows."""
-        locked = getattr(self.history.settings, f"range_{name}", 0.0)
-        largest = float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
-        return locked or self.ranges[name].follow(largest, time.monotonic())
-
     def _show_estimate(self, estimate: Estimate) -> None:
         if not self.membrane.ready:
             return  # a picture is due; the next tick brings a newer estimate
@@ -316,11 +309,12 @@ class MainWindow(QMainWindow):
         now = time.monotonic()
         due = now >= self._next_heatmaps
         if colour == "displacement":
-            top = self._limit(colour, values)
+            top = self.ranges.limit(colour, values, settings, now)
             pulled = float(np.nansum(values)) < 0
             limits, colours, unit = (-top, 0.0) if pulled else (0.0, top), SEQUENTIAL, "mm"
         else:
-            limit = self._limit(colour, estimate.curvature[COMPONENTS.index(colour)])
+            readings = estimate.curvature[COMPONENTS.index(colour)]
+            limit = self.ranges.limit(colour, readings, settings, now)
             limits, colours, unit = (-limit, limit), DIVERGING, "1/m"
         self.membrane.show_estimate(estimate, values, limits)
         simulated = self.session.simulating
@@ -332,7 +326,8 @@ class MainWindow(QMainWindow):
             self._next_heatmaps = now + _HEATMAPS
             for row, (name, heatmap) in enumerate(self.heatmaps.items()):
                 readings = estimate.curvature[row]
-                heatmap.show_values(readings, self._limit(name, readings))
+                limit = self.ranges.limit(name, readings, settings, now)
+                heatmap.show_values(readings, limit)
 
     # Small things.
 
@@ -349,15 +344,8 @@ class MainWindow(QMainWindow):
         self._tell(f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}")
 
     def _show_shortcuts(self) -> None:
-        rows = [
-            f"<tr><td><b>{entry.action.shortcut().toString()}</b>&nbsp;&nbsp;</td>"
-            f"<td>{entry.action.text().replace('&', '')}</td></tr>"
-            for entry in self.actions_by_name.entries.values()
-            if not entry.action.shortcut().isEmpty()
-        ]
-        box = QMessageBox(self)
-        box.setWindowTitle("Shortcuts")
-        box.setText(f"<table>{''.join(rows)}</table>")
+        box = QMessageBox(QMessageBox.Icon.NoIcon, "Shortcuts", self.actions_by_name.cheat_sheet())
+        box.setParent(self, Qt.WindowType.Dialog)
         box.setModal(False)
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         box.show()

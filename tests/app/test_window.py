@@ -91,7 +91,7 @@ def test_noise_turned_off_leaves_only_what_the_basis_cannot_follow(
 def _shown(window: MainWindow) -> bool:
     """Whether the load is drawn where the settings have it."""
     settings, contact = window.history.settings, window.session.estimate.true_contact
-    drawn = np.allclose(window.membrane.handles[0], [settings.x, settings.y])
+    drawn = np.allclose(window.membrane.drag.handles[0], [settings.x, settings.y])
     return drawn and np.allclose(contact, [settings.x, settings.y])
 
 
@@ -101,7 +101,7 @@ def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
     window.history.change("Point", -1, load_case="point", x=0.05, y=0.05)
     until(lambda: _shown(window))
     view, count = window.membrane, window.history.stack.count()
-    start = view.handle_on_screen().toPoint() - QPoint(0, 8)
+    start = view.drag.on_screen().toPoint() - QPoint(0, 8)
     qtbot.mousePress(view.plotter, Qt.MouseButton.LeftButton, pos=start)
     for step in range(1, 9):
         qtbot.mouseMove(view.plotter, start + QPoint(9 * step, 2 * step))
@@ -111,7 +111,7 @@ def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
     assert moved.x > 0.06
     assert window.history.stack.count() == count + 1
     until(lambda: _shown(window))
-    end = view.handle_on_screen().toPoint()
+    end = view.drag.on_screen().toPoint()
     assert (end - start - QPoint(72, 24)).manhattanLength() <= 12
     window.history.stack.undo()
     assert window.history.settings.x == 0.05

@@ -8,28 +8,24 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal
-from PySide6.QtGui import QMouseEvent, QResizeEvent
+from PySide6.QtCore import QTimer, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, LineLoad, Load, Patch, Sensor
 from kappaskin_app.theme import Colours, Theme
+from kappaskin_app.views.drag import ARROW, MM, LoadDrag
 
 Array = NDArray[np.float64]
 
-MM = 1e3
-_GRAB = 28  # pixels around a load's arrow within which the mouse takes hold of it
 _LIFT = 0.6  # mm of drawing above the surface, or half of a line drowns in it
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
 class MembraneView(QWidget):
-    """Shows estimates; says when a load is dragged. The skin is drawn pressed in, downwards."""
+    """Shows estimates, the skin pressed in downwards; `drag` says when a load is moved."""
 
-    load_grabbed = Signal(float, float)
-    load_dragged = Signal(float, float)
-    load_released = Signal()
     drawn = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -41,7 +37,7 @@ class MembraneView(QWidget):
         around.addWidget(self.plotter)
         self._make_actors()
         self._make_lights()
-        self.plotter.installEventFilter(self)
+        self.drag = LoadDrag(self.plotter, self._height_at)
         self.setMinimumSize(320, 240)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
         """(when, age of its frame in s) of each drawing completed."""
@@ -51,9 +47,6 @@ class MembraneView(QWidget):
         self._exaggeration = 1.0
         self._layout_of: Sensor | None = None
         self._heights: Array = np.zeros((2, 2))
-        self.handles: Array = np.empty((0, 2))
-        self._dragging = False
-        self._plane, self._slip, self._held = 0.0, np.zeros(2), np.zeros(2)
         self._lost = False
         self._fitted = True
         self.plotter.iren.interactor.AddObserver("InteractionEvent", self._note_turning)
@@ -74,7 +67,7 @@ class MembraneView(QWidget):
             self._elements, style="points", point_size=5, **unlit
         )
         self._line_actor = plotter.add_mesh(self._line, line_width=5, color="#e8543f", **unlit)
-        arrow = pv.Arrow(start=(0, 0, 22), direction=(0, 0, -1), scale=22, tip_length=0.35)
+        arrow = pv.Arrow(start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35)
         self._arrows = [
             plotter.add_mesh(arrow, color="#e8543f", reset_camera=False, render=False)
             for _ in range(2)
@@ -276,10 +269,10 @@ class MembraneView(QWidget):
         """Draw the simulated loads, none for a real sensor; a moving one where it is now."""
         moving = moving_to is not None and bool(np.isfinite(moving_to).all())
         centres = [moving_to] if moving else [load.centre() for load in loads]
-        self.handles = np.array(centres).reshape(-1, 2)
+        self.drag.handles = np.array(centres).reshape(-1, 2)
         for number, arrow in enumerate(self._arrows):
             there = number < len(centres)
-            self._place(arrow, self.handles[number] if there else np.full(2, np.nan))
+            self._place(arrow, self.drag.handles[number] if there else np.full(2, np.nan))
         lines = [load for load in loads if isinstance(load, LineLoad)]
         self._line_actor.visibility = bool(lines)
         for load in lines[:1]:
@@ -332,90 +325,6 @@ class MembraneView(QWidget):
             self._wire_actor.prop.opacity = 0.75
         self.plotter.update()
 
-    # The mouse: a load near the pointer is taken hold of, everything else turns the camera.
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if isinstance(event, QMouseEvent):
-            kind, left = event.type(), Qt.MouseButton.LeftButton
-            if kind == QEvent.Type.MouseButtonPress and event.button() == left:
-                return self._grab(event.position())
-            if kind == QEvent.Type.MouseMove:
-                return self._move(event.position())
-            if kind == QEvent.Type.MouseButtonRelease and self._dragging:
-                self._dragging = False
-                self.load_released.emit()
-                return True
-        return super().eventFilter(watched, event)
-
-    def _near_handle(self, at: QPointF) -> Array | None:
-        """The handle (2,) in m whose arrow is drawn near `at`."""
-        for handle in self.handles:
-            height = float(self._height_at(handle[None])[0])
-            tip, tail = (self._to_screen(handle, height + up) for up in (0.0, 22.0))
-            along = tail - tip
-            point = np.array([at.x(), at.y()])
-            share = np.clip((point - tip) @ along / max(along @ along, 1.0), 0, 1)
-            if np.linalg.norm(point - tip - share * along) < _GRAB / 2:
-                return handle
-        return None
-
-    def _grab(self, at: QPointF) -> bool:
-        handle = self._near_handle(at)
-        if handle is None:
-            return False
-        self._dragging = True
-        self._plane = float(self._height_at(handle[None])[0])
-        self._slip, self._held = handle - self._to_skin(at), handle
-        self.load_grabbed.emit(*handle)
-        return True
-
-    def _move(self, at: QPointF) -> bool:
-        if not self._dragging:
-            over = self._near_handle(at) is not None
-            shape = Qt.CursorShape.OpenHandCursor if over else Qt.CursorShape.ArrowCursor
-            self.plotter.setCursor(shape)
-            return False
-        self.plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
-        if len(self.handles):  # the skin sinks as the load moves on it: stay at its height
-            near = self.handles[np.argmin(np.linalg.norm(self.handles - self._held, axis=1))]
-            self._plane = float(self._height_at(near[None])[0])
-        self._held = self._to_skin(at) + self._slip
-        self.load_dragged.emit(*self._held)
-        return True
-
-    def _to_screen(self, position: Array, height: float) -> Array:
-        """Widget pixels (2,) of a point at `position` in m and drawn `height` in mm."""
-        renderer = self.plotter.renderer
-        renderer.SetWorldPoint(position[0] * MM, position[1] * MM, height, 1.0)
-        renderer.WorldToDisplay()
-        x, y, _ = renderer.GetDisplayPoint()
-        ratio = self.plotter.devicePixelRatioF()
-        return np.array([x / ratio, self.plotter.height() - y / ratio])
-
-    def _to_skin(self, at: QPointF) -> Array:
-        """Where the line of sight through `at` meets the plane of the load, (2,) in m."""
-        renderer, ratio = self.plotter.renderer, self.plotter.devicePixelRatioF()
-        ends = []
-        for depth in (0.0, 1.0):
-            renderer.SetDisplayPoint(
-                at.x() * ratio, (self.plotter.height() - at.y()) * ratio, depth
-            )
-            renderer.DisplayToWorld()
-            x, y, z, w = renderer.GetWorldPoint()
-            ends.append(np.array([x, y, z]) / w)
-        near, far = ends
-        fall = far[2] - near[2]
-        share = (self._plane - near[2]) / fall if abs(fall) > 1e-9 else 0.0
-        return (near + share * (far - near))[:2] / MM
-
-    def handle_on_screen(self) -> QPointF | None:
-        """Where in this view the first load's arrow ends, None without a load."""
-        if not len(self.handles):
-            return None
-        height = float(self._height_at(self.handles[:1])[0])
-        return QPointF(*self._to_screen(self.handles[0], height))
-
     def close_plotter(self) -> None:
         """Before the window goes: give VTK's resources back."""
-        self.plotter.removeEventFilter(self)
         self.plotter.close()
