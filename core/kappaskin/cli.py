@@ -1,6 +1,7 @@
 """The command `kappaskin`: each subcommand in a few lines."""
 
 import json
+import os
 import signal
 import sys
 from dataclasses import replace
@@ -155,7 +156,7 @@ def doctor(*, json: Annotated[bool, Parameter(negative="")] = False) -> None:
     print(f"{'display':<20}{found['display'] or 'none (a virtual one will be used)'}")
     for port in found["serial_ports"]:
         may = "" if port["opened"] else "  no permission: sudo usermod -aG dialout $USER"
-        print(f"{port['port']:<20}{port['description']}{may}")
+        print(f"{port['port']:<19} {port['description']}{may}")
     if not found["serial_ports"]:
         print(f"{'serial ports':<20}none found")
     print(f"{'missing':<20}{' '.join(found['missing']) or 'nothing'}")
@@ -186,5 +187,6 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"kappaskin: {error} See `kappaskin --help`.", file=sys.stderr)
         return REFUSED
     except BrokenPipeError:
-        sys.stderr.close()  # whoever read our output has gone
+        # Whoever read our output has gone; what is still buffered must have somewhere to go.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0

@@ -28,6 +28,7 @@ _DAMAGES = (
     EOFError,
     RuntimeError,
     MemoryError,
+    OverflowError,
     zipfile.BadZipFile,
     zlib.error,
 )

@@ -1,5 +1,6 @@
 """What a device says it is: its skin, its elements and its electronics."""
 
+import math
 from dataclasses import dataclass
 
 from kappaskin.errors import Refusal
@@ -21,7 +22,7 @@ class Sensor:
     simulated: bool
 
     def __post_init__(self) -> None:
-        if not self.rigidity > 0:
+        if not 0 < self.rigidity < math.inf:
             raise Refusal(f"expected a rigidity above zero in N m, got {self.rigidity}")
         scan_time = self.transduction.scan_time(self.channels)
         if not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):

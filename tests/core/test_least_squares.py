@@ -285,7 +285,9 @@ def test_any_set_of_missing_readings_gives_the_shape_of_the_rest_or_is_refused(g
             fit, fit(K).coefficients, by_lstsq(fit, K), 1e3 * EPS * (s[0] / s[-1]) ** 2
         )
     else:
-        with pytest.raises(RankDeficient, match=r"readings determine \d of the 9 coefficients"):
+        with pytest.raises(
+            RankDeficient, match=r"readings determine (at most )?\d of the 9 coefficients"
+        ):
             fit(K)
 
 

@@ -75,9 +75,11 @@ class LeastSquares:
         self.basis, self.layout = basis, layout
         self._sigma_known = sigma is not None
         self._weight = self._weights(1.0 if sigma is None else sigma)
+        used = layout.live.ravel() & (self._weight > 0)
+        if used.sum() < basis.size:  # before any memory is taken for it
+            raise RankDeficient(self._refusal(int(used.sum()), int(used.sum())))
         self.M = layout.curvature_operator(basis)
         """The curvature operator (3 P, Ni Nj) (Eq. 2)."""
-        used = layout.live.ravel() & (self._weight > 0)
         self._factor(used)
         self._solver = _Solver(used, self._root @ self._U.T, *self._spread(self._root))
         self._reduced: OrderedDict[bytes, _Solver] = OrderedDict()
@@ -95,27 +97,23 @@ class LeastSquares:
     def _factor(self, used: Mask) -> None:
         """U (R, N) orthonormal and root (N, N) with operator = root U^T, for the readings used."""
         A = self._weight[used, None] * self.M[used]
-        rank, N = 0, self.basis.size
         length = np.linalg.norm(A, axis=0)
         length[length == 0] = 1
-        if len(A) >= N:
-            Q, R = cast("tuple[Array, Array]", linalg.qr(A / length, mode="economic"))
-            U, s, Vt = linalg.svd(R)
-            rank = int(np.sum(s > s[0] * max(A.shape) * np.finfo(float).eps))
-            if rank == N:
-                self._U = Q @ U
-                self._root = (Vt.T / s) / length[:, None]
-                self.condition = float(s[0] / s[-1])
-                """Condition number of M with its columns scaled to unit length."""
-                return
-        elif len(A):
-            rank = int(np.linalg.matrix_rank(A / length))
-        raise RankDeficient(self._refusal(len(A), rank))
+        Q, R = cast("tuple[Array, Array]", linalg.qr(A / length, mode="economic"))
+        U, s, Vt = linalg.svd(R)
+        rank = int(np.sum(s > s[0] * max(A.shape) * np.finfo(float).eps))
+        if rank < self.basis.size:
+            raise RankDeficient(self._refusal(len(A), rank))
+        self._U = Q @ U
+        self._root = (Vt.T / s) / length[:, None]
+        self.condition = float(s[0] / s[-1])
+        """Condition number of M with its columns scaled to unit length."""
 
     def _refusal(self, readings: int, rank: int) -> str:
         (Ni, Nj), N, layout = self.basis.shape, self.basis.size, self.layout
-        what = f"{layout} with {readings} readings determine {rank} of the {N} coefficients of a "
-        what += f"{Ni} x {Nj} basis"
+        bound = "at most " if readings < N else ""
+        what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
+        what += f"of a {Ni} x {Nj} basis"
         if readings == 0:
             return f"{what}: no readings are left; check the connection and the dead elements"
         missing = 3 * len(layout) - readings
@@ -142,12 +140,6 @@ class LeastSquares:
         if missing is None:
             return self._solver.covariance
         return self._without(missing.ravel()).covariance
-
-    @property
-    def information(self) -> Array:
-        """M^T W M (N, N) of the readings in use: the inverse of the unit covariance."""
-        A = self._weight[self._solver.used, None] * self.M[self._solver.used]
-        return A.T @ A
 
     def _without(self, missing: Mask) -> _Solver:
         """The solver without the readings `missing` (3 P,), remembered for the next frames."""

@@ -1,0 +1,290 @@
+"""The command: what it prints where, and that a refusal leaves nothing but its reason."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
+from kappaskin.cli import REFUSED, app, main
+
+SIZE, BASIS = np.array([0.1, 0.1]), SineBasis(Patch(0.1, 0.1), 8, 8)
+LAYOUT = SensorLayout.regular(BASIS.patch, 10, 10)
+TRUTH = Plate(BASIS.patch).deflection([PointLoad(0.03, 0.06)], BASIS)
+READINGS = {
+    "size": SIZE,
+    "positions": LAYOUT.positions,
+    "curvature": (LAYOUT.curvature_operator(BASIS) @ TRUTH.ravel()).reshape(3, -1),
+}
+
+
+@pytest.fixture
+def npz(tmp_path) -> Callable[..., Path]:
+    def save(**changes: Any) -> Path:
+        np.savez(tmp_path / "in.npz", **READINGS | changes)
+        return tmp_path / "in.npz"
+
+    return save
+
+
+@pytest.fixture
+def run(capsys) -> Callable[..., tuple[int, str, str]]:
+    """Runs a command in this process: its exit code, standard output and standard error."""
+
+    def run_one(*arguments: object) -> tuple[int, str, str]:
+        code = main([str(argument) for argument in arguments])
+        return code, *capsys.readouterr()
+
+    return run_one
+
+
+def outside(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Runs a command in a process of its own."""
+    command = [sys.executable, "-m", "kappaskin", *map(str, arguments)]
+    return subprocess.run(command, text=True, capture_output=True, timeout=60, **options)
+
+
+# reconstruct
+
+
+def test_reconstruct_writes_what_the_readings_were_made_of(run, npz, tmp_path) -> None:
+    out = tmp_path / "out.npz"
+    code, printed, told = run(
+        "reconstruct", npz(), "--basis", "8x8", "--out", out, "--grid", "21x11"
+    )
+    assert (code, printed, told) == (0, "", f"{out}: 1 shapes\n")
+    with np.load(out, allow_pickle=False) as found:
+        assert set(found) == {"coefficients", "sd", "residual", "grid_x", "grid_y", "w"}
+        assert np.allclose(found["coefficients"], TRUTH[None], rtol=0, atol=1e-12)
+        assert found["w"].shape == (1, 11, 21)
+        assert np.abs(found["residual"]).max() < 1e-9
+
+
+def test_the_basis_is_8x8_and_the_surface_left_out_unless_asked(run, npz, tmp_path) -> None:
+    assert run("reconstruct", npz(), "--out", tmp_path / "out.npz")[0] == 0
+    with np.load(tmp_path / "out.npz") as found:
+        assert set(found) == {"coefficients", "sd", "residual"}
+        assert found["sd"].shape == (1, 8, 8)
+
+
+@pytest.mark.parametrize("basis", ["6x5", "6X5", " 6 x 5 "])
+def test_a_basis_may_be_written_in_either_case_and_with_spaces(run, npz, tmp_path, basis) -> None:
+    assert run("reconstruct", npz(), "--basis", basis, "--out", tmp_path / "out.npz")[0] == 0
+    with np.load(tmp_path / "out.npz") as found:
+        assert found["coefficients"].shape == (1, 6, 5)
+
+
+def test_the_file_is_called_what_was_asked_without_an_ending_added(run, npz, tmp_path) -> None:
+    assert run("reconstruct", npz(), "--out", tmp_path / "shape")[0] == 0
+    assert (tmp_path / "shape").exists()
+    assert not (tmp_path / "shape.npz").exists()
+
+
+def refused(found: tuple[int, str, str], reason: str) -> None:
+    code, printed, told = found
+    assert code == REFUSED == 2
+    assert printed == ""
+    assert reason in told
+    assert told.startswith("kappaskin: ")
+    assert "Traceback" not in told
+
+
+@pytest.mark.parametrize(
+    ("basis", "reason"),
+    [
+        ("8", "expected a basis as two numbers such as 8x8, got '8'"),
+        ("8x", "expected a basis as two numbers such as 8x8, got '8x'"),
+        ("x", "expected a basis as two numbers"),
+        ("", "expected a basis as two numbers"),
+        ("axb", "expected a basis as two numbers"),
+        ("8.5x8", "expected a basis as two numbers"),
+        ("8x8x8", "expected a basis as two numbers such as 8x8, got '8x8x8'"),
+        ("nanxinf", "expected a basis as two numbers"),
+        ("9" * 5000 + "x1", "expected a basis as two numbers"),
+        ("0x8", "expected at least 1 x 1 functions, got 0 x 8"),
+        ("-1x8", "expected at least 1 x 1 functions, got -1 x 8"),
+        ("18x17", "expected at most 300 functions for 300 readings per frame, got 18 x 17 = 306"),
+        ("12x12", "do not tell these functions apart; use a smaller basis"),
+        ("1000000x1000000", "expected at most 300 functions"),
+    ],
+)
+def test_a_basis_that_cannot_be_is_refused(run, npz, tmp_path, basis, reason) -> None:
+    out = tmp_path / "out.npz"
+    refused(run("reconstruct", npz(), "--basis", basis, "--out", out), reason)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("grid", "reason"),
+    [
+        ("101", "expected a grid as two numbers such as 8x8, got '101'"),
+        ("1x1", "expected a grid of at least 2 x 2 points, got 1 x 1"),
+        ("-4x4", "expected a grid of at least 2 x 2 points, got -4 x 4"),
+        ("1000000x1000000", "coarser grid"),
+    ],
+)
+def test_a_grid_that_cannot_be_is_refused(run, npz, tmp_path, grid, reason) -> None:
+    out = tmp_path / "out.npz"
+    refused(run("reconstruct", npz(), "--out", out, "--grid", grid), reason)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"size": [0.1, 0.0]}, "give lengths such as 0.1 x 0.1"),
+        ({"positions": 1e3 * LAYOUT.positions}, "positions are in metres"),
+        ({"curvature": np.full((3, 100), np.nan)}, "no readings are left; check the connection"),
+        ({"curvature": np.zeros((0, 3, 100))}, "got (0, 3, 100)"),
+        ({"sigma": -1.0}, "expected every sigma above zero"),
+        ({"sigma": np.array(None)}, "cannot be read as NPZ"),
+    ],
+)
+def test_readings_that_cannot_be_used_are_refused(run, npz, tmp_path, changes, reason) -> None:
+    out = tmp_path / "out.npz"
+    refused(run("reconstruct", npz(**changes), "--out", out), reason)
+    assert not out.exists()
+
+
+def test_a_refusal_leaves_an_earlier_answer_alone(run, npz, tmp_path) -> None:
+    out = tmp_path / "out.npz"
+    out.write_text("an earlier answer")
+    refused(run("reconstruct", npz(size=[0, 0]), "--out", out), "two sides above zero")
+    assert out.read_text() == "an earlier answer"
+
+
+def test_a_file_that_is_no_archive_or_not_there_is_refused(run, tmp_path) -> None:
+    (tmp_path / "in.txt").write_text("0.1 0.2 0.3")
+    out = tmp_path / "out.npz"
+    refused(run("reconstruct", tmp_path / "in.txt", "--out", out), "cannot be read as NPZ")
+    refused(run("reconstruct", tmp_path / "none.npz", "--out", out), "there is no such file")
+    refused(run("reconstruct", tmp_path, "--out", out), "cannot be read as NPZ")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("out", ["missing/out.npz", "in.npz/out.npz", "."])
+def test_a_place_that_cannot_be_written_is_refused(run, npz, tmp_path, out) -> None:
+    before = set(tmp_path.iterdir()) | {npz()}
+    refused(run("reconstruct", npz(), "--out", tmp_path / out), "cannot be written")
+    assert set(tmp_path.iterdir()) == before
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="has no device that is always full")
+def test_a_full_disk_is_a_refusal(run, npz) -> None:
+    refused(run("reconstruct", npz(), "--out", "/dev/full"), "cannot be written ([Errno 28]")
+
+
+# The other commands
+
+
+def test_tables_prints_one_json_list_of_rows(run) -> None:
+    code, printed, told = run("tables", "--json")
+    rows = json.loads(printed)
+    assert (code, told, printed.count("\n")) == (0, "", 1)
+    assert isinstance(rows, list)
+    assert [(row["case"], row["noise"]) for row in rows] == [
+        (case, noise) for case in ("centre", "off-centre", "line") for noise in (False, True)
+    ]
+
+
+def test_tables_prints_the_papers_numbers_beside_ours(run) -> None:
+    code, printed, told = run("tables")
+    assert (code, told) == (0, "")
+    lines = printed.splitlines()
+    assert len(lines) == 2 + 6 + 1
+    assert "(4.59)" in lines[2]
+    assert "(-0.11)" in lines[2]
+
+
+def test_a_device_of_no_scene_or_an_impossible_rate_is_refused(run) -> None:
+    pytest.importorskip("pty", reason="no pseudo-terminals on this system")
+    refused(run("device", "nowhere"), "expected a scene among circle, centre, off-centre, line")
+    refused(run("device", "circle", "--rate", "0"), "a rate of at most 666.7 frames/s, got 0")
+    refused(run("device", "circle", "--rate", "1e9"), "a rate of at most 666.7 frames/s, got 1e+09")
+    refused(run("device", "circle", "--rate", "nan"), "got nan")
+    refused(run("device", "circle", "--rate", "fast"), 'unable to convert "fast" into float')
+
+
+# The command itself
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["fly"],
+        ["reconstruct"],
+        ["reconstruct", "in.npz"],
+        ["reconstruct", "a", "b", "--out", "c"],
+        ["reconstruct", "in.npz", "--out", "o", "--colour", "red"],
+        ["tables", "--jsom"],
+        ["--fly"],
+    ],
+)
+def test_a_command_that_is_not_understood_points_to_the_help(run, arguments) -> None:
+    refused(run(*arguments), "See `kappaskin --help`")
+
+
+def test_every_subcommand_shows_an_example_in_its_help(run) -> None:
+    code, printed, _ = run("--help")
+    assert code == 0
+    names = [name for name in app if not name.startswith("-")]
+    assert {"tables", "reconstruct", "device", "doctor"} <= set(names)
+    for name in names:
+        assert name in printed
+        code, text, told = run(name, "--help")
+        assert (code, told) == (0, "")
+        assert "Example" in text, name
+
+
+def test_the_version_is_that_of_the_distribution(run) -> None:
+    assert run("--version") == (0, metadata.version("kappaskin") + "\n", "")
+
+
+def test_commands_may_follow_one_another_in_one_process(run) -> None:
+    assert [run("--version")[0] for _ in range(3)] == [0, 0, 0]
+
+
+# In a process of its own
+
+
+def test_a_refusal_is_one_line_on_standard_error_and_exit_code_2(tmp_path) -> None:
+    found = outside("reconstruct", "none.npz", "--out", "out.npz", cwd=tmp_path)
+    refused((found.returncode, found.stdout, found.stderr), "there is no such file")
+    assert found.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_million_by_a_million_functions_do_not_exhaust_the_memory(npz, tmp_path) -> None:
+    resource = pytest.importorskip("resource")
+    limit = 4 * 2**30
+
+    found = outside(
+        *("reconstruct", npz(), "--basis", "1000000x1000000", "--out", tmp_path / "out.npz"),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+    )
+
+    refused((found.returncode, found.stdout, found.stderr), "expected at most 300 functions")
+    assert not (tmp_path / "out.npz").exists()
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_who_has_gone_is_no_error(unbuffered: str) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    found = subprocess.run(
+        [sys.executable, "-m", "kappaskin", "doctor"],
+        stdout=write,
+        stderr=subprocess.PIPE,
+        env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
+        text=True,
+        timeout=60,
+    )
+    os.close(write)
+    assert (found.returncode, found.stderr) == (0, "")

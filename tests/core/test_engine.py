@@ -1,0 +1,293 @@
+"""The live process: what it shows, what it survives, and that nothing outlives it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import psutil
+import pytest
+
+from kappaskin import Estimate, PointLoad, Setup, load_scene
+from kappaskin.engine import LOST, OFF, STREAMING, Engine, Status
+
+Answer = TypeVar("Answer")
+
+
+def wait_for(ask: Callable[[], Answer], within: float = 10.0) -> Answer:
+    """The first answer that is true, or the last one."""
+    end = time.monotonic() + within
+    while not (answer := ask()) and time.monotonic() < end:
+        time.sleep(0.01)
+    return answer
+
+
+def state(engine: Engine, expected: str, within: float = 10.0) -> Status:
+    wait_for(lambda: engine.status().state == expected, within)
+    status = engine.status()
+    assert status.state == expected, status.message
+    return status
+
+
+def next_estimate(engine: Engine, after: int = 0) -> Estimate:
+    """The first estimate of a generation above `after`."""
+
+    def ask() -> Estimate | None:
+        status = engine.status()
+        return engine.latest(status) if status.generation > after else None
+
+    estimate = wait_for(ask)
+    assert estimate is not None, engine.status()
+    return estimate
+
+
+@pytest.fixture(scope="module")
+def running() -> Iterator[Engine]:
+    with Engine() as made:
+        yield made
+
+
+@pytest.fixture
+def engine(running: Engine) -> Iterator[Engine]:
+    """One engine for all tests that leave it alive, disconnected after each."""
+    yield running
+    running.set_up(Setup())
+    running.disconnect()
+    state(running, OFF)
+
+
+@pytest.fixture
+def own_engine() -> Iterator[Engine]:
+    with Engine() as made:
+        yield made
+
+
+# What it shows
+
+
+def test_a_simulated_scene_gives_estimates_with_the_truth_beside_them(engine) -> None:
+    engine.connect("sim:centre")
+    estimate, status = next_estimate(engine), state(engine, STREAMING)
+    assert estimate.surface.shape == (65, 65)
+    assert estimate.touch.position == pytest.approx([0.05, 0.05], abs=1e-3)
+    assert estimate.true_contact.tolist() == [0.05, 0.05]
+    assert abs(estimate.error_at_load) < 0.5e-3
+    assert 0 <= estimate.ready_time - estimate.host_time < 5
+    assert status.sensor is not None
+    assert status.sensor.simulated
+    assert (status.source, status.message, status.refusal) == ("sim:centre", "", "")
+
+
+def test_frames_are_counted_and_timed(engine) -> None:
+    engine.connect("sim:")
+    next_estimate(engine)
+    time.sleep(1.5)
+    status = engine.status()
+    seen = status.accounting
+    print(
+        f"rate {status.rate:.1f}/s, reader gap {status.reader_gap * 1e3:.1f} ms, lost {seen.lost}"
+    )
+    assert status.rate == pytest.approx(500, rel=0.4)  # the machine may be busy
+    assert 0.001 < status.reader_gap < 1.0
+    assert seen.span == seen.accepted + seen.lost > 500
+    assert time.monotonic() - status.last_frame < 0.5
+    assert time.monotonic() - status.reported < 0.5
+
+
+def test_another_setup_is_swapped_in_whole(engine) -> None:
+    engine.connect("sim:")
+    before = next_estimate(engine)
+
+    engine.set_up(Setup(6, 7, 33, 17))
+    after = next_estimate(engine, before.generation)
+
+    assert after.generation > before.generation
+    assert after.coefficients.shape == (6, 7)
+    assert after.surface.shape == after.true_surface.shape == (17, 33)
+    assert after.sequence > before.sequence
+    assert engine.status().setup == Setup(6, 7, 33, 17)
+
+
+def test_estimates_of_an_older_setup_are_never_shown_for_a_newer_one(engine) -> None:
+    engine.connect("sim:")
+    next_estimate(engine)
+    for n in range(4, 9):
+        engine.set_up(Setup(n, n, 5 + n, 6 + n))
+        for _ in range(30):
+            status = engine.status()
+            estimate = engine.latest(status)
+            if estimate is not None:
+                assert estimate.generation == status.generation
+                assert estimate.surface.shape == (status.setup.ny, status.setup.nx)
+            time.sleep(0.002)
+
+
+def test_a_basis_that_the_readings_do_not_decide_leaves_the_old_one_and_says_why(engine) -> None:
+    engine.connect("sim:")
+    before = next_estimate(engine)
+
+    engine.set_up(Setup(12, 12))
+    wait_for(lambda: engine.status().refusal)
+    status = engine.status()
+
+    assert "10 x 10 elements" in status.refusal
+    assert "12 x 12 basis" in status.refusal
+    assert "use at most 10 x 10 functions" in status.refusal
+    assert (status.state, status.setup, status.generation) == (
+        STREAMING,
+        Setup(),
+        before.generation,
+    )
+    assert wait_for(lambda: engine.latest(status).sequence > before.sequence + 50)
+    engine.set_up(Setup(9, 9))
+    assert next_estimate(engine, before.generation).coefficients.shape == (9, 9)
+    assert engine.status().refusal == ""
+
+
+def test_a_setup_chosen_before_there_is_a_source_is_used(engine) -> None:
+    engine.set_up(Setup(5, 4))
+    engine.connect("sim:")
+    assert wait_for(lambda: next_estimate(engine).coefficients.shape == (5, 4))
+
+
+def test_another_scene_plays_on_the_same_line(engine) -> None:
+    engine.connect("sim:centre")
+    before = next_estimate(engine)
+    here = np.array([0.03, 0.06])
+
+    engine.play(replace(load_scene("centre"), loads=(PointLoad(*here, 0.5),)))
+
+    assert wait_for(lambda: np.array_equal(next_estimate(engine).true_contact, here))
+    after = wait_for(lambda: next_estimate(engine))
+    assert after.generation == before.generation
+    assert np.abs(after.touch.position - here).max() < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("source", "reason"),
+    [
+        ("/dev/ttyABSENT7", "there is no such port"),
+        ("sim:nowhere", "expected a scene among"),
+        ("", "got an empty name"),
+        ("hwgrep://(", "cannot be opened"),
+    ],
+)
+def test_a_source_that_cannot_be_opened_is_lost_with_the_reason(engine, source, reason) -> None:
+    engine.connect(source)
+    status = state(engine, LOST)
+    assert reason in status.message
+    assert status.source == source
+    assert engine.alive
+    engine.connect("sim:")
+    assert state(engine, STREAMING).message == ""
+
+
+def test_disconnected_it_shows_nothing_new(engine) -> None:
+    engine.connect("sim:")
+    next_estimate(engine)
+
+    engine.disconnect()
+    status = state(engine, OFF)
+
+    assert (status.source, status.sensor, status.last_frame) == ("", None, -np.inf)
+    last = engine.latest(status)
+    time.sleep(0.2)
+    now = engine.latest(engine.status())
+    assert (now and now.sequence) == (last and last.sequence)
+
+
+# What it survives
+
+
+def test_killed_it_is_lost_and_connecting_starts_another(own_engine) -> None:
+    engine = own_engine
+    engine.connect("sim:")
+    before = next_estimate(engine)
+    pid = engine.pid
+    assert pid is not None
+
+    os.kill(pid, signal.SIGKILL)
+    status = state(engine, LOST, within=1.0)
+    assert "ended unexpectedly; connect again to restart it" in status.message
+    assert status.rate == 0.0
+
+    engine.set_up(Setup(6, 5, 20, 21))  # there is no process to hear it
+    engine.connect("sim:line")
+    assert engine.status().state == OFF  # not yet what the dead one said of itself
+    after = next_estimate(engine, before.generation)
+    assert engine.pid != pid
+    assert after.coefficients.shape == (6, 5)
+    assert after.surface.shape == (21, 20)
+    assert state(engine, STREAMING).source == "sim:line"
+
+
+def test_interrupted_from_the_keyboard_it_goes_on(own_engine) -> None:
+    own_engine.connect("sim:")
+    before = next_estimate(own_engine)
+    assert own_engine.pid is not None
+    os.kill(own_engine.pid, signal.SIGINT)
+    assert wait_for(lambda: next_estimate(own_engine).sequence > before.sequence + 50)
+
+
+# What is left
+
+PARENT = """
+import sys, time
+from kappaskin.engine import Engine
+
+if __name__ == "__main__":
+    engine = Engine()
+    engine.connect(sys.argv[1])
+    while engine.status().state != "streaming":
+        time.sleep(0.01)
+    print(engine.pid, engine._ring.name, flush=True)
+    sys.stdin.read()
+    engine.close()
+"""
+
+
+def gone(pid: int) -> bool:
+    """Whether a process ended, be it still a zombie because nobody asked for its exit code."""
+    try:
+        return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
+
+
+@pytest.fixture
+def parent(tmp_path) -> Iterator[tuple[subprocess.Popen[str], int, Path]]:
+    """Another process with an engine, the pid of that engine and where its memory is listed."""
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, str(script), "sim:"], text=True, **pipes) as process:
+        assert process.stdout is not None
+        pid, block = process.stdout.readline().split()
+        yield process, int(pid), Path("/dev/shm", block)
+        process.kill()
+
+
+def test_an_engine_whose_parent_was_killed_ends_within_a_second(parent) -> None:
+    process, pid, block = parent
+    assert not gone(pid)
+    process.kill()
+    start = time.monotonic()
+    assert wait_for(lambda: gone(pid), within=3.0)
+    print(f"the engine ended {time.monotonic() - start:.3f} s after its parent was killed")
+    assert time.monotonic() - start < 1.0
+    assert wait_for(lambda: not block.exists())
+
+
+def test_a_parent_that_ends_as_it_should_leaves_nothing_and_says_nothing(parent) -> None:
+    process, pid, block = parent
+    _, errors = process.communicate("", timeout=10)
+    assert process.returncode == 0
+    assert errors == ""
+    assert gone(pid)
+    assert not block.exists()

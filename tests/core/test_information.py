@@ -1,0 +1,202 @@
+"""What a device says it is: understood whole, or refused with a reason."""
+
+import json
+import tracemalloc
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin import Converter, HalfBridge, Patch, Sensor, SensorLayout, SourceError, Transduction
+from kappaskin.sources.information import from_json, to_json
+
+PATCH = Patch(0.1, 0.08)
+
+
+def sensor_on(layout: SensorLayout, **changes: Any) -> Sensor:
+    transduction = Transduction(HalfBridge(gain=51.5), Converter(bits=12, offset=-0.01))
+    sensor = Sensor(layout, transduction, 2e-3, 10.0, "skin", "A-7", "1.2", simulated=False)
+    return replace(sensor, **changes)
+
+
+def same(one: Sensor, other: Sensor) -> bool:
+    names = ("transduction", "rigidity", "rate", "name", "serial_number", "firmware", "simulated")
+    a, b = one.layout, other.layout
+    return (
+        all(getattr(one, name) == getattr(other, name) for name in names)
+        and (a.patch, a.shape) == (b.patch, b.shape)
+        and np.array_equal(a.positions, b.positions)
+        and np.array_equal(a.live, b.live)
+    )
+
+
+def said(**changes: Any) -> dict[str, Any]:
+    regular = SensorLayout.regular(PATCH, 3, 2)
+    return {**json.loads(to_json(sensor_on(regular))), **changes}
+
+
+def scattered(positions: Any, **changes: Any) -> dict[str, Any]:
+    found = said(positions=positions, **changes)
+    del found["grid"]
+    return found
+
+
+# Round trips
+
+SIDES = st.floats(1e-3, 10, allow_subnormal=False)
+
+
+@given(SIDES, SIDES, st.integers(1, 9), st.integers(1, 9), st.data())
+def test_a_regular_sensor_comes_back(a, b, m, n, data) -> None:
+    dead = data.draw(st.sets(st.integers(0, m * n - 1)))
+    sensor = sensor_on(SensorLayout.regular(Patch(a, b), m, n).without(dead))
+    assert same(from_json(to_json(sensor)), sensor)
+
+
+@given(st.lists(st.tuples(st.floats(0, 0.1), st.floats(0, 0.08)), min_size=1, max_size=30))
+def test_a_scattered_sensor_comes_back_to_the_last_digit(positions) -> None:
+    sensor = sensor_on(SensorLayout.scattered(PATCH, positions))
+    assert same(from_json(to_json(sensor)), sensor)
+
+
+def test_a_single_dead_channel_comes_back() -> None:
+    layout = SensorLayout.regular(PATCH, 2, 2)
+    live = layout.live.copy()
+    live[1, 3] = False
+    sensor = sensor_on(replace(layout, live=live))
+
+    assert json.loads(to_json(sensor))["dead_channels"] == [7]
+    assert same(from_json(to_json(sensor)), sensor)
+
+
+def test_names_in_any_script_come_back() -> None:
+    sensor = sensor_on(SensorLayout.regular(PATCH, 1, 1), name='Haut "№ 7" 皮膚', simulated=True)
+    assert same(from_json(to_json(sensor)), sensor)
+
+
+def test_keys_of_later_firmware_are_passed_over() -> None:
+    assert from_json(json.dumps(said(colour="blue"))).name == "skin"
+
+
+# Refusals
+
+
+@pytest.mark.parametrize("key", [key for key in said() if key != "grid"])
+def test_a_missing_key_is_named(key: str) -> None:
+    found = said()
+    del found[key]
+    with pytest.raises(SourceError, match=f"lacks '{key}'.*firmware"):
+        from_json(json.dumps(found))
+
+
+def test_neither_grid_nor_positions_is_refused() -> None:
+    found = said()
+    del found["grid"]
+    with pytest.raises(SourceError, match="lacks 'positions'"):
+        from_json(json.dumps(found))
+
+
+@pytest.mark.parametrize("group", ["bridge", "converter"])
+def test_a_missing_part_of_the_electronics_is_never_guessed(group: str) -> None:
+    for key in said()[group]:
+        found = said()
+        del found[group][key]
+        with pytest.raises(SourceError, match=f"lacks '{key}'"):
+            from_json(json.dumps(found))
+
+
+BAD = {
+    "no JSON": ("", "Expecting value"),
+    "a text": ('"skin"', "expected an object"),
+    "a list": ("[]", "expected an object"),
+    "null": ("null", "expected an object"),
+    "number too long": ('{"rate":' + "9" * 5000 + "}", "digits"),
+    "deep": ("[" * 100_000 + "]" * 100_000, "recursion"),
+    "Infinity": (json.dumps(said(rigidity=float("inf"))), "expected a number, got Infinity"),
+    "-Infinity": (json.dumps(said(rate=float("-inf"))), "expected a number, got -Infinity"),
+    "NaN": (json.dumps(said(size=[float("nan"), 0.1])), "expected a number, got NaN"),
+    "infinite by overflow": (
+        json.dumps(said()).replace('"rigidity": 0.002', '"rigidity": 1e999'),
+        "expected a number, got 1e999",
+    ),
+    "grid beyond reason": (said(grid=[10**9, 10**9]), "at most 21845 elements"),
+    "grid of 10^400": (said(grid=[10**400, 1]), "at most 21845 elements"),
+    "grid negative": (said(grid=[-(10**9), -1]), "at most 21845 elements"),
+    "grid half negative": (said(grid=[10**9, -1]), "at least 1 x 1"),
+    "grid zero": (said(grid=[0, 10**9]), "at least 1 x 1"),
+    "grid of one side": (said(grid=[4]), "unpack"),
+    "grid of fractions": (said(grid=[3.5, 2]), "integer"),
+    "grid of texts": (said(grid=["3", "2"]), "integer"),
+    "grid a text": (said(grid="32"), "expected grid to be a list, got '32'"),
+    "size zero": (said(size=[0, 0.1]), "two sides above zero"),
+    "size negative": (said(size=[-0.1, 0.1]), "two sides above zero"),
+    "size huge": (said(size=[10**400, 0.1]), "too large"),
+    "three sides": (said(size=[0.1, 0.1, 0.1]), "argument"),
+    "size a text": (said(size="12"), "expected size to be a list"),
+    "positions outside": (scattered([[0.05, 0.09]]), "outside the patch"),
+    "positions in three": (scattered([[0.05, 0.01, 0.0]]), r"shape \(P, 2\)"),
+    "positions ragged": (scattered([[0.05, 0.01], [0.02]]), "shape"),
+    "no positions": (scattered([]), "expected positions"),
+    "positions null": (scattered([[None, 0.01]]), "outside|float"),
+    "dead -1": (said(dead_channels=[-1]), r"from 0 to 17, got \[-1\]"),
+    "dead beyond": (said(dead_channels=[3, 18]), r"from 0 to 17, got \[18\]"),
+    "dead huge": (said(dead_channels=[10**400]), "from 0 to 17"),
+    "dead fraction": (said(dead_channels=[1.5]), "from 0 to 17"),
+    "dead nested": (said(dead_channels=[[1]]), "from 0 to 17"),
+    "dead a text": (said(dead_channels="1"), "expected dead_channels to be a list"),
+    "rigidity zero": (said(rigidity=0), "rigidity above zero"),
+    "rigidity a text": (said(rigidity="stiff"), "expected rigidity to be a number, got 'stiff'"),
+    "rate too high": (said(rate=1e9), "rate of at most"),
+    "rate zero": (said(rate=0.0), "rate of at most"),
+    "rate null": (said(rate=None), "expected rate to be a number, got None"),
+    "name a number": (said(name=7), "expected name to be a text, got 7"),
+    "simulated a text": (said(simulated="false"), "expected simulated to be true or false"),
+    "bridge a list": (said(bridge=[1]), "expected bridge to be an object"),
+    "gain zero": (said(bridge={**said()["bridge"], "gain": 0}), "HalfBridge.gain above zero"),
+    "gain a text": (said(bridge={**said()["bridge"], "gain": "5"}), "number"),
+    "bits": (said(converter={**said()["converter"], "bits": 99}), "8 to 24 bits"),
+    "offset": (said(converter={**said()["converter"], "offset": 9}), "balance the bridge"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_a_device_is_refused_at_once(case: str) -> None:
+    what, reason = BAD[case]
+    text = what if isinstance(what, str) else json.dumps(what)
+
+    tracemalloc.start()
+    try:
+        with pytest.raises(SourceError, match=reason) as refusal:
+            from_json(text)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+    assert str(refusal.value).startswith("the device's information ")
+    assert peak < 4e6
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=8,
+)
+
+
+@given(st.sampled_from([*said(), "positions"]), JSON)
+def test_any_value_of_any_key_is_understood_or_refused(key: str, value: Any) -> None:
+    found = scattered([[0.01, 0.02]]) if key == "positions" else said()
+    try:
+        sensor = from_json(json.dumps({**found, key: value}))
+    except SourceError:
+        return
+    assert sensor.layout.live.shape == (3, len(sensor.layout))
+
+
+@given(JSON)
+def test_any_json_is_refused(value: Any) -> None:
+    with pytest.raises(SourceError):
+        from_json(json.dumps(value))

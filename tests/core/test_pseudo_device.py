@@ -1,0 +1,301 @@
+"""The simulated sensor on a pseudo-terminal: what it spends, others receive or count as lost."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
+from kappaskin.engine import LOST, STREAMING, Engine
+from kappaskin.scene import Orbit
+from kappaskin.sources import SerialSource
+from kappaskin.sources.wire import Decoder, Message
+
+pytest.importorskip("pty", reason="no pseudo-terminals on this system")
+from kappaskin.sources.device import PseudoDevice
+
+SCENE = load_scene("circle")
+MOTION = SCENE.motion or Orbit(0.022, 4.0)
+
+
+def wait_for(ask: Callable[[], Any], within: float = 5.0) -> Any:
+    """The first answer that is true, or the last one."""
+    end = time.monotonic() + within
+    while not (answer := ask()) and time.monotonic() < end:
+        time.sleep(0.005)
+    return answer
+
+
+@contextmanager
+def serving(device: PseudoDevice) -> Iterator[None]:
+    stop = threading.Event()
+    thread = threading.Thread(target=device.serve, args=(stop.is_set,))
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join(2.0)
+        assert not thread.is_alive(), "the device blocks"
+        device.close()
+
+
+def listened(port: str, count: int, within: float = 5.0) -> tuple[SerialSource, list[Frame]]:
+    """`count` frames or more of a source that is closed by now, and the source."""
+    source, frames = SerialSource(port), list[Frame]()
+    end = time.monotonic() + within
+    while len(frames) < count and time.monotonic() < end:
+        frames += source.read(0.02)
+    source.close()
+    return source, frames
+
+
+class Listener:
+    """The other end of the line, which reads only when told to."""
+
+    def __init__(self, port: str) -> None:
+        self._line = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        self.decoder = Decoder()
+
+    def reads(self, spent: int, within: float = 5.0) -> list[Message]:
+        """What comes until `spent` numbers are accounted for."""
+        messages: list[Message] = []
+        end = time.monotonic() + within
+        while self.decoder.sequence.span < spent and time.monotonic() < end:
+            try:
+                messages += self.decoder.feed(os.read(self._line, 65536))
+            except BlockingIOError:
+                time.sleep(0.001)
+        return messages
+
+    def close(self) -> None:
+        os.close(self._line)
+
+
+class Clock:
+    """Device time, which moves when told to."""
+
+    now = 7.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+# In this process
+
+
+def test_every_number_spent_is_received() -> None:
+    clock = Clock()
+    device = PseudoDevice(SCENE, clock)
+    listener = Listener(device.port)
+    with serving(device):
+        listener.reads(2)
+        for _ in range(16):  # a second, in steps that a clock in binary does not round
+            clock.now += 1 / 16
+            listener.reads(listener.decoder.sequence.span + 31)
+        listener.reads(504)
+    listener.close()
+
+    seen = listener.decoder.accounting()
+    # A second of frames, its first and last included, and an introduction every half of it.
+    assert device.spent == seen.span == seen.accepted == 501 + 3
+    assert (seen.bytes_discarded, seen.buffered, device.unsent, device.samples) == (0, 0, 0, 501)
+
+
+def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost() -> None:
+    clock = Clock()
+    device = PseudoDevice(SCENE, clock)
+    listener = Listener(device.port)
+    with serving(device):
+        assert wait_for(lambda: device.spent == 2)
+        for second in range(1, 9):
+            clock.now += 1.0
+            assert wait_for(lambda due=2 + 501 * second: device.spent == due)
+        time.sleep(0.05)  # for what the last number was spent on to be sent, or not
+        unsent = device.unsent
+        assert unsent > 100
+
+        listener.reads(device.spent - unsent)
+        clock.now += 0.05
+        listener.reads(device.spent + 25)
+
+        seen = listener.decoder.accounting()
+        assert seen.lost == unsent == device.unsent
+        assert seen.span == device.spent
+        assert seen.bytes_discarded == 0
+    listener.close()
+
+
+def test_the_bytes_carry_the_simulation_unchanged() -> None:
+    device = PseudoDevice(replace(SCENE, seed=5))
+    with serving(device):
+        source, frames = listened(device.port, 50)
+
+    simulator = Simulator(replace(SCENE, seed=5))
+    made = [simulator.frame(n, time.monotonic) for n in range(1000)]
+    for frame in frames:
+        twin = made[round(frame.device_time * 500)]
+        assert np.array_equal(frame.counts, twin.counts)
+        assert np.array_equal(frame.channels, twin.channels)
+        assert frame.truth is None
+    assert source.sensor is not None
+    assert source.sensor.name == SCENE.sensor().name
+    assert len(frames) >= 50
+
+
+def test_it_keeps_its_rate() -> None:
+    device = PseudoDevice(replace(SCENE, rate=200.0))
+    with serving(device):
+        _, frames = listened(device.port, 100)
+    took = frames[-1].host_time - frames[0].host_time
+    assert took == pytest.approx((len(frames) - 1) / 200, abs=0.1)
+
+
+def test_without_a_listener_it_spends_nothing() -> None:
+    device = PseudoDevice(SCENE)
+    with serving(device):
+        time.sleep(0.2)
+        assert device.spent == 0
+        listened(device.port, 20)
+        time.sleep(0.1)
+        spent = device.spent
+        time.sleep(0.2)
+        assert device.spent == spent > 0
+
+
+def test_a_second_listener_is_introduced_and_served() -> None:
+    device = PseudoDevice(SCENE)
+    with serving(device):
+        _, first = listened(device.port, 20)
+        source, second = listened(device.port, 20)
+
+    assert len(second) >= 20
+    assert second[0].sequence > first[-1].sequence
+    assert second[0].device_time - first[-1].device_time < 1.0
+    assert source.accounting().lost == 0
+    assert source.accounting().bytes_discarded == 0
+
+
+def test_a_rate_that_no_converter_keeps_is_refused_and_leaves_no_descriptor() -> None:
+    before = os.listdir("/dev/fd")
+    with pytest.raises(Refusal, match=r"at most 666.7 frames/s, got 5000"):
+        PseudoDevice(replace(SCENE, rate=5000.0))
+    assert os.listdir("/dev/fd") == before
+
+
+# As a process of its own
+
+
+class Device:
+    """`kappaskin device`, and the port that it told."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "kappaskin", "device", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        self.said = json.loads(self.process.stdout.readline())
+        self.port: str = self.said["port"]
+
+    def end(self, how: signal.Signals = signal.SIGTERM) -> tuple[int, str, str]:
+        """Exit code, and what else was written on standard output and error."""
+        self.process.send_signal(how)
+        out, err = self.process.communicate(timeout=5)
+        return self.process.returncode, out, err
+
+
+@pytest.fixture
+def device() -> Iterator[Device]:
+    made = Device("circle", "--rate", "500")
+    yield made
+    made.process.kill()
+    made.process.communicate()
+
+
+def test_the_command_tells_its_port_and_reports_what_it_spent(device) -> None:
+    assert device.said == {"port": device.port, "rate": 500.0}
+    assert os.path.exists(device.port)
+    _, frames = listened(device.port, 100)
+
+    code, out, err = device.end()
+
+    assert (code, out) == (0, "")
+    report = json.loads(err)
+    assert report.keys() == {"spent", "unsent"}
+    assert report["unsent"] == 0
+    assert report["spent"] > frames[-1].sequence
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_the_command_ends_at_once_when_told_with_a_listener_or_without(how) -> None:
+    device = Device()
+    assert device.said["rate"] == SCENE.rate
+    assert device.end(how) == (0, "", '{"spent": 0, "unsent": 0}\n')
+
+
+def contact_at(time: float) -> np.ndarray:
+    return np.array([0.05, 0.05]) + MOTION.offset(time)
+
+
+def test_an_engine_on_a_real_port_loses_nothing_and_follows_the_contact(device) -> None:
+    estimates: dict[int, Estimate] = {}
+    with Engine() as engine:
+        engine.connect(device.port)
+        assert wait_for(lambda: engine.status().state == STREAMING), engine.status().message
+        end = time.monotonic() + 3.2
+        while time.monotonic() < end:
+            if estimate := engine.latest(engine.status()):
+                estimates[estimate.sequence] = estimate
+            time.sleep(0.004)
+        status = engine.status()
+        code, _, err = device.end()
+        after = wait_for(lambda: (found := engine.status()).state == LOST and found, within=1.0)
+
+    report, seen = json.loads(err), after.accounting
+    errors = [np.hypot(*(e.touch.position - contact_at(e.device_time))) for e in estimates.values()]
+    close = np.mean(np.array(errors) < 1e-3)
+    print(
+        f"rate {status.rate:.1f}/s, reader gap {status.reader_gap * 1e3:.1f} ms; {report}; {seen}; "
+        f"{len(errors)} contacts, {close:.2%} within 1 mm, median {np.median(errors) * 1e3:.2f} mm"
+    )
+    assert code == 0
+    assert (seen.lost, seen.duplicate, seen.restarts, report["unsent"]) == (0, 0, 0, 0)
+    assert seen.bytes_in == seen.bytes_good + seen.bytes_discarded + seen.buffered
+    # What is under way when either end starts or stops is all that may be missing.
+    assert 0 <= report["spent"] - seen.span < 30
+    assert seen.span > 3 * 500
+    assert status.rate == pytest.approx(500, rel=0.4)  # the machine may be busy
+    assert len(errors) > 100
+    assert close > 0.98
+    assert all(np.isnan(e.true_contact).all() for e in estimates.values())
+
+
+def test_a_killed_device_is_lost_within_a_second_and_another_can_take_over(device) -> None:
+    with Engine() as engine:
+        engine.connect(device.port)
+        assert wait_for(lambda: engine.status().state == STREAMING)
+        device.process.kill()
+        killed = time.monotonic()
+
+        status = wait_for(lambda: (found := engine.status()).state == LOST and found, within=3.0)
+
+        assert time.monotonic() - killed < 1.0
+        assert "the line is gone" in status.message
+        assert status.accounting.accepted > 0
+        other = Device("circle")
+        engine.connect(other.port)
+        assert wait_for(lambda: engine.status().state == STREAMING)
+        other.end()

@@ -1,0 +1,414 @@
+"""A file of readings to a file of shapes: the right numbers, or a reason and no file."""
+
+import io
+import tracemalloc
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin import RankDeficient, Refusal
+from kappaskin.reconstruct import reconstruct
+
+RNG = np.random.default_rng(7)
+A, B, P, T = 0.12, 0.09, 40, 5
+SIZE = np.array([A, B])
+POSITIONS = RNG.uniform((0.05 * A, 0.05 * B), (0.95 * A, 0.95 * B), (P, 2))
+NI, NJ = 4, 3
+
+
+def operator(positions: np.ndarray = POSITIONS) -> np.ndarray:
+    """M (3 P, Ni Nj) written out from Eqs. 1 to 5, one function after the other."""
+    x, y = positions.T
+    columns = []
+    for i in range(1, NI + 1):
+        for j in range(1, NJ + 1):
+            p, q = i * np.pi / A, j * np.pi / B
+            xx = -(p**2) * np.sin(p * x) * np.sin(q * y)
+            yy = -(q**2) * np.sin(p * x) * np.sin(q * y)
+            xy = p * q * np.cos(p * x) * np.cos(q * y)
+            columns.append(np.concatenate([xx, yy, xy]))
+    return np.column_stack(columns)
+
+
+M = operator()
+TRUTH = RNG.normal(0, 1e-3, (T, NI * NJ))
+CURVATURE = (TRUTH @ M.T + RNG.normal(0, 0.3, (T, 3 * P))).reshape(T, 3, P)
+GOOD: dict[str, Any] = {"size": SIZE, "positions": POSITIONS, "curvature": CURVATURE}
+
+
+@pytest.fixture
+def saved(tmp_path) -> Callable[..., Path]:
+    """Writes the readings, with changes; a change to None leaves a name out."""
+
+    def save(**changes: Any) -> Path:
+        path = tmp_path / "readings.npz"
+        np.savez(path, **{k: v for k, v in (GOOD | changes).items() if v is not None})
+        return path
+
+    return save
+
+
+def shapes(found: dict[str, np.ndarray]) -> dict[str, tuple[int, ...]]:
+    return {name: values.shape for name, values in found.items()}
+
+
+def weighted(frame: int, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients and their covariance by NumPy's least squares, rows scaled by `weight`."""
+    rows = weight.ravel() > 0
+    w, k = weight.ravel()[rows], CURVATURE[frame].ravel()[rows]
+    answer = np.linalg.lstsq(M[rows] * w[:, None], k * w)[0]
+    return answer, np.linalg.inv((M[rows] * w[:, None]).T @ (M[rows] * w[:, None]))
+
+
+# Good readings
+
+
+def test_the_shapes_are_those_of_numpys_least_squares(saved) -> None:
+    found = reconstruct(saved(), (NI, NJ))
+    answer = np.linalg.lstsq(M, CURVATURE.reshape(T, -1).T)[0].T
+    assert np.allclose(found["coefficients"].reshape(T, -1), answer, rtol=1e-9, atol=1e-15)
+    residual = CURVATURE - (answer @ M.T).reshape(T, 3, P)
+    assert np.allclose(found["residual"], residual, rtol=0, atol=1e-9)
+
+
+def test_the_arrays_have_the_shapes_and_types_that_are_promised(saved) -> None:
+    found = reconstruct(saved(), (NI, NJ), (31, 21))
+    assert shapes(found) == {
+        "coefficients": (T, NI, NJ),
+        "sd": (T, NI, NJ),
+        "residual": (T, 3, P),
+        "grid_x": (31,),
+        "grid_y": (21,),
+        "w": (T, 21, 31),
+    }
+    assert {values.dtype for values in found.values()} == {np.dtype(float)}
+
+
+def test_without_a_grid_there_is_no_surface(saved) -> None:
+    assert reconstruct(saved(), (NI, NJ)).keys() == {"coefficients", "sd", "residual"}
+
+
+def test_the_surface_is_the_sum_of_its_functions(saved) -> None:
+    found = reconstruct(saved(), (NI, NJ), (13, 11))
+    x, y, c = found["grid_x"], found["grid_y"], found["coefficients"]
+    assert (x[0], x[-1], y[0], y[-1]) == (0, A, 0, B)
+    w = np.zeros((T, 11, 13))
+    for i in range(NI):
+        for j in range(NJ):
+            product = np.outer(np.sin((j + 1) * np.pi * y / B), np.sin((i + 1) * np.pi * x / A))
+            w += c[:, i, j, None, None] * product
+    assert np.allclose(found["w"], w, rtol=0, atol=1e-15)
+
+
+def test_one_frame_without_its_axis_is_one_shape(saved) -> None:
+    one = reconstruct(saved(curvature=CURVATURE[2]), (NI, NJ), (5, 6))
+    assert shapes(one)["coefficients"] == (1, NI, NJ)
+    assert shapes(one)["residual"] == (1, 3, P)
+    assert shapes(one)["w"] == (1, 6, 5)
+    every = reconstruct(saved(), (NI, NJ), (5, 6))
+    assert np.allclose(one["w"][0], every["w"][2], rtol=0, atol=1e-15)
+
+
+def test_missing_readings_are_left_out_frame_by_frame(saved) -> None:
+    missing = RNG.random((T, 3, P)) < 0.2
+    missing[3] = False
+    found = reconstruct(saved(curvature=np.where(missing, np.nan, CURVATURE)), (NI, NJ))
+    for frame in range(T):
+        answer, _ = weighted(frame, (~missing[frame]).astype(float))
+        assert np.allclose(found["coefficients"][frame].ravel(), answer, rtol=1e-8, atol=1e-14)
+    assert np.array_equal(np.isnan(found["residual"]), missing)
+
+
+def test_without_sigma_the_error_bar_is_the_residuals(saved) -> None:
+    found = reconstruct(saved(), (NI, NJ))
+    spare = 3 * P - NI * NJ
+    for frame in range(T):
+        answer, unit = weighted(frame, np.ones((3, P)))
+        variance = np.sum((CURVATURE[frame].ravel() - M @ answer) ** 2) / spare
+        expected = np.sqrt(variance * np.diag(unit))
+        assert np.allclose(found["sd"][frame].ravel(), expected, rtol=1e-9)
+
+
+SIGMAS = {
+    "one number": np.array(0.3),
+    "one for each reading": RNG.uniform(0.1, 1.0, (3, P)),
+    "one for each reading of each frame": RNG.uniform(0.1, 1.0, (T, 3, P)),
+    "some infinite": np.where(RNG.random((3, P)) < 0.1, np.inf, 0.3),
+    "whole numbers": np.ones((3, P), int),
+}
+
+
+@pytest.mark.parametrize("case", SIGMAS)
+def test_sigma_weighs_the_readings_and_gives_the_error_bars(saved, case: str) -> None:
+    sigma = SIGMAS[case]
+    found = reconstruct(saved(sigma=sigma), (NI, NJ))
+    assert shapes(found) == {
+        "coefficients": (T, NI, NJ),
+        "sd": (T, NI, NJ),
+        "residual": (T, 3, P),
+    }
+    for frame, own in enumerate(np.broadcast_to(sigma, (T, 3, P))):
+        answer, covariance = weighted(frame, 1 / own)
+        assert np.allclose(found["coefficients"][frame].ravel(), answer, rtol=1e-8, atol=1e-14)
+        assert np.allclose(found["sd"][frame].ravel(), np.sqrt(np.diag(covariance)), rtol=1e-8)
+
+
+def test_readings_of_any_number_type_and_order_are_the_same_readings(saved) -> None:
+    expected = reconstruct(saved(curvature=np.round(CURVATURE)), (NI, NJ))["coefficients"]
+    for other in (
+        np.asfortranarray(np.round(CURVATURE)),
+        np.round(CURVATURE).astype(">f8"),
+        np.round(CURVATURE).astype(np.int16),
+        np.round(CURVATURE).astype(np.float16),
+    ):
+        found = reconstruct(saved(curvature=other), (NI, NJ))["coefficients"]
+        assert np.allclose(found, expected, rtol=1e-9, atol=1e-15)
+
+
+def test_compressed_files_and_names_beside_ours_are_read(saved, tmp_path) -> None:
+    path = tmp_path / "compressed.npz"
+    np.savez_compressed(path, **GOOD, notes=np.array("by hand"))
+    expected = reconstruct(saved(), (NI, NJ))
+    assert np.array_equal(reconstruct(path, (NI, NJ))["sd"], expected["sd"])
+
+
+# Readings that cannot be used
+
+
+def changed(where: Any, value: float, shape: tuple[int, ...] = (3, P)) -> np.ndarray:
+    array = np.full(shape, 0.3)
+    array[where] = value
+    return array
+
+
+OUTSIDE = POSITIONS.copy()
+OUTSIDE[7] = (0.2, 0.05)
+LOST = CURVATURE.copy()
+LOST[3, :, 3:] = np.nan
+
+BAD: dict[str, tuple[dict[str, Any], str]] = {
+    "no size": ({"size": None}, r"has no 'size' \(it has \['curvature', 'positions'\]\)"),
+    "no positions": ({"positions": None}, "has no 'positions'"),
+    "no curvature": ({"curvature": None}, "has no 'curvature'"),
+    "size a number": ({"size": 0.1}, r"size of shape \(2,\) in m, got \(\)"),
+    "three sizes": ({"size": [0.1, 0.1, 0.1]}, r"size of shape \(2,\) in m, got \(3,\)"),
+    "size zero": ({"size": [0.0, 0.1]}, "two sides above zero"),
+    "size negative": ({"size": [0.1, -0.1]}, "two sides above zero"),
+    "size NaN": ({"size": [np.nan, 0.1]}, "two sides above zero"),
+    "size infinite": ({"size": [np.inf, 0.1]}, "two sides above zero"),
+    "positions a number": ({"positions": 0.05}, r"positions of shape \(P, 2\) in m, got \(\)"),
+    "positions a list": ({"positions": [0.05, 0.05]}, r"positions of shape \(P, 2\)"),
+    "positions in space": ({"positions": np.full((P, 3), 0.05)}, r"positions of shape \(P, 2\)"),
+    "no elements": ({"positions": np.ones((0, 2))}, r"P >= 1, got \(0, 2\)"),
+    "positions outside": (
+        {"positions": OUTSIDE},
+        r"1 of 40 elements lie outside.*element 7 is at \(0.2, 0.05\) m",
+    ),
+    "positions in mm": ({"positions": 1e3 * POSITIONS}, "positions are in metres"),
+    "positions NaN": ({"positions": np.full((P, 2), np.nan)}, "40 of 40 elements lie outside"),
+    "curvature flat": ({"curvature": CURVATURE[0].ravel()}, r"\(3, 40\) for 40 positions"),
+    "curvature too deep": ({"curvature": CURVATURE[None]}, r"got \(1, 5, 3, 40\)"),
+    "two components": ({"curvature": CURVATURE[:, :2]}, r"got \(5, 2, 40\)"),
+    "elements too few": ({"curvature": CURVATURE[..., 1:]}, r"for 40 positions, got \(5, 3, 39\)"),
+    "no frames": ({"curvature": CURVATURE[:0]}, r"got \(0, 3, 40\)"),
+    "curvature complex": ({"curvature": CURVATURE + 0j}, "curvature to be real .* complex128"),
+    "curvature text": (
+        {"curvature": CURVATURE.astype(str)},
+        "curvature to be real numbers, got <U",
+    ),
+    "curvature truth": ({"curvature": CURVATURE > 0}, "curvature to be real numbers, got bool"),
+    "curvature dates": ({"curvature": CURVATURE.astype("M8[s]")}, "got datetime64"),
+    "curvature objects": ({"curvature": CURVATURE.astype(object)}, "cannot be read as NPZ"),
+    "curvature records": ({"curvature": np.zeros((3, P), "f8,f8")}, "real numbers"),
+    "nothing left": ({"curvature": np.full((T, 3, P), np.nan)}, "frame 0: .*no readings are left"),
+    "one bad frame": ({"curvature": LOST}, "frame 3: .*9 readings determine"),
+    "sigma zero": ({"sigma": 0.0}, "sigma above zero"),
+    "sigma negative": ({"sigma": changed((1, 5), -0.3)}, "sigma above zero in 1/m, got"),
+    "sigma NaN": ({"sigma": changed((1, 5), np.nan)}, "sigma above zero in 1/m, got"),
+    "sigma all infinite": ({"sigma": np.inf}, "no readings are left"),
+    "sigma in a list": ({"sigma": [0.3]}, r"sigma to be one number or \(3, 40\), got \(1,\)"),
+    "sigma transposed": ({"sigma": np.ones((P, 3))}, r"got \(40, 3\)"),
+    "sigma for other frames": (
+        {"sigma": np.ones((4, 3, P))},
+        r"sigma of shape \(5, 3, 40\) as curvature has.* got \(4, 3, 40\)",
+    ),
+    "sigma for no frame": ({"sigma": np.ones((0, 3, P, 1))}, r"got \(0, 3, 40, 1\)"),
+    "sigma text": ({"sigma": "0.3"}, "sigma to be real numbers, got <U3"),
+    "sigma bad in one frame": (
+        {"sigma": changed((2, 1, 5), 0.0, (T, 3, P))},
+        "frame 2: expected every sigma above zero",
+    ),
+    "sigma leaving one frame too little": (
+        {"sigma": changed((4, slice(None), slice(3, None)), np.inf, (T, 3, P))},
+        "frame 4: .*9 readings determine",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_readings_that_cannot_be_used_are_refused_with_the_reason(saved, case: str) -> None:
+    changes, reason = BAD[case]
+    with pytest.raises(Refusal, match=reason):
+        reconstruct(saved(**changes), (NI, NJ))
+
+
+def packed(save: Callable[..., None] = np.savez_compressed, **changes: Any) -> bytes:
+    buffer = io.BytesIO()
+    save(buffer, **GOOD | changes)
+    return buffer.getvalue()
+
+
+def one_array() -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, CURVATURE)
+    return buffer.getvalue()
+
+
+def claiming(shape: str) -> bytes:
+    """An archive whose curvature claims a shape in its header, and holds nothing."""
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".encode()
+    header += b" " * (-(10 + len(header) + 1) % 64) + b"\n"
+    member = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
+    buffer = io.BytesIO(packed())
+    with zipfile.ZipFile(buffer, "a") as archive:
+        archive.writestr("sigma.npy", member)
+    return buffer.getvalue()
+
+
+NO_ARCHIVES = {
+    "empty": b"",
+    "text": b"x,y,kxx\n0.1,0.2,0.3\n",
+    "one array": one_array(),
+    "a pickle": b"\x80\x04\x95\x00.",
+    "a pickle in text": b"cos\nsystem\n(S'true'\ntR.",
+    "another archive": b"PK\x05\x06" + bytes(18),
+    "half": packed()[: len(packed()) // 2],
+    "all but its last byte": packed()[:-1],
+    "an array of 10^15 numbers": claiming(f"({10**15},)"),
+    "an array of 10^30 numbers": claiming(f"({10**30},)"),
+    "an array of less than nothing": claiming("(-1,)"),
+    "an array without a shape": claiming("None"),
+}
+
+
+@pytest.mark.parametrize("case", NO_ARCHIVES)
+def test_what_is_no_archive_is_refused(tmp_path, case: str) -> None:
+    path = tmp_path / "readings.npz"
+    path.write_bytes(NO_ARCHIVES[case])
+    with pytest.raises(
+        Refusal, match=r"npz: (cannot be read as NPZ|has no 'size').* expected size"
+    ):
+        reconstruct(path, (NI, NJ))
+
+
+def test_nothing_in_a_file_is_ever_executed(tmp_path) -> None:
+    class Trap:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return (Path.touch, (tmp_path / "sprung",))
+
+    np.savez(tmp_path / "trap.npz", **GOOD | {"sigma": np.array([Trap()], object)})
+    with pytest.raises(Refusal, match="cannot be read as NPZ"):
+        reconstruct(tmp_path / "trap.npz", (NI, NJ))
+    assert not (tmp_path / "sprung").exists()
+
+
+@pytest.mark.parametrize("name", ["", "nothing.npz"])
+def test_what_is_not_there_is_refused(tmp_path, name: str) -> None:
+    with pytest.raises(Refusal, match=r"there is no such file|cannot be read"):
+        reconstruct(tmp_path / name, (NI, NJ))
+
+
+SMALL = {"curvature": CURVATURE[:1, :, :12], "positions": POSITIONS[:12]}
+ARCHIVES = st.sampled_from([packed(save, **SMALL) for save in (np.savez, np.savez_compressed)])
+PLACES = st.integers(0, 10**6)
+
+
+@given(ARCHIVES, st.lists(st.tuples(PLACES, st.integers(1, 255)), max_size=3))
+def test_damage_anywhere_is_refused_or_does_no_harm(tmp_path_factory, archive, damages) -> None:
+    data = bytearray(archive)
+    for at, flip in damages:
+        data[at % len(data)] ^= flip
+    path = tmp_path_factory.getbasetemp() / "damaged.npz"
+    path.write_bytes(data)
+    try:
+        found = reconstruct(path, (2, 2))
+    except Refusal:
+        return
+    assert shapes(found)["coefficients"] == (1, 2, 2)
+
+
+@given(ARCHIVES, PLACES)
+def test_a_file_cut_off_anywhere_is_refused(tmp_path_factory, archive: bytes, end: int) -> None:
+    path = tmp_path_factory.getbasetemp() / "cut.npz"
+    path.write_bytes(archive[: end % len(archive)])
+    with pytest.raises(Refusal, match="cannot be read as NPZ"):
+        reconstruct(path, (2, 2))
+
+
+# Questions that cannot be answered
+
+
+@pytest.mark.parametrize(
+    ("basis", "reason"),
+    [
+        ((0, 8), "at least 1 x 1 functions, got 0 x 8"),
+        ((-1, 8), "at least 1 x 1 functions, got -1 x 8"),
+        ((-3, -3), "at least 1 x 1 functions"),
+        ((12, 11), "at most 120 functions for 120 readings per frame, got 12 x 11 = 132"),
+        ((10**6, 10**6), "at most 120 functions"),
+        ((10**400, 1), "at most 120 functions"),
+    ],
+)
+def test_a_basis_the_readings_cannot_decide_is_refused_before_it_costs(saved, basis, reason):
+    path = saved()
+    tracemalloc.start()
+    try:
+        with pytest.raises(Refusal, match=reason):
+            reconstruct(path, basis)
+        assert tracemalloc.get_traced_memory()[1] < 5e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_basis_that_only_few_elements_tell_apart_is_refused_with_a_way_out(saved) -> None:
+    row = np.column_stack([np.linspace(0.01, 0.11, P), np.full(P, B / 2)])
+    with pytest.raises(RankDeficient, match="do not tell these functions apart; use a smaller"):
+        reconstruct(saved(positions=row), (4, 8))
+
+
+@pytest.mark.parametrize(
+    ("grid", "reason"),
+    [
+        ((1, 1), "at least 2 x 2 points, got 1 x 1"),
+        ((101, 1), "at least 2 x 2 points"),
+        ((0, 5), "at least 2 x 2 points"),
+        ((-5, 5), "at least 2 x 2 points"),
+        ((10**6, 10**6), "coarser grid"),
+        ((10**12, 2), "coarser grid"),
+        ((-(10**12), -2), "coarser grid|at least 2 x 2"),
+    ],
+)
+def test_a_grid_that_cannot_be_is_refused_before_it_costs(saved, grid, reason) -> None:
+    path = saved()
+    tracemalloc.start()
+    try:
+        with pytest.raises(Refusal, match=reason):
+            reconstruct(path, (NI, NJ), grid)
+        assert tracemalloc.get_traced_memory()[1] < 5e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_an_operator_that_would_not_fit_is_refused_before_it_costs(tmp_path) -> None:
+    many = RNG.uniform(0, 0.09, (20_000, 2))
+    np.savez(
+        tmp_path / "many.npz", **GOOD | {"positions": many, "curvature": np.zeros((3, 20_000))}
+    )
+    with pytest.raises(Refusal, match="at most 134217728 numbers in one array, got 2400000000"):
+        reconstruct(tmp_path / "many.npz", (200, 200))

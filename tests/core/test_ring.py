@@ -1,0 +1,226 @@
+"""Estimates through shared memory: whole or not at all, whatever the writer does meanwhile."""
+
+import multiprocessing
+import time
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from multiprocessing.shared_memory import SharedMemory
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kappaskin import Estimate, Pipeline, Refusal, Setup, Simulator, load_scene
+from kappaskin.frames import Array, Touch
+from kappaskin.ring import Ring, slot_type
+
+
+def pipeline_of(setup: Setup | None = None) -> Pipeline:
+    return Pipeline(load_scene("centre").sensor(), setup or Setup(4, 3, 9, 7), 1)
+
+
+PIPELINE = pipeline_of()
+SLOT = slot_type(PIPELINE)
+
+
+def estimate_of(pipeline: Pipeline = PIPELINE) -> Estimate:
+    return pipeline(Simulator(load_scene("centre")).frame(0, time.monotonic))
+
+
+def numbers(value: Any) -> Array:
+    """Every number in an estimate or a touch, in a row."""
+    parts = [getattr(value, field.name) for field in fields(value)]
+    return np.concatenate([numbers(p) if isinstance(p, Touch) else np.ravel(p) for p in parts])
+
+
+@pytest.fixture
+def ring() -> Iterator[Ring]:
+    made = Ring.create()
+    yield made
+    made.destroy()
+
+
+@pytest.fixture
+def writer(ring) -> Iterator[Ring]:
+    made = Ring.attach(ring.name)
+    yield made
+    made.close()
+
+
+# Estimates
+
+
+def test_an_estimate_comes_back_as_written(ring, writer) -> None:
+    estimate = estimate_of()
+    writer.lay_out(1, SLOT)
+    writer.write(estimate)
+
+    got = ring.read(1, SLOT)
+
+    assert got is not None
+    assert np.array_equal(numbers(got), numbers(estimate))
+    assert [np.shape(getattr(got, f.name)) for f in fields(got) if f.name != "touch"] == [
+        np.shape(getattr(estimate, f.name)) for f in fields(got) if f.name != "touch"
+    ]
+    assert type(got.sequence) is int
+    assert type(got.noise) is float
+
+
+def test_nothing_is_read_before_the_first_estimate(ring, writer) -> None:
+    assert ring.read(1, SLOT) is None
+    writer.lay_out(1, SLOT)
+    assert ring.read(1, SLOT) is None
+
+
+def test_the_latest_of_many_estimates_is_read(ring, writer) -> None:
+    estimate = estimate_of()
+    writer.lay_out(1, SLOT)
+    for n in range(200):
+        writer.write(replace(estimate, sequence=n))
+        got = ring.read(1, SLOT)
+        assert got is not None
+        assert got.sequence == n
+
+
+def test_an_estimate_read_stays_as_it_was_while_others_are_written(ring, writer) -> None:
+    estimate = estimate_of()
+    writer.lay_out(1, SLOT)
+    writer.write(estimate)
+    got = ring.read(1, SLOT)
+    assert got is not None
+    for n in range(100):
+        writer.write(replace(estimate, sequence=n, surface=np.full((7, 9), float(n))))
+    assert np.array_equal(numbers(got), numbers(estimate))
+
+
+def test_generations_of_other_shapes_do_not_mix(ring, writer) -> None:
+    other = pipeline_of(Setup(8, 8, 65, 65))
+    writer.lay_out(1, SLOT)
+    writer.write(estimate_of())
+    writer.lay_out(2, slot_type(other))
+
+    assert ring.read(1, SLOT) is None  # gone
+    assert ring.read(2, slot_type(other)) is None  # none yet
+    writer.write(replace(estimate_of(other), generation=2))
+    got = ring.read(2, slot_type(other))
+
+    assert got is not None
+    assert got.surface.shape == (65, 65)
+    assert ring.read(1, SLOT) is None
+
+
+def test_a_generation_laid_out_anew_in_another_shape_is_read_in_that_shape(ring, writer) -> None:
+    other = pipeline_of(Setup(6, 6, 11, 12))
+    writer.lay_out(1, SLOT)
+    writer.write(estimate_of())
+    ring.read(1, SLOT)
+
+    writer.lay_out(1, slot_type(other))
+    writer.write(estimate_of(other))
+
+    got = ring.read(1, slot_type(other))
+    assert got is not None
+    assert got.coefficients.shape == (6, 6)
+
+
+def test_an_estimate_too_large_for_two_slots_is_refused(writer) -> None:
+    slot = np.dtype([("opened", "u8"), ("surface", "f8", (3000, 3000)), ("closed", "u8")])
+    with pytest.raises(Refusal, match="72000016 bytes is too large; use a smaller"):
+        writer.lay_out(1, slot)
+
+
+# Two processes
+
+WRITING = """
+import time
+import kappaskin.ring
+from kappaskin.ring import Ring
+
+kappaskin.ring._MOST_SLOTS = 2  # so that the writer overtakes the reader all the time
+ring = Ring.attach(name)
+ring.lay_out(1, slot)
+ring.write_status(statuses[0])
+end = time.monotonic() + seconds
+while time.monotonic() < end:
+    for estimate in estimates:
+        ring.write(estimate)
+    for status in statuses:
+        ring.write_status(status)
+ring.close()
+"""
+
+
+def all_of(number: float) -> Estimate:
+    """An estimate that holds nothing but `number`."""
+    estimate = estimate_of(pipeline_of(Setup(8, 8, 129, 129)))
+    parts = {f.name: np.full(np.shape(getattr(estimate, f.name)), number) for f in fields(estimate)}
+    touch = Touch(np.full(2, number), np.full(2, number), number, number, number, number)
+    return Estimate(**parts | {"touch": touch})
+
+
+def test_another_process_never_shows_half_an_estimate_or_half_a_status(ring, monkeypatch) -> None:
+    monkeypatch.setattr("kappaskin.ring._MOST_SLOTS", 2)
+    slot = slot_type(pipeline_of(Setup(8, 8, 129, 129)))
+    given = {
+        "name": ring.name,
+        "slot": slot,
+        "estimates": [all_of(number) for number in range(1, 8)],
+        "statuses": [[number] * 5000 for number in range(1, 8)],
+        "seconds": 2.0,
+    }
+    writing = multiprocessing.get_context("spawn").Process(target=exec, args=(WRITING, given))
+    writing.start()
+    whole, torn = [0, 0], [0, 0]
+    while writing.is_alive():
+        estimate, status = ring.read(1, slot), ring.read_status()
+        if estimate is not None:
+            found = numbers(estimate)
+            whole[0] += int(found.min() == found.max())
+            torn[0] += int(found.min() != found.max())
+        if status is not None:
+            whole[1] += int(len(set(status)) == 1)
+            torn[1] += int(len(set(status)) != 1)
+    writing.join()
+
+    assert writing.exitcode == 0
+    assert torn == [0, 0]
+    assert min(whole) > 1000
+
+
+# Status
+
+
+def test_a_status_comes_back_as_written(ring, writer) -> None:
+    assert ring.read_status() is None
+    for status in ({"a": [1, 2.5, "x"]}, "longer " * 5000, "short", None, Setup()):
+        writer.write_status(status)
+        assert ring.read_status() == status
+
+
+def test_too_large_a_status_is_refused_and_the_last_one_stays(ring, writer) -> None:
+    writer.write_status("fits")
+    with pytest.raises(Refusal, match="at most 2097152 bytes"):
+        writer.write_status(bytes(2**21))
+    assert ring.read_status() == "fits"
+
+
+def test_a_writer_killed_in_the_middle_does_not_spoil_the_next_ones_status(ring, writer) -> None:
+    writer.write_status("before")
+    memory = SharedMemory(ring.name)
+    count = np.frombuffer(memory.buf, np.uint64, 1)
+    count += np.uint64(1)  # the header's first number is odd while a status is written
+    del count
+    memory.close()
+    assert ring.read_status() is None
+
+    for n in range(3):
+        writer.write_status(n)
+        assert ring.read_status() == n
+
+
+def test_a_block_given_back_is_gone() -> None:
+    ring = Ring.create()
+    name = ring.name
+    ring.destroy()
+    with pytest.raises(FileNotFoundError):
+        Ring.attach(name)

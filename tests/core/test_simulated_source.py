@@ -1,0 +1,163 @@
+"""The simulated source keeps a device's pace by any clock, and counts what it leaves out."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin import Frame, PointLoad, load_scene
+from kappaskin.sources import SimulatedSource, open_source
+
+
+class Clock:
+    """A clock that stands still but for those who sleep by it."""
+
+    def __init__(self, now: float = 1000.1) -> None:
+        self.now = now
+        self.slept: list[float] = []
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        assert seconds >= 0
+        self.slept.append(seconds)
+        self.now += seconds
+
+
+def source_of(name: str = "centre", clock: Clock | None = None, **changes) -> SimulatedSource:
+    clock = clock or Clock()
+    return SimulatedSource(replace(load_scene(name), **changes), clock, clock.sleep)
+
+
+def read_until(source: SimulatedSource, clock: Clock, end: float) -> list[Frame]:
+    frames: list[Frame] = []
+    for _ in range(5000):  # a source that stands still fails the test instead of stopping it
+        frames += source.read(0.02) if clock.now < end else []
+    return frames
+
+
+def counts_of(frames: list[Frame]) -> list[list[int]]:
+    return [frame.counts.tolist() for frame in frames]
+
+
+@pytest.mark.parametrize("start", [0.0, 1000.1, 12345.678, 4e7 / 3])
+def test_frames_come_at_their_rate(start: float) -> None:
+    clock = Clock(start)
+    source = source_of(clock=clock)
+
+    frames = read_until(source, clock, start + 2)
+
+    assert [f.sequence for f in frames] == list(range(len(frames)))
+    assert len(frames) in (1000, 1001)
+    assert [f.device_time for f in frames] == [n / 500 for n in range(len(frames))]
+    late = [f.host_time - start - f.device_time for f in frames]
+    assert max(map(abs, late)) < 1e-5  # each when it is due, not in a lump
+
+
+@given(st.floats(0, 1e6), st.sampled_from([50.0, 333.3, 500.0]))
+def test_a_reader_that_sleeps_as_told_never_reads_nothing_twice(start: float, rate: float) -> None:
+    clock = Clock(start)
+    source = source_of(clock=clock, rate=rate)
+    empty = [not source.read(1.0) for _ in range(60)]
+    assert not any(one and two for one, two in pairwise(empty))
+    assert empty.count(False) >= 30
+
+
+def test_no_read_sleeps_longer_than_it_may() -> None:
+    clock = Clock()
+    source = source_of(clock=clock, rate=10.0)
+    for _ in range(50):
+        source.read(0.004)
+    assert max(clock.slept) == pytest.approx(0.004)
+
+
+def test_a_reader_a_little_late_gets_every_frame() -> None:
+    clock = Clock()
+    source = source_of(clock=clock)
+    source.read(0.0)
+
+    clock.now += 0.2
+    frames = source.read(0.0)
+
+    assert [f.sequence for f in frames] == list(range(1, 101))
+    assert source.accounting().lost == 0
+
+
+def test_a_reader_far_too_late_gets_the_latest_and_the_rest_count_as_lost() -> None:
+    clock = Clock()
+    source = source_of(clock=clock)
+    source.read(0.0)
+
+    clock.now += 2.0
+    frames = source.read(0.0)
+
+    assert [f.sequence for f in frames] == list(range(876, 1001))
+    assert frames[-1].device_time == 2.0
+    seen = source.accounting()
+    assert (seen.accepted, seen.lost, seen.span) == (126, 875, 1001)
+
+
+@given(st.lists(st.floats(0, 1.5), max_size=12))
+def test_the_balance_holds_however_late_the_reader_is(pauses: list[float]) -> None:
+    clock = Clock()
+    source = source_of(clock=clock, rate=40.0)
+    got: list[Frame] = []
+    for pause in pauses:
+        clock.now += pause
+        got += source.read(0.01)
+
+    seen = source.accounting()
+
+    assert seen.good == seen.accepted == len(got)
+    assert seen.span == seen.accepted + seen.lost
+    assert got == [] or seen.span == got[-1].sequence + 1
+    assert seen.bytes_in == seen.bytes_good == seen.bytes_discarded == seen.buffered == 0
+
+
+def test_the_same_seed_gives_the_same_counts_and_another_gives_others() -> None:
+    def first(seed: int) -> list[list[int]]:
+        clock = Clock()
+        return counts_of(read_until(source_of("circle", clock, seed=seed), clock, clock.now + 0.1))
+
+    assert first(3) == first(3)
+    assert first(3) != first(4)
+
+
+def test_other_loads_play_on_without_a_gap() -> None:
+    clock = Clock()
+    source = source_of("circle", clock)
+    before = read_until(source, clock, clock.now + 0.5)
+    scene = replace(load_scene("circle"), loads=(PointLoad(0.03, 0.06, 0.2),), motion=None)
+
+    source.play(scene)
+    after = read_until(source, clock, clock.now + 0.5)
+
+    assert [f.sequence for f in before + after] == list(range(len(before) + len(after)))
+    assert after[0].device_time == len(before) / 500
+    assert after[0].truth is not None
+    assert after[0].truth.contact.tolist() == [0.03, 0.06]
+    assert source.accounting().lost == 0
+
+
+def test_no_load_reads_nothing_but_noise() -> None:
+    clock = Clock()
+    source = source_of(clock=clock, loads=(), effects=())
+    (frame,) = source.read(0.0)
+    assert not frame.counts.any()
+    assert frame.truth is not None
+    assert np.isnan(frame.truth.contact).all()
+
+
+def test_the_name_of_a_scene_opens_it() -> None:
+    for name, contact in (("sim:", (0.072, 0.05)), ("sim:line", (0.05, 0.05))):
+        source = open_source(name)
+        (frame, *_) = source.read(0.1)
+        assert source.sensor is not None
+        assert source.sensor.simulated
+        assert frame.truth is not None
+        assert frame.truth.contact == pytest.approx(contact)
+        source.close()
