@@ -482,7 +482,6 @@ def test_the_covariance_is_the_inverse_of_the_information(setup):
     np.testing.assert_allclose(
         covariance / scale, expected / scale, rtol=0, atol=1e3 * EPS * fit.condition**2
     )
-    np.testing.assert_allclose(fit.information / np.outer(length, length), A.T @ A, atol=1e-10)
 
 
 def test_the_covariance_of_a_batch_is_that_of_each_frame():
