@@ -160,6 +160,8 @@ def doctor(*, json: Annotated[bool, Parameter(negative="")] = False) -> None:
     if not found["serial_ports"]:
         print(f"{'serial ports':<20}none found")
     print(f"{'missing':<20}{' '.join(found['missing']) or 'nothing'}")
+    if None in found["packages"].values():
+        print("Install the desktop app's packages with: pip install 'kappaskin[app]'")
     if found["install"]:
         print(f"Install what is missing with: sudo {found['install']}")
 
