@@ -15,7 +15,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    terminalreporter.section("figures")
+    if _figures:
+        terminalreporter.section("figures")
     for figure in _figures:
         terminalreporter.write_line(figure)
 
