@@ -70,4 +70,5 @@ class Actions:
             for entry in self.entries.values()
             if not entry.action.shortcut().isEmpty()
         ]
-        return f"<table>{''.join(rows)}</table>"
+        mouse = "<p>Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom.</p>"
+        return f"<table>{''.join(rows)}</table>{mouse}"

@@ -15,7 +15,7 @@ class _Change(QUndoCommand):
     def __init__(
         self, history: "History", before: Settings, after: Settings, text: str, gesture: int
     ) -> None:
-        super().__init__(text)
+        super().__init__(text[:1].lower() + text[1:])
         self._history, self._before, self.after = history, before, after
         self._gesture = gesture
 

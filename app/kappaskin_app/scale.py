@@ -25,12 +25,12 @@ class SteadyRange:
     """Follows the largest value shown; a locked range is whatever it was locked to."""
 
     def __init__(self, least: float) -> None:
-        self._least = self.limit = least
+        self.least = self.limit = least
         self._small_since = math.inf
 
     def follow(self, largest: float, now: float) -> float:
         """The limit to use for values up to `largest` at time `now` in s."""
-        wanted = max(self._least, round_up(largest))
+        wanted = max(self.least, round_up(largest))
         if wanted >= self.limit:
             self.limit, self._small_since = wanted, math.inf
         elif self._small_since == math.inf:
@@ -43,9 +43,18 @@ class SteadyRange:
 class Ranges:
     """The colour limit of each quantity: locked by a setting, or following what is shown."""
 
-    def __init__(self) -> None:
+    def __init__(self, side: float = 100.0) -> None:
+        """`side` in mm is the skin's longer one: what moves less than a thousandth is at rest."""
         self._steady = {name: SteadyRange(0.5) for name in COMPONENTS}
-        self._steady["displacement"] = SteadyRange(0.1)
+        self._steady["displacement"] = SteadyRange(1e-3 * side)
+        self._pulled = False
+
+    def pulled(self, displacement: Array) -> bool:
+        """Whether the skin is pulled out rather than pressed in; a skin at rest keeps its side."""
+        out, into = -np.nanmin(displacement), np.nanmax(displacement)
+        if max(out, into) > self._steady["displacement"].least:
+            self._pulled = bool(out > into)
+        return self._pulled
 
     def limit(self, name: str, values: Array, settings: Settings, now: float) -> float:
         """The limit in mm or 1/m for `values` of the quantity `name`, NaN among them or not."""

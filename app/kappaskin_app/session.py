@@ -54,7 +54,7 @@ class Session(QObject):
 
     def connect_to(self, source: str) -> None:
         """Take frames from `source`; a scene named there becomes the load case."""
-        self.source = source.strip()
+        self.source, self.estimate = source.strip(), None
         self.engine.connect(self.source)
         scene = self.source.removeprefix("sim:")
         if self.simulating and scene in dict(LOAD_CASES):
@@ -84,7 +84,9 @@ class Session(QObject):
         now = time.monotonic()
         if now >= self._next_status:
             self._next_status = now + _STATUS
-            self.status = self.engine.status()
+            was, self.status = self.status, self.engine.status()
+            if self.status.meetings != was.meetings:
+                self.estimate = None  # what the last sensor showed is not this one's
             self.reported.emit(self.status)
         estimate = self.engine.latest(self.status)
         if estimate is not None and (estimate.generation, estimate.sequence) != self._shown:

@@ -27,6 +27,8 @@ class Theme:
     warning: str
     bad: str
     off: str
+    alert: str
+    disabled: str
 
 
 LIGHT = Theme(
@@ -41,9 +43,11 @@ LIGHT = Theme(
     missing="#9aa3ad",
     good="#1b7f4b",
     simulated="#1f6fb2",
-    warning="#b36b00",
+    warning="#9a5b00",
     bad="#b3261e",
-    off="#6b7480",
+    off="#5f6873",
+    alert="#a3201a",
+    disabled="#6b7480",
 )
 DARK = Theme(
     window="#1b1f24",
@@ -55,11 +59,13 @@ DARK = Theme(
     scene="#0f1216",
     scene_top="#2b323b",
     missing="#59626d",
-    good="#2f9e68",
-    simulated="#2f7fc1",
-    warning="#c27a10",
-    bad="#c8443b",
+    good="#1b7f4b",
+    simulated="#1f6fb2",
+    warning="#9a5b00",
+    bad="#b93a32",
     off="#5a636e",
+    alert="#ff9a90",
+    disabled="#8a939e",
 )
 THEMES = {"light": LIGHT, "dark": DARK}
 
@@ -87,7 +93,7 @@ def palette(theme: Theme) -> QPalette:
     }.items():
         made.setColor(role, QColor(colour))
     for role in (roles.WindowText, roles.Text, roles.ButtonText):
-        made.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.missing))
+        made.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.disabled))
     return made
 
 
@@ -115,3 +121,7 @@ DIVERGING = _colour_map(
 )
 # Dark blue to yellow, brighter all the way.
 SEQUENTIAL = _colour_map("#1a2a5e", "#2c5282", "#3f7f8f", "#63a878", "#a9c95b", "#f5e663")
+PULLED = SEQUENTIAL[::-1]  # the same for what lies below zero
+
+# What is drawn over each: seen against every one of its colours.
+LIGHT_INK, DARK_INK = "#f4f6f8", "#16191d"

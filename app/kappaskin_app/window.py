@@ -31,15 +31,24 @@ from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.view import ViewPanel
 from kappaskin_app.scale import Ranges
 from kappaskin_app.session import Session
-from kappaskin_app.settings import COLOURS, Settings, ask_of
+from kappaskin_app.settings import COLOURS, LOAD_CASES, Settings, ask_of
 from kappaskin_app.simulation import dragged, scene_of
-from kappaskin_app.theme import DIVERGING, SEQUENTIAL, THEMES, palette
-from kappaskin_app.views.badge import LOST, OFF, Badge
+from kappaskin_app.theme import (
+    DARK_INK,
+    DIVERGING,
+    LIGHT_INK,
+    PULLED,
+    SEQUENTIAL,
+    THEMES,
+    palette,
+)
+from kappaskin_app.views.badge import LOST, OFF, STALE, Badge
 from kappaskin_app.views.heatmap import ColourBar, Heatmap
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.readouts import Health, Readouts
 
 _HEATMAPS = 0.06  # s between two drawings of the heatmaps
+_GESTURE = 1.0  # s within which changes of one setting are one step to undo
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
 _TIPS = {
     "xx": "Bending along x as each element reads it (Eq. 3).",
@@ -51,11 +60,14 @@ _TIPS = {
 class MainWindow(QMainWindow):
     """The desktop app's one window."""
 
-    def __init__(self, source: str = "sim:", settings: Settings | None = None) -> None:
+    def __init__(self, source: str = "sim:") -> None:
         super().__init__()
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
-        self.history = History(settings or Settings(), self)
+        case = source.removeprefix("sim:")
+        self.history = History(
+            Settings(load_case=case) if case in dict(LOAD_CASES) else Settings(), self
+        )
         self.session = Session(self.history, self)
         self.membrane, self.badge, self.readouts = MembraneView(), Badge(), Readouts()
         self.colour_bar = ColourBar()
@@ -64,6 +76,10 @@ class MainWindow(QMainWindow):
         self.load, self.noise, self.view = LoadPanel(), NoisePanel(), ViewPanel()
         self.ranges = Ranges()
         self._met = 0
+        self._colours: object = None
+        self._last_wish, self._wished_at = "", 0.0
+        self._shortcuts: QMessageBox | None = None
+        self.statusBar()  # there from the start, or its first message would push the rest up
         self._next_heatmaps = self._next_numbers = 0.0
         self._gesture, self._grabbed_end = -1, False
         self.setCentralWidget(self._centre())
@@ -107,7 +123,8 @@ class MainWindow(QMainWindow):
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         scroll.setFrameShape(QScrollArea.Shape.NoFrame)
         scroll.setWidget(panels)
-        scroll.setMinimumWidth(285)
+        bar = scroll.verticalScrollBar().sizeHint().width()
+        scroll.setMinimumWidth(panels.minimumSizeHint().width() + bar)
         maps, column = QWidget(), QVBoxLayout()
         column.setContentsMargins(0, 0, 0, 0)
         for heatmap in self.heatmaps.values():
@@ -180,8 +197,12 @@ class MainWindow(QMainWindow):
     # Wishes: a person wants something; a change of settings is always a command.
 
     def _wish(self, name: str, value: object) -> None:
-        label = ask_of(name).label if not name.startswith("range_") else "Colour range"
-        self.history.change(label, -1, **{name: value})
+        label = ask_of(name).label if not name.startswith("range_") else "colour range"
+        now = time.monotonic()
+        if name != self._last_wish or now - self._wished_at > _GESTURE:
+            self._gesture = self.history.new_gesture()
+        self._last_wish, self._wished_at = name, now
+        self.history.change(f"Change of {label}", self._gesture, **{name: value})
 
     def _toggle(self, name: str) -> None:
         self._wish(name, not getattr(self.history.settings, name))
@@ -219,7 +240,7 @@ class MainWindow(QMainWindow):
         self.history.change("Drag the load", self._gesture, **moved)
 
     def _release(self) -> None:
-        self._gesture = -1
+        self._last_wish = ""
 
     def _point(self, element: int) -> None:
         for heatmap in self.heatmaps.values():
@@ -233,8 +254,6 @@ class MainWindow(QMainWindow):
             panel.show_settings(settings)
         for name, heatmap in self.heatmaps.items():
             heatmap.show_lock(getattr(settings, f"range_{name}") > 0)
-        by_displacement = settings.colour_by == "displacement"
-        self.membrane.show_colours(SEQUENTIAL if by_displacement else DIVERGING)
         self.membrane.show_options(
             settings.exaggeration, settings.show_elements, settings.show_truth
         )
@@ -247,20 +266,22 @@ class MainWindow(QMainWindow):
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.setPalette(palette(theme))
-        for view in (self.membrane, self.badge, self.readouts, *self.heatmaps.values()):
-            view.show_theme(theme)
+        panels = (self.connection, self.load, self.noise, self.basis)
+        views = (self.membrane, self.badge, self.readouts, *self.heatmaps.values())
+        for widget in (*panels, *views):
+            widget.show_theme(theme)
 
     def _show_status(self, status: Status) -> None:
         if status.sensor is not None and status.meetings != self._met:
             self._meet(status)
         state = self.session.badge()
         self.badge.show_state(state)
-        lost = state in (LOST, OFF)
+        lost = state in (LOST, OFF, STALE)
         for view in (self.membrane, *self.heatmaps.values()):
             view.show_lost(lost)
         self.connection.show_status(status)
         self.basis.show_status(status)
-        simulating = self.session.simulating
+        simulating = self.session.simulating and status.state == "streaming"
         self.load.show_simulating(simulating)
         self.noise.show_simulating(simulating)
         self._show_health(status, lost)
@@ -271,6 +292,7 @@ class MainWindow(QMainWindow):
             return
         self._met = status.meetings
         self.membrane.show_skin(sensor, setup.nx, setup.ny)
+        self.ranges = Ranges(1e3 * max(sensor.layout.patch.a, sensor.layout.patch.b))
         settings = self.history.settings
         self.membrane.show_options(
             settings.exaggeration, settings.show_elements, settings.show_truth
@@ -292,13 +314,13 @@ class MainWindow(QMainWindow):
                 float(np.median(recent)) if recent else math.nan,
                 counts.lost,
                 counts.bytes_discarded,
+                status.skipped,
             )
         )
         estimate = None if lost else self.session.estimate
         self.readouts.show_estimate(estimate)
-        if self.session.estimate is not None:
-            for row, heatmap in enumerate(self.heatmaps.values()):
-                heatmap.show_reading(self.session.estimate.curvature[row])
+        for row, heatmap in enumerate(self.heatmaps.values()):
+            heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
 
     def _show_estimate(self, estimate: Estimate) -> None:
         if not self.membrane.ready:
@@ -310,12 +332,16 @@ class MainWindow(QMainWindow):
         due = now >= self._next_heatmaps
         if colour == "displacement":
             top = self.ranges.limit(colour, values, settings, now)
-            pulled = float(np.nansum(values)) < 0
-            limits, colours, unit = (-top, 0.0) if pulled else (0.0, top), SEQUENTIAL, "mm"
+            pulled = self.ranges.pulled(values)
+            limits = (-top, 0.0) if pulled else (0.0, top)
+            colours, unit = PULLED if pulled else SEQUENTIAL, "mm"
         else:
             readings = estimate.curvature[COMPONENTS.index(colour)]
             limit = self.ranges.limit(colour, readings, settings, now)
             limits, colours, unit = (-limit, limit), DIVERGING, "1/m"
+        if colours is not self._colours:
+            self._colours = colours
+            self.membrane.show_colours(colours, DARK_INK if colours is DIVERGING else LIGHT_INK)
         self.membrane.show_estimate(estimate, values, limits)
         simulated = self.session.simulating
         self.membrane.show_loads(
@@ -344,11 +370,13 @@ class MainWindow(QMainWindow):
         self._tell(f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}")
 
     def _show_shortcuts(self) -> None:
-        box = QMessageBox(QMessageBox.Icon.NoIcon, "Shortcuts", self.actions_by_name.cheat_sheet())
-        box.setParent(self, Qt.WindowType.Dialog)
-        box.setModal(False)
-        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        box.show()
+        if self._shortcuts is None:
+            text = self.actions_by_name.cheat_sheet()
+            self._shortcuts = QMessageBox(QMessageBox.Icon.NoIcon, "Shortcuts", text)
+            self._shortcuts.setParent(self, Qt.WindowType.Dialog)
+            self._shortcuts.setModal(False)
+        self._shortcuts.show()
+        self._shortcuts.raise_()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         guard.forget(self._tell)

@@ -72,7 +72,7 @@ def serial_ports() -> list[dict[str, Any]]:
     return [
         {
             "port": found.device,
-            "description": found.description,
+            "description": "" if found.description == "n/a" else found.description,
             "opened": sys.platform == "win32" or os.access(found.device, os.R_OK | os.W_OK),
         }
         for found in sorted(list_ports.comports())

@@ -7,6 +7,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Generator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
@@ -28,6 +29,7 @@ OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
 
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
+_LIVE = 64  # frames of one read that are computed, the newest: older ones are history
 _GAPS = 4096  # gaps between reads that the percentile is taken over
 
 
@@ -36,10 +38,11 @@ class Status:
     """How the engine is doing.
 
     `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
-    `message` says why. `refusal` says why the setup asked for last was not taken. `meetings`
-    counts the devices that said what they are. `rate` in frames/s, `reader_gap` the 99th
-    percentile of the time between two reads in s, `last_frame` and `reported` on the monotonic
-    clock.
+    `message` says why. `setup` is the one in use, `refusal` says why it is not the one asked for
+    last, and `computing` that another is on its way. `meetings` counts the devices that said what
+    they are, `skipped` the frames that came in faster than they could be computed. `rate` in
+    frames/s, `reader_gap` the 99th percentile of the time between two reads in s, `last_frame`
+    and `reported` on the monotonic clock.
     """
 
     state: str = OFF
@@ -49,6 +52,8 @@ class Status:
     sensor: Sensor | None = None
     meetings: int = 0
     setup: Setup = field(default_factory=Setup)
+    computing: bool = False
+    skipped: int = 0
     generation: int = 0
     slot: "np.dtype[np.void] | None" = None
     accounting: Accounting = field(default_factory=Accounting)
@@ -80,6 +85,9 @@ class _Loop:
         self._scene: Scene | None = None
         self._pipeline: Pipeline | None = None
         self._status = ring.read_status() or Status()
+        self._asked = self._status.setup
+        self._builder = ThreadPoolExecutor(1, "pipeline-builder")
+        self._building: Future[_Built] | None = None
         self._gaps: deque[float] = deque(maxlen=_GAPS)
         self._times: deque[float] = deque(maxlen=1024)
         self._last_read = math.nan
@@ -94,13 +102,17 @@ class _Loop:
                     wait = 0.0
                 if self._source is not None:
                     self._read(self._source)
+                if self._building is not None and self._building.done():
+                    self._swap(self._building.result())
                 if time.monotonic() - self._status.reported >= _REPORT:
                     self._report()
         self._close()
+        self._builder.shutdown(wait=False, cancel_futures=True)
 
     def _take(self, request: Request) -> None:
         if isinstance(request, Setup):
-            self._set_up(request)
+            self._asked = request
+            self._set_up(smaller=False)
         elif isinstance(request, Scene):
             self._scene = request
             self._play()
@@ -113,6 +125,9 @@ class _Loop:
                 source="",
                 message="",
                 sensor=None,
+                computing=False,
+                skipped=0,
+                slot=None,  # what the last device showed is not this one's
                 accounting=Accounting(),
                 rate=0.0,
                 last_frame=-math.inf,
@@ -135,28 +150,44 @@ class _Loop:
     def _close(self) -> None:
         if self._source is not None:
             self._source.close()
-        self._source, self._pipeline = None, None
+        self._source, self._pipeline, self._building = None, None, None
         self._gaps.clear()
         self._times.clear()
         self._last_read = math.nan
 
-    def _set_up(self, setup: Setup) -> None:
-        """Swap the whole pipeline, or keep the one there is and say why."""
+    def _set_up(self, smaller: bool) -> None:
+        """Begin to build the pipeline asked for, beside the running one."""
         sensor = self._status.sensor
         if sensor is None:
-            self._status = replace(self._status, setup=setup, refusal="")
+            self._status = replace(self._status, setup=self._asked, refusal="")
+        elif self._building is None:
+            generation = self._status.generation + 1
+            job = (_built, sensor, self._asked, generation, smaller)
+            self._building = self._builder.submit(*job)
+            self._status = replace(self._status, computing=True)
+
+    def _swap(self, built: "_Built") -> None:
+        """Go over to the whole of another pipeline, or keep the one there is and say why."""
+        self._building = None
+        self._status = replace(self._status, computing=False)
+        if built.asked != self._asked or built.sensor is not self._status.sensor:
+            self._set_up(smaller=self._pipeline is None)  # overtaken while it was built
             return
-        generation = self._status.generation + 1
+        self._status = replace(self._status, refusal=built.refusal)
+        if built.pipeline is not None:
+            self._use(built.pipeline)
+        self._report()
+
+    def _use(self, pipeline: Pipeline) -> None:
+        slot = slot_type(pipeline)
         try:
-            pipeline = Pipeline(sensor, setup, generation)
-            slot = slot_type(pipeline)
-            self._ring.lay_out(generation, slot)
+            self._ring.lay_out(pipeline.generation, slot)
         except Refusal as refusal:
             self._status = replace(self._status, refusal=str(refusal))
             return
         self._pipeline = pipeline
         self._status = replace(
-            self._status, setup=setup, refusal="", generation=generation, slot=slot
+            self._status, setup=pipeline.setup, generation=pipeline.generation, slot=slot
         )
 
     def _read(self, source: Source) -> None:
@@ -183,7 +214,10 @@ class _Loop:
             self._last_read = now
         if self._pipeline is None:
             return
-        for frame in frames:
+        late = max(0, len(frames) - _LIVE)
+        if late:
+            self._status = replace(self._status, skipped=self._status.skipped + late)
+        for frame in frames[late:]:
             self._ring.write(self._pipeline(frame))
             self._times.append(frame.host_time)
 
@@ -194,7 +228,7 @@ class _Loop:
             self._status, state=STREAMING, sensor=sensor, meetings=self._status.meetings + 1
         )
         self._play()
-        self._set_up(self._status.setup)
+        self._set_up(smaller=True)
 
     def _report(self) -> None:
         now, source, status = time.monotonic(), self._source, self._status
@@ -210,6 +244,34 @@ class _Loop:
             )
         self._status = replace(status, reported=now)
         self._ring.write_status(self._status)
+
+
+@dataclass(frozen=True, eq=False)
+class _Built:
+    """What came of building a pipeline: `asked` or a smaller one, or none and why."""
+
+    sensor: Sensor
+    asked: Setup
+    pipeline: Pipeline | None
+    refusal: str = ""
+
+
+def _built(sensor: Sensor, asked: Setup, generation: int, smaller: bool) -> _Built:
+    """A pipeline as asked, or if it may be `smaller` with the most functions that it can have."""
+    refusal = ""
+    most = max(asked.Ni, asked.Nj)
+    for limit in range(most, 0 if smaller else most - 1, -1):
+        setup = replace(asked, Ni=min(asked.Ni, limit), Nj=min(asked.Nj, limit))
+        try:
+            return _Built(sensor, asked, Pipeline(sensor, setup, generation), refusal)
+        except Refusal as reason:
+            refusal = refusal or str(reason)
+        except MemoryError:
+            refusal = refusal or (
+                f"{asked.Ni} x {asked.Nj} functions for {sensor.layout} do not fit in memory; "
+                "use fewer"
+            )
+    return _Built(sensor, asked, None, refusal)
 
 
 def _serve(requests: "Connection[Request, Request]", name: str) -> None:

@@ -43,7 +43,8 @@ class Touch:
     """A contact: `position` (2,) in m with `position_sd` (2,) in m, and how hard it is.
 
     `force` and `force_sd` in N, `displacement` and `displacement_sd` in m, of the skin at the
-    contact. Every number is NaN when the readings hold no contact that stands out of the noise.
+    contact; `single` says whether one point load explains the readings as well as the shape does.
+    Every number is NaN when the readings hold no contact that stands out of the noise.
     """
 
     position: Array
@@ -52,6 +53,7 @@ class Touch:
     force_sd: float
     displacement: float
     displacement_sd: float
+    single: bool
 
     @property
     def present(self) -> bool:

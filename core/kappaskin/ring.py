@@ -30,6 +30,7 @@ _TOUCH = [
     ("force_sd", "f8"),
     ("displacement", "f8"),
     ("displacement_sd", "f8"),
+    ("single", "?"),
 ]
 
 

@@ -17,9 +17,12 @@ _FUNCTIONS = 15  # along each side, of the shape a point load makes: Table 1's d
 _STEPS = 2  # of Gauss-Newton, from the best point searched
 _REMEMBERED = 8  # sets of missing readings whose norms are kept
 
+_AS_WELL = 1.2  # times the residual of the fitted shape that a single point load may leave
 _RIDGE = 1e-12 * np.eye(3)  # keeps a load on the rim, which moves nothing, solvable
 
-NO_TOUCH = Touch(np.full(2, np.nan), np.full(2, np.nan), *[math.nan] * 4)
+NO_TOUCH = Touch(
+    np.full(2, np.nan), np.full(2, np.nan), math.nan, math.nan, math.nan, math.nan, False
+)
 
 
 class PointContact:
@@ -80,12 +83,12 @@ class PointContact:
             force += float(step[2])
             readings = self._readings(position, used)
         left = K - force * readings[0]
-        # Either model may leave more than noise, never less: the smaller residual is nearer to it.
+        # What a point load leaves of the readings: the noise, or more where it is none.
         spread = math.sqrt(float(left @ left) / max(int(used.sum()) - 3, 1))
-        sd = min(spread, float(fit.noise)) * np.sqrt(np.diag(covariance))
-        return Touch(
-            position, sd[:2], force, float(sd[2]), *self._displacement(fit, position, force)
-        )
+        sd = spread * np.sqrt(np.diag(covariance))
+        moved, moved_sd = self._displacement(fit, position, force)
+        single = spread < _AS_WELL * float(fit.noise)
+        return Touch(position, sd[:2], force, float(sd[2]), moved, moved_sd, single)
 
     def _readings(self, position: Array, used: Mask) -> Array:
         """T and its slopes along x and y (3, 3 P) at `position`; zero where not `used`."""

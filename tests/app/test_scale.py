@@ -1,9 +1,10 @@
 import math
 
+import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin_app.scale import SteadyRange, round_up
+from kappaskin_app.scale import Ranges, SteadyRange, round_up
 
 
 @given(st.floats(1e-9, 1e9))
@@ -31,3 +32,11 @@ def test_a_peak_between_keeps_the_range() -> None:
     steady.follow(9.0, now=1.5)
     assert steady.follow(2.0, now=2.5) == 10.0
     assert not math.isnan(steady.limit)
+
+
+def test_a_skin_at_rest_keeps_its_side() -> None:
+    ranges = Ranges(side=100.0)
+    sides = [
+        ranges.pulled(np.array(w)) for w in ([0.1, 3.0], [-0.05, 0.04], [-3.0, 0.1], [0.0, 0.05])
+    ]
+    assert sides == [False, False, True, True]

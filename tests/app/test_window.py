@@ -15,7 +15,7 @@ def test_the_simulation_is_shown_as_a_simulation(window: MainWindow, until) -> N
     until(lambda: window.readouts.text("contact").endswith(" mm"))
     assert window.readouts.text("rms").endswith(" mm")
     until(lambda: window.readouts.text("age").endswith(" ms"))
-    assert window.readouts.text("force").endswith(" N")
+    assert window.readouts.text("force").endswith(" mN")
 
 
 def test_no_view_is_blank(window: MainWindow, until, colours_in) -> None:
@@ -115,6 +115,54 @@ def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
     assert (end - start - QPoint(72, 24)).manhattanLength() <= 12
     window.history.stack.undo()
     assert window.history.settings.x == 0.05
+
+
+def test_letters_typed_over_the_skin_do_not_reach_vtk(window: MainWindow, qtbot) -> None:
+    window.membrane.plotter.setFocus()
+    for key in "3wspfvr":
+        qtbot.keyClick(window.membrane.plotter, key)
+    assert not window.membrane.plotter.ren_win.GetStereoRender()
+
+
+def test_a_load_cannot_be_dragged_when_nothing_comes_in(window: MainWindow, until) -> None:
+    assert len(window.membrane.drag.handles) == 1
+    window.actions_by_name["disconnect"].trigger()
+    until(lambda: not len(window.membrane.drag.handles))
+    assert not window.load.editor("load_case").isEnabled()
+
+
+def test_two_points_are_not_called_one(window: MainWindow, until) -> None:
+    window.history.change("Two", -1, load_case="two-points", x=0.03, y=0.03, x_end=0.07, y_end=0.07)
+    until(lambda: "spread" in window.readouts.text("contact"))
+    window.history.change("One", -1, load_case="centre")
+    until(lambda: "\N{PLUS-MINUS SIGN}" in window.readouts.text("contact"))
+
+
+def test_a_port_typed_is_the_port_meant(window: MainWindow, qtbot) -> None:
+    window.connection.show_ports([("/dev/ttyACM10", "/dev/ttyACM10  Board")])
+    line = window.connection.sources.lineEdit()
+    line.selectAll()
+    qtbot.keyClicks(line, "/dev/ttyACM1")
+    assert window.connection.source() == "/dev/ttyACM1"
+
+
+def test_too_large_a_number_typed_becomes_the_largest_not_another(
+    window: MainWindow, qtbot
+) -> None:
+    box = window.basis.editor("functions_x")
+    box.selectAll()
+    qtbot.keyClicks(box, "99")
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+    assert window.history.settings.functions_x == 64
+
+
+def test_steps_of_one_setting_in_a_row_are_one_to_undo(window: MainWindow, qtbot) -> None:
+    box = window.basis.editor("functions_x")
+    for _ in range(3):
+        qtbot.keyClick(box, Qt.Key.Key_Down)
+    assert window.history.settings.functions_x == 5
+    window.history.stack.undo()
+    assert window.history.settings.functions_x == 8
 
 
 def test_turning_the_camera_does_not_move_the_load(window: MainWindow, qtbot) -> None:

@@ -291,3 +291,41 @@ def test_a_parent_that_ends_as_it_should_leaves_nothing_and_says_nothing(parent)
     assert errors == ""
     assert gone(pid)
     assert not block.exists()
+
+
+def test_a_sensor_too_small_for_the_basis_gets_the_largest_that_fits_and_says_why(
+    own_engine,
+) -> None:
+    own_engine.set_up(Setup(12, 11))
+    own_engine.connect("sim:")
+
+    estimate = next_estimate(own_engine)
+    status = own_engine.status()
+
+    # Eleven either way is two more than ten elements tell apart; the largest that fits is used.
+    assert estimate.coefficients.shape == (status.setup.Ni, status.setup.Nj)
+    assert max(estimate.coefficients.shape) == 10
+    assert "use at most 10 x 10 functions" in status.refusal
+
+
+def test_a_basis_refused_is_asked_for_again_when_another_device_comes(own_engine) -> None:
+    own_engine.connect("sim:")
+    next_estimate(own_engine)
+    own_engine.set_up(Setup(12, 12))
+    wait_for(lambda: own_engine.status().refusal)
+
+    own_engine.connect("sim:line")
+    status = wait_for(lambda: (s := own_engine.status()).source == "sim:line" and s.slot and s)
+
+    assert "12 x 12" in status.refusal
+    assert status.setup == Setup(10, 10)
+
+
+def test_nothing_of_the_last_device_is_shown_as_the_next_ones(own_engine) -> None:
+    own_engine.connect("sim:")
+    next_estimate(own_engine)
+
+    own_engine.connect("loop://")
+    status = wait_for(lambda: (s := own_engine.status()).source == "loop://" and s)
+
+    assert own_engine.latest(status) is None

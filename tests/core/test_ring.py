@@ -29,7 +29,7 @@ def estimate_of(pipeline: Pipeline = PIPELINE) -> Estimate:
 
 def numbers(value: Any) -> Array:
     """Every number in an estimate or a touch, in a row."""
-    parts = [getattr(value, field.name) for field in fields(value)]
+    parts = [getattr(value, field.name) for field in fields(value) if field.name != "single"]
     return np.concatenate([numbers(p) if isinstance(p, Touch) else np.ravel(p) for p in parts])
 
 
@@ -154,7 +154,7 @@ def all_of(number: float) -> Estimate:
     """An estimate that holds nothing but `number`."""
     estimate = estimate_of(pipeline_of(Setup(8, 8, 129, 129)))
     parts = {f.name: np.full(np.shape(getattr(estimate, f.name)), number) for f in fields(estimate)}
-    touch = Touch(np.full(2, number), np.full(2, number), number, number, number, number)
+    touch = Touch(np.full(2, number), np.full(2, number), number, number, number, number, True)
     return Estimate(**parts | {"touch": touch})
 
 

@@ -331,7 +331,7 @@ def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened) -> No
         ("hwgrep://(", "cannot be opened"),
         ("hwgrep://no such device", "no ports found"),
         ("socket://127.0.0.1", "URL such as socket://host:port"),
-        ("socket://127.0.0.1:1", "refused"),
+        ("socket://127.0.0.1:1", "nothing listens there"),
         ("replay:x.mcap", "cannot be replayed yet"),
         ("sim:nowhere", "expected a scene among"),
     ],

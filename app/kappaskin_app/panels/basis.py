@@ -14,5 +14,5 @@ class BasisPanel(Panel):
 
     def show_status(self, status: Status) -> None:
         setup = status.setup
-        kept = f"Still {setup.Ni} x {setup.Nj}: {status.refusal}." if status.refusal else ""
-        self.show_message(kept)
+        kept = f"In use: {setup.Ni} x {setup.Nj}. {status.refusal}." if status.refusal else ""
+        self.show_message("Computing\N{HORIZONTAL ELLIPSIS}" if status.computing else kept)

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import Status
+from kappaskin_app.theme import Theme
 
 _SIMULATED = ("sim:", "Simulated skin")
 
@@ -46,6 +47,8 @@ class ConnectionPanel(QGroupBox):
         line = QLineEdit()
         line.returnPressed.connect(self.connect_button.click)
         self.sources.setLineEdit(line)
+        # A completer would turn a typed ttyACM1 into a listed ttyACM10.
+        self.sources.setCompleter(None)  # pyright: ignore[reportArgumentType]
         self.disconnect_button.clicked.connect(self.disconnect_wanted)
         self.look_button.clicked.connect(self.ports_wanted)
         buttons = QHBoxLayout()
@@ -88,9 +91,11 @@ class ConnectionPanel(QGroupBox):
         text = ""
         if sensor is not None and status.state == "streaming":
             a, b = sensor.layout.patch.a * 1e3, sensor.layout.patch.b * 1e3
+            dead = int((~sensor.layout.live).sum())
+            health = f", {dead} of {sensor.channels} channels dead" if dead else ""
             text = (
-                f"{sensor.name}\n{sensor.layout}, {a:g} x {b:g} mm\n"
-                f"up to {sensor.rate:g} frames/s, serial number {sensor.serial_number}"
+                f"{sensor.name} ({sensor.serial_number})\n{sensor.layout}, {a:g} x {b:g} mm"
+                f"{health}\nup to {sensor.rate:g} frames/s"
             )
         elif status.state == "waiting":
             text = "Waiting for the device to say what it is\N{HORIZONTAL ELLIPSIS}"
@@ -101,3 +106,6 @@ class ConnectionPanel(QGroupBox):
             self.message.setText(status.message)
         self.message.setVisible(bool(status.message))
         self.disconnect_button.setEnabled(status.state != "off")
+
+    def show_theme(self, theme: Theme) -> None:
+        self.message.setStyleSheet(f"color: {theme.alert};")

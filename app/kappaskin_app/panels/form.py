@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QKeySequence, QValidator
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -20,6 +20,40 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.settings import Choice, Range, Settings, Switch, ask_of
+from kappaskin_app.theme import Theme
+
+
+class _WholeBox(QSpinBox):
+    """Takes any digits and goes to the nearest number allowed, instead of dropping digits."""
+
+    def validate(self, text: str, position: int) -> object:
+        return _typing(self, text.removesuffix(self.suffix())), text, position
+
+    def fixup(self, text: str) -> str:
+        typed = float(text.removesuffix(self.suffix()) or self.value())
+        return str(int(min(max(typed, self.minimum()), self.maximum())))
+
+
+class _RealBox(QDoubleSpinBox):
+    """The same for numbers with decimals, and a comma is a point."""
+
+    def validate(self, text: str, position: int) -> object:
+        text = text.replace(",", ".")
+        return _typing(self, text.removesuffix(self.suffix())), text, position
+
+    def fixup(self, text: str) -> str:
+        typed = float(text.removesuffix(self.suffix()) or self.value())
+        return self.textFromValue(min(max(typed, self.minimum()), self.maximum()))
+
+
+def _typing(box: QSpinBox | QDoubleSpinBox, text: str) -> QValidator.State:
+    try:
+        value = float(text)
+    except ValueError:
+        begun = text.strip() in ("", "-", ".", "-.")
+        return QValidator.State.Intermediate if begun else QValidator.State.Invalid
+    inside = box.minimum() <= value <= box.maximum()
+    return QValidator.State.Acceptable if inside else QValidator.State.Intermediate
 
 
 class _Manners(QObject):
@@ -56,7 +90,7 @@ class _Editor:
 
 
 def _whole(how: Range, said: Callable[[Any], None]) -> _Editor:
-    box = QSpinBox()
+    box = _WholeBox()
     box.setRange(int(how.least), int(how.most))
     box.setSingleStep(int(how.step))
     box.valueChanged.connect(said)
@@ -66,7 +100,8 @@ def _whole(how: Range, said: Callable[[Any], None]) -> _Editor:
 def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
     if not how.decimals:
         return _whole(how, said)
-    box = QDoubleSpinBox()
+    box = _RealBox()
+    box.setLocale(QLocale.c())
     box.setDecimals(how.decimals)
     box.setRange(how.least * how.scale, how.most * how.scale)
     box.setSingleStep(how.step * how.scale)
@@ -77,6 +112,8 @@ def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
 def _dressed(box: QSpinBox | QDoubleSpinBox, how: Range) -> QWidget:
     if how.unit:
         box.setSuffix(f" {how.unit}")
+    low, high = how.least * how.scale, how.most * how.scale
+    box.setToolTip(f"{how.tip} From {low:g} to {high:g} {how.unit}".rstrip() + ".")
     box.setKeyboardTracking(False)
     box.setAlignment(Qt.AlignmentFlag.AlignRight)
     return box
@@ -126,7 +163,8 @@ class Panel(QGroupBox):
     def _add(self, name: str) -> None:
         how = ask_of(name)
         editor = _editor(name, lambda value: self.wished.emit(name, value))
-        editor.widget.setToolTip(how.tip)
+        if not isinstance(how, Range):
+            editor.widget.setToolTip(how.tip)
         editor.widget.setObjectName(name)
         _well_behaved(editor.widget)
         self._editors[name] = editor
@@ -134,6 +172,9 @@ class Panel(QGroupBox):
         label.setBuddy(editor.widget)
         label.setToolTip(how.tip)
         self.form.addRow(label, editor.widget)
+
+    def editors(self) -> list[QWidget]:
+        return [editor.widget for editor in self._editors.values()]
 
     def editor(self, name: str) -> QWidget:
         return self._editors[name].widget
@@ -147,6 +188,9 @@ class Panel(QGroupBox):
         """Show only the rows of these settings."""
         for name, editor in self._editors.items():
             self.form.setRowVisible(editor.widget, name in names)
+
+    def show_theme(self, theme: Theme) -> None:
+        self.message.setStyleSheet(f"color: {theme.alert};")
 
     def show_message(self, text: str) -> None:
         """Say something below the form, or nothing."""

@@ -10,8 +10,8 @@ LIVE, SIM, STALE, LOST, OFF = "LIVE", "SIM", "STALE", "LOST", "OFF"
 TIPS = {
     LIVE: "Readings of a real sensor, as they come.",
     SIM: "Readings of a simulation, not of a real sensor.",
-    STALE: "Connected, but no reading has come for half a second: what is shown is old.",
-    LOST: "The connection ended: what is shown is the last that came.",
+    STALE: "No reading has come for half a second, or none yet: what is shown is old.",
+    LOST: "The connection ended or could not be made: what is shown is the last that came.",
     OFF: "Nothing is connected.",
 }
 

@@ -11,7 +11,7 @@ from pyvistaqt import QtInteractor
 Array = NDArray[np.float64]
 
 MM = 1e3
-ARROW = 22.0  # mm from a load's tip to its tail, as drawn
+ARROW = 0.22  # from a load's tip to its tail, as a share of the skin's longer side
 _NEAR = 14.0  # pixels around an arrow within which the mouse takes hold of it
 
 
@@ -30,14 +30,20 @@ class LoadDrag(QObject):
         super().__init__(plotter)
         self._plotter, self._height_at = plotter, height_at
         self.handles: Array = np.empty((0, 2))
+        self.arrow = MM * 0.1 * ARROW
+        """Drawn length of an arrow in mm."""
         self._dragging = False
         self._plane, self._slip, self._held = 0.0, np.zeros(2), np.zeros(2)
         plotter.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind, left = event.type(), Qt.MouseButton.LeftButton
+        if kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+            event.ignore()  # for the window: VTK's own keys turn on stereo or wireframe for good
+            return True
         if isinstance(event, QMouseEvent):
-            kind, left = event.type(), Qt.MouseButton.LeftButton
-            if kind == QEvent.Type.MouseButtonPress and event.button() == left:
+            presses = (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick)
+            if kind in presses and event.button() == left:
                 return self._grab(event.position())
             if kind == QEvent.Type.MouseMove:
                 return self._move(event.position())
@@ -54,7 +60,7 @@ class LoadDrag(QObject):
         """The handle (2,) in m whose arrow is drawn near `at`."""
         for handle in self.handles:
             height = self._height(handle)
-            tip, tail = (self._to_screen(handle, height + up) for up in (0.0, ARROW))
+            tip, tail = (self._to_screen(handle, height + up) for up in (0.0, self.arrow))
             along = tail - tip
             point = np.array([at.x(), at.y()])
             share = np.clip((point - tip) @ along / max(along @ along, 1.0), 0, 1)

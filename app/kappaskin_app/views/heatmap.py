@@ -84,6 +84,15 @@ class _Cells(QWidget):
         self._values = np.full(len(layout), np.nan)
         self._under = -1
 
+    def _spacing(self) -> float:
+        """What separates the two nearest elements, in m: squares of that side hide none."""
+        positions = self._layout.positions if self._layout else np.empty((0, 2))
+        if len(positions) < 2 or self._layout is None:
+            return 0.2 * self._layout.patch.a if self._layout else 1.0
+        apart = np.max(np.abs(positions[:, None] - positions[None]), axis=-1)
+        nearest = float(np.min(apart + np.where(np.eye(len(positions)), np.inf, 0.0)))
+        return max(0.9 * nearest, 0.02 * self._layout.patch.a)
+
     def show_cells(self, rgb: Colours) -> None:
         self._colours = rgb
         self.update()
@@ -110,7 +119,7 @@ class _Cells(QWidget):
         layout = self._layout
         if layout is None:
             return []
-        side = 0.8 * math.sqrt(area.width() * area.height() / len(layout))
+        side = self._spacing() * area.width() / layout.patch.a
         return [
             QRectF(c.x() - side / 2, c.y() - side / 2, side, side)
             for c in (self.pixel_of(area, x, y) for x, y in layout.positions)
@@ -140,8 +149,10 @@ class _Cells(QWidget):
         painter.setPen(QPen(self._line, 1))
         painter.drawRect(area)
         if self._under >= 0:
-            painter.setPen(QPen(self.palette().windowText().color(), 2))
-            painter.drawRect(self._cell(area, self._under))
+            cell = self._cell(area, self._under)
+            for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # seen on every colour
+                painter.setPen(QPen(QColor(colour), width))
+                painter.drawRect(cell)
 
     def _cell(self, area: QRectF, element: int) -> QRectF:
         if self._layout is None or not self._layout.shape:
@@ -188,7 +199,7 @@ class Heatmap(QWidget):
         self._title.setToolTip(tip)
         self.value = Line()
         self.value.setToolTip("The element under the mouse, else the largest reading.")
-        self.lock = QToolButton(checkable=True, text="Lock range")  # pyright: ignore[reportCallIssue]
+        self.lock = QToolButton(checkable=True, text="Lock")  # pyright: ignore[reportCallIssue]
         self.lock.setToolTip("Keep the colours' range as it is now; else it follows the readings.")
         self.lock.clicked.connect(self._ask_lock)
         self.cells, self.bar = _Cells(), ColourBar()
@@ -214,7 +225,7 @@ class Heatmap(QWidget):
 
     def show_lock(self, locked: bool) -> None:
         self.lock.setChecked(locked)
-        self.lock.setText("Locked" if locked else "Lock range")
+        self.lock.setText("Locked" if locked else "Lock")
 
     def show_layout(self, layout: SensorLayout) -> None:
         self._layout = layout
@@ -240,6 +251,7 @@ class Heatmap(QWidget):
     def show_reading(self, values: Array) -> None:
         """Write the value of the element pointed at, else the largest."""
         if self._layout is None or len(values) != len(self._layout):
+            self.value.show_text("")
             return
         element = self._element
         if element >= 0:
@@ -249,8 +261,9 @@ class Heatmap(QWidget):
             text = f"{what} at ({x:.0f}, {y:.0f}) mm"
         else:
             finite = values[np.isfinite(values)]
-            peak = finite[np.argmax(np.abs(finite))] if len(finite) else math.nan
-            text = f"peak {peak:+.2f} 1/m" if len(finite) else "no readings"
+            peak = f"peak {finite[np.argmax(np.abs(finite))]:+.2f} 1/m" if len(finite) else ""
+            missing = len(values) - len(finite)
+            text = ", ".join(filter(None, [peak, f"{missing} missing" if missing else ""]))
         self.value.show_text(text.replace("-", "\N{MINUS SIGN}"))
 
     def show_theme(self, theme: Theme) -> None:

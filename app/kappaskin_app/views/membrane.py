@@ -19,7 +19,7 @@ from kappaskin_app.views.drag import ARROW, MM, LoadDrag
 
 Array = NDArray[np.float64]
 
-_LIFT = 0.6  # mm of drawing above the surface, or half of a line drowns in it
+_LIFT = 0.006  # of the longer side above the surface, or half of a line drowns in it
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
@@ -44,13 +44,16 @@ class MembraneView(QWidget):
         self._host_time = float("nan")
         self._drawn = True
         self.plotter.renderer.AddObserver("EndEvent", self._note_drawing)
-        self._exaggeration = 1.0
+        self._exaggeration, self._lift, self._want_truth = 1.0, 0.0, True
+        self._element_positions: Array = np.zeros((1, 2))
         self._layout_of: Sensor | None = None
         self._heights: Array = np.zeros((2, 2))
         self._lost = False
         self._fitted = True
-        self.plotter.iren.interactor.AddObserver("InteractionEvent", self._note_turning)
+        for turning in ("InteractionEvent", "MouseWheelForwardEvent", "MouseWheelBackwardEvent"):
+            self.plotter.iren.interactor.AddObserver(turning, self._note_turning)
         self._theme: Theme | None = None
+        self._ink = "#ffffff"
 
     def _make_actors(self) -> None:
         plotter = self.plotter
@@ -67,13 +70,14 @@ class MembraneView(QWidget):
             self._elements, style="points", point_size=5, **unlit
         )
         self._line_actor = plotter.add_mesh(self._line, line_width=5, color="#e8543f", **unlit)
+        # Sized for a skin whose longer side is 1; `show_skin` scales them to the one there is.
         arrow = pv.Arrow(start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35)
         self._arrows = [
             plotter.add_mesh(arrow, color="#e8543f", reset_camera=False, render=False)
             for _ in range(2)
         ]
         self._contact = plotter.add_mesh(
-            pv.Sphere(radius=1.8), color="#1fd17a", reset_camera=False, render=False
+            pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
         self._labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
         for label in self._labels:
@@ -82,10 +86,10 @@ class MembraneView(QWidget):
     def _make_lights(self) -> None:
         """One low lamp from the left for relief, and a weak one at the camera."""
         self.plotter.remove_all_lights()
-        lamp = pv.Light(position=(-1.0, 0.4, 0.75), light_type="scene light", intensity=0.75)
+        lamp = pv.Light(position=(-1.0, 0.4, 0.75), light_type="scene light", intensity=0.65)
         lamp.positional = False
         self.plotter.add_light(lamp)
-        self.plotter.add_light(pv.Light(light_type="headlight", intensity=0.35))
+        self.plotter.add_light(pv.Light(light_type="headlight", intensity=0.3))
 
     def _note_drawing(self, *_: object) -> None:
         now = time.monotonic()
@@ -126,34 +130,42 @@ class MembraneView(QWidget):
             smooth_shading=False,
             reset_camera=False,
             render=False,
-            specular=0.1,
-            ambient=0.45,
-            diffuse=0.75,
+            specular=0.0,
+            ambient=0.6,
+            diffuse=0.42,
         )
         self._surface_actor.prop.interpolation = "Gouraud"
         self._wire_actor = plotter.add_mesh(
             self._wire, line_width=1, lighting=False, reset_camera=False, render=False
         )
         positions = np.column_stack([sensor.layout.positions * MM, np.zeros(len(sensor.layout))])
+        positions = positions[sensor.layout.live.any(axis=0)]
+        self._element_positions = positions[:, :2] / MM
         self._elements.points = positions
         self._elements.verts = np.column_stack(
             [np.ones(len(positions), int), np.arange(len(positions))]
         ).ravel()
+        side = MM * max(patch.a, patch.b)
+        self._lift, self.drag.arrow = _LIFT * side, ARROW * side
+        self._contact.scale = side
         self._place_labels(patch)
         another = self._layout_of is None or self._layout_of.layout.patch != patch
         self._layout_of = sensor
         if another:
             self.reset_camera()
+        self._wire_actor.prop.color = self._ink
         if self._theme:
             self.show_theme(self._theme)
 
-    @staticmethod
-    def _wireframe(points: Array) -> pv.PolyData:
+    def _wireframe(self, points: Array) -> pv.PolyData:
+        """Every few lines of the grid, as lines through their own points alone."""
         ny, nx = points.shape[:2]
         index = np.arange(nx * ny).reshape(ny, nx)
-        rows = [np.r_[nx, row] for row in index[::_STRIDE]]
-        columns = [np.r_[ny, column] for column in index[:, ::_STRIDE].T]
-        return pv.PolyData(points.reshape(-1, 3).copy(), lines=np.concatenate([*rows, *columns]))
+        lines = [*index[::_STRIDE], *index[:, ::_STRIDE].T]
+        self._wire_points = np.concatenate(lines)
+        ends = np.cumsum([len(line) for line in lines])
+        cells = [np.r_[len(x), np.arange(e - len(x), e)] for x, e in zip(lines, ends, strict=True)]
+        return pv.PolyData(points.reshape(-1, 3)[self._wire_points], lines=np.concatenate(cells))
 
     def _place_labels(self, patch: Patch) -> None:
         a, b = patch.a * MM, patch.b * MM
@@ -223,14 +235,13 @@ class MembraneView(QWidget):
         self._mesh.point_data.active_normals[:] = self._normals(self._heights)
         self._mesh.point_data["value"][:] = values.ravel()
         self._surface_actor.mapper.scalar_range = limits
-        if self._wire_actor and self._wire_actor.visibility:
-            known = bool(np.isfinite(estimate.true_surface[0, 0]))
-            true = estimate.true_surface if known else estimate.surface
-            self._wire.points[:, 2] = (
-                -MM * self._exaggeration * np.nan_to_num(true)
-            ).ravel() + _LIFT
-        if self._elements_actor.visibility and self._layout_of:
-            self._elements.points[:, 2] = self._height_at(self._layout_of.layout.positions) + _LIFT
+        known = bool(np.isfinite(estimate.true_surface[0, 0]))
+        self._wire_actor.visibility = known and self._want_truth
+        if self._wire_actor.visibility:
+            true = estimate.true_surface.ravel()[self._wire_points]
+            self._wire.points[:, 2] = -MM * self._exaggeration * true + self._lift
+        if self._elements_actor.visibility:
+            self._elements.points[:, 2] = self._height_at(self._element_positions) + self._lift
         self._place(self._contact, estimate.touch.position)
         self._host_time = estimate.host_time
         self._request()
@@ -265,20 +276,31 @@ class MembraneView(QWidget):
             height = float(self._height_at(position[None])[0])
             actor.position = (position[0] * MM, position[1] * MM, height)
 
+    def _point(self, arrow: pv.Actor, pulls: bool) -> None:
+        """Down for a push; for a pull up, from the surface."""
+        side = self.drag.arrow / ARROW
+        arrow.scale = (side, side, -side if pulls else side)
+        if pulls:
+            x, y, z = arrow.position
+            arrow.position = (x, y, z + self.drag.arrow)
+
     def show_loads(self, loads: Sequence[Load], moving_to: Array | None) -> None:
         """Draw the simulated loads, none for a real sensor; a moving one where it is now."""
+        loads = [load for load in loads if load.force]
         moving = moving_to is not None and bool(np.isfinite(moving_to).all())
-        centres = [moving_to] if moving else [load.centre() for load in loads]
+        centres = [moving_to] if moving and loads else [load.centre() for load in loads]
         self.drag.handles = np.array(centres).reshape(-1, 2)
         for number, arrow in enumerate(self._arrows):
             there = number < len(centres)
             self._place(arrow, self.drag.handles[number] if there else np.full(2, np.nan))
+            if there:
+                self._point(arrow, pulls=loads[number].force < 0)
         lines = [load for load in loads if isinstance(load, LineLoad)]
         self._line_actor.visibility = bool(lines)
         for load in lines[:1]:
             s = np.linspace(0, 1, 41)[:, None]
             along = (1 - s) * [load.x0, load.y0] + s * [load.x1, load.y1]
-            points = np.column_stack([along * MM, self._height_at(along) + _LIFT])
+            points = np.column_stack([along * MM, self._height_at(along) + self._lift])
             if len(points) != self._line.n_points:
                 self._line.points = points
                 self._line.lines = [41, *range(41)]
@@ -287,16 +309,18 @@ class MembraneView(QWidget):
     # How it is shown.
 
     def show_options(self, exaggeration: float, elements: bool, truth: bool) -> None:
-        self._exaggeration = exaggeration
+        self._exaggeration, self._want_truth = exaggeration, truth
         self._elements_actor.visibility = elements
-        if self._wire_actor:
-            self._wire_actor.visibility = truth
         self.plotter.update()
 
-    def show_colours(self, colours: Colours) -> None:
-        """Colour by a map of 256 colours (256, 3)."""
+    def show_colours(self, colours: Colours, ink: str) -> None:
+        """Colour by a map of 256 colours (256, 3), with points and lines in `ink`."""
         opaque = np.full((len(colours), 1), 255, np.uint8)
         self._colours.values = np.hstack([colours, opaque])
+        self._ink = ink
+        self._elements_actor.prop.color = ink
+        if self._wire_actor:
+            self._wire_actor.prop.color = ink
 
     @property
     def greyed(self) -> bool:
@@ -307,6 +331,8 @@ class MembraneView(QWidget):
         """Grey the skin while what it shows is not coming in any more."""
         if self._surface_actor is None or lost == self._lost:
             return
+        if lost:
+            self.show_loads((), None)
         self._lost = lost
         self._surface_actor.mapper.scalar_visibility = not lost
         self._contact.visibility = not lost
@@ -315,14 +341,10 @@ class MembraneView(QWidget):
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
         self.plotter.set_background(theme.scene, top=theme.scene_top)
-        self._elements_actor.prop.color = theme.text
         for label in self._labels:
             label.prop.color = theme.text
         if self._surface_actor:
             self._surface_actor.prop.color = theme.missing
-        if self._wire_actor:
-            self._wire_actor.prop.color = theme.text
-            self._wire_actor.prop.opacity = 0.75
         self.plotter.update()
 
     def close_plotter(self) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
-from kappaskin import Estimate
+from kappaskin import Estimate, Touch
 from kappaskin_app.theme import Theme
 from kappaskin_app.views.line import Line
 
@@ -23,6 +23,7 @@ class Health:
     age: float
     lost: int
     discarded: int
+    skipped: int
 
 
 FIELDS = {
@@ -30,11 +31,17 @@ FIELDS = {
     "age": ("Latency", "Age of the frame when it was drawn, since its bytes were read."),
     "lost": (
         "Lost",
-        "Frames that never came, and bytes that made no sense.",
+        "Frames that never came, bytes that made no sense, frames too many to compute.",
     ),
-    "contact": ("Contact", "Where one point load explains the readings best, with its error bar."),
+    "contact": (
+        "Contact",
+        "Where one point load explains the readings best; spread: they are not of one.",
+    ),
     "force": ("Force", "How hard that load presses, with its error bar."),
-    "depth": ("Depth", "Displacement of the skin at the contact, with its error bar."),
+    "depth": (
+        "Depth",
+        "Displacement at the contact, with its error bar; positive is in.",
+    ),
     "error": (
         "Error at load",
         "Reconstructed minus true displacement there (simulated only).",
@@ -49,7 +56,22 @@ def _with_error(value: float, sd: float, digits: int, unit: str) -> str:
     if not math.isfinite(value):
         return NONE
     bar = f" \N{PLUS-MINUS SIGN} {sd:.{digits}f}" if math.isfinite(sd) else ""
-    return f"{value:.{digits}f}{bar} {unit}".replace("-", "\N{MINUS SIGN}")
+    return f"{_number(value, digits)}{bar} {unit}"
+
+
+def _number(value: float, digits: int, sign: str = "") -> str:
+    rounded = round(value, digits) + 0.0  # no minus before a zero
+    return f"{rounded:{sign}.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _contact(touch: Touch) -> str:
+    if not touch.present:
+        return "none"
+    x, y = touch.position * 1e3
+    if not touch.single:
+        return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, spread"
+    sd = float(np.max(touch.position_sd)) * 1e3
+    return f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.2f} mm"
 
 
 class Readouts(QWidget):
@@ -83,7 +105,8 @@ class Readouts(QWidget):
         age = f"{health.age * 1e3:.0f} ms" if math.isfinite(health.age) else NONE
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
         self._write("age", age)
-        self._write("lost", f"{health.lost} frames, {health.discarded} B")
+        skipped = f", {health.skipped} skipped" if health.skipped else ""
+        self._write("lost", f"{health.lost} frames, {health.discarded} B{skipped}")
 
     def show_estimate(self, estimate: Estimate | None) -> None:
         if estimate is None:
@@ -91,15 +114,13 @@ class Readouts(QWidget):
                 self._write(key, NONE)
             return
         touch = estimate.touch
-        x, y = touch.position * 1e3
-        sd = float(np.max(touch.position_sd)) * 1e3
-        where = f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.1f} mm" if touch.present else "none"
-        self._write("contact", where)
-        self._write("force", _with_error(touch.force, touch.force_sd, 3, "N"))
+        self._write("contact", _contact(touch))
+        self._write("force", _with_error(touch.force * 1e3, touch.force_sd * 1e3, 1, "mN"))
         depth = touch.displacement * 1e3, touch.displacement_sd * 1e3
         self._write("depth", _with_error(*depth, 2, "mm"))
-        self._write("error", _with_error(estimate.error_at_load * 1e3, math.nan, 3, "mm"))
-        self._write("rms", _with_error(estimate.error_rms * 1e3, math.nan, 3, "mm"))
+        error, rms = estimate.error_at_load * 1e3, estimate.error_rms * 1e3
+        self._write("error", f"{_number(error, 3, '+')} mm" if math.isfinite(error) else NONE)
+        self._write("rms", f"{_number(rms, 3)} mm" if math.isfinite(rms) else NONE)
 
     def _write(self, key: str, text: str) -> None:
         self._numbers[key].show_text(text)

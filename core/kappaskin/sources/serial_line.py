@@ -47,9 +47,11 @@ def _why_not(url: str, error: Exception) -> str:
         return f"{url}: busy, another program has it open; close that program, then connect again"
     if code in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
         return (
-            f"{url}: there is no such port; plug the sensor in, or choose one of the ports listed "
-            "by `kappaskin doctor`"
+            f"{url}: there is no such port; plug the sensor in, or choose one of the ports found "
+            "(`kappaskin doctor` lists them)"
         )
+    if code == errno.ECONNREFUSED or "refused" in str(error):
+        return f"{url}: nothing listens there; start the server, then connect again"
     return (
         f"{url}: cannot be opened ({error}); expected a port such as /dev/ttyACM0 or COM3, or a "
         "URL such as socket://host:port"
