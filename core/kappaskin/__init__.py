@@ -5,7 +5,6 @@ from kappaskin.doctor import serial_ports as serial_ports
 from kappaskin.effects import GaussianNoise as GaussianNoise
 from kappaskin.effects import UniformNoise as UniformNoise
 from kappaskin.engine import Engine as Engine
-from kappaskin.engine import Status as Status
 from kappaskin.errors import RankDeficient as RankDeficient
 from kappaskin.errors import Refusal as Refusal
 from kappaskin.errors import SourceError as SourceError
@@ -17,6 +16,7 @@ from kappaskin.frames import Frame as Frame
 from kappaskin.frames import Touch as Touch
 from kappaskin.frames import Truth as Truth
 from kappaskin.layout import SensorLayout as SensorLayout
+from kappaskin.live import Status as Status
 from kappaskin.mechanics import LineLoad as LineLoad
 from kappaskin.mechanics import Load as Load
 from kappaskin.mechanics import Plate as Plate

@@ -15,7 +15,8 @@ import psutil
 import pytest
 
 from kappaskin import Estimate, PointLoad, Setup, load_scene
-from kappaskin.engine import LOST, OFF, STREAMING, Engine, Status
+from kappaskin.engine import Engine
+from kappaskin.live import LOST, OFF, STREAMING, Status
 
 Answer = TypeVar("Answer")
 

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
-from kappaskin.engine import LOST, STREAMING, Engine
+from kappaskin.engine import Engine
+from kappaskin.live import LOST, STREAMING
 from kappaskin.scene import Orbit
 from kappaskin.sources import SerialSource
 from kappaskin.sources.wire import Decoder, Message

@@ -1,0 +1,269 @@
+"""Source to pipeline to ring, as the live process runs it: requests in, statuses out."""
+
+import math
+import time
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+from kappaskin.errors import Refusal, SourceError
+from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.ring import Ring, slot_type
+from kappaskin.scene import Scene
+from kappaskin.sensor import Sensor
+from kappaskin.sources import SimulatedSource, Source, open_source
+from kappaskin.sources.wire import Accounting
+
+OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
+
+_READ = 0.02  # s a read may wait, and so a command
+_REPORT = 0.1  # s between two statuses
+_LIVE = 64  # frames of one read that are computed, the newest: older ones are history
+_GAPS = 4096  # gaps between reads that the percentile is taken over
+
+
+@dataclass(frozen=True)
+class Status:
+    """How the engine is doing.
+
+    `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
+    `message` says why. `setup` is the one in use, `refusal` says why it is not the one asked for
+    last, and `computing` that another is on its way. `meetings` counts the devices that said what
+    they are, `skipped` the frames that came in faster than they could be computed. `rate` in
+    frames/s, `reader_gap` the 99th percentile of the time between two arrivals in s, `last_frame`
+    and `reported` on the monotonic clock.
+    """
+
+    state: str = OFF
+    source: str = ""
+    message: str = ""
+    refusal: str = ""
+    sensor: Sensor | None = None
+    meetings: int = 0
+    setup: Setup = field(default_factory=Setup)
+    computing: bool = False
+    skipped: int = 0
+    generation: int = 0
+    slot: "np.dtype[np.void] | None" = None
+    accounting: Accounting = field(default_factory=Accounting)
+    rate: float = 0.0
+    reader_gap: float = math.nan
+    last_frame: float = -math.inf
+    reported: float = -math.inf
+
+
+@dataclass(frozen=True)
+class Connect:
+    source: str
+
+
+@dataclass(frozen=True)
+class Disconnect:
+    pass
+
+
+Request = Connect | Disconnect | Setup | Scene
+
+
+class Loop:
+    """The engine's own side: takes requests, reads, computes, writes, reports."""
+
+    def __init__(self, requests: "Connection[Request, Request]", ring: Ring) -> None:
+        self._requests, self._ring = requests, ring
+        self._source: Source | None = None
+        self._scene: Scene | None = None
+        self._pipeline: Pipeline | None = None
+        self._status = ring.read_status() or Status()
+        self._asked = self._status.setup
+        # Two, so that one given up in the middle of a large basis does not hold up the next.
+        self._builder = ThreadPoolExecutor(2, "pipeline-builder")
+        self._building: Future[_Built] | None = None
+        self._gaps: deque[float] = deque(maxlen=_GAPS)
+        self._times: deque[float] = deque(maxlen=1024)
+        self._last_read = math.inf
+
+    def run(self) -> None:
+        """Serve until the parent closes its end, or is gone."""
+        with suppress(EOFError):
+            while True:
+                wait = 0.05 if self._source is None else 0.0
+                while self._requests.poll(wait):
+                    self._take(self._requests.recv())
+                    wait = 0.0
+                if self._source is not None:
+                    self._read(self._source)
+                if self._building is not None and self._building.done():
+                    self._swap(self._building.result())
+                if time.monotonic() - self._status.reported >= _REPORT:
+                    self._report()
+        self._close()
+        self._builder.shutdown(wait=False, cancel_futures=True)
+
+    def _take(self, request: Request) -> None:
+        if isinstance(request, Setup):
+            self._asked = request
+            self._set_up(smaller=False)
+        elif isinstance(request, Scene):
+            self._scene = request
+            self._play()
+        else:
+            self._close()
+            self._scene = None
+            self._status = replace(
+                self._status,
+                state=OFF,
+                source="",
+                message="",
+                sensor=None,
+                computing=False,
+                skipped=0,
+                slot=None,  # what the last device showed is not this one's
+                accounting=Accounting(),
+                rate=0.0,
+                last_frame=-math.inf,
+            )
+            if isinstance(request, Connect):
+                self._open(request.source)
+        self._report()
+
+    def _open(self, name: str) -> None:
+        self._status = replace(self._status, state=WAITING, source=name)
+        try:
+            self._source = open_source(name)
+        except Refusal as refusal:
+            self._status = replace(self._status, state=LOST, message=str(refusal))
+
+    def _play(self) -> None:
+        if isinstance(self._source, SimulatedSource) and self._scene is not None:
+            self._source.play(self._scene)
+
+    def _close(self) -> None:
+        if self._source is not None:
+            self._source.close()
+        self._source, self._pipeline, self._building = None, None, None
+        self._gaps.clear()
+        self._times.clear()
+        self._last_read = math.inf
+
+    def _set_up(self, smaller: bool) -> None:
+        """Begin to build the pipeline asked for, beside the running one."""
+        sensor = self._status.sensor
+        if sensor is None:
+            self._status = replace(self._status, setup=self._asked, refusal="")
+        elif self._building is None:
+            generation = self._status.generation + 1
+            job = (_built, sensor, self._asked, generation, smaller)
+            self._building = self._builder.submit(*job)
+            self._status = replace(self._status, computing=True)
+
+    def _swap(self, built: "_Built") -> None:
+        """Go over to the whole of another pipeline, or keep the one there is and say why."""
+        self._building = None
+        self._status = replace(self._status, computing=False)
+        if built.asked != self._asked or built.sensor is not self._status.sensor:
+            self._set_up(smaller=self._pipeline is None)  # overtaken while it was built
+            return
+        self._status = replace(self._status, refusal=built.refusal)
+        if built.pipeline is not None:
+            self._use(built.pipeline)
+        self._report()
+
+    def _use(self, pipeline: Pipeline) -> None:
+        slot = slot_type(pipeline)
+        try:
+            self._ring.lay_out(pipeline.generation, slot)
+        except Refusal as refusal:
+            self._status = replace(self._status, refusal=str(refusal))
+            return
+        self._pipeline = pipeline
+        self._status = replace(
+            self._status, setup=pipeline.setup, generation=pipeline.generation, slot=slot
+        )
+
+    def _read(self, source: Source) -> None:
+        try:
+            frames = source.read(_READ)
+        except SourceError as error:
+            accounting, last = source.accounting(), self._status.last_frame
+            self._close()
+            self._status = replace(
+                self._status,
+                state=LOST,
+                message=str(error),
+                computing=False,
+                accounting=accounting,
+                last_frame=last,
+                rate=0.0,
+            )
+            self._report()
+            return
+        if source.sensor is not self._status.sensor:
+            self._meet(source.sensor)
+        for frame in frames:
+            if frame.host_time > self._last_read:
+                self._gaps.append(frame.host_time - self._last_read)
+            self._last_read = frame.host_time
+        if self._pipeline is None:
+            return
+        late = max(0, len(frames) - _LIVE)
+        if late:
+            self._status = replace(self._status, skipped=self._status.skipped + late)
+        for frame in frames[late:]:
+            self._ring.write(self._pipeline(frame))
+            self._times.append(frame.host_time)
+
+    def _meet(self, sensor: Sensor | None) -> None:
+        """A device said what it is: make the pipeline for it."""
+        self._pipeline = None
+        self._status = replace(
+            self._status, state=STREAMING, sensor=sensor, meetings=self._status.meetings + 1
+        )
+        self._play()
+        self._set_up(smaller=True)
+
+    def _report(self) -> None:
+        now, source, status = time.monotonic(), self._source, self._status
+        if source is not None:
+            gaps = np.array(self._gaps)
+            recent = [t for t in self._times if t > now - 1.0]
+            status = replace(
+                status,
+                accounting=source.accounting(),
+                rate=len(recent) / min(1.0, max(now - recent[0], 1e-3)) if recent else 0.0,
+                reader_gap=float(np.percentile(gaps, 99)) if len(gaps) else math.nan,
+                last_frame=self._times[-1] if self._times else -math.inf,
+            )
+        self._status = replace(status, reported=now)
+        self._ring.write_status(self._status)
+
+
+@dataclass(frozen=True, eq=False)
+class _Built:
+    """What came of building a pipeline: `asked` or a smaller one, or none and why."""
+
+    sensor: Sensor
+    asked: Setup
+    pipeline: Pipeline | None
+    refusal: str = ""
+
+
+def _built(sensor: Sensor, asked: Setup, generation: int, smaller: bool) -> _Built:
+    """A pipeline as asked, or if it may be `smaller` with the most functions that it can have."""
+    refusal = ""
+    most = max(asked.Ni, asked.Nj)
+    for limit in range(most, 0 if smaller else most - 1, -1):
+        setup = replace(asked, Ni=min(asked.Ni, limit), Nj=min(asked.Nj, limit))
+        try:
+            return _Built(sensor, asked, Pipeline(sensor, setup, generation), refusal)
+        except Refusal as reason:
+            refusal = refusal or str(reason)
+        except MemoryError:
+            refusal = refusal or (
+                f"{asked.Ni} x {asked.Nj} functions for {sensor.layout} do not fit in memory; "
+                "use fewer"
+            )
+    return _Built(sensor, asked, None, refusal)
