@@ -11,7 +11,7 @@ from kappaskin import (
     UniformNoise,
     load_scene,
 )
-from kappaskin_app.settings import FREE_CASES, Settings
+from kappaskin_app.settings import FREE_CASES, LOAD_CASES, Settings
 
 _MARGIN = 0.03  # share of the patch along each edge that a dragged load keeps out of
 
@@ -39,6 +39,13 @@ def scene_of(settings: Settings) -> Scene:
     if free:
         scene = replace(scene, name=settings.load_case, loads=_free_loads(settings), motion=None)
     return replace(scene, effects=_effects(settings), seed=settings.noise_seed)
+
+
+def settings_for(source: str) -> Settings:
+    """The settings to begin with on `source`: a simulated scene's load case, else as they are."""
+    case = source.removeprefix("sim:")
+    ready = source.startswith("sim:") and case in dict(LOAD_CASES)
+    return Settings(load_case=case) if ready else Settings()
 
 
 def dragged(settings: Settings, x: float, y: float, grabbed_end: bool) -> dict[str, Any]:

@@ -31,8 +31,8 @@ from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.view import ViewPanel
 from kappaskin_app.scale import Ranges
 from kappaskin_app.session import Session
-from kappaskin_app.settings import COLOURS, LOAD_CASES, Settings, ask_of
-from kappaskin_app.simulation import dragged, scene_of
+from kappaskin_app.settings import COLOURS, Settings, ask_of
+from kappaskin_app.simulation import dragged, scene_of, settings_for
 from kappaskin_app.theme import (
     DARK_INK,
     DIVERGING,
@@ -64,10 +64,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
-        case = source.removeprefix("sim:")
-        self.history = History(
-            Settings(load_case=case) if case in dict(LOAD_CASES) else Settings(), self
-        )
+        self.history = History(settings_for(source), self)
         self.session = Session(self.history, self)
         self.membrane, self.badge, self.readouts = MembraneView(), Badge(), Readouts()
         self.colour_bar = ColourBar()
