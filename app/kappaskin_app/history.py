@@ -1,5 +1,6 @@
 """The settings as they are, and every change a person makes as an undoable command."""
 
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -7,6 +8,8 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from kappaskin_app.settings import Settings
+
+_IN_A_ROW = 1.0  # s from one change of a setting to the next
 
 
 class _Change(QUndoCommand):
@@ -45,6 +48,15 @@ class History(QObject):
         self.settings = settings
         self.stack = QUndoStack(self)
         self._gesture = 0
+        self._wished, self._wished_at, self._wish = "", 0.0, -1
+
+    def wish(self, name: str, label: str, value: Any) -> None:
+        """Change one setting; changes of the same one in a row are one step to undo."""
+        now = time.monotonic()
+        if name != self._wished or now - self._wished_at > _IN_A_ROW:
+            self._wish = self.new_gesture()
+        self._wished, self._wished_at = name, now
+        self.change(f"Change of {label}", self._wish, **{name: value})
 
     def new_gesture(self) -> int:
         """A number under which changes merge into one command, a drag say."""

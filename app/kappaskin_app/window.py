@@ -14,15 +14,14 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QMainWindow,
     QMessageBox,
-    QScrollArea,
     QToolBar,
-    QVBoxLayout,
     QWidget,
 )
 
 from kappaskin import COMPONENTS, Estimate, Status, serial_ports
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
+from kappaskin_app.columns import column, scrolled
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.panels.basis import BasisPanel
@@ -48,7 +47,6 @@ from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.readouts import Health, Readouts
 
 _HEATMAPS = 0.06  # s between two drawings of the heatmaps
-_GESTURE = 1.0  # s within which changes of one setting are one step to undo
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
 _TIPS = {
     "xx": "Bending along x as each element reads it (Eq. 3).",
@@ -74,7 +72,6 @@ class MainWindow(QMainWindow):
         self.ranges = Ranges()
         self._met = 0
         self._colours: object = None
-        self._last_wish, self._wished_at = "", 0.0
         self._shortcuts: QMessageBox | None = None
         self.statusBar()  # there from the start, or its first message would push the rest up
         self._next_heatmaps = self._next_numbers = 0.0
@@ -111,23 +108,8 @@ class MainWindow(QMainWindow):
         self.addToolBar(header)
 
     def _make_docks(self) -> None:
-        panels, stack = QWidget(), QVBoxLayout()
-        for panel in (self.connection, self.load, self.noise, self.basis, self.view):
-            stack.addWidget(panel)
-        stack.addStretch(1)
-        panels.setLayout(stack)
-        scroll = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setFrameShape(QScrollArea.Shape.NoFrame)
-        scroll.setWidget(panels)
-        bar = scroll.verticalScrollBar().sizeHint().width()
-        scroll.setMinimumWidth(panels.minimumSizeHint().width() + bar)
-        maps, column = QWidget(), QVBoxLayout()
-        column.setContentsMargins(0, 0, 0, 0)
-        for heatmap in self.heatmaps.values():
-            column.addWidget(heatmap, 1)
-        maps.setLayout(column)
-        maps.setMinimumWidth(270)
+        scroll = scrolled(self.connection, self.load, self.noise, self.basis, self.view)
+        maps = column(*self.heatmaps.values())
         left = Qt.DockWidgetArea.LeftDockWidgetArea
         right = Qt.DockWidgetArea.RightDockWidgetArea
         self._docks = [
@@ -195,11 +177,7 @@ class MainWindow(QMainWindow):
 
     def _wish(self, name: str, value: object) -> None:
         label = ask_of(name).label if not name.startswith("range_") else "colour range"
-        now = time.monotonic()
-        if name != self._last_wish or now - self._wished_at > _GESTURE:
-            self._gesture = self.history.new_gesture()
-        self._last_wish, self._wished_at = name, now
-        self.history.change(f"Change of {label}", self._gesture, **{name: value})
+        self.history.wish(name, label, value)
 
     def _toggle(self, name: str) -> None:
         self._wish(name, not getattr(self.history.settings, name))
@@ -237,7 +215,7 @@ class MainWindow(QMainWindow):
         self.history.change("Drag the load", self._gesture, **moved)
 
     def _release(self) -> None:
-        self._last_wish = ""
+        self._gesture = -1
 
     def _point(self, element: int) -> None:
         for heatmap in self.heatmaps.values():

@@ -15,6 +15,7 @@ from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, LineLoad, Load, Patch, Sensor
 from kappaskin_app.theme import Colours, Theme
+from kappaskin_app.views.camera import fit_camera
 from kappaskin_app.views.drag import ARROW, MM, LoadDrag
 
 Array = NDArray[np.float64]
@@ -180,42 +181,12 @@ class MembraneView(QWidget):
             label.prop.justification_horizontal = "center" if text[0] == "y" else "left"
 
     def reset_camera(self) -> None:
-        """Look at the whole skin from the front, a little from the left, as large as it fits."""
+        """Look at the whole skin, as large as it fits, and again whenever the size changes."""
         if self._layout_of is None:
             return
-        patch, camera = self._layout_of.layout.patch, self.plotter.camera
-        a, b = patch.a * MM, patch.b * MM
-        side, low = max(a, b), -0.2 * min(a, b)
-        camera.focal_point = (a / 2, b / 2, low / 2)
-        camera.position = (a / 2 - 0.45 * side, b / 2 - 1.1 * side, 1.0 * side)
-        camera.up = (0.0, 0.0, 1.0)
-        camera.view_angle = 30.0
-        self.plotter.renderer.ResetCamera(0.0, a, 0.0, b, low, 0.0)
-        camera.SetWindowCenter(0.0, 0.0)
-        # Room for the labels beside the edges and the arrow above them.
-        margin = 0.06 * side
-        seen = np.array(
-            [
-                self._in_view(x, y, z)
-                for x in (-margin, a + 2.5 * margin)
-                for y in (-margin, b + margin)
-                for z in (low, 2 * margin)
-            ]
-        )
-        least, most = seen.min(axis=0), seen.max(axis=0)
-        zoom = 1.94 / float(np.max(most - least))
-        camera.zoom(zoom)
-        camera.SetWindowCenter(*(zoom * (least + most) / 2))
-        self.plotter.renderer.ResetCameraClippingRange()
+        fit_camera(self.plotter.renderer, self._layout_of.layout.patch)
         self._fitted = True
         self.plotter.update()
-
-    def _in_view(self, x: float, y: float, z: float) -> Array:
-        """Where a point in mm is in the picture, (2,), each from -1 to 1."""
-        renderer = self.plotter.renderer
-        renderer.SetWorldPoint(x, y, z, 1.0)
-        renderer.WorldToView()
-        return np.array(renderer.GetViewPoint()[:2])
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -1,0 +1,31 @@
+"""Widgets one below the other, as the docks beside the skin hold them."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
+
+
+def column(*widgets: QWidget) -> QWidget:
+    """The widgets sharing the height evenly."""
+    whole, stack = QWidget(), QVBoxLayout()
+    stack.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        stack.addWidget(widget, 1)
+    whole.setLayout(stack)
+    whole.setMinimumWidth(270)
+    return whole
+
+
+def scrolled(*widgets: QWidget) -> QScrollArea:
+    """The widgets as tall as they like to be, scrolled where the window is too low for them."""
+    whole, stack = QWidget(), QVBoxLayout()
+    for widget in widgets:
+        stack.addWidget(widget)
+    stack.addStretch(1)
+    whole.setLayout(stack)
+    area = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFrameShape(QScrollArea.Shape.NoFrame)
+    area.setWidget(whole)
+    bar = area.verticalScrollBar().sizeHint().width()
+    area.setMinimumWidth(whole.minimumSizeHint().width() + bar)
+    return area
