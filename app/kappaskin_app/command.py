@@ -42,12 +42,13 @@ def run(
     if seconds is not None and not seconds > 0:
         raise Refusal(f"expected seconds above zero, got {seconds}")
     _require_display()
+    if screenshot is not None and seconds is None:
+        seconds = _SETTLE
+    from kappaskin_app.launch import launch
+
     try:
-        from kappaskin_app.launch import launch
+        launch(source, seconds, screenshot)
     except ImportError as error:
         raise Refusal(
             f"the desktop app needs {error.name}; install it with: pip install 'kappaskin[app]'"
         ) from error
-    if screenshot is not None and seconds is None:
-        seconds = _SETTLE
-    launch(source, seconds, screenshot)

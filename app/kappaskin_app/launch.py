@@ -1,25 +1,46 @@
-"""Starts Qt, shows the window, and ends both in order."""
+"""Starts the engine, Qt and the window, and ends them in order."""
 
 import signal
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication
+from kappaskin import Engine, Refusal
 
-from kappaskin import Refusal
-from kappaskin_app.window import MainWindow
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+
+    from kappaskin_app.window import MainWindow
+
+
+def opened(source: str) -> "tuple[QApplication, MainWindow]":
+    """The application and its window, shown, on `source`."""
+    # First of all, so that the engine's process starts while this one loads Qt and VTK.
+    engine = Engine()
+    try:
+        engine.connect(source)
+        from PySide6.QtWidgets import QApplication
+
+        from kappaskin_app.window import MainWindow
+
+        application = QApplication.instance() or QApplication(sys.argv[:1])
+        if not isinstance(application, QApplication):
+            raise Refusal("expected a Qt application with widgets, got one without")
+        application.setApplicationName("Kappaskin")
+        application.setStyle("Fusion")
+        window = MainWindow(source, engine)
+    except BaseException:
+        engine.close()
+        raise
+    window.show()
+    return application, window
 
 
 def launch(source: str, seconds: float | None = None, screenshot: Path | None = None) -> None:
     """Show the window on `source`; after `seconds` save `screenshot`, if any, and close."""
-    application = QApplication.instance() or QApplication(sys.argv[:1])
-    if not isinstance(application, QApplication):
-        raise Refusal("expected a Qt application with widgets, got one without")
-    application.setApplicationName("Kappaskin")
-    application.setStyle("Fusion")
-    window = MainWindow(source)
-    window.show()
+    application, window = opened(source)
+    from PySide6.QtCore import QTimer
+
     # The session's timer lets Python see these within milliseconds while Qt has the loop; a
     # handler may run in the middle of a drawing, so the window closes from the loop.
     for number in (signal.SIGINT, signal.SIGTERM):

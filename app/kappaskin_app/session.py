@@ -31,11 +31,12 @@ class Session(QObject):
     estimated = Signal(Estimate)
     reported = Signal(Status)
 
-    def __init__(self, history: History, parent: QObject | None = None) -> None:
+    def __init__(self, history: History, engine: Engine, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._history = history
         self._settings = history.settings
-        self.engine = Engine(_setup_of(history.settings))
+        self.engine = engine
+        engine.set_up(_setup_of(history.settings))
         self.status = Status()
         self.estimate: Estimate | None = None
         self.source = ""
@@ -52,10 +53,14 @@ class Session(QObject):
         """Whether the loads and the noise are ours to choose."""
         return self.source.startswith("sim:")
 
-    def connect_to(self, source: str) -> None:
-        """Take frames from `source`; a scene named there becomes the load case."""
+    def connect_to(self, source: str, already: bool = False) -> None:
+        """Take frames from `source`, unless the engine does `already`.
+
+        A scene named there becomes the load case.
+        """
         self.source, self.estimate = source.strip(), None
-        self.engine.connect(self.source)
+        if not already:
+            self.engine.connect(self.source)
         scene = self.source.removeprefix("sim:")
         if self.simulating and scene in dict(LOAD_CASES):
             self._history.change("Load case", load_case=scene)

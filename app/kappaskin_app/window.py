@@ -12,13 +12,14 @@ from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
     QHBoxLayout,
+    QLabel,
     QMainWindow,
     QMessageBox,
     QToolBar,
     QWidget,
 )
 
-from kappaskin import COMPONENTS, Estimate, Status, serial_ports
+from kappaskin import COMPONENTS, Engine, Estimate, Status, serial_ports
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.columns import column, scrolled
@@ -48,6 +49,7 @@ from kappaskin_app.views.readouts import Health, Readouts
 
 _HEATMAPS = 0.06  # s between two drawings of the heatmaps
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
+_HINT = "Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom; F1: shortcuts"
 _TIPS = {
     "xx": "Bending along x as each element reads it (Eq. 3).",
     "yy": "Bending along y as each element reads it (Eq. 4).",
@@ -58,12 +60,12 @@ _TIPS = {
 class MainWindow(QMainWindow):
     """The desktop app's one window."""
 
-    def __init__(self, source: str = "sim:") -> None:
+    def __init__(self, source: str = "sim:", engine: Engine | None = None) -> None:
         super().__init__()
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
         self.history = History(settings_for(source), self)
-        self.session = Session(self.history, self)
+        self.session = Session(self.history, engine or Engine(), self)
         self.membrane, self.badge, self.readouts = MembraneView(), Badge(), Readouts()
         self.colour_bar = ColourBar()
         self.heatmaps = {name: Heatmap(name, _TIPS[name]) for name in COMPONENTS}
@@ -73,7 +75,8 @@ class MainWindow(QMainWindow):
         self._met = 0
         self._colours: object = None
         self._shortcuts: QMessageBox | None = None
-        self.statusBar()  # there from the start, or its first message would push the rest up
+        # There from the start, or its first message would push the rest up.
+        self.statusBar().addWidget(QLabel(_HINT))
         self._next_heatmaps = self._next_numbers = 0.0
         self._gesture, self._grabbed_end = -1, False
         self.setCentralWidget(self._centre())
@@ -86,7 +89,7 @@ class MainWindow(QMainWindow):
         self._find_ports()
         self.resize(1280, 800)
         self.connection.show_source(source)
-        self.session.connect_to(source)
+        self.session.connect_to(source, already=engine is not None)
 
     def _centre(self) -> QWidget:
         centre = QWidget()

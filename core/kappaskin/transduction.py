@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,7 +76,7 @@ class Converter:
                 "balance the bridge"
             )
 
-    @property
+    @cached_property
     def limits(self) -> tuple[int, int]:
         """The lowest and highest count: the rails."""
         return -(2 ** (self.bits - 1)), 2 ** (self.bits - 1) - 1
@@ -92,10 +94,15 @@ class Transduction:
     bridge: HalfBridge = HalfBridge()
     converter: Converter = Converter()
 
-    @property
+    @cached_property
     def resolution(self) -> float:
         """Curvature of one count, in 1/m."""
         return self.converter.step / self.bridge.sensitivity
+
+    @cached_property
+    def _offset(self) -> float:
+        """Curvature that the converter's offset looks like, in 1/m."""
+        return self.converter.offset / self.bridge.sensitivity
 
     def counts(self, curvature: Array) -> Counts:
         """What the converter reads, clipped at its rails; NaN is refused."""
@@ -108,11 +115,10 @@ class Transduction:
 
     def curvature(self, counts: Counts) -> Array:
         """Curvature in 1/m (Eq. 8); NaN on the rails, where the true value is unknown."""
-        zero = self.converter.offset / self.converter.step
-        curvature = (counts.astype(float) - zero) * self.resolution
-        saturated = self.saturated(counts)
-        if saturated.any():
-            curvature[saturated] = np.nan
+        low, high = self.converter.limits
+        curvature = cast("Array", counts * self.resolution - self._offset)
+        if counts.size and (counts.min() <= low or counts.max() >= high):
+            curvature[self.saturated(counts)] = np.nan
         return curvature
 
     def saturated(self, counts: Counts) -> Mask:

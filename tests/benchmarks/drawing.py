@@ -75,28 +75,8 @@ def app(application: QApplication, port: str, seconds: float) -> dict[str, float
     }
 
 
-def first(application: QApplication, started: float) -> None:
-    """Print how long after `started` the skin was drawn from an estimate."""
-    window = MainWindow("sim:")
-    window.show()
-
-    def look() -> None:
-        if any(np.isfinite(age) for _, age in window.membrane.ages):
-            print(time.monotonic() - started)
-            window.close()
-            application.quit()
-
-    timer = QTimer()
-    timer.timeout.connect(look)
-    timer.start(5)
-    application.exec()
-
-
 if __name__ == "__main__":
     what, seconds = sys.argv[1], float(sys.argv[2])
-    if what == "first":
-        first(QApplication([]), seconds)
-        sys.exit()
     device = subprocess.Popen(
         [sys.executable, "-m", "kappaskin", "device", "circle", "--rate", "500"],
         stdout=subprocess.PIPE,

@@ -21,19 +21,24 @@ _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits:
 class Fit:
     """The shape that answers the readings best, of one frame or of T (leading axis).
 
-    `coefficients` and their standard deviations `sd` (..., Ni, Nj) in m; `residual` (..., 3, P) in
-    1/m, NaN where a reading is missing; `noise` (...) the standard deviation of a reading in 1/m
-    as the residual tells it, NaN when every reading was spent on a coefficient, 1 when the fit was
-    made with `sigma`.
+    `coefficients` (..., Ni, Nj) in m, with their standard deviations `unit_sd` for unit noise;
+    `residual` (..., 3, P) in 1/m, NaN where a reading is missing; `noise` (...) the standard
+    deviation of a reading in 1/m as the residual tells it, NaN when every reading was spent on a
+    coefficient, 1 when the fit was made with `sigma`.
     """
 
-    arrays: ClassVar = ("coefficients", "sd", "residual", "noise")
+    arrays: ClassVar = ("coefficients", "unit_sd", "residual", "noise")
 
     estimator: "LeastSquares"
     coefficients: Array
-    sd: Array
+    unit_sd: Array
     residual: Array
     noise: Array
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations (..., Ni, Nj) of the coefficients in m."""
+        return self.noise[..., None, None] * self.unit_sd
 
     @property
     def covariance(self) -> Array:
@@ -55,6 +60,7 @@ class _Solver:
     operator: Array
     covariance: Array
     sd: Array
+    complete: bool
 
 
 class LeastSquares:
@@ -81,7 +87,7 @@ class LeastSquares:
         self.M = layout.curvature_operator(basis)
         """The curvature operator (3 P, Ni Nj) (Eq. 2)."""
         self._factor(used)
-        self._solver = _Solver(used, self._root @ self._U.T, *self._spread(self._root))
+        self._solver = self._made(used, self._root @ self._U.T, self._root @ self._root.T)
         self._reduced: OrderedDict[bytes, _Solver] = OrderedDict()
 
     def _weights(self, sigma: ArrayLike) -> Array:
@@ -131,9 +137,9 @@ class LeastSquares:
         )
         return f"{what}: {why}; use a smaller basis (at most {rank} functions), or more elements"
 
-    def _spread(self, root: Array) -> tuple[Array, Array]:
-        covariance = root @ root.T
-        return covariance, np.sqrt(np.diag(covariance)).reshape(self.basis.shape)
+    def _made(self, used: Mask, operator: Array, covariance: Array) -> _Solver:
+        sd = np.sqrt(np.diag(covariance)).reshape(self.basis.shape)
+        return _Solver(used, operator, covariance, sd, complete=bool(used.all()))
 
     def unit_covariance(self, missing: Mask | None = None) -> Array:
         """Covariance (N, N) for unit noise, without the readings `missing` (3, P)."""
@@ -166,9 +172,8 @@ class LeastSquares:
             fresh = LeastSquares(self.basis, self.layout, sigma.reshape(3, -1))
             return fresh._solver
         inverse = np.eye(self.basis.size) + U_k.T @ np.linalg.solve(G, U_k)
-        covariance = root @ inverse @ root.T
-        sd = np.sqrt(np.diag(covariance)).reshape(self.basis.shape)
-        return _Solver(was & ~missing, root @ inverse @ U_r.T, covariance, sd)
+        operator, covariance = root @ inverse @ U_r.T, root @ inverse @ root.T
+        return self._made(was & ~missing, operator, covariance)
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading."""
@@ -179,9 +184,10 @@ class LeastSquares:
                 f"{len(self.layout)}), got {K.shape}"
             )
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
-        missing = ~np.isfinite(flat)
-        if not missing.any():
+        finite = np.isfinite(flat)
+        if finite.all():
             return self._solve(self._solver, flat)
+        missing = ~finite
         if K.ndim == 2:
             return self._solve(self._without(missing), flat)
         patterns, which = np.unique(missing, axis=0, return_inverse=True)
@@ -207,26 +213,28 @@ class LeastSquares:
     def _solve(self, solver: _Solver, flat: Array) -> Fit:
         """Fit readings (..., 3 P) that share one set of missing ones."""
         used, shape = solver.used, self.basis.shape
-        complete = bool(used.all())
-        kept = flat if complete else flat[..., used]
-        weight = self._weight if complete else self._weight[used]
-        weighted = kept * weight if self._sigma_known else kept
-        c = weighted @ solver.operator.T
-        residual = flat - c @ self.M.T
-        if not complete:
-            residual[..., ~used] = np.nan
-        spare = kept.shape[-1] - self.basis.size
+        kept = flat if solver.complete else flat[..., used]
+        weighted = kept
         if self._sigma_known:
-            noise = np.ones(flat.shape[:-1])
-        elif spare:
-            left = residual if complete else residual[..., used]
-            noise = np.sqrt(np.einsum("...r,...r->...", left, left) / spare)
-        else:
-            noise = np.full(flat.shape[:-1], np.nan)
+            weighted = kept * (self._weight if solver.complete else self._weight[used])
+        c = np.dot(weighted, solver.operator.T)
+        residual = flat - np.dot(c, self.M.T)
+        if not solver.complete:
+            residual[..., ~used] = np.nan
+        noise = self._noise(residual if solver.complete else residual[..., used])
         return Fit(
             self,
             c.reshape(*c.shape[:-1], *shape),
-            np.asarray(noise)[..., None, None] * solver.sd,
+            np.broadcast_to(solver.sd, (*c.shape[:-1], *shape)) if c.ndim > 1 else solver.sd,
             residual.reshape(*flat.shape[:-1], 3, len(self.layout)),
-            np.asarray(noise),
+            noise,
         )
+
+    def _noise(self, left: Array) -> Array:
+        """Standard deviation (...) of a reading, from the residuals (..., R) of those used."""
+        if self._sigma_known:
+            return np.ones(left.shape[:-1])
+        spare = left.shape[-1] - self.basis.size
+        if not spare:
+            return np.full(left.shape[:-1], np.nan)
+        return np.asarray(np.sqrt(np.vecdot(left, left) / spare))
