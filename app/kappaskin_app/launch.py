@@ -38,13 +38,17 @@ def opened(source: str) -> "tuple[QApplication, MainWindow]":
 
 def launch(source: str, seconds: float | None = None, screenshot: Path | None = None) -> None:
     """Show the window on `source`; after `seconds` save `screenshot`, if any, and close."""
+    # A signal may come in the middle of loading or of a drawing, where closing or raising would
+    # leave things behind: it is only noted, and the loop closes the window.
+    asked: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda got, _: asked.append(got))
     application, window = opened(source)
     from PySide6.QtCore import QTimer
 
-    # The session's timer lets Python see these within milliseconds while Qt has the loop; a
-    # handler may run in the middle of a drawing, so the window closes from the loop.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: QTimer.singleShot(0, window.close))
+    watch = QTimer(window, interval=50)  # pyright: ignore[reportCallIssue]
+    watch.timeout.connect(lambda: asked and window.close())
+    watch.start()
     saved: list[bool] = []
 
     def end() -> None:

@@ -40,7 +40,7 @@ class Session(QObject):
         self.status = Status()
         self.estimate: Estimate | None = None
         self.source = ""
-        self._next_status, self._closed = 0.0, False
+        self._next_status, self.closed = 0.0, False
         self._shown: tuple[int, int] = (0, -1)
         self._values_of: tuple[object, ...] = ()
         history.changed.connect(guarded(self._follow))
@@ -84,7 +84,7 @@ class Session(QObject):
     @guarded
     def tick(self) -> None:
         """Look for news; everything that shows it hangs on the two signals."""
-        if self._closed:
+        if self.closed:
             return  # asked for by a picture drawn while closing
         now = time.monotonic()
         if now >= self._next_status:
@@ -126,5 +126,5 @@ class Session(QObject):
 
     def close(self) -> None:
         self._timer.stop()
-        self._closed = True
+        self.closed = True
         self.engine.close()

@@ -357,7 +357,8 @@ class MainWindow(QMainWindow):
         self._shortcuts.raise_()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        guard.forget(self._tell)
-        self.session.close()
-        self.membrane.close_plotter()
+        if not self.session.closed:
+            guard.forget(self._tell)
+            self.session.close()
+            self.membrane.close_plotter()
         super().closeEvent(event)

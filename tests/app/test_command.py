@@ -22,20 +22,21 @@ def test_the_app_opens_takes_its_picture_and_closes(tmp_path: Path) -> None:
     assert QImage(str(picture)).size().toTuple() == (1280, 800)
 
 
+@pytest.mark.parametrize("pause", [0.0, 3.0], ids=["loading", "shown"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_closes_the_app_and_leaves_nothing(number: int) -> None:
+def test_a_signal_closes_the_app_and_leaves_nothing(number: int, pause: float) -> None:
     command = [sys.executable, "-m", "kappaskin", "app", "--seconds", "40"]
     app = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    engine = psutil.Process(app.pid)
+    parent = psutil.Process(app.pid)
     end = time.monotonic() + 30
     while time.monotonic() < end and not any(
-        "spawn_main" in " ".join(child.cmdline()) for child in engine.children()
+        "spawn_main" in " ".join(child.cmdline()) for child in parent.children()
     ):
         time.sleep(0.05)
-    time.sleep(2.0)
-    children = engine.children(recursive=True)
+    time.sleep(pause)
+    children = parent.children(recursive=True)
     app.send_signal(number)
-    told = app.communicate(timeout=20)
+    told = app.communicate(timeout=35)
     assert (app.returncode, *told) == (0, "", "")
     assert not psutil.wait_procs(children, timeout=2)[1]
 

@@ -13,6 +13,7 @@ from kappaskin.sources import information
 from kappaskin.sources.wire import encode_information, encode_samples
 
 _OUTBOX = 2**19  # bytes held before a frame goes unsent: more than a second of a full scan
+_LINGER = 0.3  # s
 _INTRODUCTION = 0.5  # s between two information messages
 
 
@@ -87,4 +88,7 @@ class PseudoDevice:
                 del self._outbox[: os.write(self._master, self._outbox[:4096])]
 
     def close(self) -> None:
+        """Close the port, after a moment for a listener to take what it was sent."""
+        if not self._hung_up():
+            time.sleep(_LINGER)  # what is unread when the last holder closes is thrown away
         os.close(self._master)
