@@ -63,12 +63,10 @@ class _Cells(QWidget):
     """The elements, drawn as cells that tile a regular grid or as squares where they are."""
 
     pointed = Signal(int)
-    sized = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._layout: SensorLayout | None = None
-        self._values: Array = np.empty(0)
         self._colours: Colours = np.empty((0, 3), np.uint8)
         self._line = QColor("#888888")
         self._under, self._faded = -1, False
@@ -81,7 +79,6 @@ class _Cells(QWidget):
 
     def show_layout(self, layout: SensorLayout) -> None:
         self._layout = layout
-        self._values = np.full(len(layout), np.nan)
         self._under = -1
 
     def _spacing(self) -> float:

@@ -116,7 +116,6 @@ class MembraneView(QWidget):
         self._mesh.point_data["value"] = np.zeros(nx * ny)
         self._mesh.point_data.active_normals = np.tile([0.0, 0.0, 1.0], (nx * ny, 1))
         self._wire = self._wireframe(points)
-        self._grid = np.array([ny, nx])
         self._cell = np.array([x[1] - x[0], y[1] - y[0]])
         self._heights = np.zeros((ny, nx))
         plotter = self.plotter
