@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from kappaskin import Engine, Estimate, Setup, SineBasis, Status
+from kappaskin import CurvatureMap, Engine, Estimate, Setup, Status, basis_for
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.settings import LOAD_CASES, Settings
@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 STALE_AFTER = 0.5  # s without a frame
 _TICK = 4  # ms between two looks for a new estimate
 _STATUS = 0.05  # s between two looks at the status
-_DERIVATIVES = {"displacement": (0, 0), "xx": (2, 0), "yy": (0, 2), "xy": (1, 1)}
 
 
 def _setup_of(settings: Settings) -> Setup:
@@ -118,10 +117,10 @@ class Session(QObject):
         key = (estimate.generation, colour_by)
         if self._values_of[:2] != key:
             patch = self.status.sensor.layout.patch
-            basis = SineBasis(patch, *estimate.coefficients.shape)
+            edge = self.status.setup.edge or self.status.sensor.edge
+            basis = basis_for(patch, edge, *estimate.coefficients.shape)
             ny, nx = estimate.surface.shape
-            grid = basis.on_grid(*patch.grid(nx, ny), *_DERIVATIVES[colour_by])
-            self._values_of = (*key, grid)
+            self._values_of = (*key, CurvatureMap(basis, colour_by, *patch.grid(nx, ny)))
         return self._values_of[2](estimate.coefficients)  # pyright: ignore
 
     def close(self) -> None:

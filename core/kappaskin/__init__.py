@@ -1,6 +1,11 @@
 """Kappaskin: shape and contact from curvature-sensing tactile skins, live and with error bars."""
 
+from kappaskin.bases import EDGES as EDGES
+from kappaskin.bases import Basis as Basis
+from kappaskin.bases import CurvatureMap as CurvatureMap
 from kappaskin.bases import SineBasis as SineBasis
+from kappaskin.bases import ValueMap as ValueMap
+from kappaskin.bases import basis_for as basis_for
 from kappaskin.doctor import serial_ports as serial_ports
 from kappaskin.effects import GaussianNoise as GaussianNoise
 from kappaskin.effects import UniformNoise as UniformNoise
@@ -17,6 +22,7 @@ from kappaskin.frames import Touch as Touch
 from kappaskin.frames import Truth as Truth
 from kappaskin.layout import SensorLayout as SensorLayout
 from kappaskin.live import Status as Status
+from kappaskin.mechanics import Compliance as Compliance
 from kappaskin.mechanics import LineLoad as LineLoad
 from kappaskin.mechanics import Load as Load
 from kappaskin.mechanics import Plate as Plate

@@ -15,10 +15,14 @@ COMPONENTS = ("xx", "yy", "xy")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """What a simulation knows of a frame: `coefficients` (Ri, Rj) in m, `contact` (2,) in m."""
+    """What a simulation knows of a frame: `coefficients` (Ri, Rj) in m, `contact` (2,) in m.
+
+    `edge` names the functions that the coefficients belong to.
+    """
 
     coefficients: Array
     contact: Array
+    edge: str = "hinged"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

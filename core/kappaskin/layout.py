@@ -6,10 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kappaskin.bases import SineBasis
+from kappaskin.bases import Basis
+from kappaskin.bases.basis import curvature_at
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.patch import Patch
+
+
+def _channels(patch: Patch, elements: int) -> Mask:
+    """All channels (3, P); on a strip, which bends along x only, those of xx."""
+    live = np.ones((3, elements), bool)
+    live[1:] = not patch.strip
+    return live
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +55,7 @@ class SensorLayout:
         """Elements at the centres of an m x n tiling."""
         x, y = patch.cell_centres(m, n)
         positions = np.column_stack([np.tile(x, n), np.repeat(y, m)])
-        return cls(patch, positions, np.ones((3, m * n), bool), (m, n))
+        return cls(patch, positions, _channels(patch, m * n), (m, n))
 
     @classmethod
     def scattered(cls, patch: Patch, positions: ArrayLike) -> "SensorLayout":
@@ -58,7 +66,7 @@ class SensorLayout:
             raise Refusal(f"expected positions of shape (P, 2) in m, got {error}") from error
         if points.ndim != 2:
             raise Refusal(f"expected positions of shape (P, 2) in m, got {points.shape}")
-        return cls(patch, points, np.ones((3, len(points)), bool))
+        return cls(patch, points, _channels(patch, len(points)))
 
     def without(self, elements: Iterable[int]) -> "SensorLayout":
         """The same layout with all three channels of `elements` dead."""
@@ -75,8 +83,8 @@ class SensorLayout:
     def __str__(self) -> str:
         return "{} x {} elements".format(*self.shape) if self.shape else f"{len(self)} elements"
 
-    def curvature_operator(self, basis: SineBasis) -> Array:
-        """M (3 P, Ni Nj): `M @ coefficients.ravel()` is curvature (3, P) flattened (Eqs. 2-5)."""
+    def curvature_operator(self, basis: Basis) -> Array:
+        """M (3 P, N): `M @ coefficients.ravel()` is curvature (3, P) flattened (Eqs. 2-5, 11)."""
         if basis.patch != self.patch:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
-        return np.vstack([basis.at(self.positions, *order) for order in ((2, 0), (0, 2), (1, 1))])
+        return curvature_at(basis, self.positions).reshape(3 * len(self), basis.size)

@@ -7,23 +7,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.bases import GridMap, SineBasis
+from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.errors import RankDeficient
 from kappaskin.fit import Fit, LeastSquares
 from kappaskin.frames import Array, Estimate, Frame, Truth
-from kappaskin.mechanics import Plate
 from kappaskin.sensor import Sensor
 from kappaskin.touch import NO_TOUCH, PointContact
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points."""
+    """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points.
+
+    `edge` says which functions; empty, those for the edge that the sensor says it has.
+    """
 
     Ni: int = 8
     Nj: int = 8
     nx: int = 65
     ny: int = 65
+    edge: str = ""
 
 
 class Pipeline:
@@ -41,16 +44,18 @@ class Pipeline:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
-        self.basis = SineBasis(sensor.layout.patch, setup.Ni, setup.Nj)
+        edge = setup.edge or sensor.edge
+        across = 1 if sensor.layout.patch.strip else setup.Nj
+        self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         self.fit = LeastSquares(self.basis, sensor.layout)
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         self._surface = self.basis.on_grid(self._x, self._y)
-        self._touch = PointContact(Plate(sensor.layout.patch, sensor.rigidity), sensor.layout)
+        self._touch = PointContact(sensor.plate, sensor.layout, edge)
         self._dead = ~sensor.layout.live.ravel()
         self._any_dead = bool(self._dead.any())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
-        self._truths: dict[tuple[int, ...], tuple[SineBasis, GridMap]] = {}
+        self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
 
     def curvature(self, frame: Frame) -> Array:
         """Curvature (3, P) in 1/m; NaN where a channel is dead, unscanned or on a rail."""
@@ -93,11 +98,11 @@ class Pipeline:
         """True surface, true contact, error at the load and RMS; NaN without a truth."""
         if truth is None:
             return self._unknown, self._unknown[0, :2], math.nan, math.nan
-        shape = truth.coefficients.shape
-        if shape not in self._truths:
-            basis = SineBasis(self.basis.patch, *shape)
-            self._truths[shape] = basis, basis.on_grid(self._x, self._y)
-        basis, true_map = self._truths[shape]
+        key = truth.edge, *truth.coefficients.shape
+        if key not in self._truths:
+            basis = basis_for(self.basis.patch, *key)
+            self._truths[key] = basis, basis.on_grid(self._x, self._y)
+        basis, true_map = self._truths[key]
         true_surface = true_map(truth.coefficients)
         rms = math.sqrt(float(np.mean((surface - true_surface) ** 2)))
         here = truth.contact[None]

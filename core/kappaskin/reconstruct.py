@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.bases import SineBasis
+from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.fit import Fit, LeastSquares
 from kappaskin.frames import Array
@@ -61,7 +61,7 @@ def _read(path: Path) -> dict[str, Array]:
     return {name: values.astype(float) for name, values in found.items()}
 
 
-def _fit(basis: SineBasis, layout: SensorLayout, curvature: Array, sigma: Array | None) -> Fit:
+def _fit(basis: Basis, layout: SensorLayout, curvature: Array, sigma: Array | None) -> Fit:
     """All T frames, each with its own sigma when there is one for each."""
     if sigma is None or sigma.ndim < 3:
         return LeastSquares(basis, layout, sigma)(curvature)
@@ -75,7 +75,7 @@ def _fit(basis: SineBasis, layout: SensorLayout, curvature: Array, sigma: Array 
     return Fit(fits[0].estimator, *stacked)
 
 
-def _check_sizes(basis: SineBasis, readings: int, surface: int) -> None:
+def _check_sizes(basis: Basis, readings: int, surface: int) -> None:
     """Refuse what would exhaust the memory before anything is computed."""
     (Ni, Nj), N = basis.shape, basis.size
     if readings < N:

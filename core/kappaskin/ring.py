@@ -48,7 +48,7 @@ def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
             ("ready_time", "f8"),
             ("curvature", "f8", (3, P)),
             ("residual", "f8", (3, P)),
-            ("coefficients", "f8", (setup.Ni, setup.Nj)),
+            ("coefficients", "f8", pipeline.basis.shape),
             ("surface", *surface),
             ("noise", "f8"),
             ("touch", _TOUCH),

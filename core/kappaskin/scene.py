@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kappaskin.bases import SineBasis
+from kappaskin.bases import Basis, SineBasis, basis_for
 from kappaskin.effects import Effect, UniformNoise
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -41,7 +41,8 @@ class Scene:
     """A simulated skin and what happens to it; `loads` and `effects` may be empty.
 
     `reference` is the number of functions (Ri, Rj) of the true shape: Table 1 defines its truth
-    with 15 x 15, since the curvature under a point load grows with every further function.
+    with 15 x 15, since the curvature under a point load grows with every further function. `edge`
+    says how the skin is held.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Scene:
     rate: float = 500.0
     seed: int = 0
     reference: tuple[int, int] = (15, 15)
+    edge: str = "hinged"
 
     def __post_init__(self) -> None:
         turns = [0.0] if self.motion is None else [self.motion.period * q / 4 for q in range(4)]
@@ -61,15 +63,16 @@ class Scene:
             load.check(self.plate.patch)
 
     @property
-    def basis(self) -> SineBasis:
-        return SineBasis(self.plate.patch, *self.reference)
+    def basis(self) -> Basis:
+        return basis_for(self.plate.patch, self.edge, *self.reference)
 
     def sensor(self) -> Sensor:
         """What the simulated device says it is."""
         return Sensor(
             self.layout,
             self.transduction,
-            self.plate.rigidity,
+            self.plate,
+            self.edge,
             self.rate,
             name="Simulated skin",
             serial_number="SIM-0001",
@@ -85,10 +88,11 @@ class Scene:
         return tuple(load.shifted(dx, dy) for load in self.loads)
 
 
-def scaled_to(plate: Plate, load: Load, displacement: float, basis: SineBasis) -> Load:
+def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Load:
     """The load whose point of application moves by `displacement` in m."""
-    at = float(basis.at(load.centre()[None])[0] @ plate.deflection([load], basis).ravel())
-    if not at / load.force > 1e-12 * plate.compliance(basis)[0, 0]:
+    compliance = plate.compliance(basis)
+    at = float(basis.at(load.centre()[None])[0] @ compliance(load.modal(basis)).ravel())
+    if not at / load.force > 1e-12 * np.max(compliance.values):
         raise Refusal(
             f"expected a load that moves the skin where it presses, got {load}; the edges are "
             "held, press further inside"

@@ -1,20 +1,24 @@
 """What a device says it is: its skin, its elements and its electronics."""
 
-import math
 from dataclasses import dataclass
 
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
+from kappaskin.mechanics import Plate
 from kappaskin.transduction import Transduction
 
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """A sensor, real or simulated; `rate` in frames/s, `rigidity` of the skin in N m."""
+    """A sensor, real or simulated: a skin held as `edge` says, its elements, its electronics.
+
+    `rate` in frames/s.
+    """
 
     layout: SensorLayout
     transduction: Transduction
-    rigidity: float
+    plate: Plate
+    edge: str
     rate: float
     name: str
     serial_number: str
@@ -22,8 +26,10 @@ class Sensor:
     simulated: bool
 
     def __post_init__(self) -> None:
-        if not 0 < self.rigidity < math.inf:
-            raise Refusal(f"expected a rigidity above zero in N m, got {self.rigidity}")
+        if self.plate.patch != self.layout.patch:
+            raise Refusal(
+                f"the elements are on {self.layout.patch}, the plate on {self.plate.patch}; use one"
+            )
         scan_time = self.transduction.scan_time(self.channels)
         if not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):
             raise Refusal(

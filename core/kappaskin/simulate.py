@@ -14,27 +14,32 @@ class Simulator:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._rng = np.random.default_rng(scene.seed)
-        self._basis = scene.basis
-        self._operator = scene.layout.curvature_operator(self._basis)
-        self._channels = np.arange(3 * len(scene.layout))
         self._still: Truth | None = None
+        self._take_skin(scene)
 
     def change(self, scene: Scene) -> None:
         """Go on with other loads, motion or effects on the same skin; new noise is seeded anew."""
         was, self.scene, self._still = self.scene, scene, None
-        same_skin = np.array_equal(scene.layout.positions, was.layout.positions)
-        if not (same_skin and scene.basis == was.basis):
-            self._basis = scene.basis
-            self._operator = scene.layout.curvature_operator(self._basis)
-            self._channels = np.arange(3 * len(scene.layout))
+        same_elements = np.array_equal(scene.layout.positions, was.layout.positions)
+        skin = (scene.plate, scene.edge, scene.reference)
+        if not (same_elements and skin == (was.plate, was.edge, was.reference)):
+            self._take_skin(scene)
         if (scene.seed, scene.effects) != (was.seed, was.effects):
             self._rng = np.random.default_rng(scene.seed)
+
+    def _take_skin(self, scene: Scene) -> None:
+        """Compute what depends on the skin alone."""
+        self._basis = scene.basis
+        self._compliance = scene.plate.compliance(self._basis)
+        self._operator = scene.layout.curvature_operator(self._basis)
+        self._channels = np.arange(3 * len(scene.layout))
 
     def _truth(self, time: float) -> Truth:
         if self._still is not None:
             return self._still
         loads = self.scene.loads_at(time)
-        truth = Truth(self.scene.plate.deflection(loads, self._basis), contact_of(loads))
+        force = sum((load.modal(self._basis) for load in loads), np.zeros(self._basis.shape))
+        truth = Truth(self._compliance(force), contact_of(loads), self.scene.edge)
         if self.scene.motion is None:
             self._still = truth
         return truth

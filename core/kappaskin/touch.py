@@ -5,7 +5,7 @@ from collections import OrderedDict
 
 import numpy as np
 
-from kappaskin.bases import SineBasis
+from kappaskin.bases import basis_for
 from kappaskin.fit import Fit
 from kappaskin.frames import Array, Mask, Touch
 from kappaskin.layout import SensorLayout
@@ -34,10 +34,11 @@ class PointContact:
     Gauss-Newton steps in x, y and P, whose normal matrix gives the error bars.
     """
 
-    def __init__(self, plate: Plate, layout: SensorLayout) -> None:
-        self.basis = SineBasis(plate.patch, _FUNCTIONS, _FUNCTIONS)
+    def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
+        across = 1 if plate.patch.strip else _FUNCTIONS
+        self.basis = basis_for(plate.patch, edge, _FUNCTIONS, across)
         self._compliance = plate.compliance(self.basis)
-        self._M = layout.curvature_operator(self.basis) * self._compliance.ravel()
+        self._M = self._compliance.after(layout.curvature_operator(self.basis))
         self._live = layout.live.ravel()
         self._x, self._y = (s[1:-1] for s in plate.patch.grid(_SEARCHED + 2, _SEARCHED + 2))
         self._map = self.basis.on_grid(self._x, self._y)
@@ -63,7 +64,7 @@ class PointContact:
         K = np.where(used, curvature.ravel(), 0.0)
         explained = self._map((K @ self._M).reshape(self.basis.shape)) ** 2 / self._norm(used)
         best = int(np.argmax(explained))
-        spare = int(used.sum()) - fit.estimator.basis.size
+        spare = int(used.sum()) - fit.estimator.unknowns
         if not explained.flat[best] > _threshold(spare) * float(fit.noise) ** 2:
             return NO_TOUCH
         return self._refined(K, used, self._points[best], fit)
@@ -106,7 +107,7 @@ class PointContact:
         fitted = float(b @ fit.coefficients.ravel())
         variance = float(b @ fit.estimator.unit_covariance(np.isnan(fit.residual)) @ b)
         t = self.basis.with_slopes(float(position[0]), float(position[1]))[0]
-        loaded = force * float(t**2 @ self._compliance.ravel())
+        loaded = force * float(t @ self._compliance(t.reshape(self.basis.shape)).ravel())
         return fitted, math.hypot(float(fit.noise) * math.sqrt(variance), fitted - loaded)
 
 

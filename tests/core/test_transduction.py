@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Converter, HalfBridge, Patch, Refusal, Sensor, SensorLayout, Transduction
+from kappaskin import (
+    Converter,
+    HalfBridge,
+    Patch,
+    Plate,
+    Refusal,
+    Sensor,
+    SensorLayout,
+    Transduction,
+)
 from kappaskin.transduction import PAPER
 
 transductions = st.builds(
@@ -19,7 +28,8 @@ transductions = st.builds(
 
 def sensor(elements=(10, 10), transduction=PAPER, rate=100.0, rigidity=1.0):
     layout = SensorLayout.regular(Patch(0.1, 0.1), *elements)
-    return Sensor(layout, transduction, rigidity, rate, "a skin", "1", "1.0", True)
+    plate = Plate(layout.patch, rigidity)
+    return Sensor(layout, transduction, plate, "hinged", rate, "a skin", "1", "1.0", True)
 
 
 def test_volts_per_curvature_are_those_of_equation_7():

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg
 
-from kappaskin.bases import SineBasis
+from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
 _REMEMBERED = 8  # sets of missing readings whose operators are kept
+_UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits: factor anew
 
 
@@ -72,17 +73,18 @@ class LeastSquares:
 
     `sigma`, a scalar or (3, P) in 1/m, is the standard deviation of each reading; without it all
     readings weigh the same and their noise is estimated from the residual. An infinite sigma
-    leaves a reading out. Raises `RankDeficient` when the readings do not decide the coefficients.
+    leaves a reading out. Where the basis leaves only some combinations free, c = W g, only those
+    are fitted. Raises `RankDeficient` when the readings do not decide the coefficients.
     """
 
-    def __init__(
-        self, basis: SineBasis, layout: SensorLayout, sigma: ArrayLike | None = None
-    ) -> None:
+    def __init__(self, basis: Basis, layout: SensorLayout, sigma: ArrayLike | None = None) -> None:
         self.basis, self.layout = basis, layout
         self._sigma_known = sigma is not None
         self._weight = self._weights(1.0 if sigma is None else sigma)
+        self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
+        """How many numbers are fitted: the coefficients less what the edges decide."""
         used = layout.live.ravel() & (self._weight > 0)
-        if used.sum() < basis.size:  # before any memory is taken for it
+        if used.sum() < self.unknowns:  # before any memory is taken for it
             raise RankDeficient(self._refusal(int(used.sum()), int(used.sum())))
         self.M = layout.curvature_operator(basis)
         """The curvature operator (3 P, Ni Nj) (Eq. 2)."""
@@ -101,22 +103,24 @@ class LeastSquares:
         return np.broadcast_to(1 / sigma, (3, len(self.layout))).ravel()
 
     def _factor(self, used: Mask) -> None:
-        """U (R, N) orthonormal and root (N, N) with operator = root U^T, for the readings used."""
-        A = self._weight[used, None] * self.M[used]
+        """U (R, F) orthonormal and root (N, F) with operator = root U^T, for the readings used."""
+        W = self.basis.free
+        A = self._weight[used, None] * (self.M[used] if W is None else self.M[used] @ W)
         length = np.linalg.norm(A, axis=0)
-        length[length == 0] = 1
+        length[length <= _UNSEEN * length.max(initial=0.0)] = np.inf  # what is left is rounding
         Q, R = cast("tuple[Array, Array]", linalg.qr(A / length, mode="economic"))
         U, s, Vt = linalg.svd(R)
         rank = int(np.sum(s > s[0] * max(A.shape) * np.finfo(float).eps))
-        if rank < self.basis.size:
+        if rank < self.unknowns:
             raise RankDeficient(self._refusal(len(A), rank))
         self._U = Q @ U
-        self._root = (Vt.T / s) / length[:, None]
+        root = (Vt.T / s) / length[:, None]
+        self._root = root if W is None else W @ root
         self.condition = float(s[0] / s[-1])
         """Condition number of M with its columns scaled to unit length."""
 
     def _refusal(self, readings: int, rank: int) -> str:
-        (Ni, Nj), N, layout = self.basis.shape, self.basis.size, self.layout
+        (Ni, Nj), N, layout = self.basis.shape, self.unknowns, self.layout
         bound = "at most " if readings < N else ""
         what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
         what += f"of a {Ni} x {Nj} basis"
@@ -166,12 +170,12 @@ class LeastSquares:
         gone = missing[was]
         U_k, U_r = self._U[gone], self._U[~gone]
         G = np.eye(len(U_k)) - U_k @ U_k.T
-        if len(U_r) < self.basis.size or np.linalg.eigvalsh(G)[0] < _REFACTOR:
+        if len(U_r) < self.unknowns or np.linalg.eigvalsh(G)[0] < _REFACTOR:
             weight = np.where(missing, 0.0, self._weight)
             sigma = np.divide(1.0, weight, where=weight > 0, out=np.full(len(weight), np.inf))
             fresh = LeastSquares(self.basis, self.layout, sigma.reshape(3, -1))
             return fresh._solver
-        inverse = np.eye(self.basis.size) + U_k.T @ np.linalg.solve(G, U_k)
+        inverse = np.eye(self.unknowns) + U_k.T @ np.linalg.solve(G, U_k)
         operator, covariance = root @ inverse @ U_r.T, root @ inverse @ root.T
         return self._made(was & ~missing, operator, covariance)
 
@@ -234,7 +238,7 @@ class LeastSquares:
         """Standard deviation (...) of a reading, from the residuals (..., R) of those used."""
         if self._sigma_known:
             return np.ones(left.shape[:-1])
-        spare = left.shape[-1] - self.basis.size
+        spare = left.shape[-1] - self.unknowns
         if not spare:
             return np.full(left.shape[:-1], np.nan)
         return np.asarray(np.sqrt(np.vecdot(left, left) / spare))

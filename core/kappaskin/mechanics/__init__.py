@@ -3,4 +3,5 @@
 from kappaskin.mechanics.loads import LineLoad as LineLoad
 from kappaskin.mechanics.loads import Load as Load
 from kappaskin.mechanics.loads import PointLoad as PointLoad
+from kappaskin.mechanics.plate import Compliance as Compliance
 from kappaskin.mechanics.plate import Plate as Plate

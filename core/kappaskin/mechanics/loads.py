@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kappaskin.bases import SineBasis
+from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.patch import Patch
@@ -34,7 +34,7 @@ class Load(Protocol):
         """The same load with `factor` times the force."""
         ...
 
-    def modal(self, basis: SineBasis) -> Array:
+    def modal(self, basis: Basis) -> Array:
         """The force times each function's mean under the load, (Ni, Nj) in N."""
         ...
 
@@ -47,6 +47,10 @@ def _check(load: Load, patch: Patch, *points: tuple[float, float]) -> None:
             f"expected a load on the patch of {patch.a:g} x {patch.b:g} m, got {load}; "
             "positions are in metres from the corner x = y = 0"
         )
+
+
+_t, _w = np.polynomial.legendre.leggauss(96)
+_LINE = (_t + 1) / 2, _w / 2  # Gauss points and weights on [0, 1]: exact for our functions
 
 
 @dataclass(frozen=True)
@@ -69,9 +73,8 @@ class PointLoad:
     def scaled(self, factor: float) -> "PointLoad":
         return replace(self, force=self.force * factor)
 
-    def modal(self, basis: SineBasis) -> Array:
-        ki, kj = basis.wavenumbers
-        return self.force * np.multiply.outer(np.sin(ki * self.x), np.sin(kj * self.y))
+    def modal(self, basis: Basis) -> Array:
+        return self.force * basis.at(self.centre()[None]).reshape(basis.shape)
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,12 @@ class LineLoad:
     def scaled(self, factor: float) -> "LineLoad":
         return replace(self, force=self.force * factor)
 
-    def modal(self, basis: SineBasis) -> Array:
+    def modal(self, basis: Basis) -> Array:
+        if not isinstance(basis, SineBasis) or basis.patch.strip:
+            along, weights = _LINE
+            ends = np.array([[self.x0, self.y0], [self.x1, self.y1]])
+            points = np.column_stack([1 - along, along]) @ ends
+            return self.force * (weights @ basis.at(points)).reshape(basis.shape)
         # The mean over s in [0, 1] of sin(A + B s) sin(C + F s): the product is half a difference
         # of cosines, and the mean of a cosine is its value at the middle times a sinc.
         ki, kj = basis.wavenumbers

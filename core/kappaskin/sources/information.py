@@ -8,8 +8,10 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.layout import SensorLayout
+from kappaskin.mechanics import Plate
 from kappaskin.patch import Patch
 from kappaskin.sensor import Sensor
 from kappaskin.transduction import Converter, HalfBridge, Transduction
@@ -26,8 +28,12 @@ def to_json(sensor: Sensor) -> str:
             "firmware": sensor.firmware,
             "simulated": sensor.simulated,
             "rate": sensor.rate,
-            "rigidity": sensor.rigidity,
+            "rigidity": sensor.plate.rigidity,
             "size": [layout.patch.a, layout.patch.b],
+            "base_curvature": layout.patch.base_curvature,
+            "strip": layout.patch.strip,
+            "edge": sensor.edge,
+            **{name: getattr(sensor.plate, name) for name in _ALSO_OF_THE_PLATE},
             **where,
             "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
             "bridge": asdict(sensor.transduction.bridge),
@@ -39,12 +45,26 @@ def to_json(sensor: Sensor) -> str:
 
 _Part = TypeVar("_Part", HalfBridge, Converter)
 
+_ALSO_OF_THE_PLATE = ("tension", "foundation", "fluid", "poisson")
+# What a flat plate hinged along its edges need not say.
+UNSAID: dict[str, Any] = {
+    "base_curvature": 0.0,
+    "strip": False,
+    "edge": "hinged",
+    "tension": 0.0,
+    "foundation": 0.0,
+    "fluid": False,
+    "poisson": 0.3,
+}
 _KINDS: dict[str, tuple[Any, tuple[str, ...]]] = {
-    "a text": (str, ("name", "serial_number", "firmware")),
-    "a number": ((int, float), ("rate", "rigidity")),
+    "a text": (str, ("name", "serial_number", "firmware", "edge")),
+    "a number": (
+        (int, float),
+        ("rate", "rigidity", "base_curvature", "tension", "foundation", "poisson"),
+    ),
     "a list": (list, ("size", "grid", "positions", "dead_channels")),
     "an object": (dict, ("bridge", "converter")),
-    "true or false": (bool, ("simulated",)),
+    "true or false": (bool, ("simulated", "strip", "fluid")),
 }
 
 
@@ -59,7 +79,7 @@ def _parsed(text: str) -> dict[str, Any]:
     said = json.loads(text, parse_float=_number, parse_constant=_number)
     if not isinstance(said, dict):
         raise TypeError(f"expected an object with keys, got {said!r:.80}")
-    found = cast("dict[str, Any]", said)
+    found = UNSAID | cast("dict[str, Any]", said)
     for what, (kind, names) in _KINDS.items():
         for name in names:
             if name in found and not isinstance(found[name], kind):
@@ -72,7 +92,9 @@ def _made(kind: type[_Part], said: dict[str, Any]) -> _Part:
 
 
 def _layout(said: dict[str, Any]) -> SensorLayout:
-    patch = Patch(*(float(side) for side in said["size"]))
+    H = float(said["base_curvature"])
+    radius = 1 / H if H else math.inf
+    patch = Patch(*(float(side) for side in said["size"]), radius=radius, strip=said["strip"])
     if "grid" in said:
         m, n = (index(count) for count in said["grid"])
         if m * n > 2**16 // 3:
@@ -90,14 +112,25 @@ def _layout(said: dict[str, Any]) -> SensorLayout:
     return SensorLayout(patch, layout.positions, live, layout.shape)
 
 
+def _plate(patch: Patch, said: dict[str, Any]) -> Plate:
+    tension, foundation, poisson = (
+        float(said[name]) for name in ("tension", "foundation", "poisson")
+    )
+    return Plate(patch, float(said["rigidity"]), tension, foundation, said["fluid"], poisson)
+
+
 def from_json(text: str) -> Sensor:
     """The sensor that `text` tells of; raises `SourceError` when it cannot be understood."""
     try:
         said = _parsed(text)
+        layout = _layout(said)
+        edge = said["edge"]
+        basis_for(layout.patch, edge, 2, 1)  # refuses an edge that there is not
         return Sensor(
-            _layout(said),
+            layout,
             Transduction(_made(HalfBridge, said["bridge"]), _made(Converter, said["converter"])),
-            float(said["rigidity"]),
+            _plate(layout.patch, said),
+            edge,
             float(said["rate"]),
             said["name"],
             said["serial_number"],

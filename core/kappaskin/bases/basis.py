@@ -1,0 +1,95 @@
+"""What every basis answers, and the curvature that follows from it."""
+
+from typing import Protocol
+
+import numpy as np
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import COMPONENTS, Array
+from kappaskin.patch import Patch
+
+
+class ValueMap(Protocol):
+    """A map from coefficients to values on a grid, made once and called per frame."""
+
+    def __call__(self, coefficients: Array) -> Array:
+        """Values (..., ny, nx) for `coefficients` (..., Ni, Nj); NaN off the skin."""
+        ...
+
+
+class Basis(Protocol):
+    """Ni x Nj functions on a patch that meet its edge conditions, one or some of them together.
+
+    Coefficients are (Ni, Nj) arrays in metres; flattened, j runs fastest.
+    """
+
+    @property
+    def patch(self) -> Patch: ...
+
+    @property
+    def shape(self) -> tuple[int, int]: ...
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def free(self) -> Array | None:
+        """The combinations (N, F) of functions that the edges allow; None when all do."""
+        ...
+
+    def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
+        """Every function's derivative of order `dx`, `dy`, (P, N), at `positions` (P, 2).
+
+        `dx` = -1 is the integral along x, zero on average at the two ends.
+        """
+        ...
+
+    def with_slopes(self, x: float, y: float) -> Array:
+        """Every function and its slopes along x and y at one point, (3, N)."""
+        ...
+
+    def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> ValueMap:
+        """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""
+        ...
+
+    def quadrature(self) -> tuple[Array, Array]:
+        """Points (Q, 2) in m and weights (Q,) in m^2 that integrate products of two functions."""
+        ...
+
+
+# On a skin bent along x to 1/R = H, a displacement f inward changes the curvature by
+#     xx: f_xx + H^2 f,    yy: f_yy,    xy: f_xy + H v_y   with   v_x = H f.
+# These are Sanders' and Koiter's changes of curvature when neither the hoop nor the shear strain
+# changes: the tangential displacement v follows from f, and u_x = -v_y. Flat, they are Eqs. 3-5.
+_ORDERS = {"xx": ((2, 0), (0, 0)), "yy": ((0, 2), None), "xy": ((1, 1), (-1, 1))}
+
+
+def _terms(patch: Patch, component: str) -> list[tuple[float, tuple[int, int]]]:
+    """Which derivatives, and how much of each, make a component of curvature."""
+    if component not in _ORDERS:
+        raise Refusal(f"expected a component among {', '.join(COMPONENTS)}; got {component!r}")
+    plain, bent = _ORDERS[component]
+    H = patch.base_curvature
+    return [(1.0, plain)] + ([(H**2, bent)] if H and bent else [])
+
+
+def curvature_at(basis: Basis, positions: Array) -> Array:
+    """Change of curvature xx, yy, xy (3, P, N) in 1/m per m of each function (Eqs. 3-5, 11)."""
+    return np.stack(
+        [
+            sum(h * basis.at(positions, *order) for h, order in _terms(basis.patch, component))
+            for component in COMPONENTS
+        ]
+    )
+
+
+class CurvatureMap:
+    """The change of one curvature component on a grid, as a map from coefficients."""
+
+    def __init__(self, basis: Basis, component: str, x: Array, y: Array) -> None:
+        self._terms = [(h, basis.on_grid(x, y, *o)) for h, o in _terms(basis.patch, component)]
+
+    def __call__(self, coefficients: Array) -> Array:
+        """Curvature (..., ny, nx) in 1/m for `coefficients` (..., Ni, Nj)."""
+        first, *others = (h * values(coefficients) for h, values in self._terms)
+        return sum(others, first)
