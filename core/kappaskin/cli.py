@@ -14,6 +14,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from kappaskin.doctor import examine
 from kappaskin.errors import Refusal
+from kappaskin.reconstruct import METHODS
 from kappaskin.reconstruct import reconstruct as reconstructed
 from kappaskin.scene import load_scene
 from kappaskin.studies.tables import table_1
@@ -72,12 +73,20 @@ _Pair = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 @app.command
 def reconstruct(
-    readings: Path, *, out: Path, basis: _Pair = "8x8", grid: _Pair | None = None
+    readings: Path,
+    *,
+    out: Path,
+    basis: _Pair = "8x8",
+    grid: _Pair | None = None,
+    edge: str = "hinged",
+    method: str = METHODS[0],
 ) -> None:
     """Turn a file of curvature readings into a file of shapes.
 
     READINGS is an NPZ with `size` (2,) m, `positions` (P, 2) m, `curvature` (T, 3, P) or (3, P) in
-    1/m with NaN for a missing reading, and optionally `sigma` in 1/m.
+    1/m with NaN for a missing reading, and optionally `sigma` in 1/m and `radius` in m, the base
+    radius along x (infinite when flat). A `size` (1,) with `positions` (P, 1) is a strip, of whose
+    curvature only xx is read.
 
     Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`
 
@@ -91,10 +100,13 @@ def reconstruct(
         Number of functions along x and y.
     grid
         Number of points of the surface along x and y; none when left out.
+    edge
+        How the skin is held.
+    method
+        How the coefficients are found.
     """
-    found = reconstructed(
-        readings, _pair(basis, "a basis"), _pair(grid, "a grid") if grid else None
-    )
+    points = _pair(grid, "a grid") if grid else None
+    found = reconstructed(readings, _pair(basis, "a basis"), points, edge, method)
     try:
         with out.open("wb") as file:
             np.savez(file, **found)  # pyright: ignore[reportArgumentType]

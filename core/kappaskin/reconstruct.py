@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.bases import Basis, SineBasis
+from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.fit import Fit, LeastSquares
 from kappaskin.frames import Array
@@ -17,6 +17,8 @@ from kappaskin.patch import Patch
 
 _NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
 
+METHODS = ("least-squares",)
+"""Ways from readings to coefficients, the default first."""
 
 _MOST = 2**27  # numbers in one array: 1 GiB
 
@@ -40,7 +42,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         archive = np.load(file, allow_pickle=False)
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise ValueError("it holds a single array")
-        names = ("size", "positions", "curvature", "sigma")
+        names = ("size", "positions", "curvature", "sigma", "radius")
         return {name: archive[name] for name in names if name in archive}
 
 
@@ -59,6 +61,31 @@ def _read(path: Path) -> dict[str, Array]:
         if values.dtype.kind not in "fiu":
             raise Refusal(f"{path}: expected {name} to be real numbers, got {values.dtype}")
     return {name: values.astype(float) for name, values in found.items()}
+
+
+def _patch(path: Path, size: Array, radius: Array) -> Patch:
+    """The skin of `size` (2,), or of size (1,) a strip, bent to one `radius`."""
+    if size.shape not in ((1,), (2,)):
+        raise Refusal(
+            f"{path}: expected size of shape (2,) in m, or (1,) for a strip, got {size.shape}"
+        )
+    if radius.size != 1:
+        raise Refusal(f"{path}: expected one radius in m, got shape {radius.shape}")
+    strip = len(size) == 1
+    return Patch(float(size[0]), 1.0 if strip else float(size[1]), float(radius.item()), strip)
+
+
+def _layout(path: Path, patch: Patch, positions: Array) -> SensorLayout:
+    across = 1 if patch.strip else 2
+    if positions.ndim == 1 and patch.strip:
+        positions = positions[:, None]
+    if positions.ndim != 2 or positions.shape[1] != across:
+        raise Refusal(
+            f"{path}: expected positions of shape (P, {across}) in m, got {positions.shape}"
+        )
+    if patch.strip:
+        positions = np.column_stack([positions, np.full(len(positions), patch.b / 2)])
+    return SensorLayout.scattered(patch, positions)
 
 
 def _fit(basis: Basis, layout: SensorLayout, curvature: Array, sigma: Array | None) -> Fit:
@@ -92,23 +119,24 @@ def _check_sizes(basis: Basis, readings: int, surface: int) -> None:
 
 
 def reconstruct(
-    readings: Path, basis: tuple[int, int], grid: tuple[int, int] | None = None
+    readings: Path,
+    basis: tuple[int, int],
+    grid: tuple[int, int] | None = None,
+    edge: str = "hinged",
+    method: str = METHODS[0],
 ) -> dict[str, Array]:
     """What `kappaskin reconstruct` writes: `coefficients`, `sd`, `residual` and the surface.
 
     `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m; with a `grid` of nx x ny
-    points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m.
+    points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
+    `method` one of `METHODS`.
     """
+    if method not in METHODS:
+        raise Refusal(f"expected a method among {', '.join(METHODS)}; got {method!r}")
     found = _read(readings)
-    size, curvature, sigma = found["size"], found["curvature"], found.get("sigma")
-    if size.shape != (2,):
-        raise Refusal(f"{readings}: expected size of shape (2,) in m, got {size.shape}")
-    if found["positions"].ndim != 2:
-        raise Refusal(
-            f"{readings}: expected positions of shape (P, 2) in m, got {found['positions'].shape}"
-        )
-    patch = Patch(float(size[0]), float(size[1]))
-    layout = SensorLayout.scattered(patch, found["positions"])
+    curvature, sigma = found["curvature"], found.get("sigma")
+    patch = _patch(readings, found["size"], found.get("radius", np.array(np.inf)))
+    layout = _layout(readings, patch, found["positions"])
     if curvature.ndim == 2:
         curvature = curvature[None]
     if curvature.shape[-2:] != (3, len(layout)) or curvature.ndim != 3 or not len(curvature):
@@ -121,9 +149,9 @@ def reconstruct(
             f"{readings}: expected sigma of shape {curvature.shape} as curvature has, or "
             f"(3, {len(layout)}), or one number; got {sigma.shape}"
         )
-    functions = SineBasis(patch, *basis)
+    functions = basis_for(patch, edge, *basis)
     points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
-    _check_sizes(functions, 3 * len(layout), points)
+    _check_sizes(functions, int(layout.live.sum()), points)
     fit = _fit(functions, layout, curvature, sigma)
     out = {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
     if grid is not None:

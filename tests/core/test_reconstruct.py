@@ -196,8 +196,11 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "no size": ({"size": None}, r"has no 'size' \(it has \['curvature', 'positions'\]\)"),
     "no positions": ({"positions": None}, "has no 'positions'"),
     "no curvature": ({"curvature": None}, "has no 'curvature'"),
-    "size a number": ({"size": 0.1}, r"size of shape \(2,\) in m, got \(\)"),
-    "three sizes": ({"size": [0.1, 0.1, 0.1]}, r"size of shape \(2,\) in m, got \(3,\)"),
+    "size a number": ({"size": 0.1}, r"size of shape \(2,\) in m, or \(1,\) for a strip, got \(\)"),
+    "three sizes": (
+        {"size": [0.1, 0.1, 0.1]},
+        r"size of shape \(2,\) in m, or \(1,\) for a strip, got \(3,\)",
+    ),
     "size zero": ({"size": [0.0, 0.1]}, "two sides above zero"),
     "size negative": ({"size": [0.1, -0.1]}, "two sides above zero"),
     "size NaN": ({"size": [np.nan, 0.1]}, "two sides above zero"),
@@ -412,3 +415,52 @@ def test_an_operator_that_would_not_fit_is_refused_before_it_costs(tmp_path) -> 
     )
     with pytest.raises(Refusal, match="at most 134217728 numbers in one array, got 2400000000"):
         reconstruct(tmp_path / "many.npz", (200, 200))
+
+
+# Skins that are not flat
+
+
+ARC = np.pi * 12.9e-3
+
+
+def on_the_arc(count: int = 10) -> np.ndarray:
+    return (np.arange(count) + 0.5) * ARC / count
+
+
+def test_a_pinned_fingertip_strip_comes_back(saved) -> None:
+    s = on_the_arc()
+    curvature = np.full((1, 3, 10), np.nan)
+    curvature[0, 0] = 24 * 0.125e-3 * np.sin(3 * s / 12.9e-3) / 12.9e-3**2  # Eq. 11, corrected
+
+    path = saved(size=[ARC], radius=12.9e-3, positions=s, curvature=curvature)
+    found = reconstruct(path, (8, 1), (11, 2))
+
+    assert found["coefficients"].shape == (1, 8, 1)
+    x = found["grid_x"]
+    true = 0.5e-3 * (np.sin(x / 12.9e-3) - 3 * np.sin(3 * x / 12.9e-3)) / 4
+    assert np.allclose(found["w"][0, 0], true, rtol=0, atol=1e-15)
+
+
+def test_a_cylinder_skin_is_not_read_as_a_flat_one(saved) -> None:
+    flat, bent = reconstruct(saved(), (NI, NJ)), reconstruct(saved(radius=0.05), (NI, NJ))
+    infinite = reconstruct(saved(radius=np.inf), (NI, NJ))
+
+    assert np.array_equal(infinite["coefficients"], flat["coefficients"])
+    assert not np.allclose(bent["coefficients"], flat["coefficients"], rtol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "arguments", "reason"),
+    [
+        ({"radius": 0.01}, {}, "goes once round at a radius of"),
+        ({"radius": -1.0}, {}, "goes once round at a radius of"),
+        ({"radius": np.nan}, {}, "goes once round at a radius of"),
+        ({"radius": [1.0, 2.0]}, {}, r"one radius in m, got shape \(2,\)"),
+        ({"size": [0.1]}, {}, r"positions of shape \(P, 1\)"),
+        ({}, {"edge": "glued"}, "an edge among hinged, sliding.*got 'glued'"),
+        ({}, {"method": "magic"}, "a method among least-squares.*got 'magic'"),
+    ],
+)
+def test_what_no_skin_or_no_method_is_is_refused(saved, changes, arguments, reason) -> None:
+    with pytest.raises(Refusal, match=reason):
+        reconstruct(saved(**changes), (NI, NJ), **arguments)
