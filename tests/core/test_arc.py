@@ -137,3 +137,23 @@ def test_a_strip_has_one_function_along_y_and_reads_xx_alone():
         SineBasis(FINGERTIP, 8, 8)
 
     assert SensorLayout.regular(FINGERTIP, 10, 1).live.sum() == 10
+
+
+def test_missing_readings_of_a_pinned_skin_are_left_out_exactly():
+    patch = Patch(math.pi * R, 0.03, R)
+    layout, basis = SensorLayout.regular(patch, 10, 10), SineBasis(patch, 8, 8)
+    rng = np.random.default_rng(4)
+    K = rng.normal(size=(3, 100))
+    K[:, rng.choice(100, 9, replace=False)] = np.nan
+    fit, there = LeastSquares(basis, layout), np.isfinite(K).ravel()
+
+    answer = fit(K)
+
+    W = basis.free
+    A = (layout.curvature_operator(basis) @ W)[there]
+    g = np.linalg.lstsq(A, K.ravel()[there])[0]
+    covariance = W @ np.linalg.inv(A.T @ A) @ W.T * answer.noise**2
+    np.testing.assert_allclose(answer.coefficients.ravel(), W @ g, rtol=0, atol=1e-16)
+    np.testing.assert_allclose(answer.covariance, covariance, rtol=1e-9, atol=1e-20)
+    left = K.ravel()[there] - A @ g
+    assert answer.noise == pytest.approx(math.sqrt(left @ left / (there.sum() - W.shape[1])))
