@@ -18,8 +18,10 @@ from kappaskin.fit import LeastSquares as LeastSquares
 from kappaskin.frames import COMPONENTS as COMPONENTS
 from kappaskin.frames import Estimate as Estimate
 from kappaskin.frames import Frame as Frame
+from kappaskin.frames import LocalGeometry as LocalGeometry
 from kappaskin.frames import Touch as Touch
 from kappaskin.frames import Truth as Truth
+from kappaskin.geometry import local_geometry as local_geometry
 from kappaskin.layout import SensorLayout as SensorLayout
 from kappaskin.live import Status as Status
 from kappaskin.mechanics import Compliance as Compliance

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int32]
@@ -47,7 +48,9 @@ class Touch:
     """A contact: `position` (2,) in m with `position_sd` (2,) in m, and how hard it is.
 
     `force` and `force_sd` in N, `displacement` and `displacement_sd` in m, of the skin at the
-    contact; `single` says whether one point load explains the readings as well as the shape does.
+    contact; `spare` readings more than a point load needs tell the noise. `single` says whether one
+    point load explains the readings as well as the shape does. `near_rim` warns that the contact is
+    too near a held edge, where no force moves the skin, for its place and force to be trusted.
     Every number is NaN when the readings hold no contact that stands out of the noise.
     """
 
@@ -57,11 +60,126 @@ class Touch:
     force_sd: float
     displacement: float
     displacement_sd: float
+    spare: int
     single: bool
+    near_rim: bool
 
     @property
     def present(self) -> bool:
         return bool(np.isfinite(self.force))
+
+    @property
+    def position_95(self) -> Array:
+        """Half widths (2,) in m of the 95 % intervals of the position, by Student's t."""
+        return self._reach * self.position_sd
+
+    @property
+    def force_95(self) -> float:
+        """Half width in N of the 95 % interval of the force, by Student's t."""
+        return self._reach * self.force_sd
+
+    @property
+    def _reach(self) -> float:
+        return float(special.stdtrit(max(self.spare, 1), 0.975))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalGeometry:
+    """The skin around a point, or around P points (leading axis), as rolling and sliding need it.
+
+    In the sense of Montana (doi:10.1177/027836498800700302): `position` (..., 3) in m; `frame`
+    (..., 3, 3), whose rows are the unit vectors along x, across it, and the outward normal, to the
+    side that objects press from; `curvature_form` K (..., 2, 2) and `torsion_form` T (..., 2) in
+    1/m; `metric` (..., 2, 2), what a step in the coordinates x, y is along the frame. Montana's
+    coordinates are orthogonal and his metric is diagonal. The coordinates of a bent skin are not;
+    the frame's first vector stays along x, and the metric is upper triangular: his formulas hold
+    with it as they stand. Curvature is positive where the skin is convex seen from outside, so
+    that a flat skin with a slight displacement f has K = [[f_xx, f_xy], [f_xy, f_yy]] (Eqs. 3-5).
+
+    `covariance` (..., 3, 3) in 1/m^2 is that of xx, yy and xy of K.
+    """
+
+    position: Array
+    frame: Array
+    metric: Array
+    curvature_form: Array
+    torsion_form: Array
+    covariance: Array
+
+    @property
+    def normal(self) -> Array:
+        """The outward unit normal (..., 3)."""
+        return self.frame[..., 2, :]
+
+    @property
+    def first_form(self) -> Array:
+        """Scalar products (..., 2, 2) of the surface's derivatives along x and y."""
+        return np.swapaxes(self.metric, -1, -2) @ self.metric
+
+    @property
+    def second_form(self) -> Array:
+        """The second fundamental form (..., 2, 2) in 1/m, with K's sign."""
+        return np.swapaxes(self.metric, -1, -2) @ self.curvature_form @ self.metric
+
+    @property
+    def mean(self) -> Array:
+        """Mean curvature (...) in 1/m."""
+        return np.trace(self.curvature_form, axis1=-2, axis2=-1) / 2
+
+    @property
+    def gaussian(self) -> Array:
+        """Gaussian curvature (...) in 1/m^2."""
+        xx, yy, xy = self._components
+        return xx * yy - xy**2
+
+    @property
+    def principal(self) -> Array:
+        """Principal curvatures (..., 2) in 1/m, the larger one first."""
+        xx, yy, xy = self._components
+        half = np.hypot((xx - yy) / 2, xy)
+        return np.stack([self.mean + half, self.mean - half], axis=-1)
+
+    @property
+    def angle(self) -> Array:
+        """Angle (...) in rad from x to the larger principal curvature; 0 where both are equal."""
+        xx, yy, xy = self._components
+        return np.arctan2(xy, (xx - yy) / 2) / 2
+
+    @property
+    def directions(self) -> Array:
+        """Unit vectors (..., 2, 3) along the two principal curvatures."""
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        turn = np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=-2)
+        return turn @ self.frame[..., :2, :]
+
+    @property
+    def mean_sd(self) -> Array:
+        """Standard deviation (...) of the mean curvature in 1/m."""
+        return self._sd(np.array([0.5, 0.5, 0.0]))
+
+    @property
+    def gaussian_sd(self) -> Array:
+        """Standard deviation (...) of the Gaussian curvature in 1/m^2, of first order."""
+        xx, yy, xy = self._components
+        return self._sd(np.stack([yy, xx, -2 * xy], axis=-1))
+
+    @property
+    def principal_sd(self) -> Array:
+        """Standard deviations (..., 2) of the principal curvatures in 1/m, of first order."""
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        first = np.stack([c**2, s**2, 2 * c * s], axis=-1)
+        second = np.stack([s**2, c**2, -2 * c * s], axis=-1)
+        return np.stack([self._sd(first), self._sd(second)], axis=-1)
+
+    @property
+    def _components(self) -> tuple[Array, Array, Array]:
+        K = self.curvature_form
+        return K[..., 0, 0], K[..., 1, 1], K[..., 0, 1]
+
+    def _sd(self, gradient: Array) -> Array:
+        """Standard deviation (...) of what changes with xx, yy, xy by `gradient` (..., 3)."""
+        variance = np.einsum("...i,...ij,...j->...", gradient, self.covariance, gradient)
+        return np.sqrt(np.maximum(variance, 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,9 +188,9 @@ class Estimate:
 
     `curvature` and `residual` (3, P) in 1/m, NaN where a reading is missing; `coefficients`
     (Ni, Nj) in m; `surface` (ny, nx) in m; `noise` is the standard deviation of a reading in 1/m
-    as the residual tells it. `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all
-    in m) are NaN unless a simulation made the frame. `ready_time` is when the estimate was done,
-    on the clock of `host_time`.
+    as the residual tells it; `geometry` is that of the skin at the contact. `true_surface`,
+    `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a simulation made the
+    frame. `ready_time` is when the estimate was done, on the clock of `host_time`.
     """
 
     generation: int
@@ -86,6 +204,7 @@ class Estimate:
     surface: Array
     noise: float
     touch: Touch
+    geometry: LocalGeometry
     true_surface: Array
     true_contact: Array
     error_at_load: float

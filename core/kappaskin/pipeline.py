@@ -11,6 +11,7 @@ from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.errors import RankDeficient
 from kappaskin.fit import Fit, LeastSquares
 from kappaskin.frames import Array, Estimate, Frame, Truth
+from kappaskin.geometry import contact_geometry
 from kappaskin.sensor import Sensor
 from kappaskin.touch import NO_TOUCH, PointContact
 
@@ -77,6 +78,7 @@ class Pipeline:
         fit = self._fitted(curvature)
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
+        touch = self._touch(curvature, fit) if math.isfinite(noise) else NO_TOUCH
         return Estimate(
             self.generation,
             frame.sequence,
@@ -88,7 +90,8 @@ class Pipeline:
             fit.coefficients,
             surface,
             noise,
-            self._touch(curvature, fit) if math.isfinite(noise) else NO_TOUCH,
+            touch,
+            contact_geometry(fit, touch),
             *self._compared(surface, fit.coefficients, frame.truth),
         )
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Estimate, Touch
+from kappaskin.frames import Estimate, LocalGeometry, Touch
 from kappaskin.pipeline import Pipeline
 
 _SIZE = 96 * 2**20  # pages that are never written cost no memory
@@ -30,8 +30,19 @@ _TOUCH = [
     ("force_sd", "f8"),
     ("displacement", "f8"),
     ("displacement_sd", "f8"),
+    ("spare", "i8"),
     ("single", "?"),
+    ("near_rim", "?"),
 ]
+_GEOMETRY = [
+    ("position", "f8", 3),
+    ("frame", "f8", (3, 3)),
+    ("metric", "f8", (2, 2)),
+    ("curvature_form", "f8", (2, 2)),
+    ("torsion_form", "f8", 2),
+    ("covariance", "f8", (3, 3)),
+]
+_RECORDS: dict[str, type[Touch | LocalGeometry]] = {"touch": Touch, "geometry": LocalGeometry}
 
 
 def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
@@ -52,6 +63,7 @@ def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
             ("surface", *surface),
             ("noise", "f8"),
             ("touch", _TOUCH),
+            ("geometry", _GEOMETRY),
             ("true_surface", *surface),
             ("true_contact", "f8", 2),
             ("error_at_load", "f8"),
@@ -64,14 +76,14 @@ def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
 def _estimate(record: Any) -> Estimate:
     """The estimate in a copied record; its arrays are views of the copy."""
 
-    def values(owner: Any, names: tuple[str, ...]) -> list[Any]:
-        return [v if (v := owner[name]).shape else v.item() for name in names]
+    def read(owner: Any, name: str) -> Any:
+        value = owner[name]
+        if name in _RECORDS:
+            return _RECORDS[name](*(read(value, part) for part in value.dtype.names))
+        return value if value.shape else value.item()
 
-    names = tuple(name for name in record.dtype.names if name not in ("opened", "closed"))
-    before, after = names[: names.index("touch")], names[names.index("touch") + 1 :]
-    touch = record["touch"]
-    parts: list[Any] = [*values(record, before), Touch(*values(touch, touch.dtype.names))]
-    return Estimate(*parts, *values(record, after))
+    names = (name for name in record.dtype.names if name not in ("opened", "closed"))
+    return Estimate(*(read(record, name) for name in names))
 
 
 class Ring:
@@ -148,10 +160,10 @@ class Ring:
         slot = self._slots[written % len(self._slots)]
         slot["opened"] = written + 1
         for name in slot.dtype.names[1:-1]:
-            if name != "touch":
-                slot[name] = getattr(estimate, name)
-        for name, *_ in _TOUCH:
-            slot["touch"][name] = getattr(estimate.touch, name)
+            value = getattr(estimate, name)
+            if name in _RECORDS:
+                value = tuple(getattr(value, part) for part in slot.dtype[name].names)
+            slot[name] = value
         slot["closed"] = written + 1
         self._header[self._WRITTEN] = written + 1
 

@@ -3,14 +3,14 @@
 import multiprocessing
 import time
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any
 
 import numpy as np
 import pytest
 
-from kappaskin import Estimate, Pipeline, Refusal, Setup, Simulator, load_scene
+from kappaskin import Estimate, LocalGeometry, Pipeline, Refusal, Setup, Simulator, load_scene
 from kappaskin.frames import Array, Touch
 from kappaskin.ring import Ring, slot_type
 
@@ -28,9 +28,10 @@ def estimate_of(pipeline: Pipeline = PIPELINE) -> Estimate:
 
 
 def numbers(value: Any) -> Array:
-    """Every number in an estimate or a touch, in a row."""
-    parts = [getattr(value, field.name) for field in fields(value) if field.name != "single"]
-    return np.concatenate([numbers(p) if isinstance(p, Touch) else np.ravel(p) for p in parts])
+    """Every number in an estimate, in a row; what is true or false is none."""
+    parts = [getattr(value, field.name) for field in fields(value)]
+    parts = [part for part in parts if not isinstance(part, bool)]
+    return np.concatenate([numbers(p) if is_dataclass(p) else np.ravel(p) for p in parts])
 
 
 @pytest.fixture
@@ -154,8 +155,11 @@ def all_of(number: float) -> Estimate:
     """An estimate that holds nothing but `number`."""
     estimate = estimate_of(pipeline_of(Setup(8, 8, 129, 129)))
     parts = {f.name: np.full(np.shape(getattr(estimate, f.name)), number) for f in fields(estimate)}
-    touch = Touch(np.full(2, number), np.full(2, number), number, number, number, number, True)
-    return Estimate(**parts | {"touch": touch})
+    pair, matrix = np.full(2, number), np.full((2, 2), number)
+    touch = Touch(pair, pair, number, number, number, number, int(number), True, False)
+    square = np.full((3, 3), number)
+    geometry = LocalGeometry(square[0], square, matrix, matrix, pair, square)
+    return Estimate(**parts | {"touch": touch, "geometry": geometry})
 
 
 def test_another_process_never_shows_half_an_estimate_or_half_a_status(ring, monkeypatch) -> None:

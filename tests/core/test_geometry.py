@@ -1,0 +1,404 @@
+"""The skin's local geometry, against closed forms, finite differences and the laws of surfaces."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin import (
+    LeastSquares,
+    Patch,
+    Pipeline,
+    Plate,
+    PointLoad,
+    Refusal,
+    SensorLayout,
+    Setup,
+    Simulator,
+    SineBasis,
+    load_scene,
+    local_geometry,
+)
+from kappaskin.geometry import surface_geometry
+
+FLAT = Patch(0.1, 0.08)
+BENT = Patch(0.1, 0.08, 0.045)
+HERE = np.array([[0.031, 0.052], [0.07, 0.01], [0.05, 0.04], [0.0, 0.08]])
+
+
+@dataclass
+class Surface:
+    """One function on a patch, by its derivatives: f, f_x, f_y, f_xx, f_yy, f_xy."""
+
+    patch: Patch
+    jet: object
+    shape = (1, 1)
+
+    def at(self, positions, dx=0, dy=0):
+        number = ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1)).index((dx, dy))
+        return np.broadcast_to(self.jet(*positions.T)[number], len(positions))[:, None]
+
+    def geometry(self, positions):
+        return surface_geometry(self, np.ones((1, 1)), positions, np.zeros((1, 1)))
+
+
+def polynomial(c, angle=0.0, patch=FLAT):
+    """sum c_ij u^i v^j, u and v turned by `angle` around the middle of the patch."""
+    P = np.polynomial.polynomial
+    cos, sin = math.cos(angle), math.sin(angle)
+
+    def jet(x, y):
+        x, y = x - 0.05, y - 0.04
+        u, v = cos * x + sin * y, -sin * x + cos * y
+        orders = ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1))
+        f, u1, v1, uu, vv, uv = (
+            P.polyval2d(u, v, P.polyder(P.polyder(c, i, axis=0), j, axis=1)) for i, j in orders
+        )
+        xx = cos**2 * uu - 2 * cos * sin * uv + sin**2 * vv
+        yy = sin**2 * uu + 2 * cos * sin * uv + cos**2 * vv
+        xy = cos * sin * (uu - vv) + (cos**2 - sin**2) * uv
+        return f, cos * u1 - sin * v1, sin * u1 + cos * v1, xx, yy, xy
+
+    return Surface(patch, jet)
+
+
+def steep(seed, patch=FLAT):
+    """A random polynomial of fourth order with slopes up to about 1."""
+    scale = 0.01 / 0.04 ** np.add.outer(np.arange(5), np.arange(5))
+    return polynomial(scale * np.random.default_rng(seed).normal(size=(5, 5)), patch=patch)
+
+
+def sine_surface(patch, seed=0):
+    basis = SineBasis(patch, 4, 3)
+    c = np.random.default_rng(seed).normal(0, 0.004, (4, 3)) / np.add.outer(range(1, 5), range(3))
+    return basis, c
+
+
+def dome(R):
+    """The top of a sphere of radius R around the middle of the patch."""
+
+    def jet(x, y):
+        x, y = x - 0.05, y - 0.04
+        q = np.sqrt(R**2 - x**2 - y**2)
+        xx, yy, xy = 1 / q + x**2 / q**3, 1 / q + y**2 / q**3, x * y / q**3
+        return R - q, x / q, y / q, xx, yy, xy
+
+    return Surface(FLAT, jet)
+
+
+def trough(R, angle):
+    """A cylinder of radius R pressed in, which bends along `angle` from x."""
+
+    def jet(x, y):
+        c, s = math.cos(angle), math.sin(angle)
+        u = c * (x - 0.05) + s * (y - 0.04)
+        q = np.sqrt(R**2 - u**2)
+        slope, bend = -u / q, -(R**2) / q**3
+        return q - R, c * slope, s * slope, c**2 * bend, s**2 * bend, c * s * bend
+
+    return Surface(FLAT, jet)
+
+
+def test_a_sphere_curves_alike_everywhere_in_every_direction():
+    geometry = dome(0.09).geometry(HERE)
+
+    np.testing.assert_allclose(geometry.principal, 1 / 0.09, rtol=1e-13)
+    np.testing.assert_allclose(geometry.mean, 1 / 0.09, rtol=1e-13)
+    np.testing.assert_allclose(geometry.gaussian, 1 / 0.09**2, rtol=1e-13)
+    centre = np.array([0.05, 0.04, -0.09])
+    np.testing.assert_allclose(geometry.normal, (geometry.position - centre) / 0.09, atol=1e-14)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2, 2.5])
+def test_a_trough_curves_across_its_axis_only_and_is_concave(angle):
+    geometry = trough(0.09, angle).geometry(HERE)
+
+    np.testing.assert_allclose(geometry.principal, [[0, -1 / 0.09]] * 4, atol=1e-12)
+    axis = np.array([-math.sin(angle), math.cos(angle), 0.0])
+    np.testing.assert_allclose(np.abs(geometry.directions[:, 0] @ axis), 1, rtol=1e-13)
+    np.testing.assert_allclose(geometry.directions[:, 1] @ axis, 0, atol=1e-13)
+
+
+def test_a_bent_skin_at_rest_has_the_curvature_of_its_base():
+    geometry = polynomial(np.zeros((1, 1)), patch=BENT).geometry(HERE)
+
+    np.testing.assert_allclose(geometry.curvature_form, [[[1 / 0.045, 0], [0, 0]]] * 4, atol=1e-13)
+    np.testing.assert_allclose(geometry.metric, [np.eye(2)] * 4, atol=1e-15)
+    np.testing.assert_allclose(geometry.torsion_form, 0, atol=1e-15)
+    points, normals = BENT.at_rest(HERE)
+    np.testing.assert_allclose(geometry.position, points, atol=1e-15)
+    np.testing.assert_allclose(geometry.normal, normals, atol=1e-15)
+
+
+def test_a_bent_skin_pressed_in_everywhere_is_a_narrower_cylinder():
+    geometry = polynomial(np.full((1, 1), 0.005), patch=BENT).geometry(HERE)
+
+    np.testing.assert_allclose(geometry.principal, [[1 / 0.040, 0]] * 4, atol=1e-12)
+    np.testing.assert_allclose(geometry.metric[:, 0, 0], 40 / 45, rtol=1e-14)
+
+
+def test_a_flat_skin_is_the_limit_of_a_bent_one():
+    bent = steep(0, Patch(0.1, 0.08, 1e7)).geometry(HERE)
+    flat = steep(0, FLAT).geometry(HERE)
+
+    for field in fields(flat):
+        np.testing.assert_allclose(
+            getattr(bent, field.name), getattr(flat, field.name), rtol=1e-5, atol=1e-7
+        )
+
+
+def test_with_slight_slopes_the_curvature_form_is_that_of_equations_3_to_5():
+    basis, c = sine_surface(FLAT)
+    c = 1e-4 * c
+
+    K = surface_geometry(basis, c, HERE, np.zeros((12, 12))).curvature_form
+
+    for (i, j), order in {(0, 0): (2, 0), (1, 1): (0, 2), (0, 1): (1, 1), (1, 0): (1, 1)}.items():
+        np.testing.assert_allclose(K[:, i, j], basis.at(HERE, *order) @ c.ravel(), atol=1e-8)
+
+
+@given(st.integers(0, 10**6))
+def test_mean_and_gaussian_curvature_are_those_of_a_graph(seed):
+    surface = steep(seed)
+    geometry = surface.geometry(HERE)
+
+    _, fx, fy, fxx, fyy, fxy = surface.jet(*HERE.T)
+    W = np.sqrt(1 + fx**2 + fy**2)
+    mean = ((1 + fy**2) * fxx - 2 * fx * fy * fxy + (1 + fx**2) * fyy) / (2 * W**3)
+    scale = np.abs(geometry.principal).max() + 1
+    np.testing.assert_allclose(geometry.mean, mean, atol=1e-12 * scale)
+    np.testing.assert_allclose(
+        geometry.gaussian, (fxx * fyy - fxy**2) / W**4, atol=1e-12 * scale**2
+    )
+    np.testing.assert_allclose(geometry.principal.mean(axis=1), geometry.mean, rtol=1e-12)
+    np.testing.assert_allclose(
+        geometry.principal.prod(axis=1), geometry.gaussian, atol=1e-12 * scale**2
+    )
+
+
+def by_differences(surface, x, y, h=2e-5):
+    """Frame, metric, K and T at a point from positions alone, by central differences."""
+
+    def position(x, y):
+        point, normal = surface.patch.at_rest(np.array([x, y]))
+        return point - float(surface.jet(np.array([x]), np.array([y]))[0][0]) * normal
+
+    def frame(x, y):
+        rx = (position(x + h, y) - position(x - h, y)) / (2 * h)
+        ry = (position(x, y + h) - position(x, y - h)) / (2 * h)
+        n = np.cross(rx, ry) / np.linalg.norm(np.cross(rx, ry))
+        first = rx / np.linalg.norm(rx)
+        return np.array([first, np.cross(n, first), n]), np.column_stack([rx, ry])
+
+    E, r = frame(x, y)
+    metric = E[:2] @ r
+    along_x = (frame(x + h, y)[0] - frame(x - h, y)[0]) / (2 * h)
+    along_y = (frame(x, y + h)[0] - frame(x, y - h)[0]) / (2 * h)
+    K = E[:2] @ np.column_stack([along_x[2], along_y[2]]) @ np.linalg.inv(metric)
+    T = E[1] @ np.column_stack([along_x[0], along_y[0]]) @ np.linalg.inv(metric)
+    return E, metric, K, T
+
+
+@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+@pytest.mark.parametrize("seed", range(5))
+def test_frame_metric_and_forms_are_what_montana_defines(patch, seed):
+    surface, (x, y) = steep(seed, patch), (0.061, 0.033)
+
+    ours = surface.geometry(np.array([x, y]))
+
+    E, metric, K, T = by_differences(surface, x, y)
+    size = np.abs(K).max()
+    np.testing.assert_allclose(ours.frame, E, atol=1e-5)
+    np.testing.assert_allclose(ours.metric, metric, atol=1e-5)
+    np.testing.assert_allclose(ours.curvature_form, K, atol=1e-4 * size)
+    np.testing.assert_allclose(ours.torsion_form, T, atol=1e-4 * size)
+    assert np.linalg.det(ours.frame) == pytest.approx(1, abs=1e-12)
+
+
+@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+def test_the_fundamental_forms_are_those_of_the_derivatives(patch):
+    surface = steep(3, patch)
+    geometry = surface.geometry(HERE)
+
+    _, metric, K, _ = by_differences(surface, *HERE[0])
+    np.testing.assert_allclose(geometry.first_form[0], metric.T @ metric, atol=1e-5)
+    np.testing.assert_allclose(
+        geometry.second_form[0], metric.T @ K @ metric, atol=1e-4 * np.abs(K).max()
+    )
+    np.testing.assert_allclose(geometry.second_form, geometry.second_form.swapaxes(1, 2))
+
+
+@given(st.integers(0, 10**6), st.floats(-math.pi, math.pi))
+def test_turning_the_coordinates_turns_the_directions_and_nothing_else(seed, angle):
+    c = np.random.default_rng(seed).normal(size=(4, 4)) * 0.01
+    c /= 0.04 ** np.add.outer(np.arange(4), np.arange(4))
+    middle, out = np.array([0.05, 0.04]), np.array([[0.012, -0.007], [-0.02, 0.01]])
+    cos, sin = math.cos(angle), math.sin(angle)
+    turn = np.array([[cos, -sin], [sin, cos]])
+
+    plain = polynomial(c).geometry(middle + out)
+    turned = polynomial(c, angle).geometry(middle + out @ turn.T)
+
+    scale = np.abs(plain.principal).max()
+    np.testing.assert_allclose(turned.principal, plain.principal, atol=1e-10 * scale)
+    np.testing.assert_allclose(turned.mean, plain.mean, atol=1e-10 * scale)
+    np.testing.assert_allclose(turned.gaussian, plain.gaussian, atol=1e-10 * scale**2)
+    in_space = np.block([[turn, np.zeros((2, 1))], [np.zeros((1, 2)), np.eye(1)]])
+    apart = (plain.principal[:, 0] - plain.principal[:, 1]) > 1e-3 * scale
+    along = np.einsum("pki,pki->pk", turned.directions, plain.directions @ in_space.T)
+    np.testing.assert_allclose(np.abs(along[apart]), 1, atol=1e-6)
+
+
+@given(st.integers(0, 10**6))
+def test_along_a_principal_direction_the_normal_turns_in_that_direction(seed):
+    geometry = steep(seed).geometry(HERE)
+
+    in_plane = np.einsum("pki,pji->pkj", geometry.directions, geometry.frame[:, :2])
+    turned = np.einsum("pij,pkj->pki", geometry.curvature_form, in_plane)
+
+    scale = np.abs(geometry.principal).max() + 1
+    expected = geometry.principal[:, :, None] * in_plane
+    np.testing.assert_allclose(turned, expected, atol=1e-10 * scale)
+
+
+@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+def test_the_curl_of_the_torsion_is_the_gaussian_curvature(patch):
+    basis, c = sine_surface(patch)
+    zero = np.zeros((12, 12))
+
+    def turning(x, y):  # T metric: how the frame spins per step in x and in y
+        g = surface_geometry(basis, c, np.array([[x, y]]), zero)
+        return (g.torsion_form[:, None] @ g.metric)[0, 0]
+
+    h = 1e-5
+    for x, y in [(0.031, 0.052), (0.07, 0.015), (0.02, 0.03)]:
+        curl = (turning(x + h, y)[1] - turning(x - h, y)[1]) / (2 * h)
+        curl -= (turning(x, y + h)[0] - turning(x, y - h)[0]) / (2 * h)
+        g = surface_geometry(basis, c, np.array([x, y]), zero)
+        # Gauss's Theorema Egregium: bending from inside, without a normal.
+        assert -curl == pytest.approx(g.gaussian * np.linalg.det(g.metric), rel=1e-4)
+
+
+@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+def test_gauss_and_bonnet_hold_around_a_rectangle(patch):
+    basis, c = sine_surface(patch, 1)
+    t, w = np.polynomial.legendre.leggauss(40)
+    (x0, x1), (y0, y1) = (0.013, 0.078), (0.009, 0.069)
+    x, wx = x0 + (t + 1) / 2 * (x1 - x0), w / 2 * (x1 - x0)
+    y, wy = y0 + (t + 1) / 2 * (y1 - y0), w / 2 * (y1 - y0)
+
+    def at(x, y):
+        positions = np.stack(np.broadcast_arrays(x, y), axis=-1).reshape(-1, 2)
+        return surface_geometry(basis, c, positions, np.zeros((12, 12)))
+
+    def spin(geometry, axis):
+        return np.einsum("pi,pi->p", geometry.torsion_form, geometry.metric[:, :, axis])
+
+    around = wx @ (spin(at(x, y0), 0) - spin(at(x, y1), 0))
+    around += wy @ (spin(at(x1, y), 1) - spin(at(x0, y), 1))
+
+    inside = at(*np.meshgrid(x, y, indexing="ij"))
+    total = np.multiply.outer(wx, wy).ravel() @ (inside.gaussian * np.linalg.det(inside.metric))
+    assert -around == pytest.approx(total, rel=1e-9)
+    assert abs(total) > 0.005
+
+
+def test_an_umbilic_point_has_directions_and_error_bars():
+    basis = SineBasis(FLAT, 3, 3)
+    flat = surface_geometry(basis, np.zeros((3, 3)), HERE[:3], np.eye(9))
+
+    for values in (flat.principal, flat.principal_sd, flat.directions, flat.angle, flat.mean_sd):
+        assert np.isfinite(values).all()
+    assert (flat.principal_sd > 0).all()
+    np.testing.assert_allclose(flat.directions @ flat.directions.swapaxes(1, 2), [np.eye(2)] * 3)
+
+
+def test_one_point_and_many_points_are_answered_alike():
+    basis, c = sine_surface(BENT)
+    covariance = np.diag(np.linspace(1, 2, 12)) * 1e-8
+
+    many = surface_geometry(basis, c, HERE, covariance)
+
+    for p, here in enumerate(HERE):
+        one = surface_geometry(basis, c, here, covariance)
+        for field in fields(one):
+            ours, theirs = getattr(one, field.name), getattr(many, field.name)[p]
+            assert ours.shape == theirs.shape
+            np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
+
+
+def noisy_fits(curvature, layout, draws, noise=0.231):
+    fit = LeastSquares(SineBasis(layout.patch, 8, 8), layout)
+    rng = np.random.default_rng(0)
+    return [fit(curvature + rng.normal(0, noise, curvature.shape)) for _ in range(draws)]
+
+
+@pytest.mark.parametrize("name", ["mean", "gaussian", "principal"])
+def test_the_error_bars_are_the_scatter_of_noisy_shapes(name):
+    patch = Patch(0.1, 0.1)
+    layout, basis = SensorLayout.regular(patch, 10, 10), SineBasis(patch, 8, 8)
+    c = Plate(patch).deflection([PointLoad(0.06, 0.045, 0.2)], basis)
+    K = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+    here = np.array([0.066, 0.047])
+
+    all_of = [local_geometry(fit, here) for fit in noisy_fits(K, layout, 2500)]
+
+    values = np.array([getattr(g, name) for g in all_of])
+    told = np.array([getattr(g, f"{name}_sd") for g in all_of]).mean(axis=0)
+    # The standard error of a standard deviation over 2500 draws is 1.4 %.
+    np.testing.assert_allclose(values.std(axis=0), told, rtol=0.05)
+    exact = surface_geometry(basis, c, here, np.zeros((64, 64)))
+    np.testing.assert_allclose(values.mean(axis=0), getattr(exact, name), atol=0.1 * told.min())
+
+
+def test_readings_that_are_missing_widen_the_error_bars():
+    patch = Patch(0.1, 0.1)
+    layout = SensorLayout.regular(patch, 10, 10)
+    fit = LeastSquares(SineBasis(patch, 8, 8), layout, sigma=0.231)
+    K = np.random.default_rng(0).normal(0, 0.231, (3, 100))
+    missing = K.copy()
+    missing[:, [44, 45, 54, 55]] = np.nan
+
+    here = np.array([0.05, 0.05])
+
+    assert local_geometry(fit(missing), here).mean_sd > 1.1 * local_geometry(fit(K), here).mean_sd
+
+
+def test_what_is_not_one_frame_or_not_places_is_refused():
+    layout = SensorLayout.regular(FLAT, 4, 4)
+    fit = LeastSquares(SineBasis(FLAT, 3, 3), layout)
+
+    with pytest.raises(Refusal, match=r"fit of one frame, got .* \(2, 3, 3\)"):
+        local_geometry(fit(np.zeros((2, 3, 16))), HERE)
+    with pytest.raises(Refusal, match=r"\(P, 2\) in m, got \(3, 3\) and \(3,\)"):
+        local_geometry(fit(np.zeros((3, 16))), np.zeros(3))
+
+
+def test_an_estimate_tells_the_geometry_at_its_contact():
+    scene = load_scene("centre")
+    pipeline = Pipeline(scene.sensor(), Setup())
+    estimate = pipeline(Simulator(scene).frame(0, lambda: 0.0))
+
+    here = local_geometry(pipeline.fit(estimate.curvature), estimate.touch.position)
+
+    np.testing.assert_array_equal(estimate.geometry.curvature_form, here.curvature_form)
+    # A push dents the skin: concave as seen from where it comes.
+    assert (estimate.geometry.principal < -5).all()
+    assert estimate.geometry.position[2] == pytest.approx(-4.65e-3, abs=0.15e-3)
+    assert (estimate.geometry.principal_sd < 0.3).all()
+    np.testing.assert_allclose(estimate.geometry.normal, [0, 0, 1], atol=0.01)
+
+
+def test_without_a_contact_there_is_no_geometry():
+    scene = load_scene("centre")
+    pipeline = Pipeline(scene.sensor(), Setup())
+    frame = Simulator(type(scene)("idle", scene.plate, scene.layout)).frame(0, lambda: 0.0)
+
+    geometry = pipeline(frame).geometry
+
+    assert all(np.isnan(getattr(geometry, field.name)).all() for field in fields(geometry))
+    assert np.isnan(geometry.principal).all()
+    assert np.isnan(geometry.principal_sd).all()
