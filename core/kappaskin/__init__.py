@@ -39,6 +39,10 @@ from kappaskin.scene import load_scene as load_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
 from kappaskin.touch import PointContact as PointContact
+from kappaskin.transduction import FIRST_GENERATION as FIRST_GENERATION
+from kappaskin.transduction import SECOND_GENERATION as SECOND_GENERATION
+from kappaskin.transduction import Amplifier as Amplifier
 from kappaskin.transduction import Converter as Converter
 from kappaskin.transduction import HalfBridge as HalfBridge
+from kappaskin.transduction import Multiplexer as Multiplexer
 from kappaskin.transduction import Transduction as Transduction

@@ -33,9 +33,9 @@ class Sensor:
         scan_time = self.transduction.scan_time(self.channels)
         if not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):
             raise Refusal(
-                f"{self.channels} channels at {self.transduction.converter.conversion_time * 1e6:g}"
-                f" us take {scan_time * 1e3:.3g} ms: expected a rate of at most {1 / scan_time:.1f}"
-                f" frames/s, got {self.rate:g}; lower the rate or the conversion time"
+                f"{self.channels} channels at {self.transduction.channel_time * 1e6:g} us take "
+                f"{scan_time * 1e3:.3g} ms: expected a rate of at most {1 / scan_time:.1f} "
+                f"frames/s, got {self.rate:g}; lower the rate or the conversion time"
             )
 
     @property

@@ -1,7 +1,7 @@
-"""Curvature to volts to ADC counts, and back."""
+"""Curvature to volts to ADC counts, and back: the chain of Figs. 4 and 5."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
 
@@ -15,28 +15,56 @@ ELASTIC_LIMIT = 0.01
 """Strain up to which metal-foil gages are elastic (paper, section 2.3)."""
 
 
-def _require_positive(owner: object, names: tuple[str, ...]) -> None:
+def _require_positive(owner: object, *names: str) -> None:
     for name in names:
         value = getattr(owner, name)
         if not (math.isfinite(value) and value > 0):
             raise Refusal(f"expected {type(owner).__name__}.{name} above zero, got {value}")
 
 
+def _require_not_negative(owner: object, name: str) -> None:
+    value = getattr(owner, name)
+    if not (math.isfinite(value) and value >= 0):
+        raise Refusal(f"expected {type(owner).__name__}.{name} of at least zero, got {value}")
+
+
 @dataclass(frozen=True)
 class HalfBridge:
-    """Back-to-back strain gages in a half-bridge with an amplifier.
+    """Back-to-back strain gages in a half-bridge, and the dummy half-bridge beside it (Fig. 4).
 
-    Thicknesses in m, excitation in V; gage factor and gain have no unit.
+    Thicknesses in m, excitation V_in in V; the gage factor has no unit. `gage_resistance` R_g in
+    ohm is that of an unstrained gage, `gage_mismatch` by what share of it the lower gage of a pair
+    exceeds the upper one. `dummy_resistance` R_d in ohm is the lower arm of the dummy, whose middle
+    stands at `balance_voltage` V_bal in V; None means half of the excitation, two equal arms.
+
+    One gage of a pair stretches by what the other shrinks, so their sum stays 2 R_g and the middle
+    moves in proportion to the strain, however large it is: nothing of a quarter bridge's
+    nonlinearity is left to model. A mismatch m bends that line by the share m GF strain / 2, 1e-4
+    at 1 % of each, and a multiplexer of the supply tilts it by less than m / 2: neither is modelled.
     """
 
     gage_factor: float = 2.1
     substrate_thickness: float = 225e-6
     gage_thickness: float = 25e-6
     excitation: float = 5.0
-    gain: float = 100.0
+    gage_resistance: float = 350.0
+    gage_mismatch: float = 0.0
+    dummy_resistance: float = 350.0
+    balance_voltage: float | None = None
 
     def __post_init__(self) -> None:
-        _require_positive(self, tuple(f.name for f in fields(self)))
+        _require_positive(self, "gage_factor", "substrate_thickness", "gage_thickness")
+        _require_positive(self, "excitation", "gage_resistance", "dummy_resistance")
+        if not abs(self.gage_mismatch) < 1:
+            raise Refusal(
+                "expected HalfBridge.gage_mismatch between -1 and 1, a share of the gage's "
+                f"resistance, got {self.gage_mismatch}"
+            )
+        if not 0 < self.v_bal < self.excitation:
+            raise Refusal(
+                f"expected HalfBridge.balance_voltage between 0 and the excitation of "
+                f"{self.excitation:g} V, got {self.balance_voltage}"
+            )
 
     @property
     def thickness(self) -> float:
@@ -44,13 +72,60 @@ class HalfBridge:
         return self.substrate_thickness + self.gage_thickness
 
     @property
-    def sensitivity(self) -> float:
-        """Volts out per 1/m of curvature: V_in GF (t_s + t_g) Gain / 4 (Eq. 7)."""
-        return self.excitation * self.gage_factor * self.thickness * self.gain / 4
+    def v_bal(self) -> float:
+        """V_bal in V, where the middle of the dummy half-bridge stands."""
+        return self.excitation / 2 if self.balance_voltage is None else self.balance_voltage
+
+    @property
+    def dummy_arms(self) -> tuple[float, float]:
+        """The dummy's upper and lower resistor in ohm: a divider of V_in to V_bal."""
+        R_d = self.dummy_resistance
+        return R_d * (self.excitation / self.v_bal - 1), R_d
 
     def strain(self, curvature: ArrayLike) -> Array:
         """Gage strain: curvature in 1/m times half the distance between the gages."""
         return np.asarray(curvature, float) * self.thickness / 2
+
+    def fed(self, supply_resistance: float = 0.0) -> float:
+        """Volts across a pair that is fed through `supply_resistance` in ohm."""
+        R_g = self.gage_resistance
+        return self.excitation * 2 * R_g / (2 * R_g + supply_resistance)
+
+    def null_voltage(self, supply_resistance: float = 0.0) -> float:
+        """The balance voltage in V at which an unbent pair gives no voltage."""
+        return self.fed(supply_resistance) * (1 + self.gage_mismatch / 2) / 2
+
+    def balanced(self, supply_resistance: float = 0.0) -> "HalfBridge":
+        """The same bridge with its dummy at `null_voltage`."""
+        return replace(self, balance_voltage=self.null_voltage(supply_resistance))
+
+
+@dataclass(frozen=True)
+class Multiplexer:
+    """Connects one half-bridge after the other; `settling_time` in s before each conversion.
+
+    `supply_resistance` in ohm is what it puts between the excitation and the pair it feeds. It is
+    0 for a multiplexer of signals as in Fig. 4: that one stands before an amplifier whose inputs
+    draw no current, so nothing drops across its on-resistance and there is nothing to model.
+    """
+
+    settling_time: float = 0.0
+    supply_resistance: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_not_negative(self, "settling_time")
+        _require_not_negative(self, "supply_resistance")
+
+
+@dataclass(frozen=True)
+class Amplifier:
+    """An instrumentation amplifier; its output stays between minus and plus `rail` in V."""
+
+    gain: float = 100.0
+    rail: float = 2.5
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "gain", "rail")
 
 
 @dataclass(frozen=True)
@@ -58,7 +133,7 @@ class Converter:
     """A bipolar analog-to-digital converter, scanned over all channels.
 
     Reads volts between minus and plus `full_scale` as signed counts of `bits`; `offset` in V is
-    what it reads at zero curvature; `conversion_time` in s per channel bounds the frame rate.
+    what it reads of no voltage; `conversion_time` in s per channel bounds the frame rate.
     """
 
     bits: int = 16
@@ -67,7 +142,7 @@ class Converter:
     conversion_time: float = 5e-6
 
     def __post_init__(self) -> None:
-        _require_positive(self, ("full_scale", "conversion_time"))
+        _require_positive(self, "full_scale", "conversion_time")
         if not (8 <= self.bits <= 24 and self.bits == int(self.bits)):
             raise Refusal(f"expected a converter of 8 to 24 bits, got {self.bits}")
         if not abs(self.offset) < self.full_scale:
@@ -78,7 +153,7 @@ class Converter:
 
     @cached_property
     def limits(self) -> tuple[int, int]:
-        """The lowest and highest count: the rails."""
+        """The lowest and highest count."""
         return -(2 ** (self.bits - 1)), 2 ** (self.bits - 1) - 1
 
     @property
@@ -89,33 +164,108 @@ class Converter:
 
 @dataclass(frozen=True)
 class Transduction:
-    """What turns curvature in 1/m into counts, the same for every channel (Eqs. 7, 8)."""
+    """What turns curvature in 1/m into counts, the same for every channel (Figs. 4, 5; Eqs. 7, 8).
+
+    Refused when the unbent skin already drives the amplifier or the converter to a rail.
+    """
 
     bridge: HalfBridge = HalfBridge()
+    multiplexer: Multiplexer = Multiplexer()
+    amplifier: Amplifier = Amplifier()
     converter: Converter = Converter()
+
+    def __post_init__(self) -> None:
+        if not (0 < self.sensitivity < math.inf and 0 < self.resolution < math.inf):
+            raise Refusal(
+                f"expected electronics that turn 1/m into volts, got {self.sensitivity} V per 1/m "
+                f"with steps of {self._step} V; check thicknesses, gain and excitation"
+            )
+        out, rail = self._resting, self.amplifier.rail
+        low, high = self.limits
+        if not (abs(out) < rail and low < (out + self.converter.offset) / self._step < high):
+            raise Refusal(
+                f"expected the unbent skin to read inside +-{rail:g} V at the amplifier and "
+                f"+-{self.converter.full_scale:g} V at the converter, got {out:.4g} V with a "
+                f"balance voltage of {self.bridge.v_bal:g} V; balance the bridge with "
+                f"{self.bridge.null_voltage(self.multiplexer.supply_resistance):.6g} V"
+            )
+
+    @property
+    def _resting(self) -> float:
+        """Volts out of the amplifier when the skin is not bent."""
+        null = self.bridge.null_voltage(self.multiplexer.supply_resistance)
+        return self.amplifier.gain * (null - self.bridge.v_bal)
+
+    @cached_property
+    def offset(self) -> float:
+        """Volts that the converter reads when the skin is not bent."""
+        return self._resting + self.converter.offset
+
+    @cached_property
+    def sensitivity(self) -> float:
+        """Volts out per 1/m of curvature: V_in GF (t_s + t_g) Gain / 4 (Eq. 7).
+
+        V_in is what a multiplexer of the supply leaves of the excitation.
+        """
+        V_in = self.bridge.fed(self.multiplexer.supply_resistance)
+        GF, t = self.bridge.gage_factor, self.bridge.thickness
+        return V_in * GF * t * self.amplifier.gain / 4
+
+    @property
+    def _step(self) -> float:
+        return self.converter.step
 
     @cached_property
     def resolution(self) -> float:
         """Curvature of one count, in 1/m."""
-        return self.converter.step / self.bridge.sensitivity
+        return self._step / self.sensitivity
 
     @cached_property
     def _offset(self) -> float:
-        """Curvature that the converter's offset looks like, in 1/m."""
-        return self.converter.offset / self.bridge.sensitivity
+        """Curvature that the offset looks like, in 1/m."""
+        return self.offset / self.sensitivity
+
+    @cached_property
+    def limits(self) -> tuple[int, int]:
+        """The lowest and highest count that can come: the converter's, or the amplifier's rails."""
+        low, high = self.converter.limits
+        rail, offset = self.amplifier.rail, self.converter.offset
+        return (
+            max(low, round((offset - rail) / self._step)),
+            min(high, round((offset + rail) / self._step)),
+        )
+
+    @property
+    def strain_limit_curvature(self) -> float:
+        """Curvature in 1/m that strains a gage by 1 %: beyond it, metal foil is not elastic."""
+        return ELASTIC_LIMIT / float(self.bridge.strain(1.0))
+
+    def overstrained(self, curvature: ArrayLike) -> Mask:
+        """Which elements (..., P) are bent beyond `strain_limit_curvature`.
+
+        `curvature` (..., 3, P) in 1/m. What counts is the larger principal curvature, the most
+        that a gage along any direction can see; where a reading is missing (NaN), the largest of
+        the others, which is never more.
+        """
+        K = np.asarray(curvature, float)
+        if K.ndim < 2 or K.shape[-2] != 3:
+            raise Refusal(f"expected curvature of shape (..., 3, P) in 1/m, got {K.shape}")
+        xx, yy, xy = (K[..., n, :] for n in range(3))
+        with np.errstate(invalid="ignore"):  # of infinite readings the differences are NaN
+            principal = np.abs(xx + yy) / 2 + np.hypot((xx - yy) / 2, xy)
+        largest = np.fmax.reduce([np.abs(xx), np.abs(yy), np.abs(xy), principal])
+        return largest > self.strain_limit_curvature
 
     def counts(self, curvature: Array) -> Counts:
-        """What the converter reads, clipped at its rails; NaN is refused."""
-        volts = self.bridge.sensitivity * curvature + self.converter.offset
+        """What the converter reads, clipped at the rails; NaN is refused."""
+        volts = self.sensitivity * curvature + self.offset
         if np.isnan(volts).any():
             raise Refusal("expected numbers of curvature, got NaN; a converter always reads one")
-        return np.clip(np.rint(volts / self.converter.step), *self.converter.limits).astype(
-            np.int32
-        )
+        return np.clip(np.rint(volts / self._step), *self.limits).astype(np.int32)
 
     def curvature(self, counts: Counts) -> Array:
         """Curvature in 1/m (Eq. 8); NaN on the rails, where the true value is unknown."""
-        low, high = self.converter.limits
+        low, high = self.limits
         curvature = cast("Array", counts * self.resolution - self._offset)
         if counts.size and (counts.min() <= low or counts.max() >= high):
             curvature[self.saturated(counts)] = np.nan
@@ -123,13 +273,35 @@ class Transduction:
 
     def saturated(self, counts: Counts) -> Mask:
         """Which counts stand on a rail."""
-        low, high = self.converter.limits
+        low, high = self.limits
         return (counts <= low) | (counts >= high)
+
+    @property
+    def channel_time(self) -> float:
+        """Seconds that one channel takes: settling, then conversion."""
+        return self.multiplexer.settling_time + self.converter.conversion_time
 
     def scan_time(self, channels: int) -> float:
         """Seconds for one scan: conversion, not arithmetic, bounds the frame rate."""
-        return channels * self.converter.conversion_time
+        return channels * self.channel_time
 
 
-PAPER = Transduction(converter=Converter(bits=12, conversion_time=20e-6))
-"""The paper's time scale: 20 us per conversion, 300 channels at 167 frames/s."""
+# The paper gives neither excitation, gain, gage nor converter: the defaults above, 12 bits, and
+# 20 us that hold the settling too. A foil gage is taken as 25 um of polyimide with 5 um of foil.
+_GAGE = 30e-6
+_CONVERTER = Converter(bits=12, conversion_time=20e-6)
+
+FIRST_GENERATION = Transduction(
+    HalfBridge(substrate_thickness=2 * (25e-6 + 13e-6) + 50e-6, gage_thickness=_GAGE),
+    converter=_CONVERTER,
+)
+"""The first prototype (section 3, Fig. 3): two halves of flex circuit with 13 um copper foil,
+glued by an adhesive film. Assumed: 25 um of polyimide in each half, as in the second, and a film
+of 50 um; 126 um of substrate in all."""
+
+SECOND_GENERATION = Transduction(
+    HalfBridge(substrate_thickness=25e-6 + 2 * 35e-6, gage_thickness=_GAGE),
+    converter=_CONVERTER,
+)
+"""The second prototype (section 5, Fig. 5): gages bonded to 25 um of polyimide clad with 35 um of
+copper on both sides. Assumed: the copper stays under the gages; 95 um of substrate in all."""
