@@ -12,6 +12,7 @@ from kappaskin.errors import RankDeficient
 from kappaskin.fit import Fit, LeastSquares
 from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.geometry import contact_geometry
+from kappaskin.hold import Hold
 from kappaskin.sensor import Sensor
 from kappaskin.touch import NO_TOUCH, PointContact
 
@@ -20,7 +21,8 @@ from kappaskin.touch import NO_TOUCH, PointContact
 class Setup:
     """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points.
 
-    `edge` says which functions; empty, those for the edge that the sensor says it has.
+    `edge` says which functions; empty, those for the edge that the sensor says it has. A channel
+    that a frame leaves out keeps its last reading until that is `hold` s old.
     """
 
     Ni: int = 8
@@ -28,6 +30,7 @@ class Setup:
     nx: int = 65
     ny: int = 65
     edge: str = ""
+    hold: float = 0.1
 
 
 class Pipeline:
@@ -52,6 +55,7 @@ class Pipeline:
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
+        self._hold = Hold(sensor.channels, setup.hold)
         self._dead = ~sensor.layout.live.ravel()
         self._any_dead = bool(self._dead.any())
         self._no_shape = np.full(self.basis.shape, np.nan)
@@ -74,7 +78,7 @@ class Pipeline:
             return Fit(self.fit, nothing, nothing, unknown, np.array(math.nan))
 
     def __call__(self, frame: Frame) -> Estimate:
-        curvature = self.curvature(frame)
+        curvature, fresh = self._hold(frame, self.curvature(frame))
         fit = self._fitted(curvature)
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
@@ -86,6 +90,7 @@ class Pipeline:
             frame.host_time,
             self._clock(),
             curvature,
+            fresh,
             fit.residual,
             fit.coefficients,
             surface,

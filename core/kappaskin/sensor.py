@@ -2,9 +2,13 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
+from kappaskin.scan import Scan
 from kappaskin.transduction import Transduction
 
 
@@ -41,3 +45,19 @@ class Sensor:
     @property
     def channels(self) -> int:
         return 3 * len(self.layout)
+
+    def scan(self, channels: ArrayLike | None = None) -> Scan:
+        """The scan of `channels` (C,) in their order; of all of them when left out."""
+        every = np.arange(self.channels)
+        chosen = every if channels is None else np.asarray(channels)
+        if chosen.size and not (chosen.dtype.kind in "iu" and chosen.max() < self.channels):
+            raise Refusal(
+                f"expected channels from 0 to {self.channels - 1}, got {channels!s:.80}; channel "
+                "component * P + element is one reading"
+            )
+        electronics = self.transduction
+        return Scan(
+            chosen.astype(np.intp),
+            electronics.multiplexer.settling_time,
+            electronics.converter.conversion_time,
+        )

@@ -22,7 +22,7 @@ from kappaskin import (
     load_scene,
 )
 
-SETUP = Setup(nx=33, ny=17)
+SETUP = Setup(nx=33, ny=17, hold=0)
 QUIET = replace(load_scene("off-centre"), effects=())
 FINE = Transduction(converter=Converter(bits=24))
 
