@@ -43,7 +43,8 @@ class Scan:
     @cached_property
     def times(self) -> Array:
         """Seconds (C,) from the start of the frame to each channel's reading: the skew."""
-        return np.arange(len(self.channels)) * self.interval + self.settling_time
+        places = np.arange(len(self.channels), dtype=np.float64)
+        return self.settling_time + places * self.interval
 
     @property
     def duration(self) -> float:
