@@ -100,6 +100,10 @@ class Pipeline:
             *self._compared(surface, fit.coefficients, frame.truth),
         )
 
+    def pass_over(self, frame: Frame) -> None:
+        """Hold the readings of a frame of which nobody waits for the estimate."""
+        self._hold(frame, self.curvature(frame))
+
     def _compared(
         self, surface: Array, coefficients: Array, truth: Truth | None
     ) -> tuple[Array, Array, float, float]:

@@ -3,7 +3,10 @@
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from kappaskin.frames import Frame
+from kappaskin.intrinsic import ForceTorqueSensor, Wrench
 from kappaskin.region import Scanner
 from kappaskin.scene import Scene
 from kappaskin.sensor import Sensor
@@ -11,6 +14,7 @@ from kappaskin.simulate import Simulator
 from kappaskin.sources.wire import Accounting
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
+_DEPTH = 0.02  # m from the middle of the skin down to the force/torque sensor
 _ROUNDING = 1e-3  # of a frame: a clock that was slept to may stand a rounding error before it
 
 
@@ -30,6 +34,11 @@ class SimulatedSource:
         self._first, self._since, self._rate = 0, 0.0, self._sensor.rate
         self._all = self._sensor.scan()
         self._scanner: Scanner | None = None
+        patch = scene.plate.patch
+        self.base = ForceTorqueSensor((patch.a / 2, patch.b / 2, -_DEPTH))
+        """The simulated force/torque sensor that carries the skin."""
+        self._base_noise = np.random.default_rng(scene.seed)
+        self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
 
     @property
@@ -56,9 +65,13 @@ class SimulatedSource:
             rate = min(self._scanner.rate, scan.rate)
         if rate != self._rate:
             self._first, self._since, self._rate = self._n, due, rate
-        frame = self._simulator.scanned(scan, self._n, due, self._clock)
-        self._n += 1
-        return frame
+        self._n, self._taken = self._n + 1, due
+        return self._simulator.scanned(scan, self._n - 1, due, self._clock)
+
+    def wrench(self) -> Wrench:
+        """What `base` reads of the contact, at the time of the last frame."""
+        scene = self._simulator.scene
+        return self.base.read(scene.plate.patch, scene.loads_at(self._taken), self._base_noise)
 
     def read(self, timeout: float) -> list[Frame]:
         now, due = self._clock(), self._start + self._due()
