@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ from kappaskin.geometry import contact_geometry
 from kappaskin.hold import Hold
 from kappaskin.sensor import Sensor
 from kappaskin.touch import NO_TOUCH, PointContact
+
+_LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undecided
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,7 @@ class Pipeline:
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         self.fit = LeastSquares(self.basis, sensor.layout)
+        self._loosest = _LOOSE * math.sqrt(np.trace(self.fit.unit_covariance()))
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
@@ -71,11 +75,12 @@ class Pipeline:
         return flat.reshape(3, -1)
 
     def _fitted(self, curvature: Array) -> Fit:
-        try:
-            return self.fit(curvature)
-        except RankDeficient:
-            nothing, unknown = self._no_shape, np.full_like(curvature, np.nan)
-            return Fit(self.fit, nothing, nothing, unknown, np.array(math.nan))
+        with suppress(RankDeficient):
+            fit = self.fit(curvature)
+            if np.linalg.norm(fit.unit_sd) <= self._loosest:
+                return fit
+        nothing, unknown = self._no_shape, np.full_like(curvature, np.nan)
+        return Fit(self.fit, nothing, nothing, unknown, np.array(math.nan))
 
     def __call__(self, frame: Frame) -> Estimate:
         curvature, fresh = self._hold(frame, self.curvature(frame))

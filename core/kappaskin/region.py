@@ -28,8 +28,9 @@ class Region:
     "intrinsic": the elements within `radius` m of the contact that the skin itself, or a
     force/torque sensor at the base of the fingertip, reports, and everything while there is none.
     `share` of the other elements are scanned besides in each frame, so that each of them comes up
-    every 1 / share frames; with a share of 0 never. `rate` is asked for, in frames/s; the scan may
-    allow fewer.
+    every 1 / share frames. With a share of 0 none do, until what is held of them has expired and
+    the readings left decide no shape; then everything is scanned once. `rate` is asked for, in
+    frames/s; the scan may allow fewer.
     """
 
     around: str = OFF

@@ -193,6 +193,20 @@ def test_patterns_of_missing_readings_that_change_each_frame_stay_exact():
         )
 
 
+def test_readings_that_hardly_decide_the_shape_give_none():
+    # All elements within 35 mm of a point aside: full rank, but 8000 times the error bars.
+    near = np.flatnonzero(np.hypot(*(SCENE.layout.positions - [0.03, 0.035]).T) <= 0.035)
+    channels = (np.arange(3)[:, None] * 100 + near).ravel()
+    pipeline = Pipeline(SCENE.sensor(), Setup(nx=9, ny=9))
+
+    estimate = pipeline(only_these(channels, 0.0))
+
+    assert len(channels) > 64
+    assert np.linalg.matrix_rank(pipeline.fit.M[channels]) == 64
+    assert np.isnan(estimate.surface).all()
+    assert not estimate.touch.present
+
+
 def test_a_frame_passed_over_is_held_all_the_same():
     pipeline = Pipeline(SCENE.sensor(), Setup(nx=9, ny=9))
     pipeline.pass_over(FRAME)
