@@ -102,6 +102,12 @@ def _no_touch(reason: str) -> IntrinsicTouch:
     return IntrinsicTouch(nowhere, nowhere, nan, nan, nowhere, nowhere, nan, nan, reason)
 
 
+def _across(r: Array | tuple[float, float, float]) -> Array:
+    """The matrix (3, 3) of r x; many times faster than `np.cross` for one vector."""
+    x, y, z = r
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 class IntrinsicContact:
     """The contact on a patch, flat or bent, that explains a wrench; `find(wrench)` is the touch.
 
@@ -133,7 +139,7 @@ class IntrinsicContact:
         most = -float(F[2]) if flat else math.hypot(F[0], F[2])
         if not most > self._least:
             return self._no_press(most)
-        place = self._place(F, M + np.cross(self.sensor.origin, F), most)
+        place = self._place(F, M + _across(self.sensor.origin) @ F, most)
         if place is None:
             return _no_touch("the force passes beside the skin's cylinder")
         return self._judged(place, F, M)
@@ -149,7 +155,7 @@ class IntrinsicContact:
         R, middle = self.patch.radius, self.patch.a / 2
         if math.isinf(R):
             return np.array([-M[1], M[0]]) / F[2]
-        about_axis = M - np.cross([middle, 0.0, -R], F)
+        about_axis = M - _across((middle, 0.0, -R)) @ F
         # p.t = p_x cos - p_z sin = M_y / R, on the side where p.n = p_x sin + p_z cos < 0.
         across = about_axis[1] / (R * most)
         if not abs(across) < 1:
@@ -167,7 +173,7 @@ class IntrinsicContact:
         pressure, traction = -float(F @ n), np.array([F @ t, F[1]])
         if not pressure > self._least:
             return self._no_press(pressure)
-        torque = float((M - np.cross(arm, F)) @ n)
+        torque = float((M - _across(arm) @ F) @ n)
         sd = self._spread(arm, n, t, F, torque)
         if (sd[:2] > _VAGUE * self._side).any():
             x, y = 1e3 * sd[:2]
@@ -191,9 +197,9 @@ class IntrinsicContact:
         H, e_y = self.patch.base_curvature, np.array([0.0, 1.0, 0.0])
         J, L = np.zeros((6, 6)), np.eye(6)
         J[:3, 2:5] = np.eye(3)
-        J[3:, 0] = np.cross(t, F) + torque * H * t
-        J[3:, 1], J[3:, 5] = np.cross(e_y, F), n
-        J[3:, 2:5] = np.cross(arm, np.eye(3)).T
+        J[3:, 0] = _across(t) @ F + torque * H * t
+        J[3:, 1], J[3:, 5] = _across(e_y) @ F, n
+        J[3:, 2:5] = _across(arm)
         L[2:5, 0] = -H * (F @ t), -H * (F @ n), 0.0
         L[2:5, 2:5] = -n, t, e_y
         return np.sqrt(np.square(L @ np.linalg.inv(J)) @ self._variance)
