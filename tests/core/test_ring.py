@@ -30,7 +30,7 @@ def estimate_of(pipeline: Pipeline = PIPELINE) -> Estimate:
 def numbers(value: Any) -> Array:
     """Every number in an estimate, in a row; what is true or false is none."""
     parts = [getattr(value, field.name) for field in fields(value)]
-    parts = [part for part in parts if np.asarray(part).dtype != bool or is_dataclass(part)]
+    parts = [p for p in parts if not isinstance(p, bool) and getattr(p, "dtype", None) != "?"]
     return np.concatenate([numbers(p) if is_dataclass(p) else np.ravel(p) for p in parts])
 
 
