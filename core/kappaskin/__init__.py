@@ -22,6 +22,10 @@ from kappaskin.frames import LocalGeometry as LocalGeometry
 from kappaskin.frames import Touch as Touch
 from kappaskin.frames import Truth as Truth
 from kappaskin.geometry import local_geometry as local_geometry
+from kappaskin.intrinsic import ForceTorqueSensor as ForceTorqueSensor
+from kappaskin.intrinsic import IntrinsicContact as IntrinsicContact
+from kappaskin.intrinsic import IntrinsicTouch as IntrinsicTouch
+from kappaskin.intrinsic import Wrench as Wrench
 from kappaskin.layout import SensorLayout as SensorLayout
 from kappaskin.live import Status as Status
 from kappaskin.mechanics import Compliance as Compliance
@@ -32,6 +36,12 @@ from kappaskin.mechanics import PointLoad as PointLoad
 from kappaskin.patch import Patch as Patch
 from kappaskin.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline import Setup as Setup
+from kappaskin.region import Bargain as Bargain
+from kappaskin.region import Region as Region
+from kappaskin.region import Scanner as Scanner
+from kappaskin.region import bargain as bargain
+from kappaskin.region import contact_bound as contact_bound
+from kappaskin.scan import Scan as Scan
 from kappaskin.scene import SCENES as SCENES
 from kappaskin.scene import Orbit as Orbit
 from kappaskin.scene import Scene as Scene
@@ -39,6 +49,10 @@ from kappaskin.scene import load_scene as load_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
 from kappaskin.touch import PointContact as PointContact
+from kappaskin.transduction import FIRST_GENERATION as FIRST_GENERATION
+from kappaskin.transduction import SECOND_GENERATION as SECOND_GENERATION
+from kappaskin.transduction import Amplifier as Amplifier
 from kappaskin.transduction import Converter as Converter
 from kappaskin.transduction import HalfBridge as HalfBridge
+from kappaskin.transduction import Multiplexer as Multiplexer
 from kappaskin.transduction import Transduction as Transduction

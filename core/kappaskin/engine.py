@@ -13,6 +13,7 @@ from typing import cast
 from kappaskin.frames import Estimate
 from kappaskin.live import LOST, Connect, Disconnect, Loop, Request, Status
 from kappaskin.pipeline import Setup
+from kappaskin.region import Region
 from kappaskin.ring import Ring
 from kappaskin.scene import Scene
 
@@ -52,6 +53,7 @@ class Engine:
     def __init__(self, setup: Setup | None = None) -> None:
         self._ring = Ring.create()
         self._setup = setup or Setup()
+        self._region = Region()
         self._process: BaseProcess | None = None
         self._requests: Connection[Request, Request] | None = None
         self._start()
@@ -71,6 +73,7 @@ class Engine:
             self._process.start()
         theirs.close()
         self._send(self._setup)
+        self._send(self._region)
 
     @property
     def pid(self) -> int | None:
@@ -103,6 +106,11 @@ class Engine:
     def play(self, scene: Scene) -> None:
         """Let the simulated source, if that is what there is, go on with `scene`."""
         self._send(scene)
+
+    def scan(self, region: Region) -> None:
+        """Let every frame scan `region`; where it cannot, `status` says why."""
+        self._region = region
+        self._send(region)
 
     def status(self) -> Status:
         status = self._ring.read_status() or Status()

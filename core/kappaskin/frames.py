@@ -186,7 +186,8 @@ class LocalGeometry:
 class Estimate:
     """Everything a view, a publisher or a file may show of one frame.
 
-    `curvature` and `residual` (3, P) in 1/m, NaN where a reading is missing; `coefficients`
+    `curvature` and `residual` (3, P) in 1/m, NaN where a reading is missing; `fresh` (3, P) which
+    readings this frame brought: the others are held from earlier ones; `coefficients`
     (Ni, Nj) in m; `surface` (ny, nx) in m; `noise` is the standard deviation of a reading in 1/m
     as the residual tells it; `geometry` is that of the skin at the contact. `true_surface`,
     `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a simulation made the
@@ -199,6 +200,7 @@ class Estimate:
     host_time: float
     ready_time: float
     curvature: Array
+    fresh: Mask
     residual: Array
     coefficients: Array
     surface: Array

@@ -12,11 +12,13 @@ import numpy as np
 
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.region import Region
 from kappaskin.ring import Ring, slot_type
 from kappaskin.scene import Scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources import SimulatedSource, Source, open_source
 from kappaskin.sources.wire import Accounting
+from kappaskin.steer import Steering, steered
 
 OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
 
@@ -32,7 +34,8 @@ class Status:
 
     `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
     `message` says why. `setup` is the one in use, `refusal` says why it is not the one asked for
-    last, and `computing` that another is on its way. `meetings` counts the devices that said what
+    last, and `computing` that another is on its way. `region` is scanned if `region_refusal` does
+    not say why not. `meetings` counts the devices that said what
     they are, `skipped` the frames that came in faster than they could be computed. `rate` in
     frames/s, `reader_gap` the 99th percentile of the time between two arrivals in s, `last_frame`
     and `reported` on the monotonic clock.
@@ -46,6 +49,8 @@ class Status:
     meetings: int = 0
     setup: Setup = field(default_factory=Setup)
     computing: bool = False
+    region: Region = field(default_factory=Region)
+    region_refusal: str = ""
     skipped: int = 0
     generation: int = 0
     slot: "np.dtype[np.void] | None" = None
@@ -66,7 +71,7 @@ class Disconnect:
     pass
 
 
-Request = Connect | Disconnect | Setup | Scene
+Request = Connect | Disconnect | Setup | Scene | Region
 
 
 class Loop:
@@ -79,6 +84,7 @@ class Loop:
         self._pipeline: Pipeline | None = None
         self._status = ring.read_status() or Status()
         self._asked = self._status.setup
+        self._steering: Steering | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
         self._building: Future[_Built] | None = None
@@ -110,6 +116,9 @@ class Loop:
         elif isinstance(request, Scene):
             self._scene = request
             self._play()
+        elif isinstance(request, Region):
+            self._status = replace(self._status, region=request)
+            self._steer()
         else:
             self._close()
             self._scene = None
@@ -120,6 +129,7 @@ class Loop:
                 message="",
                 sensor=None,
                 computing=False,
+                region_refusal="",
                 skipped=0,
                 slot=None,  # what the last device showed is not this one's
                 accounting=Accounting(),
@@ -141,10 +151,21 @@ class Loop:
         if isinstance(self._source, SimulatedSource) and self._scene is not None:
             self._source.play(self._scene)
 
+    def _steer(self) -> None:
+        """Let the source scan the region asked for, or say why it does not."""
+        self._steering, refusal = None, ""
+        if self._source is not None and self._status.sensor is not None:
+            try:
+                self._steering = steered(self._source, self._status.region)
+            except Refusal as reason:
+                refusal = str(reason)
+        self._status = replace(self._status, region_refusal=refusal)
+
     def _close(self) -> None:
         if self._source is not None:
             self._source.close()
         self._source, self._pipeline, self._building = None, None, None
+        self._steering = None
         self._gaps.clear()
         self._times.clear()
         self._last_read = math.inf
@@ -212,9 +233,14 @@ class Loop:
         late = max(0, len(frames) - _LIVE)
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
+        for frame in frames[:late]:
+            self._pipeline.pass_over(frame)
         for frame in frames[late:]:
-            self._ring.write(self._pipeline(frame))
+            estimate = self._pipeline(frame)
+            self._ring.write(estimate)
             self._times.append(frame.host_time)
+            if self._steering is not None:
+                self._steering(estimate.touch)
 
     def _meet(self, sensor: Sensor | None) -> None:
         """A device said what it is: make the pipeline for it."""
@@ -223,6 +249,7 @@ class Loop:
             self._status, state=STREAMING, sensor=sensor, meetings=self._status.meetings + 1
         )
         self._play()
+        self._steer()
         self._set_up(smaller=True)
 
     def _report(self) -> None:

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +13,19 @@ from kappaskin.errors import RankDeficient
 from kappaskin.fit import Fit, LeastSquares
 from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.geometry import contact_geometry
+from kappaskin.hold import Hold
 from kappaskin.sensor import Sensor
 from kappaskin.touch import NO_TOUCH, PointContact
+
+_LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undecided
 
 
 @dataclass(frozen=True)
 class Setup:
     """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points.
 
-    `edge` says which functions; empty, those for the edge that the sensor says it has.
+    `edge` says which functions; empty, those for the edge that the sensor says it has. A channel
+    that a frame leaves out keeps its last reading until that is `hold` s old.
     """
 
     Ni: int = 8
@@ -28,6 +33,7 @@ class Setup:
     nx: int = 65
     ny: int = 65
     edge: str = ""
+    hold: float = 0.1
 
 
 class Pipeline:
@@ -49,9 +55,11 @@ class Pipeline:
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         self.fit = LeastSquares(self.basis, sensor.layout)
+        self._loosest = _LOOSE * math.sqrt(np.trace(self.fit.unit_covariance()))
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
+        self._hold = Hold(sensor.channels, setup.hold)
         self._dead = ~sensor.layout.live.ravel()
         self._any_dead = bool(self._dead.any())
         self._no_shape = np.full(self.basis.shape, np.nan)
@@ -67,14 +75,15 @@ class Pipeline:
         return flat.reshape(3, -1)
 
     def _fitted(self, curvature: Array) -> Fit:
-        try:
-            return self.fit(curvature)
-        except RankDeficient:
-            nothing, unknown = self._no_shape, np.full_like(curvature, np.nan)
-            return Fit(self.fit, nothing, nothing, unknown, np.array(math.nan))
+        with suppress(RankDeficient):
+            fit = self.fit(curvature)
+            if np.linalg.norm(fit.unit_sd) <= self._loosest:
+                return fit
+        nothing, unknown = self._no_shape, np.full_like(curvature, np.nan)
+        return Fit(self.fit, nothing, nothing, unknown, np.array(math.nan))
 
     def __call__(self, frame: Frame) -> Estimate:
-        curvature = self.curvature(frame)
+        curvature, fresh = self._hold(frame, self.curvature(frame))
         fit = self._fitted(curvature)
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
@@ -86,6 +95,7 @@ class Pipeline:
             frame.host_time,
             self._clock(),
             curvature,
+            fresh,
             fit.residual,
             fit.coefficients,
             surface,
@@ -94,6 +104,10 @@ class Pipeline:
             contact_geometry(fit, touch),
             *self._compared(surface, fit.coefficients, frame.truth),
         )
+
+    def pass_over(self, frame: Frame) -> None:
+        """Hold the readings of a frame of which nobody waits for the estimate."""
+        self._hold(frame, self.curvature(frame))
 
     def _compared(
         self, surface: Array, coefficients: Array, truth: Truth | None

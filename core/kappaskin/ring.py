@@ -58,6 +58,7 @@ def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
             ("host_time", "f8"),
             ("ready_time", "f8"),
             ("curvature", "f8", (3, P)),
+            ("fresh", "?", (3, P)),
             ("residual", "f8", (3, P)),
             ("coefficients", "f8", pipeline.basis.shape),
             ("surface", *surface),

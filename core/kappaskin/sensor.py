@@ -2,9 +2,13 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
+from kappaskin.scan import Scan
 from kappaskin.transduction import Transduction
 
 
@@ -33,11 +37,27 @@ class Sensor:
         scan_time = self.transduction.scan_time(self.channels)
         if not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):
             raise Refusal(
-                f"{self.channels} channels at {self.transduction.converter.conversion_time * 1e6:g}"
-                f" us take {scan_time * 1e3:.3g} ms: expected a rate of at most {1 / scan_time:.1f}"
-                f" frames/s, got {self.rate:g}; lower the rate or the conversion time"
+                f"{self.channels} channels at {self.transduction.channel_time * 1e6:g} us take "
+                f"{scan_time * 1e3:.3g} ms: expected a rate of at most {1 / scan_time:.1f} "
+                f"frames/s, got {self.rate:g}; lower the rate or the conversion time"
             )
 
     @property
     def channels(self) -> int:
         return 3 * len(self.layout)
+
+    def scan(self, channels: ArrayLike | None = None) -> Scan:
+        """The scan of `channels` (C,) in their order; of all of them when left out."""
+        every = np.arange(self.channels)
+        chosen = every if channels is None else np.asarray(channels)
+        if chosen.size and not (chosen.dtype.kind in "iu" and chosen.max() < self.channels):
+            raise Refusal(
+                f"expected channels from 0 to {self.channels - 1}, got {channels!s:.80}; channel "
+                "component * P + element is one reading"
+            )
+        electronics = self.transduction
+        return Scan(
+            chosen.astype(np.intp),
+            electronics.multiplexer.settling_time,
+            electronics.converter.conversion_time,
+        )

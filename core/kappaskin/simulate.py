@@ -4,12 +4,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kappaskin.frames import Frame, Truth
+from kappaskin.frames import Array, Frame, Truth
+from kappaskin.mechanics import Load
+from kappaskin.scan import Scan
 from kappaskin.scene import Scene, contact_of
 
 
 class Simulator:
-    """Makes the frames of a scene; `frame(n)` must be asked for in order to repeat with a seed."""
+    """Makes the frames of a scene; they must be asked for in order to repeat with a seed.
+
+    Each channel is read at its own instant of the scan, on a skin that moves meanwhile; the truth
+    that comes with a frame is that of its start.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -32,26 +38,47 @@ class Simulator:
         self._basis = scene.basis
         self._compliance = scene.plate.compliance(self._basis)
         self._operator = scene.layout.curvature_operator(self._basis)
-        self._channels = np.arange(3 * len(scene.layout))
+        self._scan = scene.sensor().scan()
 
     def _truth(self, time: float) -> Truth:
         if self._still is not None:
             return self._still
         loads = self.scene.loads_at(time)
-        force = sum((load.modal(self._basis) for load in loads), np.zeros(self._basis.shape))
-        truth = Truth(self._compliance(force), contact_of(loads), self.scene.edge)
+        truth = Truth(self._shape(loads), contact_of(loads), self.scene.edge)
         if self.scene.motion is None:
             self._still = truth
         return truth
 
+    def _shape(self, loads: tuple[Load, ...]) -> Array:
+        """Coefficients (Ri, Rj) in m of the deflection under `loads`."""
+        force = sum((load.modal(self._basis) for load in loads), np.zeros(self._basis.shape))
+        return self._compliance(force)
+
+    def _read(self, scan: Scan, time: float, truth: Truth) -> Array:
+        """Curvature (3 P,) of a scan begun at `time`; channels outside it as at the start."""
+        scene, first = self.scene, self._operator @ truth.coefficients.ravel()
+        if scene.motion is None:
+            return first
+        # The parabola through start, middle and end, at the share s of the scan.
+        middle, last = (
+            self._operator @ self._shape(scene.loads_at(t)).ravel()
+            for t in (time + scan.duration / 2, time + scan.duration)
+        )
+        s = np.zeros(len(first))
+        s[scan.channels] = scan.times / scan.duration
+        return first + s * (4 * middle - 3 * first - last + s * 2 * (first + last - 2 * middle))
+
     def frame(self, n: int, clock: Callable[[], float]) -> Frame:
-        """Frame `n`, taken at device time n / rate; dead channels read no curvature."""
+        """Frame `n` of all channels, begun at device time n / rate."""
+        return self.scanned(self._scan, n, n / self.scene.rate, clock)
+
+    def scanned(self, scan: Scan, n: int, time: float, clock: Callable[[], float]) -> Frame:
+        """Frame `n` of what `scan` reads, begun at device `time`; dead channels read nothing."""
         scene = self.scene
-        time = n / scene.rate
         truth = self._truth(time)
-        curvature = self._operator @ truth.coefficients.ravel()
+        curvature = self._read(scan, time, truth)
         for effect in scene.effects:
             curvature = effect.apply(curvature, self._rng)
         curvature[~scene.layout.live.ravel()] = 0.0
-        counts = scene.transduction.counts(curvature)
-        return Frame(n & 0xFFFFFFFF, time, clock(), self._channels, counts, truth)
+        counts = scene.transduction.counts(curvature[scan.channels])
+        return Frame(n & 0xFFFFFFFF, time, clock(), scan.channels, counts, truth)

@@ -14,7 +14,7 @@ import numpy as np
 import psutil
 import pytest
 
-from kappaskin import Estimate, PointLoad, Setup, load_scene
+from kappaskin import Estimate, PointLoad, Region, Setup, load_scene
 from kappaskin.engine import Engine
 from kappaskin.live import LOST, OFF, STREAMING, Status
 
@@ -201,6 +201,67 @@ def test_disconnected_it_shows_nothing_new(engine) -> None:
     time.sleep(0.2)
     now = engine.latest(engine.status())
     assert (now and now.sequence) == (last and last.sequence)
+
+
+# Regions of interest
+
+
+def scanned_of(engine: Engine) -> int | None:
+    """How many readings the newest estimate brought."""
+    estimate = engine.latest(engine.status())
+    return None if estimate is None else int(estimate.fresh.sum())
+
+
+@pytest.mark.parametrize("around", ["skin", "intrinsic"])
+def test_a_region_is_scanned_around_the_contact_until_it_is_off(engine, around) -> None:
+    engine.connect("sim:")
+    next_estimate(engine)
+    region = Region(around, radius=0.02, share=0.1)
+
+    engine.scan(region)
+    assert wait_for(lambda: 0 < (scanned_of(engine) or 0) < 90)
+    estimate, status = next_estimate(engine), engine.status()
+
+    off = np.hypot(*(status.sensor.layout.positions - estimate.true_contact).T)
+    assert estimate.fresh[:, off < 0.015].all()
+    assert np.isfinite(estimate.curvature).all()
+    assert (status.region, status.region_refusal) == (region, "")
+    engine.scan(Region())
+    assert wait_for(lambda: scanned_of(engine) == 300)
+
+
+def test_a_region_that_is_not_on_the_skin_is_refused_and_everything_goes_on(engine) -> None:
+    engine.connect("sim:")
+    next_estimate(engine)
+
+    engine.scan(Region("elements", elements=(4000,)))
+    reason = wait_for(lambda: engine.status().region_refusal)
+    before = next_estimate(engine).sequence
+
+    assert "elements from 0 to 99" in reason
+    assert wait_for(lambda: next_estimate(engine).sequence > before + 50)
+    assert scanned_of(engine) == 300
+    engine.scan(Region())
+    assert wait_for(lambda: not engine.status().region_refusal)
+
+
+def test_a_region_asked_for_before_there_is_a_source_is_scanned(engine) -> None:
+    engine.scan(Region("elements", elements=(3, 4), share=0.2))
+    engine.connect("sim:")
+
+    assert wait_for(lambda: 0 < (scanned_of(engine) or 0) < 90)
+    engine.scan(Region())
+
+
+def test_an_engine_started_anew_scans_the_region_of_the_last_one(own_engine) -> None:
+    own_engine.scan(Region("elements", elements=(3, 4), share=0.2))
+    assert own_engine.pid is not None
+    os.kill(own_engine.pid, signal.SIGKILL)
+    state(own_engine, LOST, within=1.0)
+
+    own_engine.connect("sim:")
+
+    assert wait_for(lambda: 0 < (scanned_of(own_engine) or 0) < 90)
 
 
 # What it survives

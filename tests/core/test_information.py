@@ -11,8 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    Amplifier,
     Converter,
     HalfBridge,
+    Multiplexer,
     Patch,
     Plate,
     Sensor,
@@ -26,7 +28,12 @@ PATCH = Patch(0.1, 0.08)
 
 
 def sensor_on(layout: SensorLayout, **changes: Any) -> Sensor:
-    transduction = Transduction(HalfBridge(gain=51.5), Converter(bits=12, offset=-0.01))
+    transduction = Transduction(
+        HalfBridge(gage_mismatch=1e-3, balance_voltage=2.501),
+        Multiplexer(3e-6, 0.25),
+        Amplifier(51.5, 2.25),
+        Converter(bits=12, offset=-0.01),
+    )
     sensor = Sensor(
         layout,
         transduction,
@@ -127,7 +134,29 @@ def test_neither_grid_nor_positions_is_refused() -> None:
         from_json(json.dumps(found))
 
 
-@pytest.mark.parametrize("group", ["bridge", "converter"])
+PARTS = ("bridge", "multiplexer", "amplifier", "converter")
+
+
+def part(group: str, **changes: Any) -> dict[str, Any]:
+    return said(**{group: {**said()[group], **changes}})
+
+
+def test_the_default_electronics_come_back() -> None:
+    sensor = sensor_on(SensorLayout.regular(PATCH, 2, 2), transduction=Transduction())
+    assert same(from_json(to_json(sensor)), sensor)
+
+
+@pytest.mark.parametrize("value", [True, "5", None, [5], {}])
+@pytest.mark.parametrize("group", PARTS)
+def test_no_part_of_the_electronics_is_anything_but_a_number(group: str, value: Any) -> None:
+    for key in said()[group]:
+        if (key, value) == ("balance_voltage", None):
+            continue  # two equal dummy resistors
+        with pytest.raises(SourceError, match=rf"\.{key} to be a number, got "):
+            from_json(json.dumps(part(group, **{key: value})))
+
+
+@pytest.mark.parametrize("group", PARTS)
 def test_a_missing_part_of_the_electronics_is_never_guessed(group: str) -> None:
     for key in said()[group]:
         found = said()
@@ -183,10 +212,22 @@ BAD = {
     "name a number": (said(name=7), "expected name to be a text, got 7"),
     "simulated a text": (said(simulated="false"), "expected simulated to be true or false"),
     "bridge a list": (said(bridge=[1]), "expected bridge to be an object"),
-    "gain zero": (said(bridge={**said()["bridge"], "gain": 0}), "HalfBridge.gain above zero"),
-    "gain a text": (said(bridge={**said()["bridge"], "gain": "5"}), "number"),
-    "bits": (said(converter={**said()["converter"], "bits": 99}), "8 to 24 bits"),
-    "offset": (said(converter={**said()["converter"], "offset": 9}), "balance the bridge"),
+    "rate true": (said(rate=True), "expected rate to be a number, got True"),
+    "multiplexer a list": (said(multiplexer=[1]), "expected multiplexer to be an object"),
+    "amplifier a text": (said(amplifier="big"), "expected amplifier to be an object"),
+    "gage resistance zero": (part("bridge", gage_resistance=0), "gage_resistance above zero"),
+    "mismatch": (part("bridge", gage_mismatch=-2), "between -1 and 1"),
+    "balance voltage": (part("bridge", balance_voltage=9), "between 0 and the excitation"),
+    "unbalanced": (part("bridge", balance_voltage=1), "balance the bridge with 2.50"),
+    "settling": (part("multiplexer", settling_time=-1e-6), "settling_time of at least zero"),
+    "settling that slows": (part("multiplexer", settling_time=1), "rate of at most"),
+    "gain zero": (part("amplifier", gain=0), "Amplifier.gain above zero"),
+    "gain huge": (part("amplifier", gain=10**400), "too large"),
+    "rail": (part("amplifier", rail=-1), "Amplifier.rail above zero"),
+    "bits": (part("converter", bits=99), "8 to 24 bits"),
+    "bits a fraction": (part("converter", bits=12.5), "8 to 24 bits"),
+    "offset": (part("converter", offset=9), "balance the bridge"),
+    "conversion time zero": (part("converter", conversion_time=0), "conversion_time above zero"),
 }
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from kappaskin import (
+    Amplifier,
     Converter,
     Frame,
-    HalfBridge,
     Pipeline,
     PointLoad,
     RankDeficient,
@@ -22,7 +22,7 @@ from kappaskin import (
     load_scene,
 )
 
-SETUP = Setup(nx=33, ny=17)
+SETUP = Setup(nx=33, ny=17, hold=0)
 QUIET = replace(load_scene("off-centre"), effects=())
 FINE = Transduction(converter=Converter(bits=24))
 
@@ -124,8 +124,8 @@ def test_the_surface_has_a_row_for_every_y():
 def test_readings_on_a_rail_are_left_out_and_the_shape_still_follows():
     # Full scale a third above the noise-free channels' root mean square clips the peak.
     peak = np.abs(true_curvature(QUIET)).max()
-    gain = 2.5 / (HalfBridge().sensitivity / 100 * 0.7 * peak)
-    scene = replace(QUIET, transduction=Transduction(HalfBridge(gain=gain)))
+    gain = 2.5 / (Transduction().sensitivity / 100 * 0.7 * peak)
+    scene = replace(QUIET, transduction=Transduction(amplifier=Amplifier(gain)))
 
     estimate = pipeline_of(scene)(frame_of(scene))
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
+from kappaskin import Estimate, Frame, Refusal, Region, Simulator, load_scene
 from kappaskin.engine import Engine
 from kappaskin.live import LOST, STREAMING
 from kappaskin.scene import Orbit
@@ -282,6 +282,19 @@ def test_an_engine_on_a_real_port_loses_nothing_and_follows_the_contact(device) 
     assert len(errors) > 100
     assert close > 0.98
     assert all(np.isnan(e.true_contact).all() for e in estimates.values())
+
+
+def test_a_device_that_takes_no_commands_goes_on_and_the_region_is_refused_plainly(device) -> None:
+    with Engine() as engine:
+        engine.scan(Region("skin"))
+        engine.connect(device.port)
+
+        reason = wait_for(lambda: engine.status().region_refusal)
+
+        assert "a device of wire version 1, which scans what it chooses" in reason
+        assert wait_for(lambda: engine.latest(engine.status())).fresh.all()
+        engine.scan(Region())
+        assert wait_for(lambda: not engine.status().region_refusal)
 
 
 def test_a_killed_device_is_lost_within_a_second_and_another_can_take_over(device) -> None:

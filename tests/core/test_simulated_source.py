@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Frame, PointLoad, load_scene
+from kappaskin import Frame, PointLoad, Region, Scanner, load_scene
 from kappaskin.sources import SimulatedSource, open_source
 
 
@@ -161,3 +161,60 @@ def test_the_name_of_a_scene_opens_it() -> None:
         assert frame.truth is not None
         assert frame.truth.contact == pytest.approx(contact)
         source.close()
+
+
+# Parts of the skin
+
+
+def part_of(source: SimulatedSource, rate: float, *elements: int) -> Scanner:
+    assert source.sensor is not None
+    return Scanner(source.sensor, Region("elements", elements, share=0.0, rate=rate))
+
+
+def test_a_part_of_the_skin_comes_as_often_as_its_scan_allows() -> None:
+    clock = Clock()
+    source = source_of(clock=clock)
+    source.scan(part_of(source, 1e6, 3, 4))
+
+    frames = read_until(source, clock, clock.now + 0.01)
+
+    assert {tuple(f.channels) for f in frames} == {(3, 4, 103, 104, 203, 204)}
+    # Six conversions of 5 us.
+    np.testing.assert_allclose(np.diff([f.device_time for f in frames]), 30e-6, rtol=1e-9)
+    assert source.accounting().accepted == len(frames) == pytest.approx(0.01 / 30e-6, abs=2)
+
+
+def test_rates_may_change_at_any_frame_without_a_jump_in_time() -> None:
+    clock = Clock(0.0)
+    source = source_of(clock=clock)
+    times: list[float] = []
+    for rate in (100.0, 700.0, 500.0, 33.3, 1000.0):
+        source.scan(part_of(source, rate, 7))
+        times += [f.device_time for f in read_until(source, clock, clock.now + 0.1)]
+    source.scan(None)
+    times += [f.device_time for f in read_until(source, clock, clock.now + 0.1)]
+
+    steps = np.diff(times)
+
+    assert (steps > 1e-3 * (1 - 1e-9)).all()
+    assert (steps < 1 / 33.3 * (1 + 1e-9)).all()
+    assert steps[-40:] == pytest.approx(1 / 500)
+    assert times[-1] == pytest.approx(clock.now, abs=2 / 500)
+
+
+@given(st.lists(st.tuples(st.floats(0, 0.6), st.floats(20, 600)), max_size=6))
+def test_the_balance_holds_while_rates_change(steps: list[tuple[float, float]]) -> None:
+    clock = Clock()
+    source = source_of(clock=clock, rate=40.0)
+    got: list[Frame] = []
+    for pause, rate in steps:
+        source.scan(part_of(source, rate, 5))
+        clock.now += pause
+        got += source.read(0.01)
+
+    seen = source.accounting()
+
+    assert seen.accepted == len(got)
+    assert seen.span == seen.accepted + seen.lost
+    assert got == [] or seen.span == got[-1].sequence + 1
+    assert all(b.device_time > a.device_time for a, b in pairwise(got))

@@ -14,7 +14,7 @@ from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
 from kappaskin.patch import Patch
 from kappaskin.sensor import Sensor
-from kappaskin.transduction import Converter, HalfBridge, Transduction
+from kappaskin.transduction import Amplifier, Converter, HalfBridge, Multiplexer, Transduction
 
 
 def to_json(sensor: Sensor) -> str:
@@ -36,14 +36,13 @@ def to_json(sensor: Sensor) -> str:
             **{name: getattr(sensor.plate, name) for name in _ALSO_OF_THE_PLATE},
             **where,
             "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
-            "bridge": asdict(sensor.transduction.bridge),
-            "converter": asdict(sensor.transduction.converter),
+            **asdict(sensor.transduction),
         },
         separators=(",", ":"),
     )
 
 
-_Part = TypeVar("_Part", HalfBridge, Converter)
+_Part = TypeVar("_Part", HalfBridge, Multiplexer, Amplifier, Converter)
 
 _ALSO_OF_THE_PLATE = ("tension", "foundation", "fluid", "poisson")
 # What a flat plate hinged along its edges need not say.
@@ -63,7 +62,7 @@ _KINDS: dict[str, tuple[Any, tuple[str, ...]]] = {
         ("rate", "rigidity", "base_curvature", "tension", "foundation", "poisson"),
     ),
     "a list": (list, ("size", "grid", "positions", "dead_channels")),
-    "an object": (dict, ("bridge", "converter")),
+    "an object": (dict, ("bridge", "multiplexer", "amplifier", "converter")),
     "true or false": (bool, ("simulated", "strip", "fluid")),
 }
 
@@ -82,13 +81,29 @@ def _parsed(text: str) -> dict[str, Any]:
     found = UNSAID | cast("dict[str, Any]", said)
     for what, (kind, names) in _KINDS.items():
         for name in names:
-            if name in found and not isinstance(found[name], kind):
+            # Of Python's kinds, true and false are numbers too; of JSON's they are not.
+            wrong = isinstance(found.get(name), bool) and kind is not bool
+            if name in found and (wrong or not isinstance(found[name], kind)):
                 raise TypeError(f"expected {name} to be {what}, got {found[name]!r:.80}")
     return found
 
 
 def _made(kind: type[_Part], said: dict[str, Any]) -> _Part:
-    return kind(**{field.name: said[field.name] for field in fields(kind)})
+    values = {field.name: said[field.name] for field in fields(kind)}
+    for name, value in values.items():
+        unset = value is None and name == "balance_voltage"
+        if not unset and (isinstance(value, bool) or not isinstance(value, int | float)):
+            raise TypeError(f"expected {kind.__name__}.{name} to be a number, got {value!r:.80}")
+    return kind(**values)
+
+
+def _transduction(said: dict[str, Any]) -> Transduction:
+    return Transduction(
+        _made(HalfBridge, said["bridge"]),
+        _made(Multiplexer, said["multiplexer"]),
+        _made(Amplifier, said["amplifier"]),
+        _made(Converter, said["converter"]),
+    )
 
 
 def _layout(said: dict[str, Any]) -> SensorLayout:
@@ -128,7 +143,7 @@ def from_json(text: str) -> Sensor:
         basis_for(layout.patch, edge, 2, 1)  # refuses an edge that there is not
         return Sensor(
             layout,
-            Transduction(_made(HalfBridge, said["bridge"]), _made(Converter, said["converter"])),
+            _transduction(said),
             _plate(layout.patch, said),
             edge,
             float(said["rate"]),

@@ -3,18 +3,23 @@
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from kappaskin.frames import Frame
+from kappaskin.intrinsic import ForceTorqueSensor, Wrench
+from kappaskin.region import Scanner
 from kappaskin.scene import Scene
 from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
 from kappaskin.sources.wire import Accounting
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
+_DEPTH = 0.02  # m from the middle of the skin down to the force/torque sensor
 _ROUNDING = 1e-3  # of a frame: a clock that was slept to may stand a rounding error before it
 
 
 class SimulatedSource:
-    """Yields the frames of a scene at its rate; the scene may change while it plays."""
+    """Yields the frames of a scene at its rate; scene and scan may change while it plays."""
 
     def __init__(
         self,
@@ -25,6 +30,15 @@ class SimulatedSource:
         self._simulator, self._sensor = Simulator(scene), scene.sensor()
         self._clock, self._sleep = clock, sleep
         self._start, self._n = clock(), 0
+        # Since frame `_first`, due at device time `_since`, frames come at `_rate`.
+        self._first, self._since, self._rate = 0, 0.0, self._sensor.rate
+        self._all = self._sensor.scan()
+        self._scanner: Scanner | None = None
+        patch = scene.plate.patch
+        self.base = ForceTorqueSensor((patch.a / 2, patch.b / 2, -_DEPTH))
+        """The simulated force/torque sensor that carries the skin."""
+        self._base_noise = np.random.default_rng(scene.seed)
+        self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
 
     @property
@@ -35,21 +49,42 @@ class SimulatedSource:
         """Go on with another scene on the same skin, from the same moment."""
         self._simulator.change(scene)
 
+    def scan(self, scanner: Scanner | None) -> None:
+        """Read what `scanner` chooses from the next frame on; all channels without one."""
+        self._scanner = scanner
+
+    def _due(self) -> float:
+        """Device time of the next frame."""
+        return self._since + (self._n - self._first) / self._rate
+
+    def _next(self) -> Frame:
+        """The next frame; its scan decides when the one after it begins."""
+        due, scan, rate = self._due(), self._all, self._sensor.rate
+        if self._scanner is not None:
+            scan = self._scanner()
+            rate = min(self._scanner.rate, scan.rate)
+        if rate != self._rate:
+            self._first, self._since, self._rate = self._n, due, rate
+        self._n, self._taken = self._n + 1, due
+        return self._simulator.scanned(scan, self._n - 1, due, self._clock)
+
+    def wrench(self) -> Wrench:
+        """What `base` reads of the contact, at the time of the last frame."""
+        scene = self._simulator.scene
+        return self.base.read(scene.plate.patch, scene.loads_at(self._taken), self._base_noise)
+
     def read(self, timeout: float) -> list[Frame]:
-        rate = self._sensor.rate
-        due = self._start + self._n / rate
-        now = self._clock()
+        now, due = self._clock(), self._start + self._due()
         if due > now:
             self._sleep(min(due - now, timeout))
             now = self._clock()
-        ready = int((now - self._start) * rate + _ROUNDING) + 1 - self._n
-        if ready <= 0:
-            return []
-        skipped = max(0, ready - max(1, int(_BACKLOG * rate)))
+        behind = int((now - self._start - self._due()) * self._rate + _ROUNDING) + 1
+        skipped = max(0, behind - max(1, int(_BACKLOG * self._rate)))
         self._lost += skipped
         self._n += skipped
-        frames = [self._simulator.frame(self._n + q, self._clock) for q in range(ready - skipped)]
-        self._n += len(frames)
+        frames: list[Frame] = []
+        while (now - self._start - self._due()) * self._rate + _ROUNDING >= 0:
+            frames.append(self._next())
         self._accepted += len(frames)
         return frames
 

@@ -1,0 +1,36 @@
+"""Partial scans to whole frames: what was not scanned keeps its last reading, for a while."""
+
+import math
+
+import numpy as np
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Frame, Mask
+
+
+class Hold:
+    """Holds the last reading of each of `channels` until it is `age` s old on the device's clock.
+
+    A channel that was scanned is never filled in: on a rail it has no reading, however fresh the
+    last one. A clock that went back, as of a device that restarted, holds nothing from before.
+    """
+
+    def __init__(self, channels: int, age: float) -> None:
+        if not (math.isfinite(age) and age >= 0):
+            raise Refusal(f"expected readings to be held for at least 0 s, got {age}")
+        self._age = age
+        self._values = np.full(channels, np.nan)
+        self._times = np.full(channels, -np.inf)
+
+    def __call__(self, frame: Frame, curvature: Array) -> tuple[Array, Mask]:
+        """The `curvature` (3, P) of `frame` with held readings, and which of it is fresh (3, P)."""
+        flat = curvature.ravel()
+        self._values[frame.channels] = flat[frame.channels]
+        self._times[frame.channels] = math.inf  # of no age that anything is held for
+        age = frame.device_time - self._times
+        held = (age >= 0) & (age < self._age)
+        self._times[frame.channels] = frame.device_time
+        fresh = np.isfinite(curvature)
+        if held.any():
+            flat = np.where(held, self._values, flat)
+        return flat.reshape(curvature.shape), fresh

@@ -1,0 +1,139 @@
+"""What scanning a region buys and costs while the contact moves: full scans against regions."""
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Estimate
+from kappaskin.mechanics import PointLoad
+from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.region import OFF, SKIN, Region, bargain
+from kappaskin.scene import TABLE_1_NOISE, Orbit, Scene, load_scene
+from kappaskin.sources import SimulatedSource
+from kappaskin.steer import steered
+from kappaskin.transduction import SECOND_GENERATION
+
+PERIODS = (4.0, 1.0, 0.25)
+"""Seconds per turn of the contact: 35, 138 and 553 mm/s on a circle of 22 mm."""
+
+_FASTEST = 1e6  # frames/s asked for: as many as the scan allows
+REGIONS = (
+    Region(OFF),
+    *(Region(SKIN, radius=radius, rate=_FASTEST) for radius in (0.015, 0.025, 0.035)),
+    *(Region(SKIN, radius=0.025, share=share, rate=_FASTEST) for share in (0.05, 0.2)),
+)
+_POINTS = 33  # of the surface, along each side
+_SETTLED = 0.1  # s, left out of the measurement
+
+
+def scene_of(period: float) -> Scene:
+    """Table 1's centred load going round every `period` s, read at the paper's 20 us."""
+    circle = load_scene("circle")
+    orbit = Orbit(0.022, period)
+    full_rate = 1 / SECOND_GENERATION.scan_time(3 * len(circle.layout))
+    return replace(circle, transduction=SECOND_GENERATION, motion=orbit, rate=full_rate)
+
+
+class _Clock:
+    """A clock that only those who sleep by it move: arithmetic takes no time here."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """An estimate, with when its scan began and ended in s and how many channels that read."""
+
+    estimate: Estimate
+    began: float
+    ended: float
+    channels: int
+
+
+def _answers(scene: Scene, region: Region, seconds: float) -> list[_Answer]:
+    """What the closed loop answers: each contact moves what the next frame scans."""
+    clock = _Clock()
+    source = SimulatedSource(scene, clock, clock.sleep)
+    pipeline = Pipeline(source.sensor, Setup(nx=_POINTS, ny=_POINTS), clock=clock)
+    steering = steered(source, region)
+    answers: list[_Answer] = []
+    while clock.now < seconds:
+        for frame in source.read(seconds):
+            estimate = pipeline(frame)
+            duration = scene.transduction.scan_time(len(frame.channels))
+            began = frame.device_time
+            answers.append(_Answer(estimate, began, began + duration, len(frame.channels)))
+            if steering is not None:
+                steering(estimate.touch)
+    return [answer for answer in answers if answer.began >= _SETTLED]
+
+
+class _Errors:
+    """How far answers are from the truth at any time, in mm."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._basis = scene, scene.basis
+        self._compliance = scene.plate.compliance(self._basis)
+        self._surface = self._basis.on_grid(*scene.plate.patch.grid(_POINTS, _POINTS))
+
+    def __call__(self, estimate: Estimate, time: float) -> tuple[float, float]:
+        """Distance of the contact and RMS of the shape from the truth at `time`."""
+        (load,) = self._scene.loads_at(time)
+        off = estimate.touch.position - load.centre()
+        w = self._surface(self._compliance(load.modal(self._basis)))
+        rms = math.sqrt(float(np.mean((estimate.surface - w) ** 2)))
+        return 1e3 * math.hypot(*off), 1e3 * rms
+
+
+def _rms(errors: list[tuple[float, float]]) -> Array:
+    return np.sqrt(np.nanmean(np.square(errors), axis=0))
+
+
+def measured(period: float, region: Region, seconds: float) -> dict[str, Any]:
+    """One row of `regions`: a contact that goes round every `period` s, for `seconds`."""
+    if not _SETTLED + 0.1 <= seconds < math.inf:
+        raise Refusal(f"expected at least {_SETTLED + 0.1} s to measure over, got {seconds}")
+    scene = scene_of(period)
+    answers, error = _answers(scene, region, seconds), _Errors(scene)
+    own = _rms([error(a.estimate, (a.began + a.ended) / 2) for a in answers])
+    # An answer is the newest from its own end to that of the next.
+    newest = _rms([error(a.estimate, (a.ended + b.ended) / 2) for a, b in pairwise(answers)])
+    (load,) = scene.loads_at(0.0)
+    x, y = (float(along) for along in load.centre())
+    told = bargain(scene.sensor(), region, PointLoad(x, y, load.force), TABLE_1_NOISE)
+    return {
+        "speed_mm_s": 1e3 * 2 * math.pi * 0.022 / period,
+        "radius_mm": None if region.around == OFF else 1e3 * region.radius,
+        "share": None if region.around == OFF else region.share,
+        "channels": float(np.mean([a.channels for a in answers])),
+        "rate": (len(answers) - 1) / (answers[-1].began - answers[0].began),
+        "found": float(np.mean([a.estimate.touch.present for a in answers])),
+        "bound_mm": 1e3 * math.hypot(*told.bound[:2]),
+        "contact_mm": float(own[0]),
+        "shape_mm": float(own[1]),
+        "newest_contact_mm": float(newest[0]),
+        "newest_shape_mm": float(newest[1]),
+    }
+
+
+def regions(seconds: float = 1.0) -> list[dict[str, Any]]:
+    """Contact and shape errors, RMS in mm, of full scans and of regions around the contact.
+
+    Each row is a closed loop of `seconds`, on a skin that moves while a frame is read: `contact_mm`
+    and `shape_mm` against the truth in the middle of the frame's own scan, `newest_...` against the
+    truth while the answer is the newest there is, as a controller meets it. `bound_mm` is what one
+    frame tells of the contact's position at best where the circle begins (see `contact_bound`);
+    readings held from earlier frames tell more. `found` is the share of frames with a contact.
+    """
+    return [measured(period, region, seconds) for period in PERIODS for region in REGIONS]
