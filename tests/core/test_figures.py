@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import RendererAgg
 
 from kappaskin import (
     FIGURES,
-    HalfBridge,
+    SECOND_GENERATION,
     Refusal,
     load_scene,
     write_figures,
@@ -195,7 +195,7 @@ def test_fig1_reads_the_strip_and_draws_what_least_squares_makes_of_it(drawn) ->
 
 
 def test_fig1_names_the_thicknesses_of_the_bridge(drawn) -> None:
-    bridge = HalfBridge()
+    bridge = SECOND_GENERATION.bridge
 
     for thickness in (bridge.substrate_thickness, bridge.gage_thickness, bridge.thickness):
         assert f"{1e3 * thickness:.3f} mm" in said(drawn, "fig1")

@@ -13,7 +13,7 @@ from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.patch import Patch
 from kappaskin.scene import TABLE_1_NOISE, scaled_to
-from kappaskin.transduction import Transduction
+from kappaskin.transduction import SECOND_GENERATION
 
 SKIN = Patch(0.1, 0.01, strip=True)
 ELEMENTS = 10
@@ -61,7 +61,7 @@ def draw(figure: style.Figure) -> None:
     found = run()
     style.resize(figure, style.DOUBLE, 92)
     style.letter(figure, 1, 91, "a", "skin over foam or fluid (thickness not to scale)")
-    style.letter(figure, 1, 38, "b", "back-to-back gage pair (thicknesses to scale)")
+    style.letter(figure, 1, 38, "b", "gage pair of the second prototype (thickness to scale)")
     style.letter(figure, 95, 91, "c", "curvature read by a linear sensor")
     style.letter(figure, 95, 44, "d", "deflection reconstructed from it")
     _draw_skin(style.place(figure, (1, 42, 90, 45)), found)
@@ -71,14 +71,14 @@ def draw(figure: style.Figure) -> None:
 
 
 _THICK, _GAGE, _FOAM = 2.0, 0.9, 15.0  # drawn, in mm of the skin's length
-_POLYIMIDE = "#d9b98c"
+_FLEX = "#d9b98c"
 
 
 def _draw_skin(axes: style.Axes, found: _Run) -> None:
     x, z = found.x, -found.fitted
     axes.fill((-5, -5, 105, 105), (1, -_FOAM - 5, -_FOAM - 5, 1), color=style.LINE)
     axes.fill_between(x, -_FOAM, z, color=style.FILL)
-    axes.fill_between(x, z, z + _THICK, color=_POLYIMIDE)
+    axes.fill_between(x, z, z + _THICK, color=_FLEX)
     _draw_gages(axes, found.elements, x, z)
     at = 1e3 * _LOAD
     touched = float(np.interp(at, x, z)) + _THICK + _GAGE
@@ -118,25 +118,25 @@ def _disc(x: float, z: float, r: float) -> tuple[Array, Array]:
 
 
 def _draw_pair(axes: style.Axes) -> None:
-    """Across the skin true to scale, in mm; along it cut short."""
-    bridge = Transduction().bridge
+    """Across the skin true to scale, in units of the substrate's thickness; cut short along it."""
+    bridge = SECOND_GENERATION.bridge
     t_s, t_g = 1e3 * bridge.substrate_thickness, 1e3 * bridge.gage_thickness
-    axes.fill_between((-0.6, 0.42), -t_s / 2, t_s / 2, color=_POLYIMIDE)
+    top = 0.5 + t_g / t_s
+    axes.fill_between((-2.6, 1.8), -0.5, 0.5, color=_FLEX)
     for sign, colour in ((1, style.BLUE), (-1, style.ORANGE)):
-        inner, outer = sign * t_s / 2, sign * (t_s / 2 + t_g)
-        axes.fill_between((-0.4, 0.25), inner, outer, color=colour)
+        axes.fill_between((-1.8, 1.0), sign * 0.5, sign * top, color=colour)
         strain = f"gage, strain {'+' if sign > 0 else '−'}ε"
-        axes.text(-0.075, outer + sign * 0.035, strain, ha="center", va="center")
-    axes.plot((-0.6, 0.42), (0, 0), color=style.FAINT, lw=0.6, ls=(0, (6, 2, 1, 2)))
-    axes.text(-0.075, 0.012, "polyimide substrate", ha="center", va="bottom")
-    for height in (-t_s / 2, t_s / 2, t_s / 2 + t_g):
-        axes.plot((0.27, 0.53), (height, height), color=style.FAINT, lw=0.5)
-    style.dimension(axes, (0.49, -t_s / 2), (0.49, t_s / 2))
-    axes.text(0.51, 0, f"{t_s:.3f} mm", va="center")
-    style.arrow(axes, (0.49, t_s / 2 + t_g + 0.07), (0.49, t_s / 2 + t_g), lw=0.6, mutation_scale=5)
-    axes.text(0.51, t_s / 2 + t_g + 0.04, f"{t_g:.3f} mm", va="center")
-    axes.text(0.51, -t_s / 2 - t_g - 0.035, f"ε = κ · {t_s + t_g:.3f} mm / 2", va="center")
-    axes.set(aspect="equal", xlim=(-0.62, 0.95), ylim=(-0.27, 0.27))
+        axes.text(-0.4, sign * (top + 0.17), strain, ha="center", va="center")
+    axes.plot((-2.6, 1.8), (0, 0), color=style.FAINT, lw=0.6, ls=(0, (6, 2, 1, 2)))
+    axes.text(-0.4, 0.18, "flex circuit", ha="center", va="center")
+    for height in (-0.5, 0.5, top):
+        axes.plot((1.1, 2.3), (height, height), color=style.FAINT, lw=0.5)
+    style.dimension(axes, (2.1, -0.5), (2.1, 0.5))
+    axes.text(2.2, 0, f"{t_s:.3f} mm", va="center")
+    style.arrow(axes, (2.1, top + 0.32), (2.1, top), lw=0.6, mutation_scale=5)
+    axes.text(2.2, top + 0.16, f"{t_g:.3f} mm", va="center")
+    axes.text(2.2, -top - 0.17, f"ε = κ · {t_s + t_g:.3f} mm / 2", va="center")
+    axes.set(aspect="equal", xlim=(-2.7, 4.2), ylim=(-1.15, 1.15))
     axes.axis("off")
 
 
