@@ -13,6 +13,8 @@ from kappaskin.engine import Engine as Engine
 from kappaskin.errors import RankDeficient as RankDeficient
 from kappaskin.errors import Refusal as Refusal
 from kappaskin.errors import SourceError as SourceError
+from kappaskin.figures import FIGURES as FIGURES
+from kappaskin.figures import write_figures as write_figures
 from kappaskin.fit import Fit as Fit
 from kappaskin.fit import LeastSquares as LeastSquares
 from kappaskin.frames import COMPONENTS as COMPONENTS

@@ -14,6 +14,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from kappaskin.doctor import examine
 from kappaskin.errors import Refusal
+from kappaskin.figures import FIGURES, write_figures
 from kappaskin.reconstruct import METHODS
 from kappaskin.reconstruct import reconstruct as reconstructed
 from kappaskin.scene import load_scene
@@ -144,6 +145,35 @@ def device(scene: str = "", *, rate: float | None = None) -> None:
     server.serve(lambda: bool(stopped))
     server.close()
     print(json.dumps({"spent": server.spent, "unsent": server.unsent}), file=sys.stderr)
+
+
+@app.command
+def figures(
+    *,
+    out: Path,
+    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = tuple(
+        FIGURES
+    ),
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Draw the paper's figures, from runs of our own, as SVG and PNG.
+
+    Example: `kappaskin figures --out figures --only fig6 fig9`
+
+    Parameters
+    ----------
+    out
+        The folder to write to; made when there is none.
+    only
+        The figures to draw; all when left out.
+    json
+        Print one JSON list of the files instead of one a line.
+    """
+    written = [str(path) for path in write_figures(out, only)]
+    if json:
+        _print_json(written)
+        return
+    print(*written, sep="\n")
 
 
 @app.command
