@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from dataclasses import replace
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,13 +13,19 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import App, CycloptsError, Parameter
 
+from kappaskin.calibration import RADII, check_place, save_calibration
+from kappaskin.calibration import calibrate as calibrated
 from kappaskin.doctor import examine
 from kappaskin.errors import Refusal
 from kappaskin.figures import FIGURES, write_figures
+from kappaskin.guide import summary, take_sweep
 from kappaskin.reconstruct import METHODS
 from kappaskin.reconstruct import reconstruct as reconstructed
 from kappaskin.scene import load_scene
 from kappaskin.studies.tables import table_1
+
+FAILED = 1
+"""Exit code of a command that was done, with something in the result that failed."""
 
 REFUSED = 2
 """Exit code of a command that cannot be done, with the reason on standard error."""
@@ -116,8 +123,84 @@ def reconstruct(
     print(f"{out}: {len(found['coefficients'])} shapes", file=sys.stderr)
 
 
+def _millimetres(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) / 1e3 for part in text.split(","))
+    except ValueError:
+        raise Refusal(f"expected radii in millimetres such as 100,50,25, got {text!r}") from None
+
+
+def _asked(question: str) -> str:
+    print(question, end="", file=sys.stderr, flush=True)
+    if answer := sys.stdin.readline() if sys.stdin else "":
+        return answer
+    print(file=sys.stderr)
+    raise Refusal(
+        "standard input ended before the last step, nothing was written; run this in a terminal, "
+        "or give --dwell if the device is laid on the cylinders by itself"
+    )
+
+
 @app.command
-def device(scene: str = "", *, rate: float | None = None) -> None:
+def calibrate(
+    source: str,
+    *,
+    out: Path,
+    radii: str = ",".join(f"{1e3 * radius:g}" for radius in RADII),
+    seconds: float = 1.0,
+    hold: float = 0.0,
+    dwell: float | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Calibrate a sensor against cylinders of known radius.
+
+    Names one cylinder after the other and waits for Enter; a simulated source is laid on them by
+    itself. The exit code is 1 when some channel failed: the file is written, without that channel.
+
+    Example: `kappaskin calibrate /dev/ttyACM0 --out skin.toml --radii 100,50,33,25,20`
+
+    Parameters
+    ----------
+    source
+        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+    out
+        The file to write.
+    radii
+        Radii of the cylinders in millimetres.
+    seconds
+        How long the readings on each cylinder are averaged.
+    hold
+        Seconds on the smallest cylinder from which creep is told; without it creep is not sought.
+    dwell
+        Ask nobody: the device is laid on the cylinders by itself, so many seconds each.
+    json
+        Print one JSON object with every channel instead of a summary.
+    """
+    check_place(out)
+    try:
+        sensor, sweep = take_sweep(
+            source,
+            _millimetres(radii),
+            _asked,
+            lambda line: print(line, file=sys.stderr),
+            seconds=seconds,
+            hold=hold,
+            dwell=dwell,
+        )
+        report = calibrated(sweep, sensor, datetime.now(UTC))
+        save_calibration(report.calibration, out)
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+        raise Refusal("stopped before the last step; nothing was written") from None
+    if json:
+        _print_json(report.to_json())
+    else:
+        print(*summary(report), sep="\n")
+    return FAILED if report.failed else 0
+
+
+@app.command
+def device(scene: str = "", *, rate: float | None = None, dwell: float | None = None) -> None:
     """Play a simulated sensor on a pseudo-terminal, as a real one would on a serial port.
 
     Prints one JSON line with the port, then serves until stopped (Ctrl+C); then tells on standard
@@ -131,12 +214,20 @@ def device(scene: str = "", *, rate: float | None = None) -> None:
         What to simulate; the default scene when left out.
     rate
         Frames per second; the scene's when left out.
+    dwell
+        Seconds on each cylinder, in the scene `calibration`; one when left out.
     """
     try:
         from kappaskin.sources.device import PseudoDevice
     except ImportError as error:
         raise Refusal("expected a system with pseudo-terminals (Linux, macOS)") from error
     played = load_scene(scene)
+    if dwell is not None:
+        if played.laid is None:
+            raise Refusal(
+                f"the scene {played.name} has no cylinders to dwell on; leave --dwell out"
+            )
+        played = replace(played, laid=replace(played.laid, dwell=dwell))
     server = PseudoDevice(played if rate is None else replace(played, rate=rate))
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -219,11 +310,12 @@ def _add_commands() -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; the exit code is 0 when done and 2 when refused."""
+    """Run one command; the exit code is 0 when done, 1 or 2 as said above."""
     _add_commands()
     try:
-        app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
+        return int(code or 0)
     except Refusal as refusal:
         print(f"kappaskin: {refusal}", file=sys.stderr)
         return REFUSED

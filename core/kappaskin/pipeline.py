@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kappaskin.bases import Basis, ValueMap, basis_for
+from kappaskin.calibration import Calibration, Corrector
 from kappaskin.errors import RankDeficient
 from kappaskin.fit import Fit, LeastSquares
 from kappaskin.frames import Array, Estimate, Frame, Truth
@@ -25,7 +26,8 @@ class Setup:
     """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points.
 
     `edge` says which functions; empty, those for the edge that the sensor says it has. A channel
-    that a frame leaves out keeps its last reading until that is `hold` s old.
+    that a frame leaves out keeps its last reading until that is `hold` s old. Readings are
+    corrected by the `calibration`, which must be the sensor's own.
     """
 
     Ni: int = 8
@@ -34,6 +36,7 @@ class Setup:
     ny: int = 65
     edge: str = ""
     hold: float = 0.1
+    calibration: Calibration | None = None
 
 
 class Pipeline:
@@ -51,6 +54,7 @@ class Pipeline:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
+        self._correct = self._corrector(setup.calibration)
         edge = setup.edge or sensor.edge
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
@@ -60,18 +64,24 @@ class Pipeline:
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
         self._hold = Hold(sensor.channels, setup.hold)
-        self._dead = ~sensor.layout.live.ravel()
-        self._any_dead = bool(self._dead.any())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
         self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
 
+    def _corrector(self, calibration: Calibration | None) -> Corrector | None:
+        if calibration is None:
+            return None
+        calibration.check(self.sensor)
+        return calibration.start()
+
     def curvature(self, frame: Frame) -> Array:
-        """Curvature (3, P) in 1/m; NaN where a channel is dead, unscanned or on a rail."""
-        flat = np.full(self.sensor.channels, np.nan)
-        flat[frame.channels] = self.sensor.transduction.curvature(frame.counts)
-        if self._any_dead:
-            flat[self._dead] = np.nan
+        """Curvature (3, P) in 1/m; NaN where a channel is dead, unscanned, on a rail or failed.
+
+        With a calibration each frame is to be given once, in order: the loops have a memory.
+        """
+        flat = self.sensor.nominal(frame)
+        if self._correct is not None:
+            flat = self._correct(flat, frame.device_time)
         return flat.reshape(3, -1)
 
     def _fitted(self, curvature: Array) -> Fit:

@@ -18,7 +18,7 @@ from kappaskin.frames import Estimate, LocalGeometry, Touch
 from kappaskin.pipeline import Pipeline
 
 _SIZE = 96 * 2**20  # pages that are never written cost no memory
-_STATUS_SIZE = 2 * 2**20
+_STATUS_SIZE = 8 * 2**20  # the calibration of a large skin is most of it
 _HEADER = 64
 _MOST_SLOTS = 64
 _TRIES = 100

@@ -7,14 +7,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from kappaskin.bases import Basis, SineBasis, basis_for
-from kappaskin.effects import Effect, UniformNoise
+from kappaskin.calibration import Presentation, schedule
+from kappaskin.effects import SECOND_GENERATION_LOOPS, Effect, Tolerance, UniformNoise
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import LineLoad, Load, Plate, PointLoad
 from kappaskin.patch import Patch
 from kappaskin.sensor import Sensor
-from kappaskin.transduction import Transduction
+from kappaskin.transduction import Amplifier, Transduction
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
@@ -42,7 +43,7 @@ class Scene:
 
     `reference` is the number of functions (Ri, Rj) of the true shape: Table 1 defines its truth
     with 15 x 15, since the curvature under a point load grows with every further function. `edge`
-    says how the skin is held.
+    says how the skin is held, unless it is `laid` on one cylinder after the other instead.
     """
 
     name: str
@@ -56,8 +57,11 @@ class Scene:
     seed: int = 0
     reference: tuple[int, int] = (15, 15)
     edge: str = "hinged"
+    laid: Presentation | None = None
 
     def __post_init__(self) -> None:
+        if self.laid and self.loads:
+            raise Refusal(f"expected no loads on a skin that lies on cylinders, got {self.loads}")
         turns = [0.0] if self.motion is None else [self.motion.period * q / 4 for q in range(4)]
         for load in (load for time in turns for load in self.loads_at(time)):
             load.check(self.plate.patch)
@@ -121,13 +125,33 @@ def _circle() -> Scene:
     return replace(still, motion=Orbit(radius=0.022, period=4.0))
 
 
+def _calibration() -> Scene:
+    """An uncalibrated second prototype, laid on the cylinders of a calibration, a second each."""
+    patch = Patch(0.1, 0.1)
+    return Scene(
+        "calibration",
+        Plate(patch),
+        SensorLayout.regular(patch, 10, 10),
+        effects=(
+            SECOND_GENERATION_LOOPS,
+            Tolerance(gain_sd=0.05, offset_sd=3.0),
+            UniformNoise(TABLE_1_NOISE),
+        ),
+        # A third of the gain: the smallest cylinder bends twice as far as Table 1's skins read.
+        transduction=Transduction(amplifier=Amplifier(gain=35.0)),
+        laid=Presentation(schedule(), dwell=1.0),
+    )
+
+
 SCENES: dict[str, Callable[[], Scene]] = {
     "circle": _circle,
     "centre": lambda: _table_1("centre", PointLoad(0.05, 0.05), 4.70e-3),
     "off-centre": lambda: _table_1("off-centre", PointLoad(0.02, 0.08), 4.89e-3),
     "line": lambda: _table_1("line", LineLoad(0.01, 0.09, 0.09, 0.01), 4.68e-3),
+    "calibration": _calibration,
 }
-"""Ready scenes by name: the paper's three load cases (Table 1) and a load moving in a circle."""
+"""Ready scenes by name: the paper's three load cases (Table 1), a load moving in a circle, and a
+skin that is laid on the cylinders of a calibration (Figs. 7, 8)."""
 
 DEFAULT_SCENE = "circle"
 

@@ -1,11 +1,13 @@
 """What a device says it is: its skin, its elements and its electronics."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Frame, Mask
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
 from kappaskin.scan import Scan
@@ -61,3 +63,15 @@ class Sensor:
             electronics.multiplexer.settling_time,
             electronics.converter.conversion_time,
         )
+
+    @cached_property
+    def _dead(self) -> Mask | None:
+        return None if self.layout.live.all() else ~self.layout.live.ravel()
+
+    def nominal(self, frame: Frame) -> Array:
+        """Curvature (3 P,) in 1/m as Eq. 8 reads it; NaN where dead, unscanned or on a rail."""
+        flat = np.full(self.channels, np.nan)
+        flat[frame.channels] = self.transduction.curvature(frame.counts)
+        if self._dead is not None:
+            flat[self._dead] = np.nan
+        return flat

@@ -19,19 +19,27 @@ class Simulator:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self._rng = np.random.default_rng(scene.seed)
         self._still: Truth | None = None
         self._take_skin(scene)
+        self._start_effects()
 
     def change(self, scene: Scene) -> None:
-        """Go on with other loads, motion or effects on the same skin; new noise is seeded anew."""
+        """Go on with other loads, motion or effects; the effects start anew if they changed.
+
+        Another list of them, another seed or another number of elements does.
+        """
         was, self.scene, self._still = self.scene, scene, None
         same_elements = np.array_equal(scene.layout.positions, was.layout.positions)
         skin = (scene.plate, scene.edge, scene.reference)
         if not (same_elements and skin == (was.plate, was.edge, was.reference)):
             self._take_skin(scene)
-        if (scene.seed, scene.effects) != (was.seed, was.effects):
-            self._rng = np.random.default_rng(scene.seed)
+        same_size = len(scene.layout) == len(was.layout)
+        if not same_size or (scene.seed, scene.effects) != (was.seed, was.effects):
+            self._start_effects()
+
+    def _start_effects(self) -> None:
+        rng, shape = np.random.default_rng(self.scene.seed), (3 * len(self.scene.layout),)
+        self._effects = [effect.start(shape, rng) for effect in self.scene.effects]
 
     def _take_skin(self, scene: Scene) -> None:
         """Compute what depends on the skin alone."""
@@ -68,6 +76,13 @@ class Simulator:
         s[scan.channels] = scan.times / scan.duration
         return first + s * (4 * middle - 3 * first - last + s * 2 * (first + last - 2 * middle))
 
+    def _true(self, scan: Scan, time: float) -> tuple[Truth | None, Array]:
+        """The truth, None where no coefficients can tell it, and curvature (3 P,) in 1/m."""
+        if self.scene.laid is not None:
+            return None, np.repeat(self.scene.laid.curvature(time), len(self.scene.layout))
+        truth = self._truth(time)
+        return truth, self._read(scan, time, truth)
+
     def frame(self, n: int, clock: Callable[[], float]) -> Frame:
         """Frame `n` of all channels, begun at device time n / rate."""
         return self.scanned(self._scan, n, n / self.scene.rate, clock)
@@ -75,10 +90,9 @@ class Simulator:
     def scanned(self, scan: Scan, n: int, time: float, clock: Callable[[], float]) -> Frame:
         """Frame `n` of what `scan` reads, begun at device `time`; dead channels read nothing."""
         scene = self.scene
-        truth = self._truth(time)
-        curvature = self._read(scan, time, truth)
-        for effect in scene.effects:
-            curvature = effect.apply(curvature, self._rng)
+        truth, curvature = self._true(scan, time)
+        for effect in self._effects:
+            curvature = effect(curvature, time)
         curvature[~scene.layout.live.ravel()] = 0.0
         counts = scene.transduction.counts(curvature[scan.channels])
         return Frame(n & 0xFFFFFFFF, time, clock(), scan.channels, counts, truth)

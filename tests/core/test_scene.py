@@ -64,7 +64,7 @@ def test_the_peak_of_the_off_centre_case_is_5_53_mm():
 def test_table_1s_noise_is_even_between_plus_and_minus_0_40():
     (noise,) = load_scene("centre").effects
 
-    drawn = noise.apply(np.zeros(100_000), np.random.default_rng(0))
+    drawn = noise.start((100_000,), np.random.default_rng(0))(np.zeros(100_000), 0.0)
 
     assert 0.3999 < np.abs(drawn).max() <= 0.40 + 1e-12
 
@@ -74,7 +74,9 @@ def test_without_a_name_the_default_scene_is_loaded():
 
 
 def test_an_unknown_scene_is_refused_with_those_there_are():
-    with pytest.raises(Refusal, match=r"among circle, centre, off-centre, line; got 'moon'"):
+    with pytest.raises(
+        Refusal, match=r"among circle, centre, off-centre, line, calibration; got 'moon'"
+    ):
         load_scene("moon")
 
 

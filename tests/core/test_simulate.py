@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 
 from kappaskin import (
+    SECOND_GENERATION_LOOPS,
+    Creep,
     GaussianNoise,
     Orbit,
     Patch,
     Plate,
     PointLoad,
+    Presentation,
+    Refusal,
     Scene,
     SensorLayout,
     Simulator,
+    Step,
     UniformNoise,
     load_scene,
 )
@@ -134,6 +139,39 @@ def test_changed_effects_are_seeded_anew():
     simulator.change(NOISY)
 
     np.testing.assert_array_equal(simulator.frame(1, lambda: 0.0).counts, counts(NOISY)[0])
+
+
+def test_changing_only_the_load_keeps_the_loops_and_the_creep():
+    lasting = replace(QUIET, effects=(SECOND_GENERATION_LOOPS, Creep(0.2, 0.01)))
+    changed, fresh = Simulator(lasting), Simulator(lasting)
+    for n in range(50):
+        changed.frame(n, lambda: 0.0)
+
+    changed.change(replace(lasting, loads=()))
+
+    left = changed.frame(50, lambda: 0.0).counts
+    assert np.abs(left).max() > 10  # what remains of the load
+    fresh.change(replace(lasting, loads=(), effects=(Creep(0.2, 0.01), SECOND_GENERATION_LOOPS)))
+    assert not fresh.frame(51, lambda: 0.0).counts.any()
+
+
+def test_a_skin_laid_on_cylinders_bends_alike_everywhere_and_has_no_coefficients():
+    steps = (Step(1), Step(2, 0.05, "x"), Step(3, 0.04, "diagonal", -1))
+    simulator = Simulator(replace(QUIET, loads=(), laid=Presentation(steps, 0.01)))
+
+    frames = [simulator.frame(n, lambda: 0.0) for n in range(30)]
+
+    counts = np.array([frame.counts for frame in frames]).reshape(30, 3, 20)
+    per_count = simulator.scene.transduction.resolution
+    for n, curvature in ((0, (0, 0, 0)), (5, (20, 0, 0)), (29, (-12.5, -12.5, -12.5))):
+        expected = np.rint(np.array(curvature) / per_count)[:, None]
+        np.testing.assert_array_equal(counts[n], np.tile(expected, 20))
+    assert all(frame.truth is None for frame in frames)
+
+
+def test_a_load_on_a_skin_laid_on_cylinders_is_refused():
+    with pytest.raises(Refusal, match="no loads on a skin that lies on cylinders"):
+        replace(QUIET, laid=Presentation((Step(1),), 1.0))
 
 
 def test_a_change_to_more_elements_is_answered_with_their_channels():

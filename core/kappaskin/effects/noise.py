@@ -2,20 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from kappaskin.effects.effect import Running
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array
-
-
-class Effect(Protocol):
-    """One thing that spoils a reading."""
-
-    def apply(self, curvature: Array, rng: np.random.Generator) -> Array:
-        """Curvature in 1/m, any shape, as it is read."""
-        ...
 
 
 def _check_rms(rms: float) -> None:
@@ -32,9 +23,9 @@ class UniformNoise:
     def __post_init__(self) -> None:
         _check_rms(self.rms)
 
-    def apply(self, curvature: Array, rng: np.random.Generator) -> Array:
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
         limit = math.sqrt(3) * self.rms
-        return curvature + rng.uniform(-limit, limit, curvature.shape)
+        return lambda curvature, _: curvature + rng.uniform(-limit, limit, shape)
 
 
 @dataclass(frozen=True)
@@ -46,5 +37,5 @@ class GaussianNoise:
     def __post_init__(self) -> None:
         _check_rms(self.rms)
 
-    def apply(self, curvature: Array, rng: np.random.Generator) -> Array:
-        return curvature + rng.normal(0.0, self.rms, curvature.shape)
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
+        return lambda curvature, _: curvature + rng.normal(0.0, self.rms, shape)

@@ -60,7 +60,8 @@ class _Case:
         """`DRAWS` frames of curvature (T, 3, P) with the scene's noise, seeded."""
         rng = np.random.default_rng(self.scene.seed)
         (noise,) = self.scene.effects
-        return noise.apply(np.repeat(self.curvature[None], DRAWS, axis=0), rng)
+        curvature = np.repeat(self.curvature[None], DRAWS, axis=0)
+        return noise.start(curvature.shape, rng)(curvature, 0.0)
 
 
 def _row(case: _Case, noise: bool) -> dict[str, Any]:

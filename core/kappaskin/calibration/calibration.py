@@ -1,0 +1,170 @@
+"""What a calibration found, as what the pipeline applies to every frame of readings."""
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from kappaskin.effects import PrandtlIshlinskii, StandardLinearSolid
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.layout import SensorLayout
+from kappaskin.sensor import Sensor
+
+_MOST_CHANNELS = 2**14  # whose numbers the engine can tell with every status
+
+
+def fingerprint(layout: SensorLayout) -> str:
+    """A hash of the skin's sides and of where its elements are, to a nanometre.
+
+    Not of its radius: a skin is calibrated flat, and then mounted (paper, section 5).
+    """
+    sides = (layout.patch.a, layout.patch.b)
+    where = np.rint(np.array([sides, *layout.positions]) * 1e9).astype("<i8")
+    return hashlib.sha256(where.tobytes()).hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """One device's gains, offsets in 1/m, loops and creep, for its C channels.
+
+    reading = offset + gain * creep(hysteresis(curvature)). `gain` is NaN for the channels that
+    failed, and `failures` says why, as (channel, reason). `gain_sd` and `offset_sd` are standard
+    errors. `layout` is the `fingerprint` of the skin, `date` when it was calibrated. Calibrations
+    of the same content are equal.
+    """
+
+    name: str
+    serial_number: str
+    firmware: str
+    layout: str
+    date: datetime
+    gain: Array
+    offset: Array
+    gain_sd: Array
+    offset_sd: Array
+    hysteresis: PrandtlIshlinskii | None = None
+    creep: StandardLinearSolid | None = None
+    failures: tuple[tuple[int, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.date.utcoffset() is None:
+            raise Refusal(f"expected a date with its time zone, got {self.date}")
+        C = len(self.gain)
+        shapes = [part.shape for part in (self.gain, self.offset, self.gain_sd, self.offset_sd)]
+        shapes += [self.hysteresis.linear.shape] if self.hysteresis else []
+        shapes += [self.creep.share.shape] if self.creep else []
+        if not 0 < C <= _MOST_CHANNELS or set(shapes) != {(C,)}:
+            raise Refusal(
+                f"expected numbers for 1 to {_MOST_CHANNELS} channels, as many of each kind; got "
+                f"shapes {shapes}"
+            )
+        good = np.isfinite(self.gain)
+        if not (self.gain[good] > 0).all() or not np.isfinite(self.offset[good]).all():
+            raise Refusal("expected gains above zero, and finite offsets, where a channel passed")
+        failed = sorted(channel for channel, _ in self.failures)
+        if failed != np.flatnonzero(~good).tolist():
+            raise Refusal(f"expected a reason for every channel without a gain, got {failed}")
+
+    @property
+    def content(self) -> dict[str, dict[str, Any]]:
+        """Everything it says, by heading and key, as text, dates, numbers and lists of numbers."""
+        said: dict[str, dict[str, Any]] = {
+            "device": {
+                "name": self.name,
+                "serial_number": self.serial_number,
+                "firmware": self.firmware,
+                "layout": self.layout,
+                "date": self.date,
+            },
+            "line": {
+                name: getattr(self, name).tolist()
+                for name in ("gain", "offset", "gain_sd", "offset_sd")
+            },
+            "failures": {str(channel): reason for channel, reason in self.failures},
+        }
+        if self.hysteresis:
+            names = ("thresholds", "weights", "linear", "stretch")
+            said["hysteresis"] = {name: getattr(self.hysteresis, name).tolist() for name in names}
+        if self.creep:
+            said["creep"] = {
+                "share": self.creep.share.tolist(),
+                "time_constant": self.creep.time_constant,
+            }
+        return said
+
+    @cached_property
+    def digest(self) -> str:
+        return digest(self.content)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Calibration) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def check(self, sensor: Sensor) -> None:
+        """Refuse a sensor that is not the one that was calibrated."""
+        if sensor.serial_number != self.serial_number:
+            raise Refusal(
+                f"this calibration is of {self.name} {self.serial_number}, the sensor is "
+                f"{sensor.name} {sensor.serial_number}; choose the file of this sensor, or "
+                "calibrate it"
+            )
+        if fingerprint(sensor.layout) != self.layout:
+            raise Refusal(
+                f"{sensor.name} {sensor.serial_number} has {sensor.layout} in other places than "
+                "when it was calibrated; calibrate it again"
+            )
+
+    def start(self) -> "Corrector":
+        """The calibration at work on a skin that was at rest until now."""
+        return Corrector(self)
+
+
+def digest(content: dict[str, dict[str, Any]]) -> str:
+    """SHA-256 of `content`, whatever the order of its keys."""
+    told = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(told.encode()).hexdigest()
+
+
+class Corrector:
+    """A calibration at work: each frame of readings to curvature, with a memory of those before."""
+
+    def __init__(self, calibration: Calibration) -> None:
+        failed = np.isnan(calibration.gain)
+        self._offset = np.where(failed, 0.0, calibration.offset)
+        self._per_gain = 1 / np.where(failed, 1.0, calibration.gain)
+        self._blank = np.where(failed, np.nan, 0.0)
+        self._last = self._offset.copy()
+        self._restore = calibration.creep.start_inverse() if calibration.creep else None
+        self._straighten = (
+            calibration.hysteresis.inverse.start() if calibration.hysteresis else None
+        )
+
+    def __call__(self, reading: Array, time: float) -> Array:
+        """Curvature (C,) in 1/m for nominal curvature `reading` (C,), NaN if missing, at `time`.
+
+        `time` is the device's, in s. A missing reading leaves a NaN, and to the memory it is as if
+        the channel had stayed where it was.
+        """
+        missing = None
+        if not math.isfinite(float(reading @ reading)):  # faster than to look at each
+            missing = ~np.isfinite(reading)
+            reading = np.where(missing, self._last, reading)
+        self._last = reading
+        k = reading - self._offset
+        k *= self._per_gain
+        if self._restore is not None:
+            k = self._restore(k, time)
+        if self._straighten is not None:
+            k = self._straighten(k)
+        k += self._blank
+        if missing is not None:
+            k[missing] = np.nan
+        return k

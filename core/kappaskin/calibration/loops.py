@@ -1,0 +1,187 @@
+"""Readings on known curvatures, there and back, to the hysteresis that explains them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kappaskin.calibration.lines import Lines
+from kappaskin.effects import PrandtlIshlinskii
+from kappaskin.frames import Array, Mask
+
+_STEPS = 12  # of Gauss-Newton at most, in log a
+_LONGEST = 0.3  # step in log a
+_CONVERGED = 1e-5  # step in log a
+_DECISIVE = 0.5  # share of a reading that the fit leaves to others, below which it decides alone
+_MOST = np.log(4.0)  # log a: loops of one side at most four times as wide as the other's
+
+
+def thresholds(x: Array) -> Array:
+    """Thresholds (J,) in 1/m that a sweep over curvatures `x` (S,) can tell apart.
+
+    A play reverses over twice its threshold, so loops tell those up to half of the range. The first
+    way from rest tells wider ones, badly: they are there so that the gain's error bars know of
+    them. Without them a twist gage, bent half as far, had its gain wrong by four standard errors.
+    """
+    most = np.abs(x).max() or 1.0  # any will do for channels that were never bent
+    return most * np.array([*np.arange(1, 11) / 20, 0.6, 0.75, 0.9])
+
+
+def positions(u: Array, slope: Array, r: Array) -> tuple[Array, Array]:
+    """Where plays of thresholds `r` (J,) stand on the ways `u` (S, C) from rest, (S, J, C).
+
+    And their derivatives, given those of u, `slope` (S, C): a play that is dragged moves with u.
+    """
+    at = np.zeros((len(r), u.shape[1]))
+    turn = np.zeros_like(at)
+    w, dw = np.empty((2, len(u), *at.shape))
+    for k, v in enumerate(u):
+        stayed = at
+        at = np.minimum(np.maximum(at, v - r[:, None]), v + r[:, None])
+        turn = np.where(at == stayed, turn, slope[k])
+        w[k], dw[k] = at, turn
+    return w, dw
+
+
+def _columns(x: Array, y: Array, r: Array, log_a: Array, o: Array) -> tuple[Array, Array]:
+    """What readings `y` (S, C) are linear in, and its derivative along log a, (S, J + 1, C).
+
+    reading = o + E(G_0 u + sum_j G_j w_j), u = E^-1(x). Since E(g z) = g E(z) for every gain g
+    above zero, gain times weight is one number G_j; and the sign that E looks at is that of y - o.
+    """
+    a = np.exp(log_a)
+    above = x[:, None] > 0
+    u = np.where(above, x[:, None] / a, x[:, None])
+    du = np.where(above, -u, 0.0)
+    w, dw = positions(u, du, r)
+    E = np.where(y > o, a, 1.0)[:, None]
+    dE = np.where(y > o, a, 0.0)[:, None]
+    moved = np.concatenate([u[:, None], w], axis=1)
+    turned = np.concatenate([du[:, None], dw], axis=1)
+    return E * moved, E * turned + dE * moved
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """One channel's fit: o, G (J + 1,), log a, columns A, the residual e (U,) and slopes J (U, k).
+
+    The columns of J belong to the G above zero, to o and to log a.
+    """
+
+    o: float
+    G: Array
+    log_a: float
+    A: Array
+    e: Array
+    J: Array
+
+    @property
+    def squares(self) -> float:
+        return float(self.e @ self.e)
+
+
+def _solved(A: Array, y: Array) -> tuple[Array, float]:
+    """The G >= 0 and o that fit `y` (U,) best on the columns `A` (U, J + 1)."""
+    from scipy.optimize import nnls  # takes a quarter of the time that all of kappaskin does
+
+    one = np.ones((len(y), 1))
+    found = nnls(np.hstack([A, one, -one]), y)[0]
+    return found[:-2], float(found[-2] - found[-1])
+
+
+def _fitted(A: Array, dA: Array, y: Array, log_a: float) -> _Fitted:
+    """The fit at one log a."""
+    G, o = _solved(A, y)
+    J = np.column_stack([A[:, G > 0], np.ones(len(y)), dA @ G])
+    return _Fitted(o, G, log_a, A, y - o - A @ G, J)
+
+
+def _fits(x: Array, y: Array, used: Mask, offset: Array) -> list[_Fitted]:
+    """The best fit of every channel: least squares in G and o, Gauss-Newton in log a."""
+    r, C = thresholds(x), y.shape[1]
+    log_a, o = np.zeros(C), offset.copy()
+    best: list[_Fitted | None] = [None] * C
+    for _ in range(_STEPS if C else 0):
+        A, dA = _columns(x, y, r, log_a, o)
+        step = np.zeros(C)
+        for c in range(C):
+            fit = _fitted(A[used, :, c], dA[used, :, c], y[used, c], float(log_a[c]))
+            before = best[c]
+            if before is None or fit.squares < before.squares:
+                best[c] = fit
+            o[c], step[c] = fit.o, np.linalg.lstsq(fit.J, fit.e)[0][-1]
+        moved = np.clip(log_a + np.clip(step, -_LONGEST, _LONGEST), -_MOST, _MOST)
+        if np.abs(moved - log_a).max() < _CONVERGED:
+            break
+        log_a = moved
+    return [fit for fit in best if fit is not None]
+
+
+def _needed(fit: _Fitted, line_squares: float, least: float) -> bool:
+    """Whether the loops say more than a line, by the Bayesian information criterion."""
+    n, k = fit.J.shape
+    floor = n * least**2
+
+    def criterion(squares: float, parameters: int) -> float:
+        return n * np.log(max(squares, floor)) + parameters * np.log(n)
+
+    curved = fit.G[0] > 0 and bool(fit.G[1:].any()) and n > k
+    return curved and criterion(fit.squares, k) < criterion(line_squares, 2)
+
+
+def _left_out(fit: _Fitted, h: Array) -> Array:
+    """What the fit would leave (U,) of each reading that it had not seen, leverages `h` (U,).
+
+    e / (1 - h) holds while the same G stay above zero; without a reading that decides one of them
+    by itself others take its place, and the fit is done again.
+    """
+    y = fit.e + fit.o + fit.A @ fit.G
+    out = fit.e / np.maximum(1 - h, _DECISIVE)
+    for k in np.flatnonzero(1 - h < _DECISIVE):
+        G, o = _solved(np.delete(fit.A, k, axis=0), np.delete(y, k))
+        out[k] = y[k] - o - fit.A[k] @ G
+    return out
+
+
+def _numbers(fit: _Fitted) -> tuple[float, ...]:
+    """The fields of `Lines` for one channel: its gain is that of a long way, the sum of G."""
+    n, k = fit.J.shape
+    Q, R = np.linalg.qr(fit.J)
+    spread = np.sqrt(fit.squares / (n - k)) * np.linalg.pinv(R)
+    gain = float(fit.G.sum())
+    left = _left_out(fit, (Q**2).sum(axis=1))
+    return (
+        gain,
+        fit.o,
+        float(np.linalg.norm(spread[: k - 2].sum(axis=0))),
+        float(np.linalg.norm(spread[k - 2])),
+        float(np.sqrt(fit.squares / n)) / gain,
+        float(np.sqrt(np.mean(left**2))) / gain,
+    )
+
+
+def identify(
+    x: Array, y: Array, used: Mask, line: Lines, least: float
+) -> tuple[Lines, PrandtlIshlinskii]:
+    """The loops in readings `y` (S, C) on curvatures `x` (S,) in 1/m, and what the fits are worth.
+
+    The channels share nothing but the thresholds. Glue and bonding differ from gage to gage, which
+    the paper blames for the loops and their asymmetry, and a sweep of n radii tells each channel
+    some 4 n to 8 n readings, good to a hundredth of a loop's width, for at most 16 numbers. A
+    channel that a line explains as well keeps its `line`. The skin was at rest before the first
+    step; steps that are not `used` (S,) only move the plays. No reading is known better than to
+    `least` in 1/m.
+    """
+    C = y.shape[1]
+    r = np.tile(thresholds(x)[:, None], C)
+    p, q, a = np.zeros_like(r), np.ones(C), np.ones(C)
+    numbers = np.stack(
+        [line.gain, line.offset, line.gain_sd, line.offset_sd, line.rms, line.left_out]
+    )
+    known = np.flatnonzero(np.isfinite(line.rms))
+    for c, fit in zip(known, _fits(x, y[:, known], used, line.offset[known]), strict=True):
+        straight = used.sum() * (line.rms[c] * line.gain[c]) ** 2
+        if _needed(fit, float(straight), least):
+            numbers[:, c] = _numbers(fit)
+            shares = fit.G / fit.G.sum()
+            q[c], p[:, c], a[c] = shares[0], shares[1:], np.exp(fit.log_a)
+    return Lines(*numbers), PrandtlIshlinskii(r, p, q, a)

@@ -1,0 +1,239 @@
+"""A sweep to a calibration and what it is worth: lines, loops, creep, and who passed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from datetime import datetime
+from typing import Any, TypeVar
+
+import numpy as np
+
+from kappaskin.calibration.calibration import Calibration, fingerprint
+from kappaskin.calibration.holds import identify_creep
+from kappaskin.calibration.judge import DEAD, Limits, failures_of
+from kappaskin.calibration.lines import Lines, lines
+from kappaskin.calibration.loops import identify
+from kappaskin.calibration.procedure import Sweep
+from kappaskin.calibration.schedule import FACES, FEWEST_RADII, Step, check_strain, pairs
+from kappaskin.effects import PrandtlIshlinskii, Running, StandardLinearSolid
+from kappaskin.errors import Refusal
+from kappaskin.frames import COMPONENTS, Array, Mask
+from kappaskin.sensor import Sensor
+
+_Part = TypeVar("_Part", Lines, PrandtlIshlinskii)
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationReport:
+    """A calibration and how good it is, channel by channel.
+
+    `line` is the paper's least-squares line per gage pair, `fitted` what the calibration applies:
+    the same where no loops were found. `gaps` (2, C) are the widest difference between the ways at
+    one cylinder on the inner and on the outer face, `gaps_left` what the calibration leaves of
+    them, `noise` (C,) the standard deviation of one frame; all three as curvature in 1/m.
+    """
+
+    calibration: Calibration
+    line: Lines
+    fitted: Lines
+    gaps: Array
+    gaps_left: Array
+    noise: Array
+
+    @property
+    def passed(self) -> Mask:
+        return np.isfinite(self.calibration.gain)
+
+    @property
+    def failed(self) -> dict[int, str]:
+        """Why each channel failed of those that the device says are alive."""
+        return {c: why for c, why in self.calibration.failures if why != DEAD}
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything it tells as JSON values, None for what is not a number."""
+        calibration = self.calibration
+        columns = {
+            "gain": self.fitted.gain,
+            "offset": self.fitted.offset,
+            "gain_sd": self.fitted.gain_sd,
+            "offset_sd": self.fitted.offset_sd,
+            "line_gain": self.line.gain,
+            "line_offset": self.line.offset,
+            "line_error": self.line.left_out,
+            "error": self.fitted.left_out,
+            "gap_inner": self.gaps[0],
+            "gap_outer": self.gaps[1],
+            "gap_inner_left": self.gaps_left[0],
+            "gap_outer_left": self.gaps_left[1],
+            "noise": self.noise,
+        }
+        failures = dict(calibration.failures)  # the dead ones too
+        P = len(calibration.gain) // 3
+        return {
+            "device": calibration.name,
+            "serial_number": calibration.serial_number,
+            "date": calibration.date.isoformat(),
+            "creep": calibration.creep and calibration.creep.time_constant,
+            "passed": int(self.passed.sum()),
+            "failed": len(self.failed),
+            "channels": [
+                {
+                    "channel": c,
+                    "component": COMPONENTS[c // P],
+                    "element": c % P,
+                    "passed": c not in failures,
+                    "reason": failures.get(c),
+                    **{name: _known(values[c]) for name, values in columns.items()},
+                }
+                for c in range(3 * P)
+            ],
+        }
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _check_way(steps: tuple[Step, ...], x: Array, face: int, what: str) -> None:
+    k = np.unique((face * x[face * x > 0]).round(9))
+    if not len(k):
+        raise Refusal(
+            f"no cylinder bends {what}; a calibration needs both faces, since one alone cannot "
+            "tell the offset from the loops"
+        )
+    if len(k) < FEWEST_RADII:
+        raise Refusal(
+            f"expected at least {FEWEST_RADII} radii that bend {what}, got {len(k)}; add cylinders"
+        )
+    if not pairs(steps, x, face):
+        raise Refusal(
+            f"no cylinder that bends {what} was taken again on the way back; without it the loops "
+            "cannot be seen"
+        )
+
+
+def _check(sweep: Sweep, sensor: Sensor) -> None:
+    """Refuse a sweep from which no channel could be calibrated, or only wrongly."""
+    check_strain(sweep.steps, sensor)
+    if sweep.readings.shape[1] != sensor.channels:
+        raise Refusal(
+            f"expected readings of the {sensor.channels} channels of {sensor.name}, got "
+            f"{sweep.readings.shape[1]}; use the sweep of this sensor"
+        )
+    sensed = [bool(live.any()) for live in sensor.layout.live]
+    for name, x, live in zip(COMPONENTS, sweep.curvature.T, sensed, strict=True):
+        for face, called in FACES.items() if live else ():
+            _check_way(sweep.steps, x, face, f"{name} with the {called}")
+    if not np.isfinite(sweep.readings).all(axis=0).any():
+        raise Refusal(
+            "every channel was dead or on a rail on some step; lower the amplifier's gain, or "
+            "leave out the smallest cylinders"
+        )
+
+
+def _in_time(sweep: Sweep, run: Running) -> Array:
+    """What `run` makes of the readings (S, C), given also the course of the hold."""
+    times = np.concatenate([sweep.times, sweep.moments])
+    readings = np.concatenate([sweep.readings, sweep.course])
+    out = np.empty_like(readings)
+    for k in np.argsort(times, kind="stable"):
+        out[k] = run(readings[k], float(times[k]))
+    return out[: len(sweep.times)]
+
+
+def _creep(sweep: Sweep, least: float) -> tuple[StandardLinearSolid | None, Array]:
+    """The creep that the hold shows, if there was one, and the readings (S, C) without it."""
+    if not len(sweep.moments):
+        return None, sweep.readings
+    if not sweep.steps[0].flat:
+        raise Refusal("expected a hold to begin from a flat table, got a cylinder as first step")
+    rest = sweep.readings[0]
+    creep = identify_creep(sweep.moments, sweep.course - rest, least)
+    if creep is None:
+        return None, sweep.readings
+    restore = creep.start_inverse()
+    return creep, _in_time(sweep, lambda reading, time: restore(reading - rest, time) + rest)
+
+
+def _by_component(
+    sweep: Sweep, readings: Array, least: float
+) -> tuple[Lines, Lines, PrandtlIshlinskii]:
+    """Lines, fits and loops of all channels, fitted component by component."""
+    flat = np.array([step.flat for step in sweep.steps])
+    parts: list[tuple[Lines, Lines, PrandtlIshlinskii]] = []
+    for x, y in zip(sweep.curvature.T, np.split(readings, 3, axis=1), strict=True):
+        used = flat | (x != 0)  # the others would blame on the line what bending across it does
+        line = lines(x[used], y[used])
+        parts.append((line, *identify(x, y, used, line, least)))
+    of_lines, fitted, loops = zip(*parts, strict=True)
+    return _joined(Lines, of_lines), _joined(Lines, fitted), _joined(PrandtlIshlinskii, loops)
+
+
+def _joined(kind: type[_Part], parts: Sequence[_Part]) -> _Part:
+    """The channels of all `parts`, side by side."""
+    names = [field.name for field in fields(kind)]
+    return kind(*(np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names))
+
+
+def _gaps(sweep: Sweep, values: Array) -> Array:
+    """Widest difference between the ways (2, C) of `values` (S, C), on the inner and outer face."""
+    out: list[Array] = []
+    for x, v in zip(sweep.curvature.T, np.split(values, 3, axis=1), strict=True):
+        ways = (np.array(pairs(sweep.steps, x, face), int).reshape(-1, 2).T for face in FACES)
+        widest = [np.abs(v[back] - v[there]).max(axis=0, initial=0.0) for there, back in ways]
+        out.append(np.stack(widest))
+    return np.concatenate(out, axis=1)
+
+
+def _needed(loops: PrandtlIshlinskii, passed: Mask) -> PrandtlIshlinskii | None:
+    """The loops without those of failed channels and without plays that no channel needs."""
+    p = np.where(passed, loops.weights, 0.0)
+    kept = p.any(axis=1)
+    if not kept.any():
+        return None
+    q, a = (np.where(passed, part, 1.0) for part in (loops.linear, loops.stretch))
+    return PrandtlIshlinskii(loops.thresholds[kept], p[kept], q, a)
+
+
+def calibrate(
+    sweep: Sweep, sensor: Sensor, date: datetime, limits: Limits | None = None
+) -> CalibrationReport:
+    """What a `sweep` of `sensor`, taken on `date`, says of every channel.
+
+    Refused when it has fewer than three radii, one face only, no way back or strains beyond the
+    elastic limit, or when no channel passes.
+    """
+    _check(sweep, sensor)
+    least = sensor.transduction.resolution
+    creep, readings = _creep(sweep, least)
+    line, fitted, loops = _by_component(sweep, readings, least)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a stuck channel, which fails
+        noise = np.sqrt((sweep.noise**2).mean(axis=0)) / np.abs(fitted.gain)
+        by_line = (sweep.readings - line.offset) / line.gain
+    failures = failures_of(sweep, sensor, limits or Limits(), fitted, noise, loops.linear)
+    passed = np.ones(sensor.channels, bool)
+    passed[list(failures)] = False
+    if not passed.any():
+        c, reason = next(iter(failures.items()))
+        P = sensor.channels // 3
+        raise Refusal(
+            f"none of {sensor.channels} channels passed; {COMPONENTS[c // P]} of element {c % P}: "
+            f"{reason}"
+        )
+    calibration = Calibration(
+        sensor.name,
+        sensor.serial_number,
+        sensor.firmware,
+        fingerprint(sensor.layout),
+        date,
+        np.where(passed, fitted.gain, np.nan),
+        np.where(passed, fitted.offset, np.nan),
+        np.where(passed, fitted.gain_sd, np.nan),
+        np.where(passed, fitted.offset_sd, np.nan),
+        _needed(loops, passed),
+        creep,
+        tuple(failures.items()),
+    )
+    left = _in_time(sweep, calibration.start())
+    return CalibrationReport(
+        calibration, line, fitted, _gaps(sweep, by_line), _gaps(sweep, left), noise
+    )

@@ -1,0 +1,176 @@
+"""Radii of cylinders to the steps of a calibration: what to lay the skin on, in which order."""
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+
+import numpy as np
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.sensor import Sensor
+
+RADII = (0.1, 0.05, 0.033, 0.025, 0.02, 0.017, 0.0145, 0.013)
+"""Radii in m whose curvatures are about 10 1/m apart, up to the paper's fingertip's 77 1/m."""
+
+FEWEST_RADII = 3
+
+FACES = {1: "inner face", -1: "outer face"}
+"""Which side of the skin lies on the cylinder, by the sign of the curvature."""
+
+ADVICE = (
+    "Slide the skin from each cylinder to the next without letting it spring back, and wait until "
+    "it lies still: what it reads depends on the way it came."
+)
+"""What a person must know before the first step."""
+
+_BENT = {
+    "x": ("bent along x", (1.0, 0.0, 0.0)),
+    "y": ("bent along y", (0.0, 1.0, 0.0)),
+    # The axis at 45 degrees: f = (x + y)^2 / 4R bends and twists alike.
+    "diagonal": ("bent along the diagonal from corner x = y = 0", (0.5, 0.5, 0.5)),
+}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing to lay the skin on: a cylinder of `radius` in m, or a flat table (infinite).
+
+    `along` is x, y or diagonal, the direction in which the skin bends. `face` is 1 when the inner
+    face lies on the cylinder, so that the skin is convex seen from outside and its curvature
+    positive, and -1 for the outer face, which objects touch. `back` tells the way to larger radii
+    from the way there. The skin stays for `hold` s, or no longer than a reading takes.
+    """
+
+    number: int
+    radius: float = math.inf
+    along: str = "x"
+    face: int = 1
+    back: bool = False
+    hold: float = 0.0
+
+    @property
+    def flat(self) -> bool:
+        return math.isinf(self.radius)
+
+    @property
+    def curvature(self) -> Array:
+        """Curvature (3,) in 1/m of the skin that lies on it, the same at all elements."""
+        return self.face / self.radius * np.array(_BENT[self.along][1])
+
+    def __str__(self) -> str:
+        if self.flat:
+            return "Flat table, nothing pressing on the skin"
+        face = FACES[self.face]
+        way = "back" if self.back else "there"
+        return (
+            f"Cylinder of radius {1e3 * self.radius:g} mm, {_BENT[self.along][0]}, {face} on it, "
+            + (f"held for {self.hold:g} s" if self.hold else f"on the way {way}")
+        )
+
+
+def schedule(
+    radii: tuple[float, ...] = RADII, hold: float = 0.0, strip: bool = False
+) -> tuple[Step, ...]:
+    """The steps with cylinders of `radii` in m, as the paper took them (section 5).
+
+    For each direction of bending, on a `strip` x alone: from large to small radii and back with
+    one face, then with the other, flat before and after each. A `hold` in s above zero begins with
+    a stay of so long on the smallest cylinder, which bends every channel and shows its creep.
+    """
+    radii = tuple(sorted({float(radius) for radius in radii}, reverse=True))
+    if not all(0 < radius < math.inf for radius in radii):
+        raise Refusal(f"expected radii above zero in m, got {radii}")
+    if len(radii) < FEWEST_RADII:
+        raise Refusal(
+            f"expected at least {FEWEST_RADII} different radii, got {len(radii)}; a line through "
+            "fewer leaves nothing to judge it by"
+        )
+    if not 0 <= hold < math.inf:
+        raise Refusal(f"expected a hold of at least 0 s, got {hold}")
+    steps = [Step(1)]
+    if hold:
+        steps += [Step(2, radii[-1], "x" if strip else "diagonal", hold=hold), Step(3)]
+    for along in ("x",) if strip else _BENT:
+        for face in (1, -1):
+            ways = [(radius, False) for radius in radii]
+            ways += [(radius, True) for radius in reversed(radii[:-1])]
+            for radius, back in ways:
+                steps.append(Step(len(steps) + 1, radius, along, face, back))
+            steps.append(Step(len(steps) + 1))
+    return tuple(steps)
+
+
+def applied(steps: tuple[Step, ...]) -> Array:
+    """The curvature (S, 3) in 1/m of every step."""
+    return np.array([step.curvature for step in steps]).reshape(-1, 3)
+
+
+def pairs(steps: tuple[Step, ...], x: Array, face: int) -> list[tuple[int, int]]:
+    """Steps (there, back) on the same cylinder with `face`, among those with curvature in `x`."""
+    there: dict[tuple[str, float], int] = {}
+    found: list[tuple[int, int]] = []
+    for k, step in enumerate(steps):
+        key = (step.along, step.radius)
+        if step.face != face or not x[k] or step.hold:
+            continue
+        if not step.back:
+            there[key] = k
+        elif key in there:
+            found.append((there[key], k))
+    return found
+
+
+def check_strain(steps: tuple[Step, ...], sensor: Sensor) -> None:
+    """Refuse steps that would bend the sensor's gages beyond their elastic limit."""
+    # The gage that reads twist lies along the diagonal, and so bends with the full 1/R.
+    least = 1 / sensor.transduction.strain_limit_curvature
+    for step in steps:
+        if step.radius < least * (1 - 1e-9):
+            strain = float(sensor.transduction.bridge.strain(1 / step.radius))
+            raise Refusal(
+                f"step {step.number}: a cylinder of radius {1e3 * step.radius:g} mm strains the "
+                f"gages of {sensor.name} by {strain:.2%}, beyond their elastic limit; use radii of "
+                f"at least {1e3 * least:.3g} mm"
+            )
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """Steps that follow one another by themselves, each for `dwell` s, or its hold if longer."""
+
+    steps: tuple[Step, ...]
+    dwell: float
+
+    def __post_init__(self) -> None:
+        if not (self.steps and 0 < self.dwell < math.inf):
+            raise Refusal(
+                f"expected at least one step and a dwell above zero in s, got {len(self.steps)} "
+                f"steps and {self.dwell}"
+            )
+
+    @cached_property
+    def _ends(self) -> list[float]:
+        return list(accumulate(max(self.dwell, step.hold) for step in self.steps))
+
+    def index(self, time: float) -> int:
+        """Which step is presented at `time` in s, their number once all are over."""
+        return bisect_right(self._ends, time)
+
+    def settled(self, time: float) -> bool:
+        """Whether what is read at `time` in s counts: that of a hold, or once the skin lies still.
+
+        That is taken to be the second half of a dwell, less its end, where two clocks may disagree.
+        """
+        index = self.index(time)
+        if index == len(self.steps):
+            return False
+        left = self._ends[index] - time
+        start = math.inf if self.steps[index].hold else 0.5 * self.dwell
+        return 0.05 * self.dwell < left <= start
+
+    def curvature(self, time: float) -> Array:
+        """Curvature (3,) in 1/m at `time` in s; the last step stays."""
+        return self.steps[min(self.index(time), len(self.steps) - 1)].curvature

@@ -1,0 +1,37 @@
+"""The fixed gain and offset errors of a sensor that was never calibrated."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kappaskin.effects.effect import Running
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Each channel reads gain times curvature plus offset, with both drawn once by `seed`.
+
+    Gains are normal about 1 with standard deviation `gain_sd`, offsets about 0 with `offset_sd` in
+    1/m. The seed is the skin's own: another seed of the scene leaves the skin the same.
+    """
+
+    gain_sd: float
+    offset_sd: float
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for sd in (self.gain_sd, self.offset_sd):
+            if not (math.isfinite(sd) and sd >= 0):
+                raise Refusal(f"expected standard deviations of at least 0, got {self}")
+
+    def errors(self, shape: tuple[int, ...]) -> tuple[Array, Array]:
+        """Gain and offset in 1/m of every channel of a skin of `shape`."""
+        rng = np.random.default_rng(self.seed)
+        return rng.normal(1.0, self.gain_sd, shape), rng.normal(0.0, self.offset_sd, shape)
+
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
+        gain, offset = self.errors(shape)
+        return lambda curvature, _: gain * curvature + offset

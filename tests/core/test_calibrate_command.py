@@ -1,0 +1,395 @@
+"""Calibrating from a source: simulated, on a pseudo-terminal, and with a person at the rig."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kappaskin import (
+    ADVICE,
+    Frame,
+    GaussianNoise,
+    Presentation,
+    Refusal,
+    SensorLayout,
+    Simulator,
+    Tolerance,
+    calibrate,
+    load_scene,
+    schedule,
+)
+from kappaskin.calibration.file import from_toml
+from kappaskin.cli import main
+from kappaskin.errors import SourceError
+from kappaskin.guide import summary, take_sweep
+
+pytest.importorskip("pty", reason="no pseudo-terminals on this system")
+from kappaskin.sources.device import PseudoDevice
+
+RADII = (0.1, 0.05, 0.025, 0.015)
+STEPS = schedule(RADII)
+SCENE = load_scene("calibration")
+TOLERANCE = next(effect for effect in SCENE.effects if isinstance(effect, Tolerance))
+FAST = ("--radii", "100,50,25,15", "--seconds", "0.05")
+
+
+@pytest.fixture
+def run(capsys) -> Callable[..., tuple[int, str, str]]:
+    """Runs a command in this process: its exit code, standard output and standard error."""
+
+    def run_one(*arguments: object) -> tuple[int, str, str]:
+        code = main([str(argument) for argument in arguments])
+        return code, *capsys.readouterr()
+
+    return run_one
+
+
+def refused(found: tuple[int, str, str], reason: str, folder: Path) -> None:
+    code, printed, told = found
+    assert (code, printed) == (2, "")
+    assert re.search(f"(?m)^kappaskin: .*{reason}", told), told
+    assert "Traceback" not in told
+    assert list(folder.iterdir()) == []
+
+
+# A simulated source
+
+
+def test_a_simulation_lays_itself_on_every_cylinder(run, tmp_path) -> None:
+    code, printed, told = run("calibrate", "sim:calibration", "--out", tmp_path / "s.toml", *FAST)
+
+    assert code == 0
+    assert "Simulated skin SIM-0001: 300 of 300 channels passed" in printed
+    assert told.count("\n    xx ") == len(STEPS) == 49
+    assert "2/49  Cylinder of radius 100 mm, bent along x, inner face on it" in told
+    gain, offset = TOLERANCE.errors((300,))
+    found = from_toml(tmp_path / "s.toml")
+    # Each mean is of 11 frames: 0.07 1/m, over curvatures of up to 67 1/m, half of it for twist.
+    np.testing.assert_allclose(found.gain[:200], gain[:200], atol=0.01)
+    np.testing.assert_allclose(found.offset, offset, atol=0.4)
+    assert [path.name for path in tmp_path.iterdir()] == ["s.toml"]
+
+
+def test_json_tells_every_channel_and_nothing_else(run, tmp_path) -> None:
+    out = tmp_path / "s.toml"
+    code, printed, _ = run("calibrate", "sim:calibration", "--out", out, "--json", *FAST)
+    found = json.loads(printed)
+    assert code == 0
+    assert (found["passed"], found["failed"], len(found["channels"])) == (300, 0, 300)
+    assert found["channels"][0]["gain"] == from_toml(out).gain[0]
+
+
+def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> None:
+    from kappaskin import SCENES, Creep
+
+    creeping = replace(SCENE, effects=(Creep(0.05, 2.0), *SCENE.effects[1:]))
+    monkeypatch.setitem(SCENES, "creeping", lambda: creeping)
+    out = tmp_path / "s.toml"
+    _, printed, told = run("calibrate", "sim:creeping", "--out", out, "--hold", "10", *FAST)
+    assert "held for 10 s" in told
+    assert "creep      5.0% in 2" in printed
+    assert from_toml(out).creep.time_constant == pytest.approx(2.0, rel=0.03)
+
+
+def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monkeypatch) -> None:
+    from kappaskin import SCENES
+
+    class Broken:
+        def start(self, shape: tuple[int, ...], _: object) -> Any:
+            alive = np.arange(shape[0]) != 217
+            return lambda curvature, _: curvature * alive
+
+    broken = replace(SCENE, effects=(Broken(), GaussianNoise(0.2)))
+    monkeypatch.setitem(SCENES, "broken", lambda: broken)
+    out = tmp_path / "s.toml"
+
+    code, printed, _ = run("calibrate", "sim:broken", "--out", out, *FAST)
+
+    assert code == 1
+    assert "299 of 300 channels passed" in printed
+    assert "failed     xy of element 17: gain" in printed
+    assert np.flatnonzero(np.isnan(from_toml(out).gain)).tolist() == [217]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("--radii", "100,50"), "at least 3 different radii, got 2"),
+        (("--radii", "100,fifty,25"), "radii in millimetres such as 100,50,25"),
+        (("--radii", ""), "radii in millimetres such as 100,50,25"),
+        (("--radii", "100,50,10"), "radius 10 mm strains the gages"),
+        (("--radii", "100,50,0"), "radii above zero"),
+        (("--seconds", "0"), "seconds above zero"),
+        (("--seconds", "nan"), "seconds above zero"),
+        (("--seconds", "0.004"), "at least 2 frames|was not seen"),
+        (("--seconds", "1e9"), "seconds above zero and at most 3600 s"),
+        (("--dwell", "-1"), "dwell above zero"),
+        (("--hold", "-1"), "hold above zero"),
+        (("--hold", "inf"), "hold above zero and at most 3600 s"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_and_leaves_no_file(run, tmp_path, arguments, reason):
+    found = run("calibrate", "sim:calibration", "--out", tmp_path / "s.toml", *arguments)
+    refused(found, reason, tmp_path)
+
+
+def test_a_place_that_cannot_be_written_to_is_refused_before_any_work(run, tmp_path) -> None:
+    found = run("calibrate", "sim:calibration", "--out", tmp_path / "no" / "s.toml")
+    refused(found, "expected a file in a folder that exists", tmp_path)
+    assert "Cylinder" not in found[2]
+
+
+def test_an_amplifier_that_is_too_strong_is_refused_with_the_remedy(run, tmp_path) -> None:
+    found = run("calibrate", "sim:circle", "--out", tmp_path / "s.toml", "--seconds", "0.05")
+    refused(found, "every channel is dead or on a rail.*lower the amplifier's gain", tmp_path)
+
+
+def test_dwell_is_refused_for_a_scene_without_cylinders(run, tmp_path) -> None:
+    found = run("device", "circle", "--dwell", "1")
+    refused(found, "the scene circle has no cylinders to dwell on", tmp_path)
+
+
+# A person at the rig
+
+
+class Rig:
+    """A skin that lies where a person put it last; knows what is asked and answers as scripted."""
+
+    def __init__(self, steps=STEPS, answers: dict[int, list[str]] | None = None) -> None:
+        scene = replace(SCENE, layout=SensorLayout.regular(SCENE.plate.patch, 4, 4))
+        self.scene = replace(scene, rate=2000.0, effects=(GaussianNoise(0.05),))
+        self.steps, self.answers = steps, answers or {}
+        self.sensor = self.scene.sensor()
+        self.lies, self.n, self.closed = 0, 0, False
+        self.asked: list[str] = []
+        self.told: list[str] = []
+        self._laid(0)
+
+    def _laid(self, index: int) -> None:
+        laid = Presentation((self.steps[index],), 1.0)
+        scene = replace(self.scene, laid=laid)
+        if self.n:
+            self._simulator.change(scene)
+        else:
+            self._simulator = Simulator(scene)
+
+    def ask(self, question: str) -> str:
+        self.asked.append(question)
+        number = int(question.split("/")[0])
+        answers = self.answers.get(number, [])
+        answer = answers.pop(0) if answers else "\n"
+        if answer.strip() != "r":
+            self._laid(number - 1)
+        return answer
+
+    def read(self, timeout: float) -> list[Frame]:
+        frames = [self._simulator.frame(self.n + k, time.monotonic) for k in range(8)]
+        self.n += 8
+        return frames
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def guided(rig: Rig, monkeypatch, **options):
+    monkeypatch.setattr("kappaskin.guide.open_source", lambda _: rig)
+    options = {"seconds": 0.004} | options
+    return take_sweep("a port", RADII, rig.ask, rig.told.append, **options)
+
+
+def test_a_person_is_asked_for_each_cylinder_and_shown_what_was_read(monkeypatch) -> None:
+    rig = Rig()
+    sensor, sweep = guided(rig, monkeypatch)
+
+    assert rig.closed
+    assert len(rig.asked) == 49
+    assert rig.asked[0] == (
+        "1/49  Flat table, nothing pressing on the skin: press Enter when it lies still: "
+    )
+    assert rig.asked[1].endswith("or r and Enter to take the last one again: ")
+    assert rig.told[0] == ADVICE
+    assert re.match(r" +xx \+\d+\.\d \(cylinder \+10\.0\), .* noise 0\.0\d", rig.told[2])
+    expected = np.repeat(sweep.curvature, 16, axis=1)
+    assert np.abs(sweep.readings - expected).max() < 0.3
+    report = calibrate(sweep, sensor, datetime.now(UTC))
+    assert report.passed.all()
+    assert "48 of 48 channels passed" in summary(report)[0]
+
+
+def test_redo_takes_the_last_step_again(monkeypatch) -> None:
+    rig = Rig(answers={3: ["r\n"], 4: ["R\n"]})
+    _, sweep = guided(rig, monkeypatch)
+    asked = [int(question.split("/")[0]) for question in rig.asked]
+    assert asked[:8] == [1, 2, 3, 2, 3, 4, 3, 4]
+    assert np.abs(sweep.readings - np.repeat(sweep.curvature, 16, axis=1)).max() < 0.3
+
+
+def test_a_reading_that_cannot_be_used_is_asked_for_again(monkeypatch) -> None:
+    rig = Rig()
+    take, refusals = rig.read, []
+
+    def once_on_the_rails(timeout: float) -> list[Frame]:
+        frames = take(timeout)
+        if len(rig.asked) == 2:
+            refusals.append(1)
+            frames = [replace(frame, counts=frame.counts * 0 + 32767) for frame in frames]
+        return frames
+
+    rig.read = once_on_the_rails
+    guided(rig, monkeypatch)
+    asked = [int(question.split("/")[0]) for question in rig.asked]
+    assert asked[:4] == [1, 2, 2, 3]
+    assert any("every channel is dead or on a rail" in line for line in rig.told)
+    assert refusals
+
+
+def test_what_was_read_before_enter_does_not_count(monkeypatch) -> None:
+    rig = Rig()
+    take = rig.read
+
+    def with_old_ones(timeout: float) -> list[Frame]:
+        fresh = take(timeout)
+        stale = replace(fresh[0], host_time=fresh[0].host_time - 60, counts=fresh[0].counts + 9999)
+        return [stale, *fresh]
+
+    rig.read = with_old_ones
+    _, sweep = guided(rig, monkeypatch)
+    assert np.abs(sweep.readings - np.repeat(sweep.curvature, 16, axis=1)).max() < 0.3
+
+
+def test_a_device_that_falls_silent_is_refused(monkeypatch) -> None:
+    monkeypatch.setattr("kappaskin.guide._SILENCE", 0.05)
+    rig = Rig()
+    take = rig.read
+    rig.read = lambda timeout: take(timeout) if len(rig.asked) < 5 else time.sleep(0.01) or []
+    with pytest.raises(Refusal, match=r"no frame came for .* still sending"):
+        guided(rig, monkeypatch)
+    assert rig.closed
+
+
+def test_another_device_in_the_middle_is_refused(monkeypatch) -> None:
+    rig = Rig()
+    ask = rig.ask
+
+    def swapped(question: str) -> str:
+        if question.startswith("4/"):
+            rig.sensor = rig.scene.sensor()
+        return ask(question)
+
+    rig.ask = swapped
+    with pytest.raises(Refusal, match="another device answered in the middle"):
+        guided(rig, monkeypatch)
+
+
+def test_a_line_that_is_lost_in_the_middle_is_refused(monkeypatch) -> None:
+    rig = Rig()
+    take = rig.read
+
+    def lost(timeout: float) -> list[Frame]:
+        if len(rig.asked) == 7:
+            raise SourceError("a port: the line is gone")
+        return take(timeout)
+
+    rig.read = lost
+    with pytest.raises(SourceError, match="the line is gone"):
+        guided(rig, monkeypatch)
+    assert rig.closed
+
+
+# A device that goes through the steps by itself, on a pseudo-terminal
+
+
+@contextmanager
+def serving(dwell: float, steps=STEPS) -> Iterator[str]:
+    device = PseudoDevice(replace(SCENE, laid=Presentation(steps, dwell)))
+    stop = threading.Event()
+    thread = threading.Thread(target=device.serve, args=(stop.is_set,))
+    thread.start()
+    try:
+        yield device.port
+    finally:
+        stop.set()
+        thread.join(2.0)
+        device.close()
+
+
+def test_a_device_on_the_line_is_calibrated_within_the_standard_errors(run, tmp_path) -> None:
+    out = tmp_path / "s.toml"
+    with serving(dwell=0.05, steps=schedule()) as port:
+        code, printed, told = run("calibrate", port, "--out", out, "--dwell", 0.05)
+    assert code == 0, told
+    assert "300 of 300 channels passed" in printed
+    found = from_toml(out)
+    gain, offset = TOLERANCE.errors((300,))
+    for read, sd, true in (
+        (found.gain, found.gain_sd, gain),
+        (found.offset, found.offset_sd, offset),
+    ):
+        within = np.mean(np.abs(read - true) < 1.96 * sd)
+        assert within > 0.95 - 4 * np.sqrt(0.95 * 0.05 / 300)
+
+
+def test_a_device_whose_line_is_lost_in_the_middle_leaves_no_file(run, tmp_path) -> None:
+    device = PseudoDevice(replace(SCENE, laid=Presentation(STEPS, 0.05)))
+    thread = threading.Thread(target=device.serve, args=(lambda: device.samples > 200,))
+    thread.start()
+    closer = threading.Thread(target=lambda: (thread.join(), device.close()))
+    closer.start()
+    found = run("calibrate", device.port, "--out", tmp_path / "s.toml", "--dwell", 0.05, *FAST[:2])
+    closer.join()
+    refused(found, "the line is gone", tmp_path)
+    assert "3/49" in found[2]
+
+
+def test_a_device_that_is_already_on_its_way_is_refused(run, tmp_path) -> None:
+    with serving(dwell=0.05) as port:
+        line = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        time.sleep(0.3)
+        os.close(line)
+        found = run("calibrate", port, "--out", tmp_path / "s.toml", "--dwell", 0.05, *FAST[:2])
+    refused(found, "step 1 was not seen: the device presents step.*start it anew", tmp_path)
+
+
+def started(port: str, out: Path, **streams: Any) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "kappaskin", "calibrate", port, "--out", str(out)]
+    return subprocess.Popen(
+        command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **streams
+    )
+
+
+def test_closed_standard_input_is_refused_with_what_to_do(tmp_path) -> None:
+    with serving(dwell=1.0) as port:
+        process = started(port, tmp_path / "s.toml", stdin=subprocess.DEVNULL)
+        printed, told = process.communicate(timeout=30)
+    assert "1/97  Flat table" in told
+    code = process.returncode
+    refused(
+        (code, printed, told),
+        "standard input ended before the last step",
+        tmp_path,
+    )
+
+
+def test_ctrl_c_stops_it_and_leaves_no_file(tmp_path) -> None:
+    with serving(dwell=1.0) as port:
+        process = started(port, tmp_path / "s.toml", stdin=subprocess.PIPE)
+        assert process.stderr is not None
+        assert ADVICE in process.stderr.readline()
+        time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        printed, told = process.communicate(timeout=30)
+    found = (process.returncode, printed, told)
+    refused(found, "stopped before the last step; nothing was written", tmp_path)
