@@ -66,7 +66,8 @@ def run(noise: float = _NOISE) -> _Run:
     truth = plate.deflection([load], basis).ravel()
     layout = SensorLayout.regular(SKIN, COLUMNS, ROWS)
     curvature = (layout.curvature_operator(basis) @ truth).reshape(3, -1)
-    readings = UniformNoise(noise).apply(curvature, np.random.default_rng(_SEED))
+    spoil = UniformNoise(noise).start(curvature.shape, np.random.default_rng(_SEED))
+    readings = spoil(curvature, 0.0)
     fit = LeastSquares(basis, layout, sigma=noise)(readings)
     c, M = fit.coefficients.ravel(), fit.estimator.M.reshape(3, len(layout), -1)
     xx, yy, xy = M @ c + np.array([SKIN.base_curvature, 0, 0])[:, None]

@@ -45,7 +45,7 @@ def run() -> _Run:
     curvature = (layout.curvature_operator(reference) @ truth.ravel()).reshape(3, -1)
     rng = np.random.default_rng(scene.seed)
     for effect in scene.effects:
-        curvature = effect.apply(curvature, rng)
+        curvature = effect.start(curvature.shape, rng)(curvature, 0.0)
     basis, grid = SineBasis(patch, 8, 8), patch.grid(_SIDE, _SIDE)
     c = LeastSquares(basis, layout)(curvature).coefficients
     w, fitted = reference.on_grid(*grid)(truth), basis.on_grid(*grid)(c)

@@ -57,7 +57,9 @@ def run(deflection: float, rng: np.random.Generator) -> _Load:
     truth = plate.deflection([load], term).ravel()
     layout, basis = SensorLayout.regular(SKIN, 10, 1), SineBasis(SKIN, 8, 1)
     curvature = (layout.curvature_operator(term) @ truth).reshape(3, -1)
-    fit = LeastSquares(basis, layout, sigma=NOISE)(UniformNoise(NOISE).apply(curvature, rng))
+    fit = LeastSquares(basis, layout, sigma=NOISE)(
+        UniformNoise(NOISE).start(curvature.shape, rng)(curvature, 0.0)
+    )
     s = np.column_stack([np.linspace(0, SKIN.a, 181), np.full(181, SKIN.b / 2)])
     at, c = basis.at(s), fit.coefficients.ravel()
     return _Load(
