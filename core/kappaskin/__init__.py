@@ -49,10 +49,13 @@ from kappaskin.intrinsic import Wrench as Wrench
 from kappaskin.layout import SensorLayout as SensorLayout
 from kappaskin.live import Status as Status
 from kappaskin.mechanics import Compliance as Compliance
+from kappaskin.mechanics import DiscLoad as DiscLoad
+from kappaskin.mechanics import GaussianLoad as GaussianLoad
 from kappaskin.mechanics import LineLoad as LineLoad
 from kappaskin.mechanics import Load as Load
 from kappaskin.mechanics import Plate as Plate
 from kappaskin.mechanics import PointLoad as PointLoad
+from kappaskin.mechanics import RectangleLoad as RectangleLoad
 from kappaskin.patch import Patch as Patch
 from kappaskin.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline import Setup as Setup

@@ -22,7 +22,9 @@ from kappaskin.guide import summary, take_sweep
 from kappaskin.reconstruct import METHODS
 from kappaskin.reconstruct import reconstruct as reconstructed
 from kappaskin.scene import load_scene
-from kappaskin.studies.tables import table_1
+from kappaskin.studies.as_printed import misprints
+from kappaskin.studies.tables import table_1, table_2
+from kappaskin.studies.text import misprints_text, tables_text
 
 FAILED = 1
 """Exit code of a command that was done, with something in the result that failed."""
@@ -47,32 +49,27 @@ def _pair(text: str, what: str) -> tuple[int, int]:
 
 
 @app.command
-def tables(*, json: Annotated[bool, Parameter(negative="")] = False) -> None:
-    """Compute the paper's Table 1 and print it beside the printed numbers.
+def tables(
+    *,
+    json: Annotated[bool, Parameter(negative="")] = False,
+    as_printed: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Compute the paper's Tables 1 and 2 and print them beside the printed numbers.
 
     Example: `kappaskin tables --json`
 
     Parameters
     ----------
     json
-        Print one JSON list of rows instead of a table.
+        Print one JSON list of rows instead of tables.
+    as_printed
+        Instead, tell what the paper misprints, what that would give and why it is not meant.
     """
-    rows = table_1()
+    rows = misprints() if as_printed else table_1() + table_2()
     if json:
         _print_json(rows)
-        return
-    print("Table 1: 10 x 10 elements, 8 x 8 functions, truth of 15 x 15; mm; paper in brackets")
-    print(f"{'case':<12}{'noise':<7}{'applied':>8}{'w max':>17}{'error at load':>25}{'RMS':>18}")
-    for row in rows:
-        paper, sd = row["paper"], row.get("e_max_sd_mm")
-        spread = f" +-{sd:.3f}" if sd is not None else ""
-        print(
-            f"{row['case']:<12}{'yes' if row['noise'] else 'no':<7}{row['w_applied_mm']:>8.2f}"
-            f"{row['w_max_mm']:>8.3f} ({paper['w_max_mm']:.2f}) "
-            f"{row['e_max_mm']:>+10.3f}{spread:<8} ({paper['e_max_mm']:+.2f}) "
-            f"{row['rms_mm']:>8.4f} ({paper['rms_mm']:.3f})"
-        )
-    print("With noise: means over 200 draws, error +- one standard deviation.")
+    else:
+        print(misprints_text(rows) if as_printed else tables_text(rows))
 
 
 # A hyphen is let through so that -1x8 is refused as a basis, not as an option.

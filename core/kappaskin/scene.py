@@ -64,7 +64,7 @@ class Scene:
             raise Refusal(f"expected no loads on a skin that lies on cylinders, got {self.loads}")
         turns = [0.0] if self.motion is None else [self.motion.period * q / 4 for q in range(4)]
         for load in (load for time in turns for load in self.loads_at(time)):
-            load.check(self.plate.patch)
+            self.plate.check(load)
 
     @property
     def basis(self) -> Basis:

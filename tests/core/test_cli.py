@@ -189,8 +189,9 @@ def test_tables_prints_one_json_list_of_rows(run) -> None:
     rows = json.loads(printed)
     assert (code, told, printed.count("\n")) == (0, "", 1)
     assert isinstance(rows, list)
-    assert [(row["case"], row["noise"]) for row in rows] == [
-        (case, noise) for case in ("centre", "off-centre", "line") for noise in (False, True)
+    cases = [(1, "centre"), (1, "off-centre"), (1, "line"), (2, "0.63"), (2, "1.27"), (2, "1.90")]
+    assert [(row["table"], row["case"], row["noise"]) for row in rows] == [
+        (*case, noise) for case in cases for noise in (False, True)
     ]
 
 
@@ -198,9 +199,20 @@ def test_tables_prints_the_papers_numbers_beside_ours(run) -> None:
     code, printed, told = run("tables")
     assert (code, told) == (0, "")
     lines = printed.splitlines()
-    assert len(lines) == 2 + 6 + 1
+    assert sum(line.startswith(("centre", "off-centre", "line")) for line in lines) == 6
     assert "(4.59)" in lines[2]
     assert "(-0.11)" in lines[2]
+    assert "(0.69)" in printed
+
+
+def test_tables_as_printed_tells_why_they_cannot_be_meant(run) -> None:
+    code, printed, told = run("tables", "--as-printed")
+    assert (code, told) == (0, "")
+    assert "the ends would move three times as far as the middle" in printed
+
+    code, printed, _ = run("tables", "--as-printed", "--json")
+    assert code == 0
+    assert {"Eq. 9", "Eq. 10", "Eq. 11"} <= {row["where"] for row in json.loads(printed)}
 
 
 def test_a_device_of_no_scene_or_an_impossible_rate_is_refused(run) -> None:

@@ -81,6 +81,15 @@ def scattered(positions: Any, **changes: Any) -> dict[str, Any]:
 
 # Round trips
 
+
+def test_all_that_holds_the_skin_survives() -> None:
+    patch = Patch(0.04, 0.03, 0.0129)
+    plate = Plate(patch, 0.0, 5.0, 1e4, fluid=True, poisson=0.4, axial_stiffness=300.0)
+    sensor = sensor_on(SensorLayout.regular(patch, 3, 2), plate=plate)
+
+    assert same(from_json(to_json(sensor)), sensor)
+
+
 SIDES = st.floats(1e-3, 10, allow_subnormal=False)
 
 

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import LineLoad, Patch, PointLoad, Refusal, SineBasis
+from kappaskin import (
+    DiscLoad,
+    GaussianLoad,
+    LineLoad,
+    Patch,
+    PointLoad,
+    RectangleLoad,
+    Refusal,
+    SineBasis,
+)
 
 PATCH = Patch(0.1, 0.05)
 BASIS = SineBasis(PATCH, 15, 15)
@@ -15,7 +24,34 @@ xs, ys = st.floats(0, 0.1), st.floats(0, 0.05)
 loads = st.one_of(
     st.builds(PointLoad, xs, ys, st.floats(-5, 5)),
     st.builds(LineLoad, xs, ys, xs, ys, st.floats(-5, 5)),
+    st.builds(DiscLoad, xs, ys, st.floats(1e-4, 0.02), st.floats(-5, 5)),
+    st.builds(RectangleLoad, xs, ys, st.floats(1e-4, 0.1), st.floats(1e-4, 0.05), st.floats(-5, 5)),
+    st.builds(GaussianLoad, xs, ys, st.floats(1e-4, 0.01), st.floats(-5, 5)),
 )
+SPREAD = [
+    DiscLoad(0.06, 0.02, 0.015, 2.0),
+    RectangleLoad(0.06, 0.02, 0.07, 0.03, 2.0),
+    GaussianLoad(0.06, 0.02, 0.004, 2.0),
+]
+spread = pytest.mark.parametrize("load", SPREAD, ids=lambda load: type(load).__name__)
+
+
+class AnyBasis:
+    """Sines that a load does not know to be sines."""
+
+    def __init__(self, basis):
+        self.shape, self.at = basis.shape, basis.at
+
+
+def density(load, x, y):
+    """The pressure of `load`, written out, in Pa at the points x, y."""
+    dx, dy = x - load.x, y - load.y
+    if isinstance(load, DiscLoad):
+        return (dx**2 + dy**2 < load.radius**2) / (math.pi * load.radius**2)
+    if isinstance(load, RectangleLoad):
+        inside = (abs(dx) < load.width / 2) & (abs(dy) < load.height / 2)
+        return inside / (load.width * load.height)
+    return np.exp(-(dx**2 + dy**2) / (2 * load.sd**2)) / (2 * math.pi * load.sd**2)
 
 
 def points_along(line, shares, weights):
@@ -109,3 +145,123 @@ def test_a_force_that_is_no_number_is_refused(force):
 def test_loads_on_the_edge_are_on_the_patch():
     LineLoad(0.0, 0.0, 0.1, 0.05).check(PATCH)
     PointLoad(0.1, 0.05).check(PATCH)
+
+
+# Loads spread over an area
+
+
+@spread
+def test_a_spread_load_is_the_integral_of_its_pressure(load):
+    # Sums over 800 x 400 cells; the rims of disc and rectangle pass through some of them.
+    x, y = (np.arange(800) + 0.5) * 0.1 / 800, (np.arange(400) + 0.5) * 0.05 / 400
+    pressure = load.force * density(load, x[:, None], y[None, :])
+    k, l = BASIS.wavenumbers
+
+    summed = np.sin(np.outer(k, x)) @ pressure @ np.sin(np.outer(y, l)) * (0.1 / 800) ** 2
+
+    np.testing.assert_allclose(load.modal(BASIS), summed, rtol=0, atol=2e-3 * load.force)
+
+
+@spread
+def test_by_quadrature_any_basis_feels_what_sines_feel_in_closed_form(load):
+    closed, summed = load.modal(BASIS), load.modal(AnyBasis(BASIS))
+
+    # Beyond four standard deviations lies exp(-8) of a Gaussian, which quadrature leaves out.
+    beyond = math.exp(-8) * load.force if isinstance(load, GaussianLoad) else 0.0
+    np.testing.assert_allclose(closed, summed, rtol=0, atol=1.1 * beyond + 1e-13)
+
+
+@spread
+@pytest.mark.parametrize("functions", [1, 40])
+def test_quadrature_follows_as_many_functions_as_the_basis_has(load, functions):
+    basis = SineBasis(PATCH, functions, functions)
+
+    beyond = math.exp(-8) * load.force if isinstance(load, GaussianLoad) else 0.0
+    np.testing.assert_allclose(
+        load.modal(basis), load.modal(AnyBasis(basis)), rtol=0, atol=1.1 * beyond + 1e-13
+    )
+
+
+@spread
+def test_on_a_strip_a_spread_load_is_felt_along_x_alone(load):
+    basis = SineBasis(Patch(0.1, 0.05, strip=True), 15, 1)
+    x = (np.arange(2000) + 0.5) * 0.1 / 2000
+    y = (np.arange(1000) + 0.5) * 0.05 / 1000
+    along = load.force * density(load, x[:, None], y).sum(axis=1) * (0.05 / 1000)
+
+    felt = load.modal(basis)
+
+    summed = np.sin(np.outer(basis.wavenumbers[0], x)) @ along * (0.1 / 2000)
+    np.testing.assert_allclose(felt.ravel(), summed, rtol=0, atol=1e-3 * load.force)
+    any_basis = load.modal(AnyBasis(basis))
+    np.testing.assert_allclose(felt, any_basis, rtol=0, atol=4e-4 * load.force)
+
+
+@pytest.mark.parametrize(
+    ("small", "mean_square"),
+    [
+        (lambda size: DiscLoad(0.031, 0.021, size), 1 / 2),
+        (lambda size: RectangleLoad(0.031, 0.021, size, size), 1 / 6),
+        (lambda size: GaussianLoad(0.031, 0.021, size), 2.0),
+    ],
+    ids=["disc", "rectangle", "gaussian"],
+)
+def test_spread_loads_tend_to_a_point_as_the_square_of_their_size(small, mean_square):
+    # The mean of x^2 + y^2 under each is in sizes squared; of a wave, a quarter of that times its
+    # wave number squared is lost.
+    lost = 1 - small(1e-4).modal(BASIS) / PointLoad(0.031, 0.021).modal(BASIS)
+
+    np.testing.assert_allclose(lost, mean_square * 1e-8 * BASIS.laplacian / 4, rtol=5e-3)
+
+
+def test_a_rectangle_of_no_height_to_speak_of_is_a_line():
+    line = LineLoad(0.02, 0.02, 0.08, 0.02, 2.0)
+
+    np.testing.assert_allclose(
+        RectangleLoad(0.05, 0.02, 0.06, 1e-8, 2.0).modal(BASIS), line.modal(BASIS), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        DiscLoad(0.02, 0.02, 0.02),
+        DiscLoad(0.05, 0.03, 0.02),
+        RectangleLoad(0.05, 0.025, 0.1, 0.05),
+        RectangleLoad(0.07, 0.04, 0.06, 0.02),
+        GaussianLoad(0.02, 0.02, 0.005),
+    ],
+)
+def test_a_load_that_touches_the_edge_lies_on_the_patch(load):
+    load.check(PATCH)
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        DiscLoad(0.02, 0.02, 0.0201),
+        DiscLoad(0.05, 0.025, 0.03),
+        DiscLoad(0.095, 0.045, 0.006),
+        RectangleLoad(0.05, 0.025, 0.1001, 0.02),
+        RectangleLoad(0.05, 0.025, 0.02, 0.0501),
+        GaussianLoad(0.02, 0.02, 0.0051),
+        DiscLoad(math.nan, 0.02, 0.001),
+        GaussianLoad(0.05, math.inf, 0.001),
+    ],
+)
+def test_a_load_that_spills_over_the_edge_is_refused(load):
+    with pytest.raises(Refusal, match=r"on the patch of 0\.1 x 0\.05 m, got .*Load\("):
+        load.check(PATCH)
+
+
+@pytest.mark.parametrize("size", [0.0, -0.01, math.nan, math.inf])
+@pytest.mark.parametrize("kind", [DiscLoad, GaussianLoad])
+def test_a_load_of_no_size_is_refused_with_what_to_take_instead(kind, size):
+    with pytest.raises(Refusal, match=f"size above zero in metres, got {kind.__name__}.*a point"):
+        kind(0.05, 0.02, size)
+
+
+@pytest.mark.parametrize("sides", [(0.0, 0.01), (0.01, -0.01), (math.nan, 0.01)])
+def test_a_rectangle_with_a_side_of_no_length_is_refused(sides):
+    with pytest.raises(Refusal, match="size above zero in metres, got RectangleLoad"):
+        RectangleLoad(0.05, 0.02, *sides)

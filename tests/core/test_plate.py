@@ -1,13 +1,29 @@
 """The deflection of a simply supported plate, against textbook answers and superposition."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import skfem
 from hypothesis import given
 from hypothesis import strategies as st
+from skfem.helpers import d, dd, ddot, dot, eye, trace
 
-from kappaskin import LineLoad, Patch, Plate, PointLoad, Refusal, SineBasis
+from kappaskin import (
+    Compliance,
+    DiscLoad,
+    GaussianLoad,
+    LineLoad,
+    Patch,
+    Plate,
+    PointLoad,
+    RectangleLoad,
+    Refusal,
+    Scene,
+    SensorLayout,
+    SineBasis,
+)
 
 SQUARE = Patch(0.1, 0.1)
 inside = st.tuples(st.floats(0.0, 0.1), st.floats(0.0, 0.06))
@@ -37,16 +53,17 @@ def test_the_central_force_agrees_with_timoshenko_from_1_mm_to_1_m(side):
 
 
 @pytest.mark.parametrize("side", [1e-3, 0.1, 1.0])
-def test_the_uniform_load_agrees_with_the_textbook_from_1_mm_to_1_m(side):
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    lines = [
-        LineLoad(side * (1 + s) / 2, 0, side * (1 + s) / 2, side, g / 2 * side**2)
-        for s, g in zip(nodes, weights, strict=True)
-    ]
+@pytest.mark.parametrize(
+    ("ratio", "coefficient"), [(1, 0.00406235), (1.5, 0.00772), (2, 0.01013), (3, 0.01223)]
+)
+def test_the_uniform_load_agrees_with_timoshenkos_table_from_1_mm_to_1_m(side, ratio, coefficient):
+    patch = Patch(ratio * side, side)
+    load = RectangleLoad(patch.a / 2, side / 2, patch.a, side, 3.0 * patch.a * side)
 
-    w = deflection_at(Plate(Patch(side, side), 2.0), lines, side / 2, side / 2)
+    w = deflection_at(Plate(patch, 2.0), [load], patch.a / 2, side / 2, 61)
 
-    assert w * 2.0 / side**4 == pytest.approx(0.0040624, abs=5e-8)
+    digits = 8 if ratio == 1 else 5
+    assert w * 2.0 / (3.0 * side**4) == pytest.approx(coefficient, abs=0.51 * 10**-digits)
 
 
 def test_the_plate_equation_holds_mode_by_mode():
@@ -120,3 +137,228 @@ def test_a_rigidity_that_cannot_be_is_refused(rigidity):
 def test_a_load_off_the_plate_is_refused():
     with pytest.raises(Refusal, match=r"on the patch of 0\.1 x 0\.1 m"):
         Plate(SQUARE).deflection([PointLoad(0.05, 0.11)], SineBasis(SQUARE, 4, 4))
+
+
+def test_a_basis_on_another_patch_is_refused():
+    with pytest.raises(Refusal, match=r"the plate is on Patch\(a=0\.1.*the basis on Patch\(a=0\.2"):
+        Plate(SQUARE).compliance(SineBasis(Patch(0.2, 0.1), 4, 4))
+
+
+# What else holds it: tension, foam, a fluid
+
+
+def membrane(patch, x, y):
+    """w T / q of a membrane under a uniform pressure, by Poisson's single series."""
+    n = np.arange(1, 4000, 2)
+    a, b = patch.a, patch.b
+    # cosh(u) / cosh(v) for |u| <= v without overflow.
+    u, v = np.abs(n * math.pi * (y - b / 2) / a), n * math.pi * b / (2 * a)
+    ratio = np.exp(u - v) * (1 + np.exp(-2 * u)) / (1 + np.exp(-2 * v))
+    return 4 * a**2 / math.pi**3 * np.sum((1 - ratio) * np.sin(n * math.pi * x / a) / n**3)
+
+
+def uniform(patch, pressure):
+    force = pressure * patch.a * patch.b
+    return RectangleLoad(patch.a / 2, patch.b / 2, patch.a, patch.b, force)
+
+
+@pytest.mark.parametrize("patch", [SQUARE, Patch(0.1, 0.03)])
+def test_a_drum_head_agrees_with_poissons_series(patch):
+    drum, (x, y) = Plate(patch, 0.0, tension=20.0), (0.3 * patch.a, 0.6 * patch.b)
+
+    w = deflection_at(drum, [uniform(patch, 5.0)], x, y, 151)
+
+    assert w * 20.0 / 5.0 == pytest.approx(membrane(patch, x, y), rel=2e-6)
+    assert membrane(SQUARE, 0.05, 0.05) / 0.1**2 == pytest.approx(0.07367135, abs=1e-8)
+
+
+def test_a_plate_in_tension_tends_to_the_membrane_as_its_rigidity_goes():
+    def off(rigidity):
+        plate = Plate(SQUARE, rigidity, tension=20.0)
+        w = deflection_at(plate, [uniform(SQUARE, 5.0)], 0.05, 0.05, 151)
+        return membrane(SQUARE, 0.05, 0.05) * 5.0 / 20.0 - w
+
+    # Far from its edges a membrane lacks the deflection D q / T^2 of its plate.
+    assert off(1e-4) == pytest.approx(1e-4 * 5.0 / 20.0**2, rel=0.01)
+    assert off(1e-3) == pytest.approx(10 * off(1e-4), rel=0.01)
+
+
+def test_under_a_point_a_drum_head_gives_way_without_limit_and_that_is_refused():
+    drum, basis = Plate(SQUARE, 0.0, tension=20.0), SineBasis(SQUARE, 15, 15)
+    disc = DiscLoad(0.05, 0.05, 0.01)
+
+    for point in (PointLoad(0.05, 0.05), LineLoad(0.05, 0.05, 0.05, 0.05)):
+        with pytest.raises(Refusal, match="without limit under a point: expected a distributed"):
+            drum.deflection([disc, point], basis)
+    with pytest.raises(Refusal, match="expected a distributed load"):
+        Scene("drum", drum, SensorLayout.regular(SQUARE, 4, 4), (PointLoad(0.05, 0.05),))
+    # The sum over modes grows as their logarithm, by P / (2 pi T) for every factor e.
+    centre = PointLoad(0.05, 0.05)
+    few, many = (
+        float(b.at(centre.centre()[None])[0] @ drum.compliance(b)(centre.modal(b)).ravel())
+        for b in (SineBasis(SQUARE, 51, 51), SineBasis(SQUARE, 511, 511))
+    )
+    assert many - few == pytest.approx(math.log(10) / (2 * math.pi * 20.0), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "load", [LineLoad(0.02, 0.03, 0.08, 0.07), DiscLoad(0.05, 0.05, 0.01),
+             RectangleLoad(0.05, 0.05, 0.02, 0.01), GaussianLoad(0.05, 0.05, 0.005)],
+    ids=lambda load: type(load).__name__,
+)  # fmt: skip
+def test_under_every_other_load_a_drum_head_converges(load):
+    drum = Plate(SQUARE, 0.0, tension=20.0)
+
+    w = [deflection_at(drum, [load], 0.05, 0.05, modes) for modes in (63, 127, 255)]
+
+    assert abs(w[2] - w[1]) < 0.6 * abs(w[1] - w[0]) + 1e-6 * w[2]
+    assert w[2] == pytest.approx(w[1], rel=0.01)
+
+
+def test_a_string_holds_a_point_that_a_drum_head_cannot():
+    strip = Patch(0.1, 0.02, strip=True)
+    string = Plate(strip, 0.0, tension=20.0)
+    basis = SineBasis(strip, 2000, 1)
+
+    c = string.deflection([PointLoad(0.03, 0.01, 2.0)], basis)
+
+    # P x (a - x) / (a T) under the force per width P.
+    w = basis.at(np.array([[0.03, 0.01]]))[0] @ c.ravel()
+    exact = 2.0 / 0.02 * 0.03 * 0.07 / (0.1 * 20.0)
+    # The sines beyond 2000 would add P a / (2000 pi^2 T).
+    missing = 2.0 / 0.02 * 0.1 / (2000 * math.pi**2 * 20.0)
+    assert exact - w == pytest.approx(missing, rel=0.01)
+
+
+def test_on_stiff_foam_the_middle_sinks_by_the_pressure_over_its_modulus():
+    def sunk(foundation):
+        plate = Plate(SQUARE, 1e-3, foundation=foundation)
+        return deflection_at(plate, [uniform(SQUARE, 500.0)], 0.05, 0.05, 301) * foundation / 500.0
+
+    assert abs(sunk(1e3) - 1) > 0.2
+    assert sunk(1e7) == pytest.approx(1, abs=2e-5)  # what 301 modes lack of the sum
+
+
+def test_a_long_strip_on_foam_sinks_under_a_line_as_winklers_beam():
+    strip, D, k = Patch(2.0, 0.02, strip=True), 0.05, 2e5
+    beam, basis = Plate(strip, D, foundation=k), SineBasis(strip, 3200, 1)
+
+    c = beam.deflection([PointLoad(1.0, 0.01, 2.0)], basis)
+
+    # P beta / (2 k) with beta^4 = k / (4 D), damped out long before the ends.
+    beta = (k / (4 * D)) ** 0.25
+    w = basis.at(np.array([[1.0, 0.01]]))[0] @ c.ravel()
+    assert w == pytest.approx(2.0 / 0.02 * beta / (2 * k), rel=1e-6)
+
+
+def finite_elements(plate, pressure, cells):
+    """Deflection by Argyris elements of a hinged plate: a function of points (P, 2)."""
+    a, b, nu = plate.patch.a, plate.patch.b, plate.poisson
+    mesh = skfem.MeshTri.init_tensor(*(np.linspace(0, side, cells + 1) for side in (a, b)))
+    basis = skfem.Basis(mesh, skfem.ElementTriArgyris(), intorder=12)
+
+    @skfem.BilinearForm
+    def energy(u, v, _):
+        M = plate.rigidity * ((1 - nu) * dd(u) + nu * eye(trace(dd(u)), 2))
+        return ddot(M, dd(v)) + plate.tension * dot(d(u), d(v)) + plate.foundation * u * v
+
+    @skfem.LinearForm
+    def work(v, w):
+        return pressure(*w.x) * v
+
+    at_x = mesh.facets_satisfying(lambda p: np.isclose(p[0] * (a - p[0]), 0))
+    at_y = mesh.facets_satisfying(lambda p: np.isclose(p[1] * (b - p[1]), 0))
+    held = [basis.get_dofs(at_x).all(["u", "u_y", "u_yy"]),
+            basis.get_dofs(at_y).all(["u", "u_x", "u_xx"])]  # fmt: skip
+    system = energy.assemble(basis), work.assemble(basis)
+    u = skfem.solve(*skfem.condense(*system, D=np.unique(np.concatenate(held))))
+    return lambda points: basis.probes(points.T) @ u
+
+
+@pytest.mark.parametrize("tension", [0.0, 300.0])
+@pytest.mark.parametrize("foundation", [0.0, 1e5])
+def test_finite_elements_agree_whatever_holds_the_plate(tension, foundation):
+    patch = Patch(0.1, 0.07)
+    plate = Plate(patch, 0.5, tension, foundation)
+    load = GaussianLoad(0.04, 0.036, 0.0075, 3.0)
+    points = np.array([[0.04, 0.036], [0.07, 0.02], [0.02, 0.06]])
+
+    def pressure(x, y):
+        square = (x - load.x) ** 2 + (y - load.y) ** 2
+        return 3.0 * np.exp(-square / (2 * load.sd**2)) / (2 * math.pi * load.sd**2)
+
+    w = finite_elements(plate, pressure, 8)(points)
+
+    basis = SineBasis(patch, 40, 40)
+    mine = basis.at(points) @ plate.deflection([load], basis).ravel()
+    np.testing.assert_allclose(mine, w, rtol=2e-5)
+
+
+# A fluid keeps the volume; compliance against direct solves
+
+
+def minimised(K, force, volume=None):
+    """The least of c K c / 2 - force c, where volume c = 0 when there is one, and its pressure."""
+    if volume is None:
+        return np.linalg.solve(K, force), 0.0
+    N = len(K)
+    bordered = np.block([[K, volume[:, None]], [volume[None], np.zeros((1, 1))]])
+    # Scaled: stiffness and volume differ by many powers of ten.
+    scale = 1 / np.sqrt(np.append(np.diag(K), volume @ (volume / np.diag(K))))
+    x = scale * np.linalg.solve(bordered * np.outer(scale, scale), scale * np.append(force, 0.0))
+    return x[:N], x[N]
+
+
+def a_stiffness(size):
+    A = np.random.default_rng(3).normal(size=(size, size))
+    return A @ A.T + size * np.eye(size)
+
+
+@pytest.mark.parametrize("diagonal", [True, False])
+@pytest.mark.parametrize("fluid", [True, False])
+def test_compliance_is_the_direct_solution(diagonal, fluid):
+    K = np.diag(np.arange(1.0, 13)) if diagonal else a_stiffness(12)
+    force, volume = np.random.default_rng(4).normal(size=(2, 12))
+    values = 1 / np.diag(K) if diagonal else np.linalg.inv(K)
+
+    c = Compliance(values, volume if fluid else None)(force.reshape(4, 3))
+
+    expected, _ = minimised(K, force, volume if fluid else None)
+    np.testing.assert_allclose(c.ravel(), expected, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("fluid", [True, False])
+def test_an_operator_after_compliance_is_the_product(fluid):
+    K, M = a_stiffness(12), np.random.default_rng(5).normal(size=(7, 12))
+    compliance = Compliance(np.linalg.inv(K), np.arange(12.0) if fluid else None)
+
+    whole = np.column_stack([compliance(e[:, None]).ravel() for e in np.eye(12)])
+
+    np.testing.assert_allclose(compliance.after(M), M @ whole, rtol=1e-12, atol=1e-14)
+
+
+FLUID = {"flat": Patch(0.1, 0.06), "bent": Patch(0.1, 0.06, 0.05)}
+
+
+@pytest.mark.parametrize("patch", FLUID.values(), ids=FLUID)
+def test_over_a_fluid_the_volume_stays_and_the_pressure_is_its_multiplier(patch):
+    plate = Plate(patch, 0.5, tension=30.0, foundation=1e4, axial_stiffness=1e3)
+    basis, load = SineBasis(patch, 9, 9, sliding=True), DiscLoad(0.03, 0.02, 0.01, 2.0)
+    points, weights = basis.quadrature()
+    volume = weights @ basis.at(points)
+    values = plate.compliance(basis).values
+    K = np.diag(1 / values) if values.ndim == 1 else np.linalg.inv(values)
+
+    c = replace(plate, fluid=True).deflection([load], basis).ravel()
+
+    expected, pressure = minimised(K, load.modal(basis).ravel(), volume)
+    np.testing.assert_allclose(c, expected, rtol=1e-9, atol=1e-9 * np.abs(c).max())
+    assert abs(volume @ c) < 1e-12 * np.abs(volume) @ np.abs(c)
+    # What the skin needs besides the load is that one pressure, alike everywhere.
+    np.testing.assert_allclose(
+        load.modal(basis).ravel() - K @ c,
+        pressure * volume,
+        rtol=0,
+        atol=1e-8 * pressure * volume.max(),
+    )
+    assert pressure > 0

@@ -40,7 +40,8 @@ class Basis(Protocol):
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, N), at `positions` (P, 2).
 
-        `dx` = -1 is the integral along x, zero on average at the two ends.
+        `dx` = -1 is the integral along x, zero on average at the two ends, and `dx` = -2 the
+        integral of that one along x, zero on average between them.
         """
         ...
 

@@ -11,20 +11,25 @@ from kappaskin.patch import Patch
 
 
 def _sine(k: Array, x: Array, length: float, derivative: int) -> Array:
-    """The derivative of order -1, 0, 1 or 2 of sin(k x), for every x (rows) and k (columns).
+    """The derivative of order -2 to 2 of sin(k x), for every x (rows) and k (columns).
 
-    Of order -1 it is the integral whose values at 0 and `length` cancel.
+    Of order -1 it is the integral whose values at 0 and `length` cancel, of order -2 the integral
+    of that one whose mean is zero.
     """
     kx = np.multiply.outer(x, k)
+    end = np.cos(k * length)
+    if derivative == -2:
+        tilt = np.multiply.outer(x - length / 2, (1 + end) / (2 * k))
+        return tilt - np.sin(kx) / k**2 + (1 - end) / (k**3 * length)
     if derivative == -1:
-        return ((1 + np.cos(k * length)) / 2 - np.cos(kx)) / k
+        return ((1 + end) / 2 - np.cos(kx)) / k
     if derivative == 0:
         return np.sin(kx)
     if derivative == 1:
         return k * np.cos(kx)
     if derivative == 2:
         return -(k**2) * np.sin(kx)
-    raise Refusal(f"expected a derivative of order -1, 0, 1 or 2, got {derivative}")
+    raise Refusal(f"expected a derivative of order -2 to 2, got {derivative}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,11 @@
-"""Loads on a patch, as what each basis function feels of them."""
+"""Loads on a patch, as what each basis function feels of them: a point, a line."""
 
 import math
 from dataclasses import dataclass, fields, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import Refusal
@@ -39,10 +40,11 @@ class Load(Protocol):
         ...
 
 
-def _check(load: Load, patch: Patch, *points: tuple[float, float]) -> None:
+def check_on(load: Load, patch: Patch, points: ArrayLike) -> None:
+    """Refuse a `load` of no finite force, or whose `points` (P, 2) are not all on `patch`."""
     if not math.isfinite(load.force):
         raise Refusal(f"expected a finite force in N, got {load.force}")
-    if not patch.contains(np.array(points)).all():
+    if not patch.contains(np.asarray(points)).all():
         raise Refusal(
             f"expected a load on the patch of {patch.a:g} x {patch.b:g} m, got {load}; "
             "positions are in metres from the corner x = y = 0"
@@ -65,7 +67,7 @@ class PointLoad:
         return np.array([self.x, self.y])
 
     def check(self, patch: Patch) -> None:
-        _check(self, patch, (self.x, self.y))
+        check_on(self, patch, self.centre()[None])
 
     def shifted(self, dx: float, dy: float) -> "PointLoad":
         return replace(self, x=self.x + dx, y=self.y + dy)
@@ -91,7 +93,7 @@ class LineLoad:
         return np.array([self.x0 + self.x1, self.y0 + self.y1]) / 2
 
     def check(self, patch: Patch) -> None:
-        _check(self, patch, (self.x0, self.y0), (self.x1, self.y1))
+        check_on(self, patch, [(self.x0, self.y0), (self.x1, self.y1)])
 
     def shifted(self, dx: float, dy: float) -> "LineLoad":
         x0, y0, x1, y1, force = (getattr(self, f.name) for f in fields(self))
@@ -116,3 +118,10 @@ class LineLoad:
             return np.cos(phase + turn / 2) * np.sinc(turn / (2 * np.pi))
 
         return self.force / 2 * (mean_cosine(A - C, B - F) - mean_cosine(A + C, B + F))
+
+
+def is_point(load: Load) -> bool:
+    """Whether all of the force acts at one point."""
+    if isinstance(load, LineLoad):
+        return (load.x0, load.y0) == (load.x1, load.y1)
+    return isinstance(load, PointLoad)

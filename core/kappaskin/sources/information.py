@@ -33,7 +33,8 @@ def to_json(sensor: Sensor) -> str:
             "base_curvature": layout.patch.base_curvature,
             "strip": layout.patch.strip,
             "edge": sensor.edge,
-            **{name: getattr(sensor.plate, name) for name in _ALSO_OF_THE_PLATE},
+            "fluid": sensor.plate.fluid,
+            **{name: getattr(sensor.plate, name) for name in _OF_THE_PLATE},
             **where,
             "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
             **asdict(sensor.transduction),
@@ -44,7 +45,7 @@ def to_json(sensor: Sensor) -> str:
 
 _Part = TypeVar("_Part", HalfBridge, Multiplexer, Amplifier, Converter)
 
-_ALSO_OF_THE_PLATE = ("tension", "foundation", "fluid", "poisson")
+_OF_THE_PLATE = ("tension", "foundation", "poisson", "axial_stiffness")
 # What a flat plate hinged along its edges need not say.
 UNSAID: dict[str, Any] = {
     "base_curvature": 0.0,
@@ -54,12 +55,13 @@ UNSAID: dict[str, Any] = {
     "foundation": 0.0,
     "fluid": False,
     "poisson": 0.3,
+    "axial_stiffness": 0.0,
 }
 _KINDS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "a text": (str, ("name", "serial_number", "firmware", "edge")),
     "a number": (
         (int, float),
-        ("rate", "rigidity", "base_curvature", "tension", "foundation", "poisson"),
+        ("rate", "rigidity", "base_curvature", *_OF_THE_PLATE),
     ),
     "a list": (list, ("size", "grid", "positions", "dead_channels")),
     "an object": (dict, ("bridge", "multiplexer", "amplifier", "converter")),
@@ -128,10 +130,8 @@ def _layout(said: dict[str, Any]) -> SensorLayout:
 
 
 def _plate(patch: Patch, said: dict[str, Any]) -> Plate:
-    tension, foundation, poisson = (
-        float(said[name]) for name in ("tension", "foundation", "poisson")
-    )
-    return Plate(patch, float(said["rigidity"]), tension, foundation, said["fluid"], poisson)
+    numbers = {name: float(said[name]) for name in _OF_THE_PLATE}
+    return Plate(patch, float(said["rigidity"]), fluid=said["fluid"], **numbers)
 
 
 def from_json(text: str) -> Sensor:

@@ -1,0 +1,53 @@
+"""The rows of studies, as text for people."""
+
+import textwrap
+from typing import Any
+
+_TITLES = {
+    1: "Table 1: 10 x 10 elements, 8 x 8 functions, truth of 15 x 15; mm; paper in brackets",
+    2: "Table 2: 10 elements on half a circle, 8 functions, truth of Eq. 10 as it must read; mm;\n"
+    "paper's simulation in brackets, its experiment under measured",
+}
+
+
+def _row(row: dict[str, Any]) -> str:
+    def paper(name: str, form: str) -> str:
+        value = row["paper"].get(name)
+        return "-" if value is None else format(value, form)
+
+    def bracketed(name: str, form: str) -> str:
+        return f"({paper(name, form)})"
+
+    sd = row.get("e_max_sd_mm")
+    spread = "" if sd is None else f" +-{sd:.3f}"
+    return (
+        f"{row['case']:<12}{'yes' if row['noise'] else 'no':<7}{row['w_applied_mm']:>8.2f}"
+        f"{row['w_max_mm']:>8.3f} {bracketed('w_max_mm', '.2f'):<7}"
+        f"{row['e_max_mm']:>+10.3f}{spread:<8} {bracketed('e_max_mm', '+.2f'):<8}"
+        f"{row['rms_mm']:>8.4f} {bracketed('rms_mm', '.3f'):<8}"
+        + (f"{paper('experiment_w_max_mm', '.2f'):>8}" if row["table"] == 2 else "")
+    ).rstrip()
+
+
+def tables_text(rows: list[dict[str, Any]]) -> str:
+    """Tables 1 and 2 with the paper's numbers beside ours."""
+    lines: list[str] = []
+    for table, title in _TITLES.items():
+        head = (
+            f"{'case':<12}{'noise':<7}{'applied':>8}{'w max':>17}{'error at load':>25}{'RMS':>18}"
+        )
+        lines += [title, head + ("  measured" if table == 2 else "")]
+        lines += [_row(row) for row in rows if row["table"] == table] + [""]
+    return "\n".join([*lines, "With noise: means over 200 draws, error +- one standard deviation."])
+
+
+def misprints_text(rows: list[dict[str, Any]]) -> str:
+    """What is misprinted, one paragraph each."""
+    lines: list[str] = []
+    for row in rows:
+        gives = [("gives", f"{value:.4g}  {what}") for what, value in row["gives"].items()]
+        said = [("printed", row["printed"]), ("meant", row["meant"]), *gives, ("but", row["why"])]
+        lines += [row["where"]]
+        lines += [textwrap.fill(text, 96, initial_indent=f"    {name:<9}",
+                                subsequent_indent=" " * 13) for name, text in said]  # fmt: skip
+    return "\n".join(lines)

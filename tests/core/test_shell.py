@@ -1,0 +1,301 @@
+"""A skin bent along x as a shell: against its full energy, the arc, the flat plate, geometry."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.polynomial import legendre
+
+from kappaskin import (
+    GaussianLoad,
+    LeastSquares,
+    LineLoad,
+    Patch,
+    Plate,
+    PointLoad,
+    Refusal,
+    SensorLayout,
+    SineBasis,
+)
+
+R = 12.9e-3
+ARC = math.pi * R
+THIN = {"E": 3e9, "nu": 0.3, "h": 1e-4}
+
+
+class Full:
+    """Sanders' and Koiter's shell with u, v and w unknown, by Legendre polynomials; no library.
+
+    All of its fields go as sin(q y) or cos(q y), q = j pi/b: one problem in x for every j. `hoop`
+    and `shear` multiply those membrane stiffnesses; the edges along x = 0 and a are hinged, hold
+    v and let u go.
+    """
+
+    def __init__(self, patch, E, nu, h, hoop=1.0, shear=1.0, degree=26):
+        self.patch, self.degree, self.nu = patch, degree, nu
+        self.D = E * h**3 / (12 * (1 - nu**2))
+        C = E * h / (1 - nu**2)
+        # For one j the load is resisted by what is left of C when eps_x answers freely.
+        self.C_x, self.C_y, self.C_xy, self.C_s = hoop * C, C, nu * C, shear * C * (1 - nu) / 2
+        t, weights = np.polynomial.legendre.leggauss(2 * degree + 20)
+        self.x, self.weights = (t + 1) * patch.a / 2, weights * patch.a / 2
+        self.f = [self.polynomials(self.x, order, held=True) for order in range(3)]
+        self.u = [self.polynomials(self.x, order, held=False) for order in range(2)]
+
+    def polynomials(self, x, derivative, held):
+        t, n = 2 * x / self.patch.a - 1, self.degree + 2 * held
+        P = [legendre.legval(t, legendre.legder(np.eye(n)[i], derivative)) for i in range(n)]
+        P = np.column_stack(P) * (2 / self.patch.a) ** derivative
+        return P[:, 2:] - P[:, :-2] if held else P  # those that vanish at both ends
+
+    def deflection(self, j, load, x):
+        """w at `x` (P,), over sin(q y), under the load's part `load` (X,) per metre in x."""
+        H, q, nu = 1 / self.patch.radius, j * math.pi / self.patch.b, self.nu
+        (f, fx, fxx), (v, vx, _), (u, ux) = self.f, self.f, self.u
+        n, no = f.shape[1], np.zeros_like
+
+        def product(left, right):
+            return (np.hstack(left).T * self.weights) @ np.hstack(right)
+
+        # f is inward; f, v go as sin(q y), u as cos(q y).
+        eps_x, eps_y = (-H * f, vx, no(u)), (no(f), no(v), -q * u)
+        gamma = no(f), q * v, ux
+        xx, yy = (fxx, H * vx, no(u)), (-(q**2) * f, no(v), no(u))
+        xy = q * fx, 3 / 4 * H * q * v, -H / 4 * ux
+        K = self.C_x * product(eps_x, eps_x) + self.C_y * product(eps_y, eps_y)
+        K += self.C_xy * (product(eps_x, eps_y) + product(eps_y, eps_x))
+        K += self.C_s * product(gamma, gamma)
+        bending = product(xx, xx) + product(yy, yy) + nu * (product(xx, yy) + product(yy, xx))
+        K += self.D * (bending + 2 * (1 - nu) * product(xy, xy))
+        work = np.append(f.T @ (self.weights * load), np.zeros(len(K) - n))
+        scale = 1 / np.sqrt(np.diag(K) + 1e-30)
+        A = K * np.outer(scale, scale) * self.patch.b / 2
+        # u = const. costs nothing: least squares leaves it out.
+        answer = scale * np.linalg.lstsq(A, scale * work, rcond=1e-15)[0]
+        return self.polynomials(x, 0, held=True) @ answer[:n]
+
+    def under(self, load, at, highest):
+        """Deflection at the point `at` under a Gaussian load, summed over j up to `highest`."""
+        along = np.exp(-((self.x - load.x) ** 2) / (2 * load.sd**2))
+        along *= load.force / (self.weights @ along)
+        total = 0.0
+        for j in range(1, highest + 1):
+            q = j * math.pi / self.patch.b
+            felt = math.sin(q * load.y) * math.exp(-((q * load.sd) ** 2) / 2)
+            total += self.deflection(j, felt * along, at[:1])[0] * math.sin(q * at[1])
+        return total
+
+
+def deflection_at(plate, load, at, functions, sliding=False):
+    basis = SineBasis(plate.patch, *functions, sliding=sliding)
+    return basis.at(np.asarray(at)[None])[0] @ plate.deflection([load], basis).ravel()
+
+
+# The full energy
+
+
+FINGERTIP = Patch(ARC, 0.03, R)
+
+
+def test_the_shell_is_the_limit_of_the_full_one_as_hoop_and_shear_stiffen():
+    load, at = GaussianLoad(0.45 * ARC, 0.016, ARC / 18), np.array([0.5 * ARC, 0.014])
+    # The axial stiffness that the full energy has once the hoop cannot answer.
+    C = THIN["E"] * THIN["h"] / (1 - THIN["nu"] ** 2)
+    plate = replace(Plate.of_material(FINGERTIP, **THIN), axial_stiffness=C)
+    mine = deflection_at(plate, load, at, (50, 11))
+
+    softer = [
+        Full(FINGERTIP, **THIN, hoop=stiff, shear=stiff, degree=40).under(load, at, 11) / mine - 1
+        for stiff in (1e1, 1e2, 1e3)
+    ]
+
+    assert softer[0] == pytest.approx(0.030, abs=0.001)
+    assert softer[1] == pytest.approx(softer[0] / 10, rel=0.03)
+    assert softer[2] == pytest.approx(softer[1] / 10, rel=0.03)
+
+
+@pytest.mark.parametrize(("width", "softer", "free"), [(1.0, 1.14, 16.1), (0.5, 1.30, 29.4)])
+def test_what_is_dropped_and_what_is_kept_counts_as_is_written(width, softer, free):
+    patch = Patch(ARC, width * ARC, R)
+    load, at = GaussianLoad(ARC / 2, patch.b / 2, ARC / 18), np.array([ARC, patch.b]) / 2
+    plate = Plate.of_material(patch, **THIN)
+
+    full = Full(patch, **THIN, degree=32).under(load, at, 11)
+
+    assert full / deflection_at(plate, load, at, (24, 11)) == pytest.approx(softer, abs=0.01)
+    slipping = deflection_at(replace(plate, axial_stiffness=0.0), load, at, (24, 11))
+    assert slipping / full == pytest.approx(free, abs=0.3)
+
+
+def test_the_full_shell_gives_back_naviers_flat_plate():
+    """The oracle itself, where it has a closed form."""
+    flat = Patch(0.1, 0.06, 1e5)
+    load, at = GaussianLoad(0.05, 0.03, 0.006), np.array([0.04, 0.03])
+
+    full = Full(flat, **THIN).under(load, at, 11)
+
+    plate = Plate.of_material(Patch(0.1, 0.06), **THIN)
+    assert full == pytest.approx(deflection_at(plate, load, at, (40, 11)), rel=3e-6)
+
+
+# Closed forms of one function
+
+
+@pytest.mark.parametrize("C", [0.0, 2e4])
+@pytest.mark.parametrize("i", [1, 3])
+def test_one_function_costs_what_its_strains_cost_by_hand(i, C):
+    patch, D, nu = Patch(0.8 * ARC, 0.03, R), 3e-4, 0.3
+    a, b, H = patch.a, patch.b, 1 / R
+    k, q, square = i * math.pi / a, math.pi / b, a * b / 4
+    # f = sin(k x) sin(q y) with i odd: v = -H cos(k x) sin(q y) / k, and u_y, less its mean in x.
+    xx, yy, xy = H**2 - k**2, -(q**2), (k - H**2 / k) * q
+    axial = (H * q**2 / k**2) ** 2 * (square - (2 / (k * a)) ** 2 * a * b / 2)
+    energy = square * D * (xx**2 + yy**2 + 2 * nu * xx * yy + 2 * (1 - nu) * xy**2) + C * axial
+
+    # Alone: the even functions between do not mix with it, higher ones are left out.
+    basis = SineBasis(patch, i, 1, sliding=True)
+    plate = Plate(patch, D, poisson=nu, axial_stiffness=C)
+    stiffness = np.linalg.inv(plate.compliance(basis).values)
+
+    assert stiffness[i - 1, i - 1] == pytest.approx(energy, rel=1e-9)
+
+
+# The arc and the flat plate
+
+
+@pytest.mark.parametrize("sliding", [False, True])
+@pytest.mark.parametrize(("C", "rate"), [(0.0, 2), (3e7, 4)])
+def test_as_it_grows_long_a_skin_under_a_load_along_it_bends_as_the_planar_arc(sliding, C, rate):
+    """As fast as the twist fades, or with a stiff axis the axial strain."""
+    a = 0.8 * ARC
+    strip = Patch(a, 1.0, R, strip=True)
+    line = LineLoad(0.4 * a, 0.0, 0.4 * a, 1.0, 3.0)
+    planar = Plate(strip, 3e-4).deflection([line], SineBasis(strip, 12, 1, sliding=sliding))
+
+    def off(b):
+        patch = Patch(a, b, R)
+        load = LineLoad(0.4 * a, 0.0, 0.4 * a, b, 3.0 * b)
+        c = Plate(patch, 3e-4, axial_stiffness=C).deflection(
+            [load], SineBasis(patch, 12, 1, sliding=sliding)
+        )
+        # Of an even load the first sine along y takes 4 / pi.
+        return np.abs(c * math.pi / 4 - planar).max() / np.abs(planar).max()
+
+    near, far = (4.0, 8.0) if C else (0.3, 0.6)
+    assert off(near) < 0.05
+    assert off(near) / off(far) == pytest.approx(2**rate, rel=0.1)
+
+
+def test_in_the_middle_of_a_long_skin_the_planar_arc_is_found():
+    strip, patch = Patch(ARC, 0.3, R, strip=True), Patch(ARC, 0.3, R)
+    line, middle = LineLoad(0.4 * ARC, 0.0, 0.4 * ARC, 0.3), (0.6 * ARC, 0.15)
+
+    planar = deflection_at(Plate(strip, 3e-4), line, middle, (10, 1))
+    skin = deflection_at(Plate(patch, 3e-4, axial_stiffness=300.0), line, middle, (10, 31))
+
+    # 31 sines make an even load up to 2 / (32 pi) in the middle.
+    assert skin == pytest.approx(planar, rel=0.02)
+
+
+@pytest.mark.parametrize("C", [0.0, 300.0])
+def test_coefficients_tend_to_the_flat_plates_as_the_square_of_the_curvature(C):
+    load, shape = GaussianLoad(0.04, 0.03, 0.006, 2.0), (12, 12)
+    flat = Plate(Patch(0.1, 0.06), 3e-4).deflection([load], SineBasis(Patch(0.1, 0.06), *shape))
+
+    def off(radius):
+        patch = Patch(0.1, 0.06, radius)
+        c = Plate(patch, 3e-4, axial_stiffness=C).deflection(
+            [load], SineBasis(patch, *shape, sliding=True)
+        )
+        return np.abs(c - flat).max() / np.abs(flat).max()
+
+    assert off(100.0) < 1e-3
+    assert off(100.0) == pytest.approx(off(10.0) / 100, rel=0.1)
+
+
+def test_pinning_the_ends_never_lets_the_skin_deflect_further():
+    load = PointLoad(0.3 * ARC, 0.01)
+    patch = Patch(0.9 * ARC, 0.03, R)
+    plate = Plate(patch, 3e-4, axial_stiffness=300.0)
+
+    slid, pinned = (
+        deflection_at(plate, load, load.centre(), (14, 11), sliding) for sliding in (True, False)
+    )
+
+    assert 0 < pinned < slid
+
+
+# Tension and fluid
+
+
+def test_tension_costs_area_less_the_volume_that_pressure_gains():
+    """Exactly, of the surface at radius R - e f, by its second difference in e."""
+    patch, T = Patch(ARC, 0.03, R), 40.0
+    basis = SineBasis(patch, 6, 3)
+    plate = Plate(patch, 0.0, tension=T)
+    load = GaussianLoad(0.4 * ARC, 0.013, ARC / 20)
+    c = plate.deflection([load], basis)
+    points, weights = basis.quadrature()
+    f, fx, fy = (basis.at(points, *o) @ c.ravel() for o in ((0, 0), (1, 0), (0, 1)))
+
+    def energy(e):
+        shrunk = 1 - e * f / R
+        area = np.sqrt((1 + (e * fy) ** 2) * shrunk**2 + (e * fx) ** 2)
+        return T * weights @ area - T / R * weights @ (shrunk**2 * R / 2)
+
+    e = 1e-3 * R / np.abs(f).max()
+    curvature = (energy(e) - 2 * energy(0) + energy(-e)) / e**2
+
+    work = float(np.sum(load.modal(basis) * c))  # twice the energy stored, c K c
+    assert curvature == pytest.approx(work, rel=1e-5)
+
+
+def test_tension_alone_does_not_hold_half_a_circle_whose_ends_slide():
+    with pytest.raises(Refusal, match="moves as a whole without bending"):
+        Plate(FINGERTIP_STRIP, 0.0, tension=5.0).compliance(
+            SineBasis(FINGERTIP_STRIP, 5, 1, sliding=True)
+        )
+
+
+FINGERTIP_STRIP = Patch(ARC, 0.02, R, strip=True)
+
+
+@pytest.mark.parametrize("patch", [FINGERTIP, FINGERTIP_STRIP], ids=["skin", "strip"])
+def test_pinned_ends_keep_the_volume_so_that_a_fluid_changes_nothing(patch):
+    functions = (8, 1) if patch.strip else (8, 6)
+    plate, load = Plate(patch, 3e-4), PointLoad(0.3 * ARC, 0.01)
+
+    dry, wet = (deflection_at(p, load, load.centre(), functions)
+                for p in (plate, replace(plate, fluid=True)))  # fmt: skip
+
+    assert wet == dry > 0
+
+
+def test_a_fluid_stiffens_a_skin_whose_ends_slide():
+    plate, load = Plate(Patch(0.8 * ARC, 0.03, R), 3e-4), PointLoad(0.3 * ARC, 0.01)
+
+    dry, wet = (deflection_at(p, load, load.centre(), (8, 6), sliding=True)
+                for p in (plate, replace(plate, fluid=True)))  # fmt: skip
+
+    assert 0 < wet < 0.99 * dry
+
+
+# The readings of a loaded cylinder skin
+
+
+def test_what_a_loaded_skin_reads_gives_back_its_shape():
+    plate, basis = Plate.of_material(FINGERTIP, **THIN), SineBasis(FINGERTIP, 8, 8)
+    layout = SensorLayout.regular(FINGERTIP, 10, 10)
+    c = plate.deflection([GaussianLoad(0.4 * ARC, 0.016, ARC / 18, 0.5)], basis)
+    K = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+
+    fit = LeastSquares(basis, layout)(K)
+
+    np.testing.assert_allclose(fit.coefficients, c, rtol=0, atol=1e-12 * np.abs(c).max())
+
+
+@pytest.mark.parametrize("stiffness", [-1.0, math.nan, math.inf])
+def test_an_axial_stiffness_that_cannot_be_is_refused(stiffness):
+    with pytest.raises(Refusal, match="an axial stiffness of at least zero in N/m, got"):
+        Plate(FINGERTIP, axial_stiffness=stiffness)
