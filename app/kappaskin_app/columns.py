@@ -1,7 +1,8 @@
 """Widgets one below the other, as the docks beside the skin hold them."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QVBoxLayout, QWidget
 
 
 def column(*widgets: QWidget) -> QWidget:
@@ -29,3 +30,10 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
     bar = area.verticalScrollBar().sizeHint().width()
     area.setMinimumWidth(whole.minimumSizeHint().width() + bar)
     return area
+
+
+def widen(window: QMainWindow, dock: QDockWidget, event: QResizeEvent) -> None:
+    """Let `dock` keep its share of the width of a `window` that changed its size."""
+    was, now = event.oldSize().width(), event.size().width()
+    if was > 0 and was != now and dock.isVisible() and not dock.isFloating():
+        window.resizeDocks([dock], [round(dock.width() * now / was)], Qt.Orientation.Horizontal)

@@ -19,7 +19,7 @@ class _Change(QUndoCommand):
         self, history: "History", before: Settings, after: Settings, text: str, gesture: int
     ) -> None:
         super().__init__(text[:1].lower() + text[1:])
-        self._history, self._before, self.after = history, before, after
+        self._history, self.before, self.after = history, before, after
         self._gesture = gesture
 
     def id(self) -> int:
@@ -35,7 +35,7 @@ class _Change(QUndoCommand):
         self._history.apply(self.after)
 
     def undo(self) -> None:
-        self._history.apply(self._before)
+        self._history.apply(self.before)
 
 
 class History(QObject):
@@ -50,13 +50,16 @@ class History(QObject):
         self._gesture = 0
         self._wished, self._wished_at, self._wish = "", 0.0, -1
 
-    def wish(self, name: str, label: str, value: Any) -> None:
-        """Change one setting; changes of the same one in a row are one step to undo."""
+    def wish(self, name: str, label: str, **values: Any) -> None:
+        """Change the setting `name`, and others with it.
+
+        Changes of the same one in a row are one step to undo.
+        """
         now = time.monotonic()
         if name != self._wished or now - self._wished_at > _IN_A_ROW:
             self._wish = self.new_gesture()
         self._wished, self._wished_at = name, now
-        self.change(f"Change of {label}", self._wish, **{name: value})
+        self.change(f"Change of {label}", self._wish, **values)
 
     def new_gesture(self) -> int:
         """A number under which changes merge into one command, a drag say."""
@@ -68,6 +71,15 @@ class History(QObject):
         after = replace(self.settings, **values)
         if after != self.settings:
             self.stack.push(_Change(self, self.settings, after, text, gesture))
+
+    def cancel(self, gesture: int) -> None:
+        """Take back what was changed under `gesture`, as if it had never been."""
+        top = self.stack.command(self.stack.index() - 1)
+        if gesture > 0 and isinstance(top, _Change) and top.id() == gesture:
+            before = top.before
+            top.setObsolete(True)
+            self.stack.undo()  # which only removes an obsolete command
+            self.apply(before)
 
     def apply(self, settings: Settings) -> None:
         """For commands only: make `settings` the present ones."""

@@ -51,13 +51,23 @@ class Ranges:
 
     def pulled(self, displacement: Array) -> bool:
         """Whether the skin is pulled out rather than pressed in; a skin at rest keeps its side."""
-        out, into = -np.nanmin(displacement), np.nanmax(displacement)
+        seen = np.nan_to_num(displacement)
+        out, into = -np.min(seen), np.max(seen)
         if max(out, into) > self._steady["displacement"].least:
             self._pulled = bool(out > into)
         return self._pulled
 
+    def deepest(self) -> float:
+        """The largest displacement in mm that was shown of late, as a round number."""
+        return self._steady["displacement"].limit
+
     def limit(self, name: str, values: Array, settings: Settings, now: float) -> float:
         """The limit in mm or 1/m for `values` of the quantity `name`, NaN among them or not."""
-        locked = getattr(settings, f"range_{name}", 0.0)
         largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
-        return locked or self._steady[name].follow(largest, now)
+        followed = self._steady[name].follow(largest, now)
+        return locked_at(name, settings) or followed
+
+
+def locked_at(name: str, settings: Settings) -> float:
+    """What the range of the quantity `name` is locked to in mm or 1/m, zero when it is not."""
+    return getattr(settings, f"range_{name}") * (1e3 if name == "displacement" else 1.0)

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from kappaskin import CurvatureMap, Engine, Estimate, Setup, Status, basis_for
+from kappaskin import CurvatureMap, Engine, Estimate, Refusal, Setup, Status, basis_for
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
-from kappaskin_app.settings import LOAD_CASES, Settings
+from kappaskin_app.settings import LOAD_CASES, SceneSettings, Settings, part
 from kappaskin_app.simulation import scene_of
-from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE
+from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE, WAITING
 
 Array = NDArray[np.float64]
 
@@ -21,12 +21,17 @@ _STATUS = 0.05  # s between two looks at the status
 
 
 def _setup_of(settings: Settings) -> Setup:
-    return Setup(settings.functions_x, settings.functions_y)
+    return Setup(settings.functions_x, settings.functions_y, edge=settings.fit_edge)
 
 
 class Session(QObject):
-    """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick."""
+    """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick.
 
+    `scene` is the one that is simulated; `refused` says why it is not the one the settings describe
+    now, with nothing to say when it is.
+    """
+
+    refused = Signal(str)
     estimated = Signal(Estimate)
     reported = Signal(Status)
 
@@ -35,6 +40,7 @@ class Session(QObject):
         self._history = history
         self._settings = history.settings
         self.engine = engine
+        self.scene = scene_of(history.settings)
         engine.set_up(_setup_of(history.settings))
         self.status = Status()
         self.estimate: Estimate | None = None
@@ -64,7 +70,7 @@ class Session(QObject):
         if self.simulating and scene in dict(LOAD_CASES):
             self._history.change("Load case", load_case=scene)
         if self.simulating:
-            self.engine.play(scene_of(self._history.settings))
+            self._play()
 
     def disconnect_from(self) -> None:
         self.engine.disconnect()
@@ -73,12 +79,18 @@ class Session(QObject):
         was, self._settings = self._settings, settings
         if _setup_of(settings) != _setup_of(was):
             self.engine.set_up(_setup_of(settings))
-        scene = {"load_case", "force", "x", "y", "x_end", "y_end"}
-        noise = {"noise_kind", "noise_rms", "noise_seed"}
-        if self.simulating and any(
-            getattr(settings, name) != getattr(was, name) for name in scene | noise
-        ):
-            self.engine.play(scene_of(settings))
+        if self.simulating and part(settings, SceneSettings) != part(was, SceneSettings):
+            self._play()
+
+    def _play(self) -> None:
+        """Simulate what the settings describe, or go on as before and say why."""
+        why = ""
+        try:
+            self.scene = scene_of(self._history.settings)
+        except Refusal as refusal:
+            why = str(refusal)
+        self.engine.play(self.scene)
+        self.refused.emit(why)
 
     @guarded
     def tick(self) -> None:
@@ -105,6 +117,8 @@ class Session(QObject):
             return OFF
         if status.state == "lost":
             return LOST
+        if status.state == "waiting" or (status.computing and self.estimate is None):
+            return WAITING
         last = max(status.last_frame, self.estimate.host_time if self.estimate else 0.0)
         if status.sensor is None or now - last > STALE_AFTER:
             return STALE

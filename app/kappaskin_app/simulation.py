@@ -1,19 +1,35 @@
 """What a person chose, as a scene to simulate."""
 
+import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from kappaskin import (
+    Basis,
+    Compliance,
     GaussianNoise,
     LineLoad,
+    Load,
+    Orbit,
+    Plate,
     PointLoad,
     Scene,
+    SensorLayout,
     UniformNoise,
+    basis_for,
     load_scene,
 )
 from kappaskin_app.settings import FREE_CASES, LOAD_CASES, Settings
+from kappaskin_app.skins import SHAPES
 
+_TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid")
 _MARGIN = 0.03  # share of the patch along each edge that a dragged load keeps out of
+_REFERENCE = (15, 15)  # functions of the true shape, by which Table 1 defines its truth
+_MOST_BENT = 14.0  # 1/m at an element: twice that, as a load passes over one, is still read
+_REMEMBERED = 8  # skins whose compliance need not be computed again
 
 
 def _effects(settings: Settings) -> tuple[UniformNoise | GaussianNoise, ...]:
@@ -32,13 +48,83 @@ def _free_loads(settings: Settings) -> tuple[PointLoad | LineLoad, ...]:
     return (PointLoad(s.x, s.y, s.force),)
 
 
+def plate_of(settings: Settings) -> Plate:
+    """The skin that `settings` describe, without its elements."""
+    shape = SHAPES[settings.shape]
+    patch = shape.make(*(getattr(settings, name) for name in shape.begins))
+    return Plate(patch, tension=settings.tension, foundation=settings.foam, fluid=settings.fluid)
+
+
+def is_table_1(settings: Settings) -> bool:
+    """Whether the skin is that of Table 1, where its cases are what they are called."""
+    paper = Settings()
+    return all(getattr(settings, name) == getattr(paper, name) for name in _TABLE_1)
+
+
+@lru_cache(_REMEMBERED)
+def _compliance(plate: Plate, edge: str) -> Compliance:
+    """How the true shape gives; raises `Refusal` for a skin that nothing holds."""
+    return plate.compliance(basis_for(plate.patch, edge, *_REFERENCE))
+
+
+def _moved(load: Load, basis: Basis, compliance: Compliance) -> float:
+    """How far the skin moves in m where the load presses."""
+    return float(basis.at(load.centre()[None])[0] @ compliance(load.modal(basis)).ravel())
+
+
+def _stretched(load: Load, along_x: float, along_y: float) -> PointLoad | LineLoad:
+    """The load on a skin whose sides are so many times longer."""
+    if isinstance(load, LineLoad):
+        x0, y0, x1, y1 = load.x0, load.y0, load.x1, load.y1
+        return LineLoad(x0 * along_x, y0 * along_y, x1 * along_x, y1 * along_y)
+    x, y = load.centre()
+    return PointLoad(x * along_x, y * along_y)
+
+
+@lru_cache(len(LOAD_CASES) * _REMEMBERED)
+def _ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit | None]:
+    """Loads and motion of a ready scene; on another skin, at the same shares of its sides.
+
+    What moves by W on the patch of side L moves by W s there, whose shorter side is s L: the slopes
+    stay as they are. It moves less where the skin would bend more than in Table 1.
+    """
+    paper = load_scene(case)
+    compliance, patch = _compliance(plate, edge), plate.patch
+    if (plate, edge) == (paper.plate, paper.edge):
+        return paper.loads, paper.motion
+    along_x, along_y = patch.a / paper.plate.patch.a, patch.b / paper.plate.patch.b
+    size = min(along_x, along_y)
+    moved = _moved(paper.loads[0], paper.basis, _compliance(paper.plate, paper.edge))
+    load, basis = _stretched(paper.loads[0], along_x, along_y), basis_for(patch, edge, *_REFERENCE)
+    load = load.scaled(size * moved / _moved(load, basis, compliance))
+    bent = SensorLayout.regular(patch, 10, 10).curvature_operator(basis)
+    most = float(np.abs(bent @ compliance(load.modal(basis)).ravel()).max())
+    motion = paper.motion and replace(paper.motion, radius=paper.motion.radius * size)
+    return (load.scaled(min(1.0, _MOST_BENT / most)),), motion
+
+
 def scene_of(settings: Settings) -> Scene:
-    """The scene that `settings` describe, on the skin of Table 1."""
-    free = settings.load_case in FREE_CASES
-    scene = load_scene("" if free else settings.load_case)
-    if free:
-        scene = replace(scene, name=settings.load_case, loads=_free_loads(settings), motion=None)
-    return replace(scene, effects=_effects(settings), seed=settings.noise_seed)
+    """The scene that `settings` describe; raises `Refusal` for a skin that cannot be."""
+    plate = plate_of(settings)
+    layout = SensorLayout.regular(plate.patch, settings.elements_x, settings.elements_y)
+    if settings.load_case in FREE_CASES:
+        _compliance(plate, settings.edge)  # for its refusal
+        loads, motion = _free_loads(settings), None
+    else:
+        loads, motion = _ready(settings.load_case, plate, settings.edge)
+    scene = Scene(
+        settings.load_case,
+        plate,
+        layout,
+        loads,
+        motion,
+        _effects(settings),
+        seed=settings.noise_seed,
+        reference=_REFERENCE,
+        edge=settings.edge,
+    )
+    fastest = math.floor(1 / scene.transduction.scan_time(3 * len(layout)))
+    return replace(scene, rate=min(scene.rate, fastest))
 
 
 def settings_for(source: str) -> Settings:
@@ -48,32 +134,42 @@ def settings_for(source: str) -> Settings:
     return Settings(load_case=case) if ready else Settings()
 
 
-def dragged(settings: Settings, x: float, y: float, grabbed_end: bool) -> dict[str, Any]:
-    """The settings that change when the load is dragged to (x, y) in m; it becomes a free one.
+def with_consequences(settings: Settings, name: str, value: Any) -> dict[str, Any]:
+    """The settings that change when a person changes `name`.
 
-    A line moves as a whole, of two points the one that was grabbed.
+    A shape brings its usual size; where the skin gets longer, loads move to keep their share.
     """
-    patch = load_scene().plate.patch
-    s = settings
+    changed: dict[str, Any] = {name: value}
+    if name == "shape":
+        changed |= SHAPES[value].begins
+    for side, places in (("side_x", ("x", "x_end")), ("side_y", ("y", "y_end"))):
+        if side in changed:
+            longer = changed[side] / getattr(settings, side)
+            changed |= {place: getattr(settings, place) * longer for place in places}
+    return changed
+
+
+def dragged(
+    settings: Settings, scene: Scene, x: float, y: float, grabbed_end: bool
+) -> dict[str, Any]:
+    """The settings that change when a load of `scene` is dragged to (x, y) in m.
+
+    It becomes a free one of the same force. A line moves as a whole, of two points the one that
+    was grabbed.
+    """
+    patch, load = scene.plate.patch, scene.loads[0]
 
     def inside(value: float, side: float) -> float:
         return min(max(value, _MARGIN * side), (1 - _MARGIN) * side)
 
     x, y = inside(x, patch.a), inside(y, patch.b)
-    if s.load_case == "two-points" and grabbed_end:
-        return {"x_end": x, "y_end": y}
-    if s.load_case not in ("line", "free-line"):
-        case = s.load_case if s.load_case == "two-points" else "point"
-        return {"load_case": case, "x": x, "y": y}
-    half_x, half_y = (
-        (0.04, -0.04) if s.load_case == "line" else ((s.x_end - s.x) / 2, (s.y_end - s.y) / 2)
-    )
+    if settings.load_case == "two-points":
+        return {"x_end": x, "y_end": y} if grabbed_end else {"x": x, "y": y}
+    kept = {} if settings.load_case in FREE_CASES else {"force": load.force}
+    if not isinstance(load, LineLoad):
+        return {"load_case": "point", "x": x, "y": y, **kept}
+    half_x, half_y = (load.x1 - load.x0) / 2, (load.y1 - load.y0) / 2
     x = min(max(x, abs(half_x)), patch.a - abs(half_x))
     y = min(max(y, abs(half_y)), patch.b - abs(half_y))
-    return {
-        "load_case": "free-line",
-        "x": x - half_x,
-        "y": y - half_y,
-        "x_end": x + half_x,
-        "y_end": y + half_y,
-    }
+    ends = {"x": x - half_x, "y": y - half_y, "x_end": x + half_x, "y_end": y + half_y}
+    return {"load_case": "free-line", **ends, **kept}

@@ -51,7 +51,7 @@ LIGHT = Theme(
 )
 DARK = Theme(
     window="#1b1f24",
-    base="#12151a",
+    base="#2a3038",
     text="#e8ebef",
     faint="#a0a9b4",
     line="#3a424c",

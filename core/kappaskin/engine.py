@@ -54,6 +54,7 @@ class Engine:
         self._ring = Ring.create()
         self._setup = setup or Setup()
         self._region = Region()
+        self._seen = Status()
         self._process: BaseProcess | None = None
         self._requests: Connection[Request, Request] | None = None
         self._start()
@@ -113,15 +114,16 @@ class Engine:
         self._send(region)
 
     def status(self) -> Status:
-        status = self._ring.read_status() or Status()
+        # One that is being written is not there to read: the last is nearer the truth than none.
+        self._seen = self._ring.read_status() or self._seen
         if not self.alive:
             return replace(
-                status,
+                self._seen,
                 state=LOST,
                 rate=0.0,
                 message="the engine process ended unexpectedly; connect again to restart it",
             )
-        return status
+        return self._seen
 
     def latest(self, status: Status) -> Estimate | None:
         """The newest estimate of the generation that `status` tells of."""

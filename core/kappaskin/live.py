@@ -80,7 +80,6 @@ class Loop:
     def __init__(self, requests: "Connection[Request, Request]", ring: Ring) -> None:
         self._requests, self._ring = requests, ring
         self._source: Source | None = None
-        self._scene: Scene | None = None
         self._pipeline: Pipeline | None = None
         self._status = ring.read_status() or Status()
         self._asked = self._status.setup
@@ -114,14 +113,12 @@ class Loop:
             self._asked = request
             self._set_up(smaller=False)
         elif isinstance(request, Scene):
-            self._scene = request
-            self._play()
+            self._play(request)
         elif isinstance(request, Region):
             self._status = replace(self._status, region=request)
             self._steer()
         else:
             self._close()
-            self._scene = None
             self._status = replace(
                 self._status,
                 state=OFF,
@@ -147,9 +144,15 @@ class Loop:
         except Refusal as refusal:
             self._status = replace(self._status, state=LOST, message=str(refusal))
 
-    def _play(self) -> None:
-        if isinstance(self._source, SimulatedSource) and self._scene is not None:
-            self._source.play(self._scene)
+    def _play(self, scene: Scene) -> None:
+        if not isinstance(self._source, SimulatedSource):
+            return
+        message = ""
+        try:
+            self._source.play(scene)
+        except Refusal as refusal:
+            message = str(refusal)
+        self._status = replace(self._status, message=message)
 
     def _steer(self) -> None:
         """Let the source scan the region asked for, or say why it does not."""
@@ -246,9 +249,12 @@ class Loop:
         """A device said what it is: make the pipeline for it."""
         self._pipeline = None
         self._status = replace(
-            self._status, state=STREAMING, sensor=sensor, meetings=self._status.meetings + 1
+            self._status,
+            state=STREAMING,
+            sensor=sensor,
+            meetings=self._status.meetings + 1,
+            slot=None,  # what the last device showed is not this one's
         )
-        self._play()
         self._steer()
         self._set_up(smaller=True)
 

@@ -75,13 +75,13 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
     assert told["unsent"] == 0
     assert counts.lost == 0
     assert counts.accepted == told["spent"]
-    assert "line is gone" in window.connection.message.text()
+    assert "line is gone" in window.panels.connection.message.text()
     assert window.membrane.greyed
 
     again = Device()
     try:
-        window.connection.sources.setCurrentText(again.port)
-        window.connection.connect_button.click()
+        window.panels.connection.sources.setCurrentText(again.port)
+        window.panels.connection.connect_button.click()
         until(lambda: window.badge.state == "SIM")
         shown = len(errors)
         until(lambda: len(errors) > shown + 20)

@@ -33,3 +33,21 @@ def test_two_gestures_are_two_commands(qapp: QApplication) -> None:
         history.change("Drag", history.new_gesture(), x=x)
     history.stack.undo()
     assert history.settings.x == 0.01
+
+
+def test_a_gesture_given_up_was_never_made(qapp: QApplication) -> None:
+    history = History(Settings())
+    history.change("Before", -1, x=0.07)
+    gesture = history.new_gesture()
+    for x in (0.01, 0.02):
+        history.change("Drag", gesture, x=x)
+    history.cancel(gesture)
+    assert (history.settings.x, history.stack.count(), history.stack.canRedo()) == (0.07, 1, False)
+
+
+def test_giving_up_a_gesture_that_changed_nothing_takes_nothing_back(qapp: QApplication) -> None:
+    history = History(Settings())
+    history.change("Before", -1, x=0.07)
+    history.cancel(history.new_gesture())
+    history.cancel(-1)
+    assert history.settings.x == 0.07

@@ -3,22 +3,20 @@ from dataclasses import fields, replace
 import pytest
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox
 
-from kappaskin_app.panels.basis import BasisPanel
-from kappaskin_app.panels.form import Panel
-from kappaskin_app.panels.load import LoadPanel, NoisePanel
-from kappaskin_app.panels.view import ViewPanel
-from kappaskin_app.settings import Range, Settings, ask_of
+from kappaskin import EDGES, Status
+from kappaskin_app.panels.panels import Panels
+from kappaskin_app.settings import Choice, Range, SceneSettings, Settings, ask_of, part
 
 ASKED = [f.name for f in fields(Settings) if "ask" in f.metadata]
 
 
 @pytest.fixture
-def panels(qapp: QApplication) -> list[Panel]:
-    return [LoadPanel(), NoisePanel(), BasisPanel(), ViewPanel()]
+def panels(qapp: QApplication) -> Panels:
+    return Panels()
 
 
-def test_every_setting_asked_for_stands_in_one_panel(panels: list[Panel]) -> None:
-    shown = [name for panel in panels for name in ASKED if panel.findChild(object, name)]
+def test_every_setting_asked_for_stands_in_one_panel(panels: Panels) -> None:
+    shown = [name for panel in panels.all() for name in ASKED if panel.findChild(object, name)]
     assert sorted(shown) == sorted(ASKED)
 
 
@@ -29,40 +27,123 @@ def test_every_setting_explains_itself_and_starts_in_range(name: str) -> None:
     assert how.tip.endswith(".")
     if isinstance(how, Range):
         assert how.least <= default <= how.most
+    if isinstance(how, Choice):
+        assert default in dict(how.options)
 
 
-def test_showing_settings_wishes_nothing(panels: list[Panel]) -> None:
+def test_every_edge_there_is_can_be_chosen_and_assumed() -> None:
+    for name, before in (("edge", []), ("fit_edge", [""])):
+        how = ask_of(name)
+        assert isinstance(how, Choice)
+        assert [value for value, _ in how.options] == [*before, *EDGES]
+
+
+def test_only_what_makes_the_scene_belongs_to_it() -> None:
+    was = part(Settings(), SceneSettings)
+    for change in ({"theme": "light"}, {"functions_x": 3}, {"range_xx": 2.0}, {"fit_edge": "x"}):
+        assert part(replace(Settings(), **change), SceneSettings) == was
+    for change in ({"force": 0.2}, {"noise_seed": 3}, {"tension": 2.0}, {"elements_x": 3}):
+        assert part(replace(Settings(), **change), SceneSettings) != was
+
+
+def test_showing_settings_wishes_nothing(panels: Panels) -> None:
     wishes = []
-    for panel in panels:
-        panel.wished.connect(lambda *wish: wishes.append(wish))
-        panel.show_settings(replace(Settings(), functions_x=3, x=0.01, theme="light"))
+    panels.wished.connect(lambda *wish: wishes.append(wish))
+    changed = {"functions_x": 3, "x": 0.01, "theme": "light", "shape": "cylinder", "fluid": True}
+    panels.show_settings(replace(Settings(), **changed))
+    panels.show_settings(replace(Settings(), side_x=0.02, x=0.01))
     assert wishes == []
 
 
-def test_an_editor_wishes_in_si_units_and_shows_its_unit(panels: list[Panel]) -> None:
-    load, wishes = panels[0], []
-    load.wished.connect(lambda *wish: wishes.append(wish))
-    box = load.editor("x")
-    assert isinstance(box, QAbstractSpinBox)
-    box.setProperty("value", 12.5)
-    assert wishes == [("x", pytest.approx(0.0125))]
-    assert box.text().endswith(" mm")
+def test_an_editor_wishes_in_si_units_and_shows_its_unit(panels: Panels) -> None:
+    wishes = []
+    panels.wished.connect(lambda *wish: wishes.append(wish))
+    for panel, name, typed, wished, unit in (
+        (panels.load, "x", 12.5, 0.0125, " mm"),
+        (panels.support, "foam", 20.0, 2e4, " kN/m\u00b3"),
+        (panels.shape, "side_x", 80.0, 0.08, " mm"),
+    ):
+        box = panel.editor(name)
+        assert isinstance(box, QAbstractSpinBox)
+        box.setProperty("value", typed)
+        assert wishes.pop() == (name, pytest.approx(wished))
+        assert box.text().endswith(unit)
 
 
-def test_a_choice_made_with_the_keyboard_is_a_wish(panels: list[Panel], qtbot) -> None:
-    noise, wishes = panels[1], []
-    noise.show_settings(Settings())
-    noise.wished.connect(lambda *wish: wishes.append(wish))
-    box = noise.editor("noise_kind")
+def test_a_choice_made_with_the_keyboard_is_a_wish(panels: Panels, qtbot) -> None:
+    wishes = []
+    panels.show_settings(Settings())
+    panels.wished.connect(lambda *wish: wishes.append(wish))
+    box = panels.noise.editor("noise_kind")
     assert isinstance(box, QComboBox)
     qtbot.keyClick(box, "G")
     assert wishes == [("noise_kind", "gaussian")]
 
 
-def test_a_ready_case_asks_for_no_place(panels: list[Panel]) -> None:
-    load = panels[0]
+def test_a_ready_case_asks_for_no_place(panels: Panels) -> None:
+    load = panels.load
     load.show_settings(Settings(load_case="centre"))
     assert load.form.isRowVisible(load.editor("load_case"))
     assert not load.form.isRowVisible(load.editor("x"))
     load.show_settings(Settings(load_case="free-line"))
     assert load.form.isRowVisible(load.editor("y_end"))
+
+
+def test_only_a_bent_skin_asks_for_a_radius_and_says_how_far_it_opens(panels: Panels) -> None:
+    shape = panels.shape
+    panels.show_settings(Settings())
+    assert not shape.form.isRowVisible(shape.editor("base_radius"))
+    assert not shape.form.isRowVisible(shape.opening)
+    panels.show_settings(Settings(shape="cylinder", side_x=0.03, base_radius=0.02))
+    assert shape.form.isRowVisible(shape.editor("base_radius"))
+    assert shape.form.isRowVisible(shape.opening)
+    assert shape.opening.text() == "85.9\N{DEGREE SIGN}"
+
+
+def test_a_load_can_be_placed_on_the_skin_only(panels: Panels) -> None:
+    panels.show_settings(Settings(side_x=0.04, x=0.03, load_case="point"))
+    box = panels.load.editor("x")
+    box.setProperty("value", 70.0)
+    assert box.property("value") == 40.0
+    assert "From 0 to 40 mm" in box.toolTip()
+
+
+def test_cases_are_called_table_1s_where_they_are(panels: Panels) -> None:
+    box = panels.load.editor("load_case")
+    assert isinstance(box, QComboBox)
+
+    def words() -> list[str]:
+        return [box.itemText(index) for index in range(box.count())]
+
+    panels.show_settings(Settings(elements_x=7))
+    assert [text.endswith("(Table 1)") for text in words()] == [False, *[True] * 3, *[False] * 3]
+    for changed in ({"side_x": 0.09}, {"edge": "sliding"}, {"fluid": True}):
+        panels.show_settings(replace(Settings(), **changed))
+        assert not any("Table 1" in text for text in words())
+
+
+def test_every_page_has_its_own_letter(panels: Panels) -> None:
+    titles = [panels.tabText(index) for index in range(panels.count())]
+    letters = [title[title.index("&") + 1].lower() for title in titles]
+    assert len(set(letters)) == len(letters)
+    assert not set(letters) & set("fesvh")  # the menus'
+
+
+def test_pages_turn_round_and_round(panels: Panels) -> None:
+    pages = []
+    for step in (1, 1, -1):
+        panels.turn(step)
+        pages.append(panels.currentIndex())
+    assert pages == [1 % panels.count(), 2 % panels.count(), 1]
+
+
+def test_a_skin_that_cannot_be_is_explained_until_it_can(panels: Panels) -> None:
+    shape, status = panels.shape, Status()
+    shape.show_refusal("too small a radius")
+    shape.show_status(status, simulating=True)
+    assert shape.message.text() == "The last skin stays: too small a radius."
+    shape.show_status(status, simulating=False)
+    assert "Only for the simulation" in shape.message.text()
+    shape.show_refusal("")
+    shape.show_status(status, simulating=True)
+    assert shape.message.text() == ""

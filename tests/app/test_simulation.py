@@ -1,20 +1,32 @@
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import LineLoad, PointLoad, load_scene
+from kappaskin import EDGES, LineLoad, PointLoad, Refusal, Simulator, load_scene
 from kappaskin_app.settings import LOAD_CASES, Settings
-from kappaskin_app.simulation import dragged, scene_of
+from kappaskin_app.simulation import dragged, is_table_1, scene_of, with_consequences
+from kappaskin_app.skins import SHAPES
 
 CASES = [case for case, _ in LOAD_CASES]
+READY = ["circle", "centre", "off-centre", "line"]
 
 
-@pytest.mark.parametrize("case", ["circle", "centre", "off-centre", "line"])
-def test_a_ready_case_is_the_ready_scene(case: str) -> None:
-    assert scene_of(Settings(load_case=case)).loads == load_scene(case).loads
+def on(shape: str, **more: object) -> Settings:
+    return replace(Settings(), **with_consequences(Settings(), "shape", shape) | more)
+
+
+@pytest.mark.parametrize("case", READY)
+def test_a_ready_case_on_the_first_skin_is_the_ready_scene_in_everything(case: str) -> None:
+    scene, ready = scene_of(Settings(load_case=case)), load_scene(case)
+    for field in fields(scene):
+        if field.name not in ("layout", "effects"):
+            assert getattr(scene, field.name) == getattr(ready, field.name), field.name
+    assert scene.layout.shape == ready.layout.shape
+    np.testing.assert_array_equal(scene.layout.positions, ready.layout.positions)
+    assert scene.effects[0].rms == pytest.approx(ready.effects[0].rms, abs=5e-4)
 
 
 def test_free_cases_press_where_they_are_told() -> None:
@@ -30,23 +42,129 @@ def test_no_noise_means_no_effect() -> None:
     assert scene_of(Settings(noise_rms=0.0)).effects == ()
 
 
+def test_what_is_below_and_how_it_is_held_is_in_the_scene() -> None:
+    scene = scene_of(Settings(tension=5.0, foam=2e4, fluid=True, edge="sliding"))
+    plate = scene.plate
+    assert (plate.tension, plate.foundation, plate.fluid) == (5.0, 2e4, True)
+    assert (scene.edge, scene.sensor().edge) == ("sliding", "sliding")
+
+
+def test_the_fingertip_is_half_a_circle_of_the_papers_radius() -> None:
+    patch = scene_of(on("cylinder")).plate.patch
+    assert (patch.radius, patch.b) == (0.0129, 0.04)
+    assert patch.opening == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize("fluid", [False, True], ids=["empty", "fluid"])
+@pytest.mark.parametrize("edge", ["hinged", "sliding"])
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("case", READY)
+def test_no_ready_case_drives_an_element_onto_a_rail_on_any_skin(
+    case: str, shape: str, edge: str, fluid: bool
+) -> None:
+    scene = scene_of(on(shape, edge=edge, fluid=fluid, load_case=case))
+    simulator, bent = Simulator(scene), []
+    for n in range(0, 2000, 100):
+        counts = simulator.frame(n, lambda: 0.0).counts
+        bent.append(np.abs(scene.transduction.curvature(counts)))
+    assert np.isfinite(bent).all()
+    assert np.max(bent) > 3  # and every one stands out of the noise of Table 1
+
+
+@pytest.mark.parametrize("side", [0.02, 0.1, 1.0])
+@pytest.mark.parametrize("case", READY)
+def test_the_slopes_of_a_ready_case_do_not_grow_with_the_skin(case: str, side: float) -> None:
+    scene, paper = scene_of(Settings(load_case=case, side_x=side, side_y=side)), load_scene(case)
+
+    def moved(scene) -> float:
+        c = scene.plate.deflection(scene.loads, scene.basis)
+        return float(scene.basis.at(scene.loads[0].centre()[None])[0] @ c.ravel())
+
+    assert 0 < moved(scene) / side <= moved(paper) / 0.1 * (1 + 1e-9)
+    shares = scene.loads[0].centre() / side
+    np.testing.assert_allclose(shares, paper.loads[0].centre() / 0.1)
+
+
+def test_more_elements_than_can_be_scanned_in_time_are_scanned_slower() -> None:
+    assert scene_of(Settings()).rate == 500
+    scene = scene_of(Settings(elements_x=32, elements_y=32))
+    assert scene.sensor().rate == 65
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"shape": "cylinder", "base_radius": 0.005}, "larger base radius"),
+        ({"edge": "glued"}, "expected an edge among"),
+        ({"side_y": 0.0}, "two sides above zero"),
+        ({"load_case": "point", "x": 0.2}, "expected a load on the patch"),
+    ],
+)
+def test_a_skin_that_cannot_be_is_refused(changed: dict[str, object], why: str) -> None:
+    with pytest.raises(Refusal, match=why):
+        scene_of(replace(Settings(), **changed))
+
+
+def test_only_the_first_skin_is_table_1s() -> None:
+    assert is_table_1(Settings())
+    assert not is_table_1(Settings(side_y=0.08))
+    assert not is_table_1(Settings(foam=1.0))
+    assert not is_table_1(on("cylinder"))
+
+
+def test_choosing_a_shape_brings_its_size_and_choosing_the_first_again_all_of_it() -> None:
+    settings = Settings()
+    for shape in ("cylinder", "flat"):
+        settings = replace(settings, **with_consequences(settings, "shape", shape))
+        for name, value in SHAPES[shape].begins.items():
+            assert getattr(settings, name) == value
+    assert scene_of(settings).plate == load_scene().plate
+
+
+def test_loads_keep_their_share_of_a_skin_that_grows() -> None:
+    settings = Settings(x=0.02, x_end=0.08, y=0.03)
+    changed = with_consequences(settings, "side_x", 0.2)
+    assert changed == {"side_x": 0.2, "x": pytest.approx(0.04), "x_end": pytest.approx(0.16)}
+    assert with_consequences(settings, "theme", "light") == {"theme": "light"}
+
+
 @given(
     st.sampled_from(CASES),
+    st.sampled_from(list(SHAPES)),
     st.tuples(*[st.floats(-1, 1)] * 2),
-    st.tuples(*[st.floats(0, 0.1)] * 4),
+    st.tuples(*[st.floats(0, 0.04)] * 4),
     st.booleans(),
 )
 def test_a_dragged_load_stays_on_the_skin(
-    case: str, to: tuple[float, float], ends: tuple[float, ...], end: bool
+    case: str, shape: str, to: tuple[float, float], ends: tuple[float, ...], end: bool
 ) -> None:
     x, y, x_end, y_end = ends
-    settings = Settings(load_case=case, x=x, y=y, x_end=x_end, y_end=y_end)
-    scene = scene_of(replace(settings, **dragged(settings, *to, end)))
+    settings = on(shape, load_case=case, x=x, y=y, x_end=x_end, y_end=y_end)
+    scene = scene_of(settings)
+    scene = scene_of(replace(settings, **dragged(settings, scene, *to, end)))
     for load in scene.loads:
         load.check(scene.plate.patch)
 
 
-def test_a_dragged_point_is_where_it_was_dragged_to() -> None:
-    settings = Settings(load_case="circle")
-    (load,) = scene_of(replace(settings, **dragged(settings, 0.031, 0.062, False))).loads
+@pytest.mark.parametrize("case", ["circle", "off-centre", "point"])
+def test_a_dragged_point_is_where_it_was_dragged_to_and_as_strong_as_it_was(case: str) -> None:
+    settings = Settings(load_case=case)
+    was = scene_of(settings)
+    (load,) = scene_of(replace(settings, **dragged(settings, was, 0.031, 0.062, False))).loads
     assert np.allclose(load.centre(), [0.031, 0.062])
+    assert load.force == was.loads[0].force
+
+
+def test_a_dragged_line_keeps_its_length() -> None:
+    settings = on("cylinder", load_case="line")
+    was = scene_of(settings)
+    (load,) = scene_of(replace(settings, **dragged(settings, was, 0.02, 0.02, False))).loads
+    assert isinstance(load, LineLoad)
+    ends = np.array([load.x1 - load.x0, load.y1 - load.y0])
+    old = was.loads[0]
+    np.testing.assert_allclose(ends, [old.x1 - old.x0, old.y1 - old.y0])
+
+
+def test_every_edge_can_be_simulated_on_the_first_skin() -> None:
+    for edge in EDGES:
+        assert scene_of(Settings(edge=edge)).edge == edge

@@ -1,12 +1,15 @@
 import os
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QImage, QWheelEvent
-from PySide6.QtWidgets import QApplication, QDockWidget, QPushButton
+from PySide6.QtWidgets import QApplication, QCheckBox, QDockWidget, QPushButton
 
+from kappaskin_app.panels.form import Form
+from kappaskin_app.settings import Settings
 from kappaskin_app.window import MainWindow
 
 
@@ -42,7 +45,7 @@ def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot
 
 
 def test_ctrl_z_works_while_an_editor_has_the_focus(window: MainWindow, qtbot) -> None:
-    box = window.basis.editor("functions_x")
+    box = window.panels.basis.editor("functions_x")
     box.setFocus()
     qtbot.keyClick(box, Qt.Key.Key_Down)
     assert window.history.settings.functions_x == 7
@@ -51,8 +54,8 @@ def test_ctrl_z_works_while_an_editor_has_the_focus(window: MainWindow, qtbot) -
 
 
 def test_the_wheel_changes_no_editor_without_the_focus(window: MainWindow, qtbot) -> None:
-    box = window.noise.editor("noise_seed")
-    window.basis.editor("functions_x").setFocus()
+    box = window.panels.noise.editor("noise_seed")
+    window.panels.basis.editor("functions_x").setFocus()
     here = QPointF(box.rect().center())
     event = QWheelEvent(
         here,
@@ -72,7 +75,7 @@ def test_a_basis_the_readings_do_not_decide_is_refused_in_its_panel(
     window: MainWindow, until
 ) -> None:
     window.history.change("Functions", -1, functions_x=12, functions_y=12)
-    message = window.basis.message
+    message = window.panels.basis.message
     until(lambda: "determine 140 of the 144" in message.text())
     assert window.session.estimate.coefficients.shape == (8, 8)
     window.history.stack.undo()
@@ -128,7 +131,7 @@ def test_a_load_cannot_be_dragged_when_nothing_comes_in(window: MainWindow, unti
     assert len(window.membrane.drag.handles) == 1
     window.actions_by_name["disconnect"].trigger()
     until(lambda: not len(window.membrane.drag.handles))
-    assert not window.load.editor("load_case").isEnabled()
+    assert not window.panels.load.editor("load_case").isEnabled()
 
 
 def test_two_points_are_not_called_one(window: MainWindow, until) -> None:
@@ -139,17 +142,17 @@ def test_two_points_are_not_called_one(window: MainWindow, until) -> None:
 
 
 def test_a_port_typed_is_the_port_meant(window: MainWindow, qtbot) -> None:
-    window.connection.show_ports([("/dev/ttyACM10", "/dev/ttyACM10  Board")])
-    line = window.connection.sources.lineEdit()
+    window.panels.connection.show_ports([("/dev/ttyACM10", "/dev/ttyACM10  Board")])
+    line = window.panels.connection.sources.lineEdit()
     line.selectAll()
     qtbot.keyClicks(line, "/dev/ttyACM1")
-    assert window.connection.source() == "/dev/ttyACM1"
+    assert window.panels.connection.source() == "/dev/ttyACM1"
 
 
 def test_too_large_a_number_typed_becomes_the_largest_not_another(
     window: MainWindow, qtbot
 ) -> None:
-    box = window.basis.editor("functions_x")
+    box = window.panels.basis.editor("functions_x")
     box.selectAll()
     qtbot.keyClicks(box, "99")
     qtbot.keyClick(box, Qt.Key.Key_Return)
@@ -157,7 +160,7 @@ def test_too_large_a_number_typed_becomes_the_largest_not_another(
 
 
 def test_steps_of_one_setting_in_a_row_are_one_to_undo(window: MainWindow, qtbot) -> None:
-    box = window.basis.editor("functions_x")
+    box = window.panels.basis.editor("functions_x")
     for _ in range(3):
         qtbot.keyClick(box, Qt.Key.Key_Down)
     assert window.history.settings.functions_x == 5
@@ -176,14 +179,14 @@ def test_turning_the_camera_does_not_move_the_load(window: MainWindow, qtbot) ->
 
 
 def test_an_absent_port_says_why_and_the_simulation_comes_back(window: MainWindow, until) -> None:
-    window.connection.sources.setCurrentText("/dev/ttyNOWHERE")
-    window.connection.connect_button.click()
+    window.panels.connection.sources.setCurrentText("/dev/ttyNOWHERE")
+    window.panels.connection.connect_button.click()
     until(lambda: window.badge.state == "LOST")
-    assert "there is no such port" in window.connection.message.text()
+    assert "there is no such port" in window.panels.connection.message.text()
     until(lambda: window.readouts.text("contact") == "\N{EN DASH}")
     window.actions_by_name["simulate"].trigger()
     until(lambda: window.badge.state == "SIM")
-    assert not window.connection.message.isVisible()
+    assert not window.panels.connection.message.isVisible()
 
 
 def test_disconnecting_is_said(window: MainWindow, until) -> None:
@@ -194,7 +197,7 @@ def test_disconnecting_is_said(window: MainWindow, until) -> None:
 def test_a_killed_engine_is_lost_and_connecting_starts_another(window: MainWindow, until) -> None:
     os.kill(window.session.engine.pid, 9)
     until(lambda: window.badge.state == "LOST")
-    assert "connect again" in window.connection.message.text()
+    assert "connect again" in window.panels.connection.message.text()
     window.actions_by_name["simulate"].trigger()
     until(lambda: window.badge.state == "SIM")
     drawn = len(window.membrane.ages)
@@ -241,3 +244,221 @@ def test_every_dock_has_a_name_for_saved_layouts(window: MainWindow) -> None:
     names = [dock.objectName() for dock in window.findChildren(QDockWidget)]
     assert all(names)
     assert window.restoreState(window.saveState())
+
+
+def _met(window: MainWindow, until) -> None:
+    """Wait until the skin of the settings is drawn with an estimate."""
+    settings = window.history.settings
+
+    def drawn() -> bool:
+        patch, estimate = window.membrane.skin.patch, window.session.estimate
+        here = (patch.a, patch.b) == (settings.side_x, settings.side_y)
+        count = settings.elements_x * settings.elements_y
+        return here and estimate is not None and estimate.curvature.shape == (3, count)
+
+    until(drawn)
+
+
+def test_another_skin_is_drawn_bent_and_undone_flat_again(
+    window: MainWindow, until, qtbot, colours_in
+) -> None:
+    was = window.history.settings
+    box = window.panels.shape.editor("shape")
+    window.panels.setCurrentIndex(1)
+    qtbot.keyClick(box, "C")
+    _met(window, until)
+    assert window.membrane.skin.patch.radius == pytest.approx(0.0129)
+    assert "radius 12.9 mm" in window.panels.connection.device.text()
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 3)
+    assert colours_in(window, window.membrane) > 500
+    assert window.session.status.accounting.bytes_discarded == 0
+    qtbot.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert window.history.settings == was
+    _met(window, until)
+    assert not window.membrane.skin.patch.base_curvature
+
+
+def test_a_skin_that_cannot_be_is_refused_in_its_panel_and_the_last_one_stays(
+    window: MainWindow, until
+) -> None:
+    message = window.panels.shape.message
+    window.wishes.wish("shape", "cylinder")
+    _met(window, until)
+    window.wishes.wish("base_radius", 0.004)
+    until(lambda: "larger base radius" in message.text())
+    assert window.session.scene.plate.patch.radius == pytest.approx(0.0129)
+    window.history.change("Case", -1, load_case="point")
+    assert "larger base radius" in message.text()
+    window.history.stack.undo()
+    window.history.stack.undo()
+    until(lambda: not message.text())
+
+
+def test_too_few_elements_for_the_basis_are_said_where_they_are_chosen(
+    window: MainWindow, until
+) -> None:
+    window.history.change("Few", -1, elements_x=3, elements_y=4)
+    _met(window, until)
+    for panel in (window.panels.elements, window.panels.basis):
+        until(lambda message=panel.message: "3 x 4 elements" in message.text())
+    assert window.session.estimate.coefficients.size < 36
+    assert len(window.heatmaps["xx"].cells.grab().toImage().size().toTuple()) == 2
+
+
+def test_every_way_to_hold_a_bent_skin_is_played_and_a_wrong_belief_costs(
+    window: MainWindow, until
+) -> None:
+    window.wishes.wish("shape", "cylinder")
+    window.history.change("Still", -1, load_case="centre", noise_kind="none", edge="sliding")
+    _met(window, until)
+    until(lambda: window.session.status.sensor.edge == "sliding")
+    until(lambda: window.session.estimate and window.session.estimate.error_rms < 2e-5)
+    window.history.change("Belief", -1, fit_edge="hinged")
+    until(lambda: window.session.estimate and window.session.estimate.error_rms > 2e-4)
+    window.history.stack.undo()
+    until(lambda: window.session.estimate and window.session.estimate.error_rms < 2e-5)
+
+
+def test_a_load_dragged_on_a_bent_skin_is_where_the_mouse_let_go(
+    window: MainWindow, until, qtbot
+) -> None:
+    window.wishes.wish("shape", "cylinder")
+    window.history.change("Point", -1, load_case="point", force=0.3)
+    _met(window, until)
+    until(lambda: _shown(window))
+    view = window.membrane
+    start = view.drag.on_screen().toPoint()
+    qtbot.mousePress(view.plotter, Qt.MouseButton.LeftButton, pos=start)
+    for step in range(1, 9):
+        qtbot.mouseMove(view.plotter, start + QPoint(-9 * step, 4 * step))
+        until(lambda: _shown(window))
+    qtbot.mouseRelease(view.plotter, Qt.MouseButton.LeftButton, pos=start + QPoint(-72, 32))
+    assert window.history.settings.x < 0.017
+    until(lambda: _shown(window))
+    end = view.drag.on_screen().toPoint()
+    assert (end - start - QPoint(-72, 32)).manhattanLength() <= 12
+
+
+def test_escape_puts_a_dragged_load_back_and_leaves_nothing_to_redo(
+    window: MainWindow, until, qtbot
+) -> None:
+    window.history.change("Point", -1, load_case="point", x=0.05, y=0.05)
+    until(lambda: _shown(window))
+    view, was, count = window.membrane, window.history.settings, window.history.stack.count()
+    start = view.drag.on_screen().toPoint()
+    qtbot.mousePress(view.plotter, Qt.MouseButton.LeftButton, pos=start)
+    qtbot.mouseMove(view.plotter, start + QPoint(40, 0))
+    assert window.history.settings != was
+    qtbot.keyClick(view.plotter, Qt.Key.Key_Escape)
+    assert window.history.settings == was
+    qtbot.mouseMove(view.plotter, start + QPoint(60, 0))
+    qtbot.mouseRelease(view.plotter, Qt.MouseButton.LeftButton, pos=start + QPoint(60, 0))
+    assert window.history.settings == was
+    assert window.history.stack.count() == count
+    assert not window.history.stack.canRedo()
+
+
+def test_no_height_leaves_the_picture_and_the_true_one_is_written(
+    window: MainWindow, until
+) -> None:
+    window.history.change("High", -1, exaggeration=50, load_case="point", force=0.9)
+    until(lambda: window.session.estimate.surface.max() > 0.02)
+    view, times = window.membrane, window.display.scale.times
+    until(lambda: times.text() != "height\n\N{MULTIPLICATION SIGN} 6")
+    until(lambda: -view.skin.height.min() > 20)
+    assert -view.skin.height.min() <= view.skin.deepest * (1 + 1e-9)
+    written = float(times.text().split()[-1])
+    assert written == pytest.approx(view.skin.deepest / window.display.ranges.deepest(), rel=5e-3)
+
+
+def test_the_colours_of_the_skin_can_be_locked_and_undone(window: MainWindow, until) -> None:
+    scale = window.display.scale
+    until(lambda: scale.bar.limits == (0.0, 5.0))
+    scale.lock.click()
+    assert window.history.settings.range_displacement == pytest.approx(5e-3)
+    window.history.change("More", -1, load_case="point", force=0.9)
+    until(lambda: window.session.estimate.surface.max() > 0.02)
+    until(lambda: window.display.ranges.deepest() > 5)
+    assert scale.bar.limits == (0.0, 5.0)
+    window.history.stack.undo()
+    window.history.stack.undo()
+    assert scale.lock.text() == "Lock"
+    window.history.change("Colour", -1, colour_by="xy")
+    until(lambda: scale.bar.limits[0] < 0)
+    scale.lock.click()
+    assert window.heatmaps["xy"].lock.isChecked()
+
+
+def test_pages_are_turned_with_the_keyboard_and_every_title_is_whole(
+    window: MainWindow, qtbot
+) -> None:
+    panels, control = window.panels, Qt.KeyboardModifier.ControlModifier
+    shown = []
+    for key in (Qt.Key.Key_PageDown, Qt.Key.Key_PageUp):
+        qtbot.keyClick(window, key, control)
+        shown.append(panels.tabText(panels.currentIndex()))
+    assert shown == ["S&kin", "&Live"]
+    bar = panels.tabBar()
+    for index in range(panels.count()):
+        text = panels.tabText(index).replace("&", "")
+        assert bar.tabRect(index).width() >= bar.fontMetrics().horizontalAdvance(text) + 8
+    assert bar.sizeHint().width() <= panels.width()
+
+
+def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> None:
+    window.wishes.wish("shape", "cylinder")
+    _met(window, until)
+    renderer, skin = window.membrane.plotter.renderer, window.membrane.skin
+    for name in ("look-from-above", "look-along-y", "look-along-x", "camera"):
+        window.actions_by_name[name].trigger()
+        seen = []
+        for point in skin.points():
+            renderer.SetWorldPoint(*point, 1.0)
+            renderer.WorldToView()
+            seen.append(renderer.GetViewPoint()[:2])
+        assert np.abs(seen).max() < 1, name
+        assert np.ptp(seen, axis=0).max() > 1, name  # and large
+
+
+@pytest.mark.parametrize("shape", ["flat", "cylinder"])
+def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
+    window: MainWindow, qtbot, shape: str
+) -> None:
+    window.wishes.wish("shape", shape)
+    window.history.change("All", -1, load_case="two-points", side_x=0.03, x=0.02, tension=5.0)
+    obeyed = set()
+    for page in range(window.panels.count()):
+        window.panels.setCurrentIndex(page)
+        for form in window.panels.findChildren(Form):
+            for editor in form.editors():
+                if not editor.isVisible():
+                    continue
+                was, index = window.history.settings, window.history.stack.index()
+                key = Qt.Key.Key_Space if isinstance(editor, QCheckBox) else Qt.Key.Key_Down
+                editor.setFocus()
+                qtbot.keyClick(editor, key)
+                if window.history.settings == was:
+                    qtbot.keyClick(editor, Qt.Key.Key_Up)
+                now = window.history.settings
+                assert now != was, editor.objectName()
+                assert window.history.stack.index() == index + 1
+                window.history.stack.undo()
+                assert window.history.settings == was
+                window.history.stack.redo()
+                assert window.history.settings == now
+                window.history.stack.undo()
+                obeyed.add(editor.objectName())
+    asked = {f.name for f in fields(Settings) if "ask" in f.metadata}
+    assert asked - obeyed == ({"base_radius"} if shape == "flat" else set())
+
+
+def test_the_heatmaps_keep_their_share_of_a_wider_window(window: MainWindow, qtbot) -> None:
+    was = window.heatmaps["xx"].width()
+    window.resize(1920, 1100)
+    qtbot.waitUntil(lambda: window.heatmaps["xx"].width() > 1.3 * was)
+
+
+def test_connecting_is_called_waiting(window: MainWindow, until) -> None:
+    window.session.status = replace(window.session.status, state="waiting")
+    assert window.session.badge() == "WAITING"

@@ -14,7 +14,17 @@ import numpy as np
 import psutil
 import pytest
 
-from kappaskin import Estimate, PointLoad, Region, Setup, load_scene
+from kappaskin import (
+    Estimate,
+    Patch,
+    Plate,
+    PointLoad,
+    Region,
+    Scene,
+    SensorLayout,
+    Setup,
+    load_scene,
+)
 from kappaskin.engine import Engine
 from kappaskin.live import LOST, OFF, STREAMING, Status
 
@@ -168,6 +178,56 @@ def test_another_scene_plays_on_the_same_line(engine) -> None:
     after = wait_for(lambda: next_estimate(engine))
     assert after.generation == before.generation
     assert np.abs(after.touch.position - here).max() < 2e-3
+
+
+def test_another_skin_is_met_as_another_device_is(engine) -> None:
+    engine.connect("sim:centre")
+    before, meetings = next_estimate(engine), engine.status().meetings
+    patch = Patch(0.04, 0.03, 0.0129)
+    layout = SensorLayout.regular(patch, 7, 9)
+
+    engine.play(Scene("arc", Plate(patch), layout, (PointLoad(0.02, 0.015, 0.2),)))
+    after = next_estimate(engine, before.generation)
+
+    status = engine.status()
+    assert (status.state, status.meetings) == (STREAMING, meetings + 1)
+    assert status.sensor is not None
+    assert status.sensor.layout.patch == patch
+    assert after.curvature.shape == (3, 63)
+    assert after.true_contact.tolist() == [0.02, 0.015]
+
+
+def test_between_two_skins_there_is_nothing_to_show(engine) -> None:
+    engine.connect("sim:centre")
+    next_estimate(engine)
+    engine.set_up(Setup(12, 12))
+    patch, waited = Patch(0.04, 0.03, 0.0129), 0
+    for m in (14, 15):  # so many that making the pipeline takes a while
+        layout = SensorLayout.regular(patch, m, 12)
+        engine.play(Scene("arc", Plate(patch), layout, rate=100.0))
+        for _ in range(300):
+            status = engine.status()
+            estimate = engine.latest(status)
+            waited += status.slot is None
+            if estimate is not None:
+                assert estimate.curvature.shape == (3, len(status.sensor.layout))
+            time.sleep(0.002)
+    assert waited
+
+
+def test_a_scene_that_is_refused_is_said_and_the_last_one_plays_on(engine) -> None:
+    engine.connect("sim:centre")
+    before = next_estimate(engine)
+    half = Patch(np.pi * 0.01, 0.02, 0.01, strip=True)
+    layout = SensorLayout.regular(half, 8, 1)
+
+    engine.play(Scene("loose", Plate(half), layout, reference=(15, 1), edge="sliding"))
+
+    assert wait_for(lambda: "moves as a whole" in engine.status().message)
+    assert wait_for(lambda: engine.latest(engine.status()).sequence > before.sequence + 20)
+    assert engine.status().generation == before.generation
+    engine.play(load_scene("line"))
+    assert wait_for(lambda: not engine.status().message)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Frame, PointLoad, Region, Scanner, load_scene
+from kappaskin import (
+    Frame,
+    Patch,
+    Plate,
+    PointLoad,
+    Refusal,
+    Region,
+    Scanner,
+    Scene,
+    SensorLayout,
+    Transduction,
+    load_scene,
+)
 from kappaskin.sources import SimulatedSource, open_source
 
 
@@ -141,6 +153,68 @@ def test_other_loads_play_on_without_a_gap() -> None:
     assert after[0].truth is not None
     assert after[0].truth.contact.tolist() == [0.03, 0.06]
     assert source.accounting().lost == 0
+
+
+def fingertip(m: int = 7, rate: float = 100.0) -> Scene:
+    patch = Patch(0.04, 0.03, 0.0129)
+    return Scene("arc", Plate(patch), SensorLayout.regular(patch, m, 3), rate=rate)
+
+
+def test_other_loads_are_not_another_sensor_but_another_skin_is() -> None:
+    source = source_of()
+    sensor = source.sensor
+
+    source.play(replace(load_scene("circle"), seed=5))
+    assert source.sensor is sensor
+
+    for scene in (
+        replace(load_scene(), layout=SensorLayout.regular(Patch(0.1, 0.1), 6, 6)),
+        replace(load_scene(), edge="sliding"),
+        replace(load_scene(), plate=Plate(Patch(0.1, 0.1), tension=5.0)),
+        replace(load_scene(), transduction=Transduction(), rate=400.0),
+        fingertip(),
+    ):
+        source.play(scene)
+        assert source.sensor is not sensor
+        sensor = source.sensor
+
+
+def test_another_skin_plays_on_without_a_gap_and_without_a_loss() -> None:
+    clock = Clock()
+    source = source_of(clock=clock)
+    before = read_until(source, clock, clock.now + 0.5)
+    clock.now += 5.0  # as long as another skin takes to be made
+
+    source.play(fingertip())
+    started = clock.now
+    after = read_until(source, clock, clock.now + 0.5)
+
+    assert [f.sequence for f in before + after] == list(range(len(before) + len(after)))
+    assert {len(f.counts) for f in after} == {3 * 21}
+    assert len(after) in (50, 51)
+    assert after[0].host_time == pytest.approx(started)
+    seen = source.accounting()
+    assert (seen.lost, seen.span) == (0, len(before) + len(after))
+
+
+def test_a_scene_that_is_refused_leaves_the_one_that_plays() -> None:
+    clock = Clock()
+    source = source_of("centre", clock)
+    sensor = source.sensor
+    half = Patch(np.pi * 0.01, 0.02, 0.01, strip=True)  # moves as a whole unless it is pinned
+    loose = Scene(
+        "loose", Plate(half), SensorLayout.regular(half, 8, 1), reference=(15, 1), edge="sliding"
+    )
+
+    with pytest.raises(Refusal, match="moves as a whole"):
+        source.play(loose)
+    with pytest.raises(Refusal, match="lower the rate"):
+        source.play(fingertip(m=32, rate=5000.0))
+
+    assert source.sensor is sensor
+    (frame,) = source.read(0.0)
+    assert frame.truth is not None
+    assert frame.truth.contact.tolist() == [0.05, 0.05]
 
 
 def test_no_load_reads_nothing_but_noise() -> None:

@@ -1,18 +1,23 @@
-"""How many functions make the shape."""
+"""Which functions make the shape."""
 
 from PySide6.QtWidgets import QWidget
 
 from kappaskin import Status
-from kappaskin_app.panels.form import Panel
+from kappaskin_app.panels.form import Form
 
 
-class BasisPanel(Panel):
-    """Asks for Ni x Nj and says why a number was not taken."""
+def in_use(status: Status) -> str:
+    """Why the functions are not those asked for, and which they are; nothing when they are."""
+    setup = status.setup
+    return f"In use: {setup.Ni} x {setup.Nj}. {status.refusal}." if status.refusal else ""
+
+
+class BasisPanel(Form):
+    """Asks for Ni x Nj and the edge, and says why a choice was not taken."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Basis", ("functions_x", "functions_y"), parent)
+        super().__init__("Basis", ("functions_x", "functions_y", "fit_edge"), parent)
 
-    def show_status(self, status: Status) -> None:
-        setup = status.setup
-        kept = f"In use: {setup.Ni} x {setup.Nj}. {status.refusal}." if status.refusal else ""
-        self.show_message("Computing\N{HORIZONTAL ELLIPSIS}" if status.computing else kept)
+    def show_status(self, status: Status, simulating: bool) -> None:
+        computing = "Computing\N{HORIZONTAL ELLIPSIS}"
+        self.show_message(computing if status.computing else in_use(status))

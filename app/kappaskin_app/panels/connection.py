@@ -3,22 +3,20 @@
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import (
     QComboBox,
-    QGroupBox,
     QHBoxLayout,
     QLabel,
     QLineEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
-from kappaskin import Status
-from kappaskin_app.theme import Theme
+from kappaskin import Sensor, Status
+from kappaskin_app.panels.panel import Panel
 
 _SIMULATED = ("sim:", "Simulated skin")
 
 
-class ConnectionPanel(QGroupBox):
+class ConnectionPanel(Panel):
     """Asks for a source: the simulation, a serial port found, or a typed port or URL."""
 
     connect_wanted = Signal(str)
@@ -41,8 +39,6 @@ class ConnectionPanel(QGroupBox):
         self.disconnect_button = QPushButton("Disconnect")
         self.disconnect_button.setObjectName("disconnect")
         self.device = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
-        self.message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
-        self.message.setObjectName("connection-message")
         self.connect_button.clicked.connect(lambda: self.connect_wanted.emit(self.source()))
         line = QLineEdit()
         line.returnPressed.connect(self.connect_button.click)
@@ -54,12 +50,9 @@ class ConnectionPanel(QGroupBox):
         buttons = QHBoxLayout()
         for button in (self.connect_button, self.disconnect_button, self.look_button):
             buttons.addWidget(button)
-        around = QVBoxLayout(self)
-        around.setContentsMargins(8, 6, 8, 8)
-        around.addWidget(self.sources)
-        around.addLayout(buttons)
-        around.addWidget(self.device)
-        around.addWidget(self.message)
+        self.body.addWidget(self.sources)
+        self.body.addLayout(buttons)
+        self.body.addWidget(self.device)
         self.show_ports([])
 
     def source(self) -> str:
@@ -86,26 +79,26 @@ class ConnectionPanel(QGroupBox):
             else:
                 self.sources.setCurrentText(source)
 
-    def show_status(self, status: Status) -> None:
-        sensor = status.sensor
+    def show_status(self, status: Status, simulating: bool) -> None:
         text = ""
-        if sensor is not None and status.state == "streaming":
-            a, b = sensor.layout.patch.a * 1e3, sensor.layout.patch.b * 1e3
-            dead = int((~sensor.layout.live).sum())
-            health = f", {dead} of {sensor.channels} channels dead" if dead else ""
-            text = (
-                f"{sensor.name} ({sensor.serial_number})\n{sensor.layout}, {a:g} x {b:g} mm"
-                f"{health}\nup to {sensor.rate:g} frames/s"
-            )
+        if status.sensor is not None and status.state == "streaming":
+            text = _said(status.sensor)
         elif status.state == "waiting":
             text = "Waiting for the device to say what it is\N{HORIZONTAL ELLIPSIS}"
         if text != self.device.text():
             self.device.setText(text)
         self.device.setVisible(bool(text))
-        if status.message != self.message.text():
-            self.message.setText(status.message)
-        self.message.setVisible(bool(status.message))
+        self.show_message(status.message)
         self.disconnect_button.setEnabled(status.state != "off")
 
-    def show_theme(self, theme: Theme) -> None:
-        self.message.setStyleSheet(f"color: {theme.alert};")
+
+def _said(sensor: Sensor) -> str:
+    """What a sensor is, in words."""
+    patch, dead = sensor.layout.patch, int((~sensor.layout.live).sum())
+    a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
+    bent = f", radius {radius:g} mm" if patch.base_curvature else ""
+    health = f"\n{dead} of {sensor.channels} channels dead" if dead else ""
+    return (
+        f"{sensor.name} ({sensor.serial_number})\n{sensor.layout}, {sensor.edge}{health}\n"
+        f"{a:g} x {b:g} mm{bent}, up to {sensor.rate:g} frames/s"
+    )

@@ -4,23 +4,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt
 from PySide6.QtGui import QKeyEvent, QKeySequence, QValidator
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QFormLayout,
-    QGroupBox,
     QLabel,
     QLineEdit,
     QSpinBox,
-    QVBoxLayout,
     QWidget,
 )
 
+from kappaskin_app.panels.panel import Panel
 from kappaskin_app.settings import Choice, Range, Settings, Switch, ask_of
-from kappaskin_app.theme import Theme
 
 
 class _WholeBox(QSpinBox):
@@ -112,11 +110,15 @@ def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
 def _dressed(box: QSpinBox | QDoubleSpinBox, how: Range) -> QWidget:
     if how.unit:
         box.setSuffix(f" {how.unit}")
-    low, high = how.least * how.scale, how.most * how.scale
-    box.setToolTip(f"{how.tip} From {low:g} to {high:g} {how.unit}".rstrip() + ".")
+    box.setToolTip(_tip_of(how, how.most))
     box.setKeyboardTracking(False)
     box.setAlignment(Qt.AlignmentFlag.AlignRight)
     return box
+
+
+def _tip_of(how: Range, most: float) -> str:
+    low, high = round(how.least * how.scale, 6), round(most * how.scale, how.decimals)
+    return f"{how.tip} From {low:g} to {high:g} {how.unit}".rstrip() + "."
 
 
 def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:
@@ -140,22 +142,15 @@ def _editor(name: str, said: Callable[[Any], None]) -> _Editor:
     return _choice(how, said) if isinstance(how, Choice) else _switch(how, said)
 
 
-class Panel(QGroupBox):
-    """A titled form of some settings; `wished` says which one a person wants to be what."""
-
-    wished = Signal(str, object)
+class Form(Panel):
+    """A panel with an editor for each of some settings."""
 
     def __init__(self, title: str, names: tuple[str, ...], parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
         self.form = QFormLayout()
         self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         self.form.setVerticalSpacing(5)
-        self.message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
-        self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        around = QVBoxLayout(self)
-        around.setContentsMargins(8, 6, 8, 8)
-        around.addLayout(self.form)
-        around.addWidget(self.message)
+        self.body.addLayout(self.form)
         self._editors: dict[str, _Editor] = {}
         for name in names:
             self._add(name)
@@ -189,11 +184,10 @@ class Panel(QGroupBox):
         for name, editor in self._editors.items():
             self.form.setRowVisible(editor.widget, name in names)
 
-    def show_theme(self, theme: Theme) -> None:
-        self.message.setStyleSheet(f"color: {theme.alert};")
-
-    def show_message(self, text: str) -> None:
-        """Say something below the form, or nothing."""
-        if text != self.message.text():
-            self.message.setText(text)
-        self.message.setVisible(bool(text))
+    def show_limit(self, name: str, most: float) -> None:
+        """Let the number asked for as `name` be at most `most`, in SI units."""
+        how, box = ask_of(name), self.editor(name)
+        if isinstance(how, Range) and isinstance(box, QDoubleSpinBox):
+            with QSignalBlocker(box):
+                box.setMaximum(most * how.scale)
+            box.setToolTip(_tip_of(how, most))

@@ -1,27 +1,32 @@
 """What presses on the simulated skin, and what noise its readings have."""
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QComboBox, QWidget
 
-from kappaskin_app.panels.form import Panel
-from kappaskin_app.settings import FREE_CASES, TWO_ENDED, Settings
-from kappaskin_app.theme import Theme
+from kappaskin import Status
+from kappaskin_app.panels.form import Form
+from kappaskin_app.settings import FREE_CASES, LOAD_CASES, TABLE_1_CASES, TWO_ENDED, Settings
+from kappaskin_app.simulation import is_table_1
 
 _REAL = "Only for the simulation inside the app (Ctrl+M)."
 
 
-class _SimulationPanel(Panel):
-    """A panel that belongs to the simulation, and says so while a real sensor is connected."""
+class SimulationForm(Form):
+    """A form that belongs to the simulation, and says so while a real sensor is connected."""
 
-    def show_simulating(self, simulating: bool) -> None:
+    def show_status(self, status: Status, simulating: bool) -> None:
         for editor in self.editors():
             editor.setEnabled(simulating)
-        self.show_message("" if simulating else _REAL)
+        if simulating:
+            self.show_message(self.alarm(status))
+        else:
+            self.show_message(_REAL, hint=True)
 
-    def show_theme(self, theme: Theme) -> None:
-        self.message.setStyleSheet(f"color: {theme.faint};")  # a hint, not an alarm
+    def alarm(self, status: Status) -> str:
+        """What is wrong with what is asked for here, while it is simulated."""
+        return ""
 
 
-class LoadPanel(_SimulationPanel):
+class LoadPanel(SimulationForm):
     """Asks for the load case; a free one has its place and its force."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -29,13 +34,25 @@ class LoadPanel(_SimulationPanel):
         super().__init__("Load", names, parent)
 
     def show_settings(self, settings: Settings) -> None:
+        for name, side in (("x", settings.side_x), ("y", settings.side_y)):
+            self.show_limit(name, side)
+            self.show_limit(f"{name}_end", side)
+        self._show_cases(is_table_1(settings))
         super().show_settings(settings)
         free, two = settings.load_case in FREE_CASES, settings.load_case in TWO_ENDED
         rows = {"load_case"} | ({"force", "x", "y"} if free else set())
         self.show_rows(rows | ({"x_end", "y_end"} if two else set()))
 
+    def _show_cases(self, table_1: bool) -> None:
+        """Call the cases Table 1's where they are."""
+        box = self.editor("load_case")
+        for index, (case, words) in enumerate(LOAD_CASES):
+            also = " (Table 1)" if table_1 and case in TABLE_1_CASES else ""
+            if isinstance(box, QComboBox):
+                box.setItemText(index, words + also)
 
-class NoisePanel(_SimulationPanel):
+
+class NoisePanel(SimulationForm):
     """Asks for the noise of the simulated readings."""
 
     def __init__(self, parent: QWidget | None = None) -> None:

@@ -2,10 +2,10 @@
 
 from PySide6.QtWidgets import QWidget
 
-from kappaskin_app.panels.form import Panel
+from kappaskin_app.panels.form import Form
 
 
-class ViewPanel(Panel):
+class ViewPanel(Form):
     """Asks for colours, height and what is drawn beside the skin."""
 
     def __init__(self, parent: QWidget | None = None) -> None:

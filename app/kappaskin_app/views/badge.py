@@ -5,19 +5,21 @@ from PySide6.QtWidgets import QLabel, QWidget
 
 from kappaskin_app.theme import Theme
 
-LIVE, SIM, STALE, LOST, OFF = "LIVE", "SIM", "STALE", "LOST", "OFF"
+LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
+STALE, LOST, OFF = "STALE", "LOST", "OFF"
 
 TIPS = {
     LIVE: "Readings of a real sensor, as they come.",
     SIM: "Readings of a simulation, not of a real sensor.",
-    STALE: "No reading has come for half a second, or none yet: what is shown is old.",
+    WAITING: "Connecting, or computing what this skin needs: the first reading is still to come.",
+    STALE: "No reading has come for half a second: what is shown is old.",
     LOST: "The connection ended or could not be made: what is shown is the last that came.",
     OFF: "Nothing is connected.",
 }
 
 
 class Badge(QLabel):
-    """Shows one of the five states in its colour."""
+    """Shows one of the states in its colour."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -44,6 +46,7 @@ class Badge(QLabel):
         colour = {
             LIVE: theme.good,
             SIM: theme.simulated,
+            WAITING: theme.off,
             STALE: theme.warning,
             LOST: theme.bad,
             OFF: theme.off,

@@ -1,41 +1,63 @@
 """Where to look at a skin from, so that all of it and what is written beside it is seen."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import Patch
+from kappaskin_app.views.drawn import MM, DrawnSkin
 
 Array = NDArray[np.float64]
 
+_LOW = 0.2  # of the shorter side: how far in the view reaches below the skin at rest
+_MARGIN = 0.06  # of the longer side: room for the labels beside the edges and the arrow above
 
-def fit_camera(renderer: Any, patch: Patch) -> None:
-    """Look at the whole of `patch`, drawn in mm, from the front and a little from the left."""
+
+@dataclass(frozen=True)
+class Direction:
+    """A way to look at the skin: from where, as shares of its longer side, and what is up."""
+
+    words: str
+    towards: tuple[float, float, float]
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+
+FROM_THE_LEFT = Direction("from the front, a little from the left", (-0.45, -1.1, 1.1))
+ABOVE = Direction("from above", (0.0, 0.0, 1.6), (0.0, 1.0, 0.0))
+FRONT = Direction("along y", (0.0, -1.6, 0.0))
+SIDE = Direction("along x", (1.6, 0.0, 0.0))
+
+
+def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction) -> None:
+    """Look at the whole of `skin` from `direction`."""
     camera = renderer.GetActiveCamera()
-    a, b = patch.a * 1e3, patch.b * 1e3
-    side, low = max(a, b), -0.2 * min(a, b)
-    camera.SetFocalPoint(a / 2, b / 2, low / 2)
-    camera.SetPosition(a / 2 - 0.45 * side, b / 2 - 1.1 * side, side)
-    camera.SetViewUp(0.0, 0.0, 1.0)
+    body = _around(skin, 0.0)
+    least, most = body.min(axis=0), body.max(axis=0)
+    middle = (least + most) / 2
+    camera.SetFocalPoint(*middle)
+    camera.SetPosition(*(middle + skin.side * np.array(direction.towards)))
+    camera.SetViewUp(*direction.up)
     camera.SetViewAngle(30.0)
-    renderer.ResetCamera(0.0, a, 0.0, b, low, 0.0)
+    renderer.ResetCamera(*np.column_stack([least, most]).ravel())
     camera.SetWindowCenter(0.0, 0.0)
-    # Room for the labels beside the edges and the arrow above them.
-    margin = 0.06 * side
-    seen = np.array(
-        [
-            _in_view(renderer, x, y, z)
-            for x in (-margin, a + 2.5 * margin)
-            for y in (-margin, b + margin)
-            for z in (low, 2 * margin)
-        ]
-    )
+    seen = np.array([_in_view(renderer, *point) for point in _around(skin, _MARGIN)])
     least, most = seen.min(axis=0), seen.max(axis=0)
     zoom = 1.94 / float(np.max(most - least))
     camera.Zoom(zoom)
     camera.SetWindowCenter(*(zoom * (least + most) / 2))
     renderer.ResetCameraClippingRange()
+
+
+def _around(skin: DrawnSkin, share: float) -> Array:
+    """Points (k, 3) in mm around the skin and what is drawn within this share of it."""
+    a, b = skin.patch.a, skin.patch.b
+    margin = share * skin.side
+    x = np.linspace(0, a, 9 if skin.patch.base_curvature else 2)
+    points, out = skin.at_rest(np.stack(np.meshgrid(x, (0, b)), axis=-1).reshape(-1, 2))
+    low, high = -_LOW * MM * min(a, b), 2 * margin
+    corners = [(dx, dy, 0.0) for dx in (-margin, 2.5 * margin) for dy in (-margin, margin)]
+    return np.concatenate([points + z * out + at for z in (low, high) for at in corners])
 
 
 def _in_view(renderer: Any, x: float, y: float, z: float) -> Array:

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from kappaskin import SensorLayout
 from kappaskin_app.theme import DIVERGING, Colours, Theme
+from kappaskin_app.views.colour_bar import ColourBar, LockButton
 from kappaskin_app.views.line import Line
 
 Array = NDArray[np.float64]
@@ -26,37 +27,6 @@ def coloured(values: Array, limits: tuple[float, float], colours: Colours, missi
         grey = QColor(missing)
         rgb[gone] = grey.red(), grey.green(), grey.blue()
     return rgb
-
-
-class ColourBar(QWidget):
-    """A vertical scale of colours with its limits and unit."""
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._colours, self.limits, self._unit = DIVERGING, (-1.0, 1.0), "1/m"
-        self.setFixedWidth(64)
-
-    def show_scale(self, colours: Colours, limits: tuple[float, float], unit: str) -> None:
-        if (self.limits, self._unit) != (limits, unit) or self._colours is not colours:
-            self._colours, self.limits, self._unit = colours, limits, unit
-            self.update()
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        metrics = painter.fontMetrics()
-        line = metrics.height()
-        bar = QRectF(4, line + 4, 14, max(self.height() - line - 10, 10))
-        ramp = np.ascontiguousarray(self._colours[::-1, None])
-        image = QImage(ramp.tobytes(), 1, 256, 3, QImage.Format.Format_RGB888)
-        painter.drawImage(bar, image)
-        painter.setPen(self.palette().windowText().color())
-        painter.drawText(QPointF(2, metrics.ascent()), self._unit)
-        low, high = self.limits
-        for share in (0.0, 0.5, 1.0):
-            y = bar.bottom() - share * bar.height()
-            text = f"{low + share * (high - low):.3g}".replace("-", "\N{MINUS SIGN}")
-            top = min(max(y - line / 2, bar.top()), bar.bottom() - line)
-            painter.drawText(QPointF(bar.right() + 4, top + metrics.ascent()), text)
 
 
 class _Cells(QWidget):
@@ -196,9 +166,8 @@ class Heatmap(QWidget):
         self._title.setToolTip(tip)
         self.value = Line()
         self.value.setToolTip("The element under the mouse, else the largest reading.")
-        self.lock = QToolButton(checkable=True, text="Lock")  # pyright: ignore[reportCallIssue]
-        self.lock.setToolTip("Keep the colours' range as it is now; else it follows the readings.")
-        self.lock.clicked.connect(self._ask_lock)
+        self.lock = LockButton()
+        self.lock.wanted.connect(lambda locked: self.lock_wanted.emit(self._limit * locked))
         self.cells, self.bar = _Cells(), ColourBar()
         self.cells.pointed.connect(self.pointed)
         self._limit, self._layout, self._element = 1.0, None, -1
@@ -216,13 +185,8 @@ class Heatmap(QWidget):
         around.addLayout(top)
         around.addLayout(middle, 1)
 
-    def _ask_lock(self, locked: bool) -> None:
-        self.lock.setChecked(not locked)  # the answer comes back through show_lock
-        self.lock_wanted.emit(self._limit if locked else 0.0)
-
     def show_lock(self, locked: bool) -> None:
-        self.lock.setChecked(locked)
-        self.lock.setText("Locked" if locked else "Lock")
+        self.lock.show_locked(locked)
 
     def show_layout(self, layout: SensorLayout) -> None:
         self._layout = layout

@@ -13,19 +13,20 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
-from kappaskin import Estimate, LineLoad, Load, Patch, Sensor
+from kappaskin import Estimate, LineLoad, Load, Sensor
 from kappaskin_app.theme import Colours, Theme
-from kappaskin_app.views.camera import fit_camera
-from kappaskin_app.views.drag import ARROW, MM, LoadDrag
+from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
+from kappaskin_app.views.drag import ARROW, LoadDrag
+from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
 
 Array = NDArray[np.float64]
 
-_LIFT = 0.006  # of the longer side above the surface, or half of a line drowns in it
+_LIFT = 0.006  # of the skin's size above the surface, or half of a line drowns in it
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
 class MembraneView(QWidget):
-    """Shows estimates, the skin pressed in downwards; `drag` says when a load is moved."""
+    """Shows estimates, the skin pressed in along its normals; `drag` says when a load is moved."""
 
     drawn = Signal()
 
@@ -38,19 +39,20 @@ class MembraneView(QWidget):
         around.addWidget(self.plotter)
         self._make_actors()
         self._make_lights()
-        self.drag = LoadDrag(self.plotter, self._height_at)
+        self.drag = LoadDrag(self.plotter)
         self.setMinimumSize(320, 240)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
         """(when, age of its frame in s) of each drawing completed."""
         self._host_time = float("nan")
         self._drawn = True
         self.plotter.renderer.AddObserver("EndEvent", self._note_drawing)
-        self._exaggeration, self._lift, self._want_truth = 1.0, 0.0, True
-        self._element_positions: Array = np.zeros((1, 2))
-        self._layout_of: Sensor | None = None
-        self._heights: Array = np.zeros((2, 2))
+        self.skin = self.drag.skin
+        self._lift, self._want_elements, self._want_truth = 0.0, True, True
+        self._of_elements: Indices = np.empty(0, np.intp)
+        self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
+        self._arrays: dict[str, Any] = {}
         self._lost = False
-        self._fitted = True
+        self._fitted, self._from = True, FROM_THE_LEFT
         for turning in ("InteractionEvent", "MouseWheelForwardEvent", "MouseWheelBackwardEvent"):
             self.plotter.iren.interactor.AddObserver(turning, self._note_turning)
         self._theme: Theme | None = None
@@ -71,7 +73,7 @@ class MembraneView(QWidget):
             self._elements, style="points", point_size=5, **unlit
         )
         self._line_actor = plotter.add_mesh(self._line, line_width=5, color="#e8543f", **unlit)
-        # Sized for a skin whose longer side is 1; `show_skin` scales them to the one there is.
+        # Sized for a skin of size 1; `show_skin` scales them to the one there is.
         arrow = pv.Arrow(start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35)
         self._arrows = [
             plotter.add_mesh(arrow, color="#e8543f", reset_camera=False, render=False)
@@ -104,20 +106,26 @@ class MembraneView(QWidget):
     # What a skin looks like: rebuilt only when another one appears.
 
     def show_skin(self, sensor: Sensor, nx: int, ny: int) -> None:
-        """Draw a surface of nx x ny points for the skin of `sensor`, flat until an estimate."""
+        """Draw a surface of nx x ny points for the skin of `sensor`, at rest until an estimate."""
         patch = sensor.layout.patch
-        x, y = patch.grid(nx, ny)
-        points = np.zeros((ny, nx, 3))
-        points[..., 0], points[..., 1] = np.meshgrid(x * MM, y * MM)
-        index = np.arange(nx * ny).reshape(ny, nx)
-        corners = [index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]]
-        quads = np.stack([np.full_like(corners[0], 4), *corners], axis=-1)
-        self._mesh = pv.PolyData(points.reshape(-1, 3), faces=quads.ravel())
+        another = self._surface_actor is None or self.skin.patch != patch
+        self.skin = self.drag.skin = skin = DrawnSkin(patch, nx, ny)
+        self._mesh = pv.PolyData(skin.points(), faces=skin.faces())
         self._mesh.point_data["value"] = np.zeros(nx * ny)
-        self._mesh.point_data.active_normals = np.tile([0.0, 0.0, 1.0], (nx * ny, 1))
-        self._wire = self._wireframe(points)
-        self._cell = np.array([x[1] - x[0], y[1] - y[0]])
-        self._heights = np.zeros((ny, nx))
+        self._mesh.point_data.active_normals = skin.shading()
+        self._wire = self._wireframe(skin)
+        self._put_into_scene()
+        self._lift = _LIFT * skin.size
+        self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
+        self._contact.scale = skin.size
+        self._arrays = self._changing()
+        self._place_labels(skin)
+        if another:
+            self.look_from(self._from)
+        if self._theme:
+            self.show_theme(self._theme)
+
+    def _put_into_scene(self) -> None:
         plotter = self.plotter
         for actor in (self._surface_actor, self._wire_actor):
             if actor is not None:
@@ -135,86 +143,97 @@ class MembraneView(QWidget):
             diffuse=0.42,
         )
         self._surface_actor.prop.interpolation = "Gouraud"
+        self._surface_actor.mapper.scalar_visibility = not self._lost
         self._wire_actor = plotter.add_mesh(
             self._wire, line_width=1, lighting=False, reset_camera=False, render=False
         )
-        positions = np.column_stack([sensor.layout.positions * MM, np.zeros(len(sensor.layout))])
-        positions = positions[sensor.layout.live.any(axis=0)]
-        self._element_positions = positions[:, :2] / MM
-        self._elements.points = positions
-        self._elements.verts = np.column_stack(
-            [np.ones(len(positions), int), np.arange(len(positions))]
-        ).ravel()
-        side = MM * max(patch.a, patch.b)
-        self._lift, self.drag.arrow = _LIFT * side, ARROW * side
-        self._contact.scale = side
-        self._place_labels(patch)
-        another = self._layout_of is None or self._layout_of.layout.patch != patch
-        self._layout_of = sensor
-        if another:
-            self.reset_camera()
         self._wire_actor.prop.color = self._ink
-        if self._theme:
-            self.show_theme(self._theme)
 
-    def _wireframe(self, points: Array) -> pv.PolyData:
+    def _changing(self) -> dict[str, Any]:
+        """VTK's own arrays of what changes; looking them up takes longer than to fill them."""
+        return {
+            "points": self._mesh.points,
+            "normals": self._mesh.point_data.active_normals,
+            "values": self._mesh.point_data["value"],
+            "wire": self._wire.points,
+            "elements": self._elements.points,
+        }
+
+    def _wireframe(self, skin: DrawnSkin) -> pv.PolyData:
         """Every few lines of the grid, as lines through their own points alone."""
-        ny, nx = points.shape[:2]
-        index = np.arange(nx * ny).reshape(ny, nx)
-        lines = [*index[::_STRIDE], *index[:, ::_STRIDE].T]
+        lines = skin.lines(_STRIDE)
         self._wire_points = np.concatenate(lines)
         ends = np.cumsum([len(line) for line in lines])
         cells = [np.r_[len(x), np.arange(e - len(x), e)] for x, e in zip(lines, ends, strict=True)]
-        return pv.PolyData(points.reshape(-1, 3)[self._wire_points], lines=np.concatenate(cells))
+        return pv.PolyData(skin.points(self._wire_points), lines=np.concatenate(cells))
 
-    def _place_labels(self, patch: Patch) -> None:
-        a, b = patch.a * MM, patch.b * MM
-        for label, text, at in zip(
-            self._labels,
-            ("0", f"x {a:g} mm", f"y {b:g} mm"),
-            ((-0.04 * a, -0.04 * b), (a, -0.06 * b), (0.0, 1.05 * b)),
-            strict=True,
-        ):
+    def _place_elements(self, positions: Array) -> None:
+        self._elements_at_rest = self.skin.at_rest(positions)
+        self._of_elements = self.skin.nearest(positions)
+        points, out = self._elements_at_rest
+        self._elements_actor.visibility = self._want_elements
+        self._elements.points = points + self._lift * out
+        self._elements.verts = np.column_stack(
+            [np.ones(len(points), int), np.arange(len(points))]
+        ).ravel()
+
+    def _place_labels(self, skin: DrawnSkin) -> None:
+        a, b = skin.patch.a, skin.patch.b
+        corners, _ = skin.at_rest(np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]))
+        beside = MM * np.array([(-0.04 * a, -0.04 * b, 0), (0, -0.06 * b, 0), (0, 0.05 * b, 0)])
+        texts = ("0", f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm")
+        for label, text, at in zip(self._labels, texts, corners + beside, strict=True):
             label.input = text
-            label.position = (*at, 0.0)
-            label.prop.justification_horizontal = "center" if text[0] == "y" else "left"
+            label.position = tuple(at)
+        # Where the skin rises steeply beside it, a text in the middle would lie below it.
+        y_at = "right" if skin.patch.base_curvature else "center"
+        self._labels[2].prop.justification_horizontal = y_at
 
-    def reset_camera(self) -> None:
+    def look_from(self, direction: Direction) -> None:
         """Look at the whole skin, as large as it fits, and again whenever the size changes."""
-        if self._layout_of is None:
-            return
-        fit_camera(self.plotter.renderer, self._layout_of.layout.patch)
+        self._from = direction
+        fit_camera(self.plotter.renderer, self.skin, direction)
         self._fitted = True
         self.plotter.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if self._fitted:
-            QTimer.singleShot(0, self.reset_camera)  # after VTK has its new size
+            # After VTK has its new size.
+            QTimer.singleShot(0, lambda: self._fitted and self.look_from(self._from))
 
     # What changes with every estimate.
 
-    def show_estimate(self, estimate: Estimate, values: Array, limits: tuple[float, float]) -> None:
-        """Draw a shape, coloured by `values` (ny, nx) between `limits`, in any unit."""
-        if self._surface_actor is None or estimate.surface.shape != self._heights.shape:
-            return
-        if self._lost:
-            return  # a last one that came after the news
-        self._heights = -MM * self._exaggeration * np.nan_to_num(estimate.surface)
-        self._mesh.points[:, 2] = self._heights.ravel()
-        self._mesh.point_data.active_normals[:] = self._normals(self._heights)
-        self._mesh.point_data["value"][:] = values.ravel()
+    def show_estimate(
+        self, estimate: Estimate, values: Array, limits: tuple[float, float], times: float
+    ) -> None:
+        """Draw a shape so many `times` higher than it is, coloured by `values` (ny, nx).
+
+        The colours go between `limits`, in any unit.
+        """
+        skin = self.skin
+        if estimate.surface.shape != skin.height.shape or self._lost:
+            return  # of another skin, or a last one that came after the news
+        skin.height = -MM * times * np.nan_to_num(estimate.surface)
+        self._arrays["points"][:] = skin.points()
+        self._arrays["normals"][:] = skin.shading()
+        self._arrays["values"][:] = values.ravel()
         self._surface_actor.mapper.scalar_range = limits
-        known = bool(np.isfinite(estimate.true_surface[0, 0]))
-        self._wire_actor.visibility = known and self._want_truth
-        if self._wire_actor.visibility:
-            true = estimate.true_surface.ravel()[self._wire_points]
-            self._wire.points[:, 2] = -MM * self._exaggeration * true + self._lift
+        self._show_truth(skin, estimate.true_surface, times)
         if self._elements_actor.visibility:
-            self._elements.points[:, 2] = self._height_at(self._element_positions) + self._lift
+            points, out = self._elements_at_rest
+            height = skin.height.ravel()[self._of_elements] + self._lift
+            self._arrays["elements"][:] = points + out * height[:, None]
         self._place(self._contact, estimate.touch.position)
         self._host_time = estimate.host_time
         self._request()
+
+    def _show_truth(self, skin: DrawnSkin, surface: Array, times: float) -> None:
+        true = surface.ravel()[self._wire_points]
+        self._wire_actor.visibility = bool(np.isfinite(true[0])) and self._want_truth
+        if self._wire_actor.visibility:
+            height = -MM * times * np.nan_to_num(true) + self._lift
+            self._arrays["wire"][:] = skin.points(self._wire_points, height)
 
     def _request(self) -> None:
         # One picture at a time: asking again while one is due only makes Qt queue them.
@@ -226,33 +245,13 @@ class MembraneView(QWidget):
         """Whether the picture asked for last has been drawn."""
         return self._drawn
 
-    def _normals(self, z: Array) -> Array:
-        """Unit normals (points, 3) of the drawn surface z (ny, nx), in one pass of differences."""
-        dy, dx = np.gradient(z, self._cell[1] * MM, self._cell[0] * MM)
-        normals = np.stack([-dx, -dy, np.ones_like(z)], axis=-1)
-        normals /= np.sqrt(1 + dx**2 + dy**2)[..., None]
-        return normals.reshape(-1, 3)
-
-    def _height_at(self, positions: Array) -> Array:
-        """Drawn height (P,) in mm of the nearest surface points to `positions` (P, 2) in m."""
-        p, q = np.rint(positions / self._cell).astype(int).T
-        ny, nx = self._heights.shape
-        return self._heights[np.clip(q, 0, ny - 1), np.clip(p, 0, nx - 1)]
-
-    def _place(self, actor: pv.Actor, position: Array) -> None:
-        shown = bool(np.isfinite(position).all())
-        actor.visibility = shown
+    def _place(self, actor: pv.Actor, position: Array, above: float = 0.0) -> None:
+        """Put an actor on the drawn skin, upright on it, or hide it at NaN."""
+        actor.visibility = shown = bool(np.isfinite(position).all())
         if shown:
-            height = float(self._height_at(position[None])[0])
-            actor.position = (position[0] * MM, position[1] * MM, height)
-
-    def _point(self, arrow: pv.Actor, pulls: bool) -> None:
-        """Down for a push; for a pull up, from the surface."""
-        side = self.drag.arrow / ARROW
-        arrow.scale = (side, side, -side if pulls else side)
-        if pulls:
-            x, y, z = arrow.position
-            arrow.position = (x, y, z + self.drag.arrow)
+            points, out = self.skin.place(position[None], above)
+            actor.position = tuple(points[0])
+            actor.orientation = (0.0, np.degrees(np.arctan2(out[0, 0], out[0, 2])), 0.0)
 
     def show_loads(self, loads: Sequence[Load], moving_to: Array | None) -> None:
         """Draw the simulated loads, none for a real sensor; a moving one where it is now."""
@@ -260,27 +259,33 @@ class MembraneView(QWidget):
         moving = moving_to is not None and bool(np.isfinite(moving_to).all())
         centres = [moving_to] if moving and loads else [load.centre() for load in loads]
         self.drag.handles = np.array(centres).reshape(-1, 2)
+        size = self.skin.size
         for number, arrow in enumerate(self._arrows):
             there = number < len(centres)
-            self._place(arrow, self.drag.handles[number] if there else np.full(2, np.nan))
-            if there:
-                self._point(arrow, pulls=loads[number].force < 0)
+            # Inwards for a push; for a pull outwards, from the surface.
+            pulls = there and loads[number].force < 0
+            arrow.scale = (size, size, -size if pulls else size)
+            place = self.drag.handles[number] if there else np.full(2, np.nan)
+            self._place(arrow, place, ARROW * size if pulls else 0.0)
         lines = [load for load in loads if isinstance(load, LineLoad)]
         self._line_actor.visibility = bool(lines)
         for load in lines[:1]:
-            s = np.linspace(0, 1, 41)[:, None]
-            along = (1 - s) * [load.x0, load.y0] + s * [load.x1, load.y1]
-            points = np.column_stack([along * MM, self._height_at(along) + self._lift])
-            if len(points) != self._line.n_points:
-                self._line.points = points
-                self._line.lines = [41, *range(41)]
-            self._line.points[:] = points
+            self._show_line(self.skin, load)
+
+    def _show_line(self, skin: DrawnSkin, load: LineLoad) -> None:
+        s = np.linspace(0, 1, 41)[:, None]
+        along = (1 - s) * [load.x0, load.y0] + s * [load.x1, load.y1]
+        points, _ = skin.place(along, self._lift)
+        if len(points) != self._line.n_points:
+            self._line.points = points
+            self._line.lines = [41, *range(41)]
+        self._line.points[:] = points
 
     # How it is shown.
 
-    def show_options(self, exaggeration: float, elements: bool, truth: bool) -> None:
-        self._exaggeration, self._want_truth = exaggeration, truth
-        self._elements_actor.visibility = elements
+    def show_options(self, elements: bool, truth: bool) -> None:
+        self._want_elements, self._want_truth = elements, truth
+        self._elements_actor.visibility = elements and self._surface_actor is not None
         self.plotter.update()
 
     def show_colours(self, colours: Colours, ink: str) -> None:

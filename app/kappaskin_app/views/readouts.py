@@ -49,7 +49,16 @@ FIELDS = {
     "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
 }
 
-_WIDTHS = {"contact": 6, "rate": 5, "force": 5, "depth": 5, "age": 3, "error": 4, "rms": 4}
+_WIDTHS = {
+    "contact": 6,
+    "rate": 5,
+    "lost": 5,
+    "force": 5,
+    "depth": 5,
+    "age": 3,
+    "error": 4,
+    "rms": 4,
+}
 
 
 def _with_error(value: float, sd: float, digits: int, unit: str) -> str:

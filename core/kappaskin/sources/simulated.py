@@ -11,6 +11,7 @@ from kappaskin.region import Scanner
 from kappaskin.scene import Scene
 from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
+from kappaskin.sources.information import to_json
 from kappaskin.sources.wire import Accounting
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
@@ -19,7 +20,11 @@ _ROUNDING = 1e-3  # of a frame: a clock that was slept to may stand a rounding e
 
 
 class SimulatedSource:
-    """Yields the frames of a scene at its rate; scene and scan may change while it plays."""
+    """Yields the frames of a scene at its rate; scene and scan may change while it plays.
+
+    Another skin, other elements or electronics are another device on the same line: `sensor` is
+    then another one.
+    """
 
     def __init__(
         self,
@@ -27,27 +32,36 @@ class SimulatedSource:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._simulator, self._sensor = Simulator(scene), scene.sensor()
         self._clock, self._sleep = clock, sleep
         self._start, self._n = clock(), 0
+        self._become(scene, due=0.0)
+        self._base_noise = np.random.default_rng(scene.seed)
+        self._taken = 0.0  # device time of the last frame
+        self._accepted = self._lost = 0
+
+    def _become(self, scene: Scene, due: float) -> None:
+        """Be the device of `scene`, whose next frame is due at device time `due` in s."""
+        self._simulator, self._sensor = Simulator(scene), scene.sensor()
         # Since frame `_first`, due at device time `_since`, frames come at `_rate`.
-        self._first, self._since, self._rate = 0, 0.0, self._sensor.rate
+        self._first, self._since, self._rate = self._n, due, self._sensor.rate
         self._all = self._sensor.scan()
         self._scanner: Scanner | None = None
         patch = scene.plate.patch
         self.base = ForceTorqueSensor((patch.a / 2, patch.b / 2, -_DEPTH))
         """The simulated force/torque sensor that carries the skin."""
-        self._base_noise = np.random.default_rng(scene.seed)
-        self._taken = 0.0  # device time of the last frame
-        self._accepted = self._lost = 0
 
     @property
     def sensor(self) -> Sensor:
         return self._sensor
 
     def play(self, scene: Scene) -> None:
-        """Go on with another scene on the same skin, from the same moment."""
-        self._simulator.change(scene)
+        """Go on with another scene, from the same moment; one that is refused changes nothing."""
+        if to_json(scene.sensor()) == to_json(self._sensor):
+            self._simulator.change(scene)
+            return
+        self._become(scene, self._due())
+        # The next frame is due now: making what the skin needs took a while, but nothing is lost.
+        self._start = self._clock() - self._since
 
     def scan(self, scanner: Scanner | None) -> None:
         """Read what `scanner` chooses from the next frame on; all channels without one."""

@@ -1,0 +1,146 @@
+"""All views of a window: what comes from the session, in each of them."""
+
+import math
+import time
+
+import numpy as np
+
+from kappaskin import COMPONENTS, Estimate, Status
+from kappaskin_app.scale import Ranges, locked_at
+from kappaskin_app.session import Session
+from kappaskin_app.settings import Settings
+from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, PULLED, SEQUENTIAL, Colours, Theme
+from kappaskin_app.views.badge import LOST, OFF, STALE, WAITING, Badge
+from kappaskin_app.views.colour_bar import SkinScale
+from kappaskin_app.views.heatmap import Heatmap
+from kappaskin_app.views.membrane import MembraneView
+from kappaskin_app.views.readouts import Health, Readouts
+
+_HEATMAPS = 0.06  # s between two drawings of the heatmaps
+_NUMBERS = 0.2  # s between two readouts: faster cannot be read
+_TIPS = {
+    "xx": "Bending along x as each element reads it (Eq. 3).",
+    "yy": "Bending along y as each element reads it (Eq. 4).",
+    "xy": "Twist as each element reads it (Eq. 5).",
+}
+
+
+class Display:
+    """The views, and in which colours and how high they show what the `session` brings."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.membrane, self.badge, self.readouts = MembraneView(), Badge(), Readouts()
+        self.scale = SkinScale()
+        self.heatmaps = {name: Heatmap(name, _TIPS[name]) for name in COMPONENTS}
+        self.ranges = Ranges()
+        self._settings = Settings()
+        self._met = 0
+        self._colours: object = None
+        self._next_heatmaps = self._next_numbers = 0.0
+
+    def point(self, element: int) -> None:
+        """Point at an element in every heatmap; -1 at none."""
+        for heatmap in self.heatmaps.values():
+            heatmap.show_element(element)
+        self._next_numbers = 0.0
+
+    def show_settings(self, settings: Settings) -> None:
+        self._settings = settings
+        for name, heatmap in self.heatmaps.items():
+            heatmap.show_lock(locked_at(name, settings) > 0)
+        self.scale.lock.show_locked(locked_at(settings.colour_by, settings) > 0)
+        self.membrane.show_options(settings.show_elements, settings.show_truth)
+
+    def limit_shown(self) -> float:
+        """Up to where the colours of the skin go, in SI units."""
+        largest = max(abs(limit) for limit in self.scale.bar.limits)
+        return largest * (1e-3 if self._settings.colour_by == "displacement" else 1.0)
+
+    def show_theme(self, theme: Theme) -> None:
+        for view in (self.membrane, self.badge, self.readouts, *self.heatmaps.values()):
+            view.show_theme(theme)
+
+    def show_status(self, status: Status) -> None:
+        if status.sensor is not None and status.meetings != self._met:
+            self._meet(status)
+        state = self._session.badge()
+        self.badge.show_state(state)
+        lost = state in (LOST, OFF, STALE, WAITING)
+        for view in (self.membrane, *self.heatmaps.values()):
+            view.show_lost(lost)
+        self._show_numbers(status, lost)
+
+    def _meet(self, status: Status) -> None:
+        sensor, setup = status.sensor, status.setup
+        if sensor is None:
+            return
+        self._met = status.meetings
+        self.membrane.show_skin(sensor, setup.nx, setup.ny)
+        self.ranges = Ranges(1e3 * max(sensor.layout.patch.a, sensor.layout.patch.b))
+        for heatmap in self.heatmaps.values():
+            heatmap.show_layout(sensor.layout)
+
+    def _show_numbers(self, status: Status, lost: bool) -> None:
+        now = time.monotonic()
+        if now < self._next_numbers:
+            return
+        self._next_numbers = now + _NUMBERS
+        recent = [age for when, age in self.membrane.ages if when > now - 1.0 and not lost]
+        counts = status.accounting
+        self.readouts.show_health(
+            Health(
+                status.rate,
+                len(recent),
+                float(np.median(recent)) if recent else math.nan,
+                counts.lost,
+                counts.bytes_discarded,
+                status.skipped,
+            )
+        )
+        estimate = None if lost else self._session.estimate
+        self.readouts.show_estimate(estimate)
+        for row, heatmap in enumerate(self.heatmaps.values()):
+            heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
+
+    def show_estimate(self, estimate: Estimate) -> None:
+        if not self.membrane.ready:
+            return  # a picture is due; the next tick brings a newer estimate
+        settings, now = self._settings, time.monotonic()
+        colour = settings.colour_by
+        values = self._session.surface_values(estimate, colour)
+        depth = self.ranges.limit("displacement", 1e3 * estimate.surface, settings, now)
+        if colour == "displacement":
+            pulled = self.ranges.pulled(values)
+            limits = (-depth, 0.0) if pulled else (0.0, depth)
+            colours, unit = PULLED if pulled else SEQUENTIAL, "mm"
+        else:
+            readings = estimate.curvature[COMPONENTS.index(colour)]
+            limit = self.ranges.limit(colour, readings, settings, now)
+            limits, colours, unit = (-limit, limit), DIVERGING, "1/m"
+        self._show_colours(colours)
+        times = self._times()
+        self.membrane.show_estimate(estimate, values, limits, times)
+        self._show_loads(estimate)
+        self.scale.bar.show_scale(colours, limits, unit)
+        self.scale.show_times(times)
+        if now >= self._next_heatmaps:
+            self._next_heatmaps = now + _HEATMAPS
+            for row, (name, heatmap) in enumerate(self.heatmaps.items()):
+                readings = estimate.curvature[row]
+                heatmap.show_values(readings, self.ranges.limit(name, readings, settings, now))
+
+    def _times(self) -> float:
+        """How many times the displacement is drawn larger: as wanted, or as much as fits."""
+        fits = self.membrane.skin.deepest / self.ranges.deepest()
+        return min(self._settings.exaggeration, fits)
+
+    def _show_colours(self, colours: Colours) -> None:
+        if colours is not self._colours:
+            self._colours = colours
+            self.membrane.show_colours(colours, DARK_INK if colours is DIVERGING else LIGHT_INK)
+
+    def _show_loads(self, estimate: Estimate) -> None:
+        scene = self._session.scene
+        loads = scene.loads if self._session.simulating else ()
+        self.membrane.show_loads(loads, estimate.true_contact if scene.motion else None)

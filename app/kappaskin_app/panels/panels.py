@@ -1,0 +1,68 @@
+"""All panels on their pages: a panel is added by one line, and shows whatever all are shown."""
+
+from typing import TypeVar
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QTabWidget, QWidget
+
+from kappaskin import Status
+from kappaskin_app.columns import scrolled
+from kappaskin_app.panels.basis import BasisPanel
+from kappaskin_app.panels.connection import ConnectionPanel
+from kappaskin_app.panels.load import LoadPanel, NoisePanel
+from kappaskin_app.panels.panel import Panel
+from kappaskin_app.panels.skin import ElementsPanel, ShapePanel, SupportPanel
+from kappaskin_app.panels.view import ViewPanel
+from kappaskin_app.settings import Settings
+from kappaskin_app.theme import Theme
+
+_Some = TypeVar("_Some", bound=Panel)
+_LIVE, _SKIN = "&Live", "S&kin"
+
+
+class Panels(QTabWidget):
+    """The panels by name; `wished` says which setting is to be what."""
+
+    wished = Signal(str, object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._pages: dict[str, list[Panel]] = {}
+        self.connection = self._add(_LIVE, ConnectionPanel())
+        self.load = self._add(_LIVE, LoadPanel())
+        self.noise = self._add(_LIVE, NoisePanel())
+        self.basis = self._add(_LIVE, BasisPanel())
+        self.view = self._add(_LIVE, ViewPanel())
+        self.shape = self._add(_SKIN, ShapePanel())
+        self.elements = self._add(_SKIN, ElementsPanel())
+        self.support = self._add(_SKIN, SupportPanel())
+        for title, panels in self._pages.items():
+            self.addTab(scrolled(*panels), title)
+        self.setUsesScrollButtons(False)  # every title is to be seen
+        self.tabBar().setElideMode(Qt.TextElideMode.ElideNone)
+
+    def _add(self, page: str, panel: _Some) -> _Some:
+        """A panel at the end of the page with this title."""
+        self._pages.setdefault(page, []).append(panel)
+        panel.wished.connect(self.wished)
+        return panel
+
+    def all(self) -> list[Panel]:
+        return [panel for panels in self._pages.values() for panel in panels]
+
+    def turn(self, pages: int) -> None:
+        """Show the page so many further on, round and round."""
+        self.setCurrentIndex((self.currentIndex() + pages) % self.count())
+        self.tabBar().setFocus(Qt.FocusReason.TabFocusReason)
+
+    def show_settings(self, settings: Settings) -> None:
+        for panel in self.all():
+            panel.show_settings(settings)
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        for panel in self.all():
+            panel.show_status(status, simulating)
+
+    def show_theme(self, theme: Theme) -> None:
+        for panel in self.all():
+            panel.show_theme(theme)

@@ -1,0 +1,57 @@
+"""The simulated skin: its shape, its elements and what is below it."""
+
+import math
+
+from PySide6.QtWidgets import QLabel, QWidget
+
+from kappaskin import Status
+from kappaskin_app.panels.basis import in_use
+from kappaskin_app.panels.load import SimulationForm
+from kappaskin_app.settings import Settings
+from kappaskin_app.skins import SHAPES
+
+_NUMBERS = ("side_x", "side_y", "base_radius")
+
+
+class ShapePanel(SimulationForm):
+    """Asks for the shape, its sizes and its edge; says why there can be no such skin."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Shape", ("shape", *_NUMBERS, "edge"), parent)
+        self.opening = QLabel()
+        self._opening_name = QLabel("Opening")
+        self._opening_name.setToolTip("The angle of the arc: its length over its radius.")
+        self.form.insertRow(len(_NUMBERS) + 1, self._opening_name, self.opening)
+        self._refusal = ""
+
+    def show_settings(self, settings: Settings) -> None:
+        super().show_settings(settings)
+        asked = set(SHAPES[settings.shape].begins)
+        self.show_rows({"shape", "edge"} | asked)
+        self.form.setRowVisible(self.opening, "base_radius" in asked)
+        degrees = math.degrees(settings.side_x / settings.base_radius)
+        self.opening.setText(f"{degrees:.1f}\N{DEGREE SIGN}")
+
+    def show_refusal(self, text: str) -> None:
+        """Say why the skin asked for cannot be, or nothing when it can."""
+        self._refusal = text
+
+    def alarm(self, status: Status) -> str:
+        return f"The last skin stays: {self._refusal}." if self._refusal else ""
+
+
+class ElementsPanel(SimulationForm):
+    """Asks for m x n elements, and says when they are too few for the functions of the fit."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Elements", ("elements_x", "elements_y"), parent)
+
+    def alarm(self, status: Status) -> str:
+        return in_use(status)
+
+
+class SupportPanel(SimulationForm):
+    """Asks for what holds the skin besides its own stiffness."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Below and around", ("tension", "foam", "fluid"), parent)

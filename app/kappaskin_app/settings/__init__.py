@@ -1,0 +1,37 @@
+"""What a person may change, with the unit, range and explanation that every form shows."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+from kappaskin_app.settings.asks import Ask as Ask
+from kappaskin_app.settings.asks import Choice as Choice
+from kappaskin_app.settings.asks import Range as Range
+from kappaskin_app.settings.asks import Switch as Switch
+from kappaskin_app.settings.load import FREE_CASES as FREE_CASES
+from kappaskin_app.settings.load import LOAD_CASES as LOAD_CASES
+from kappaskin_app.settings.load import TABLE_1_CASES as TABLE_1_CASES
+from kappaskin_app.settings.load import TWO_ENDED as TWO_ENDED
+from kappaskin_app.settings.load import Load, Noise
+from kappaskin_app.settings.shown import COLOURS as COLOURS
+from kappaskin_app.settings.shown import Fit, View
+from kappaskin_app.settings.skin import Skin
+
+
+@dataclass(frozen=True)
+class SceneSettings(Skin, Load, Noise):
+    """Those that make the simulated scene."""
+
+
+@dataclass(frozen=True)
+class Settings(SceneSettings, Fit, View):
+    """Everything a person may change, in SI units; a change is a new `Settings`."""
+
+
+def part(settings: Settings, kind: type[SceneSettings | Fit | View]) -> tuple[Any, ...]:
+    """The values of the settings that belong to `kind`."""
+    return tuple(getattr(settings, field.name) for field in fields(kind))
+
+
+def ask_of(name: str) -> Ask:
+    """How the setting called `name` is asked for."""
+    return next(f.metadata["ask"] for f in fields(Settings) if f.name == name)

@@ -1,0 +1,86 @@
+"""What presses on the simulated skin, and what noise its readings have."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from kappaskin_app.settings.asks import MILLIMETRES, PER_METRE, Choice, Range, asked
+
+TABLE_1_CASES = ("centre", "off-centre", "line")
+LOAD_CASES = (
+    ("circle", "Moving point"),
+    ("centre", "Centred point"),
+    ("off-centre", "Off-centre point"),
+    ("line", "Skewed line"),
+    ("point", "Point, free"),
+    ("two-points", "Two points, free"),
+    ("free-line", "Line, free"),
+)
+FREE_CASES = ("point", "two-points", "free-line")
+TWO_ENDED = ("two-points", "free-line")
+
+
+def _position(default: float, label: str, tip: str) -> Any:
+    return asked(default, Range(label, tip, 0.0, 1.0, 0.001, *MILLIMETRES, decimals=1))
+
+
+@dataclass(frozen=True)
+class Load:
+    """The load in SI units; a free one has its place on the skin and its force."""
+
+    load_case: str = asked(
+        "circle",
+        Choice(
+            "Case",
+            "What presses on the simulated skin. Drag the load on the skin with the mouse to move "
+            "it freely.",
+            LOAD_CASES,
+        ),
+    )
+    force: float = asked(
+        0.15,
+        Range(
+            "Force",
+            "Total force of a free load; the other cases have the force that displaces Table 1's "
+            "patch as there, and another skin no more steeply.",
+            -3.0,
+            3.0,
+            0.01,
+            1.0,
+            "N",
+            3,
+        ),
+    )
+    x: float = _position(0.05, "x", "Where the load presses, or the line begins.")
+    y: float = _position(0.05, "y", "Where the load presses, or the line begins.")
+    x_end: float = _position(0.075, "x, second", "The second point, or the end of the line.")
+    y_end: float = _position(0.075, "y, second", "The second point, or the end of the line.")
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of each reading, repeatable by its seed."""
+
+    noise_kind: str = asked(
+        "uniform",
+        Choice(
+            "Kind",
+            "How the noise added to each simulated reading is distributed.",
+            (("none", "None"), ("uniform", "Uniform (Table 1)"), ("gaussian", "Gaussian")),
+        ),
+    )
+    noise_rms: float = asked(
+        0.231,
+        Range(
+            "RMS",
+            "Root mean square of the curvature noise. Table 1 has 0.231 1/m, even within "
+            "+-0.40 1/m.",
+            0.0,
+            20.0,
+            0.05,
+            *PER_METRE,
+            decimals=3,
+        ),
+    )
+    noise_seed: int = asked(
+        0, Range("Seed", "The same seed gives the same noise again.", 0, 999_999, 1)
+    )

@@ -1,0 +1,144 @@
+"""A skin as it is drawn: its points at rest, moved in and out along its normals, in mm."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin import Patch
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+MM = 1e3
+_DEEPEST = 0.45  # of the shorter side that a skin is drawn deep at most, to stay in the picture
+_NEAREST = 0.7  # of the base radius, so that no skin is drawn through its own axis
+
+
+class DrawnSkin:
+    """`patch` by nx x ny points; where it ends inside its rectangle, those off it are not drawn.
+
+    Positions (k, 2) are the skin's own, in m; points (k, 3) are in space, in mm.
+    """
+
+    def __init__(self, patch: Patch, nx: int, ny: int) -> None:
+        self.patch = patch
+        x, y = patch.grid(nx, ny)
+        self._cell = np.array([x[1] - x[0], y[1] - y[0]])
+        positions = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        self._rest, self._out = self.at_rest(positions)
+        self.on = patch.contains(positions).reshape(ny, nx)
+        """Which points (ny, nx) are on the skin."""
+        self.height: Array = np.zeros((ny, nx))
+        """How far out each point is drawn, in mm."""
+
+    def at_rest(self, positions: Array) -> tuple[Array, Array]:
+        """Points of the skin at rest at `positions`, and its outward normals there."""
+        points, out = self.patch.at_rest(positions)
+        return MM * points, out
+
+    @property
+    def side(self) -> float:
+        """The longer side in mm."""
+        return MM * max(self.patch.a, self.patch.b)
+
+    @property
+    def size(self) -> float:
+        """What arrows and marks are scaled to, in mm: the side of a square as large as the skin."""
+        return MM * math.sqrt(self.patch.a * self.patch.b)
+
+    @property
+    def deepest(self) -> float:
+        """How far in mm the skin may be drawn from where it rests."""
+        patch = self.patch
+        return MM * min(_DEEPEST * min(patch.a, patch.b), _NEAREST * patch.radius)
+
+    # Its faces and lines, over the points of the grid.
+
+    def faces(self) -> Indices:
+        """Squares between four points on the skin and triangles between three, VTK's way."""
+        index = np.arange(self.on.size).reshape(self.on.shape)
+        around = (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+        corners = np.stack(around, axis=-1).reshape(-1, 4)
+        there = self.on.ravel()[corners]
+        count = there.sum(axis=1)
+        cells = [
+            np.insert(corners[count == n][there[count == n]].reshape(-1, n), 0, n, axis=1).ravel()
+            for n in (4, 3)
+        ]
+        return np.concatenate(cells)
+
+    def lines(self, stride: int) -> list[Indices]:
+        """Every so many lines of the grid along x and y, as the points that they run through."""
+        index = np.arange(self.on.size).reshape(self.on.shape)
+        found: list[Indices] = []
+        for line in (*index[::stride], *index[:, ::stride].T):
+            gaps = np.flatnonzero(~self.on.ravel()[line])
+            pieces = np.split(line, gaps)
+            found += [p[self.on.ravel()[p]] for p in pieces]
+        return [line for line in found if len(line) > 1]
+
+    # Its shape.
+
+    def points(self, which: Indices | slice = slice(None), height: Array | None = None) -> Array:
+        """The points of the grid `which`, drawn `height` (k,) mm out, else as the skin is."""
+        h = self.height.ravel()[which] if height is None else height
+        return self._rest[which] + self._out[which] * h[:, None]
+
+    def shading(self) -> Array:
+        """Unit normals (points, 3) of the drawn surface, in one pass of differences.
+
+        A surface at the height h above an arc of curvature H has the tangents
+        (1 + h H) T + h_x N and Y + h_y N; their product is the normal.
+        """
+        h = self.height
+        h_y, h_x = (d.ravel() for d in np.gradient(h, self._cell[1] * MM, self._cell[0] * MM))
+        wider = 1 + h.ravel() * self.patch.base_curvature / MM
+        sine, _, cosine = self._out.T  # N = (sine, 0, cosine), so that T = (cosine, 0, -sine)
+        normals = np.stack(
+            [wider * sine - h_x * cosine, -wider * h_y, wider * cosine + h_x * sine], axis=-1
+        )
+        normals /= np.sqrt(np.einsum("pi,pi->p", normals, normals))[:, None]
+        return normals
+
+    def nearest(self, positions: Array) -> Indices:
+        """The points of the grid nearest to `positions`."""
+        p, q = np.rint(positions / self._cell).astype(int).T
+        ny, nx = self.on.shape
+        return np.clip(q, 0, ny - 1) * nx + np.clip(p, 0, nx - 1)
+
+    def height_at(self, positions: Array) -> Array:
+        """How far out (k,) in mm the skin is drawn at `positions`."""
+        return self.height.ravel()[self.nearest(positions)]
+
+    def place(self, positions: Array, above: float = 0.0) -> tuple[Array, Array]:
+        """Points `above` mm over the drawn skin at `positions`, and the normals at rest there."""
+        points, out = self.at_rest(positions)
+        return points + out * (self.height_at(positions) + above)[:, None], out
+
+    def seen_at(self, near: Array, far: Array, height: float, beside: Array) -> Array:
+        """Where the line of sight from `near` to `far` meets the skin `height` mm out, (2,) in m.
+
+        Of two crossings the one next to `beside`; of none, where the line passes closest.
+        """
+        patch, along = self.patch, far - near
+        if not patch.base_curvature:
+            share = (height - near[2]) / along[2] if abs(along[2]) > 1e-9 else 0.0
+            return (near + share * along)[:2] / MM
+        radius = MM * patch.radius
+        centre = np.array([MM * patch.a / 2, -radius])
+        start, d = near[[0, 2]] - centre, along[[0, 2]]
+        # |start + share d| = radius + height, in the plane that the arc lies in.
+        middle = -(start @ d) / max(d @ d, 1e-12)
+        off = (start @ start - (radius + height) ** 2) / max(d @ d, 1e-12)
+        half = np.sqrt(max(middle**2 - off, 0.0))
+        crossings = [near + share * along for share in (middle - half, middle + half)]
+        found = [
+            np.array([patch.a / 2 + patch.radius * np.arctan2(x - centre[0], z + radius), y / MM])
+            for x, y, z in crossings
+        ]
+        return min(found, key=lambda position: float(np.linalg.norm(position - beside)))
+
+
+NO_SKIN = DrawnSkin(Patch(0.1, 0.1), 2, 2)
+"""What there is before a sensor has said what it is."""

@@ -1,0 +1,56 @@
+"""What a person wants, as undoable changes of the settings."""
+
+import math
+from typing import Any
+
+from kappaskin_app.history import History
+from kappaskin_app.session import Session
+from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.simulation import dragged, with_consequences
+
+
+class Wishes:
+    """Turns wishes of panels, menus and views into commands of the history."""
+
+    def __init__(self, history: History, session: Session) -> None:
+        self._history, self._session = history, session
+        self._gesture, self._grabbed_end = -1, False
+
+    def wish(self, name: str, value: Any) -> None:
+        """Make the setting `name` what is wished, and what follows from it."""
+        label = ask_of(name).label if not name.startswith("range_") else "colour range"
+        changed = with_consequences(self._history.settings, name, value)
+        self._history.wish(name, label, **changed)
+
+    def toggle(self, name: str) -> None:
+        self.wish(name, not getattr(self._history.settings, name))
+
+    def switch_theme(self) -> None:
+        self.wish("theme", "light" if self._history.settings.theme == "dark" else "dark")
+
+    def exaggerate(self, step: int) -> None:
+        wanted = self._history.settings.exaggeration + step
+        self.wish("exaggeration", float(min(max(wanted, 1), 50)))
+
+    def reset(self) -> None:
+        self._history.change("Reset settings", -1, **vars(Settings()))
+
+    def grab(self, x: float, y: float) -> None:
+        """Take hold of the load at (x, y) in m: what is dragged until it is let go is one step."""
+        settings = self._history.settings
+        second = math.dist((x, y), (settings.x_end, settings.y_end))
+        self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
+        self._gesture = self._history.new_gesture()
+
+    def drag(self, x: float, y: float) -> None:
+        settings, scene = self._history.settings, self._session.scene
+        moved = dragged(settings, scene, x, y, self._grabbed_end)
+        self._history.change("Drag the load", self._gesture, **moved)
+
+    def release(self) -> None:
+        self._gesture = -1
+
+    def give_up(self) -> None:
+        """Put the load back to where it was grabbed."""
+        self._history.cancel(self._gesture)
+        self.release()

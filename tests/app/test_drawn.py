@@ -1,0 +1,131 @@
+"""A drawn skin, by the laws of the surface it is: no display is needed."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin import Patch
+from kappaskin_app.views.drawn import DrawnSkin
+
+FLAT = Patch(0.1, 0.06)
+ARC = Patch(0.04, 0.03, 0.0129)
+PATCHES = pytest.mark.parametrize("patch", [FLAT, ARC], ids=["flat", "arc"])
+
+
+class Disk(Patch):
+    """A skin that ends at the circle inside its square."""
+
+    def contains(self, positions):
+        return np.linalg.norm(positions - self.a / 2, axis=-1) <= self.a / 2 * (1 + 1e-12)
+
+
+def drawn(patch: Patch, nx: int = 33, ny: int = 21) -> DrawnSkin:
+    """A skin pushed in along a hill with two slopes."""
+    skin = DrawnSkin(patch, nx, ny)
+    x, y = np.meshgrid(*patch.grid(nx, ny))
+    skin.height = -1e2 * patch.b * np.sin(np.pi * x / patch.a) * np.sin(4 * y / patch.b)
+    return skin
+
+
+def test_a_flat_skin_is_drawn_as_its_height_over_x_and_y() -> None:
+    skin = drawn(FLAT)
+    x, y = np.meshgrid(*FLAT.grid(33, 21))
+    expected = np.column_stack([1e3 * x.ravel(), 1e3 * y.ravel(), skin.height.ravel()])
+    np.testing.assert_allclose(skin.points(), expected, atol=1e-12)
+
+
+def test_an_arc_moved_in_everywhere_is_an_arc_of_a_smaller_radius() -> None:
+    skin = DrawnSkin(ARC, 33, 21)
+    skin.height = np.full((21, 33), -2.0)
+    x, _, z = skin.points().T
+    np.testing.assert_allclose(np.hypot(x - 20, z + 12.9), 10.9)
+
+
+@PATCHES
+def test_the_shading_is_normal_to_the_drawn_surface(patch: Patch) -> None:
+    skin = drawn(patch, 201, 151)
+    points = skin.points().reshape(151, 201, 3)
+    expected = np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0))
+    expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
+    shading = skin.shading().reshape(151, 201, 3)
+    inside = np.s_[1:-1, 1:-1]
+    np.testing.assert_allclose(shading[inside], expected[inside], atol=3e-3)
+    assert np.abs(shading[..., :2]).max() > 0.1
+
+
+@PATCHES
+def test_the_whole_of_a_rectangle_is_covered_by_squares(patch: Patch) -> None:
+    faces = DrawnSkin(patch, 5, 4).faces().reshape(-1, 5)
+    assert len(faces) == 12
+    assert (faces[:, 0] == 4).all()
+    assert set(faces[:, 1:].ravel()) == set(range(20))
+
+
+def test_what_lies_off_the_skin_is_not_drawn() -> None:
+    skin = DrawnSkin(Disk(0.1, 0.1), 41, 41)
+    faces, at, area, used = skin.faces(), 0, 0.0, set()
+    points = skin.points()
+    while at < len(faces):
+        corners = faces[at + 1 : at + 1 + faces[at]]
+        x, y, _ = points[corners].T
+        area += 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))  # positive: seen from outside
+        used |= set(corners.tolist())
+        at += 1 + faces[at]
+    assert used <= set(np.flatnonzero(skin.on))
+    assert area == pytest.approx(np.pi * 50**2, rel=0.05)
+    for line in skin.lines(8):
+        assert skin.on.ravel()[line].all()
+        assert len(line) > 1
+        assert set(np.diff(line)) <= {1, 41}  # neighbours only: no line across a gap
+
+
+def test_a_line_is_cut_where_the_skin_has_a_gap() -> None:
+    class Split(Patch):
+        def contains(self, positions):
+            return np.abs(positions[:, 0] - 0.05) > 0.02
+
+    skin = DrawnSkin(Split(0.1, 0.1), 11, 11)
+    along_x = [line for line in skin.lines(10) if np.diff(line)[0] == 1]
+    assert [len(line) for line in along_x] == [4, 4] * 2
+
+
+@PATCHES
+def test_what_lies_on_the_skin_is_placed_on_it(patch: Patch) -> None:
+    skin = drawn(patch)
+    positions = np.array([[patch.a / 4, patch.b / 2], [patch.a / 2, patch.b / 4]])
+    points, out = skin.place(positions)
+    np.testing.assert_allclose(points, skin.points(skin.nearest(positions)))
+    above, _ = skin.place(positions, 1.5)
+    np.testing.assert_allclose(above - points, 1.5 * out)
+
+
+@given(
+    st.sampled_from([FLAT, ARC, Patch(0.05, 0.02, 0.2)]),
+    st.tuples(st.floats(0, 1), st.floats(0, 1)),
+    st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 1)),
+    st.floats(-2, 2),
+)
+def test_the_line_of_sight_through_a_point_of_the_skin_meets_it_there(
+    patch: Patch, shares: tuple[float, float], towards: tuple[float, ...], height: float
+) -> None:
+    skin = DrawnSkin(patch, 9, 9)
+    position = np.array(shares) * (patch.a, patch.b)
+    points, out = skin.at_rest(position[None])
+    point = points[0] + height * out[0]
+    near, far = point + 300 * np.array(towards), point - 700 * np.array(towards)
+    seen = skin.seen_at(near, far, height, beside=position)
+    np.testing.assert_allclose(seen, position, atol=1e-7)
+
+
+def test_a_line_of_sight_beside_an_arc_sees_its_outline() -> None:
+    skin = DrawnSkin(ARC, 9, 9)
+    near, far = np.array([50.0, 10.0, 100.0]), np.array([50.0, 10.0, -100.0])
+    x, y = skin.seen_at(near, far, 0.0, beside=np.array([0.03, 0.01]))
+    assert x == pytest.approx(0.02 + 0.0129 * np.pi / 2)  # straight down past the right
+    assert y == pytest.approx(0.01)
+
+
+def test_no_skin_may_be_drawn_deeper_than_it_is_wide_or_through_its_axis() -> None:
+    assert DrawnSkin(Patch(0.1, 0.2), 9, 9).deepest == pytest.approx(45)
+    assert DrawnSkin(ARC, 9, 9).deepest == pytest.approx(0.7 * 12.9)
