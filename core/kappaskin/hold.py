@@ -26,11 +26,8 @@ class Hold:
         """The `curvature` (3, P) of `frame` with held readings, and which of it is fresh (3, P)."""
         flat = curvature.ravel()
         self._values[frame.channels] = flat[frame.channels]
-        self._times[frame.channels] = math.inf  # of no age that anything is held for
-        age = frame.device_time - self._times
-        held = (age >= 0) & (age < self._age)
         self._times[frame.channels] = frame.device_time
-        fresh = np.isfinite(curvature)
-        if held.any():
-            flat = np.where(held, self._values, flat)
-        return flat.reshape(curvature.shape), fresh
+        age = frame.device_time - self._times
+        known = (age >= 0) & (age < self._age)
+        held = np.where(known, self._values, flat)
+        return held.reshape(curvature.shape), np.isfinite(curvature)

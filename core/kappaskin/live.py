@@ -34,11 +34,10 @@ class Status:
 
     `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
     `message` says why. `setup` is the one in use, `refusal` says why it is not the one asked for
-    last, and `computing` that another is on its way. `region` is scanned if `region_refusal` does
-    not say why not. `meetings` counts the devices that said what
-    they are, `skipped` the frames that came in faster than they could be computed. `rate` in
-    frames/s, `reader_gap` the 99th percentile of the time between two arrivals in s, `last_frame`
-    and `reported` on the monotonic clock.
+    last, and `computing` that another is on its way. `region` is scanned unless `region_refusal`
+    says why not. `meetings` counts the devices that said what they are, `skipped` the frames that
+    came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
+    of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
     """
 
     state: str = OFF

@@ -86,13 +86,13 @@ class Scanner:
         """The elements (P,) that every frame scans; None while that is all of them."""
         return self._inside
 
-    def follow(self, centre: Array | None) -> None:
-        """Scan around `centre` (2,) in m from the next frame on; everything if None or NaN.
+    def follow(self, centre: Array) -> None:
+        """Scan around `centre` (2,) in m from the next frame on; everything if it is NaN.
 
         The element nearest to it is always scanned, however small the radius.
         """
         self._inside = None
-        if centre is not None and np.isfinite(centre).all():
+        if np.isfinite(centre).all():
             distance = np.hypot(*(self._sensor.layout.positions - centre).T)
             self._inside = distance <= max(self._region.radius, float(distance.min()))
 

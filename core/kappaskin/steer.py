@@ -1,7 +1,7 @@
 """A region of interest to a source that scans it: each contact moves what is scanned next."""
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Touch
+from kappaskin.frames import Touch
 from kappaskin.intrinsic import IntrinsicContact
 from kappaskin.region import INTRINSIC, OFF, SKIN, Region, Scanner
 from kappaskin.sources import SimulatedSource, Source
@@ -18,13 +18,9 @@ class Steering:
 
     def __call__(self, touch: Touch) -> None:
         if self._around == SKIN:
-            self._scanner.follow(touch.position if touch.present else None)
+            self._scanner.follow(touch.position)
         elif self._around == INTRINSIC:
-            self._scanner.follow(self._told_by_base())
-
-    def _told_by_base(self) -> Array | None:
-        found = self._intrinsic(self._source.wrench())
-        return found.position if found.present else None
+            self._scanner.follow(self._intrinsic(self._source.wrench()).position)
 
 
 def steered(source: Source, region: Region) -> Steering | None:

@@ -106,10 +106,11 @@ def test_a_region_smaller_than_the_pitch_scans_the_nearest_element(centre):
     scanner = Scanner(SENSOR, Region("skin", radius=1e-6, share=0.0))
     scanner.follow(centre)
 
-    (element,) = scanned(scanner)
+    nearest = sorted(scanned(scanner))
 
     distance = np.hypot(*(POSITIONS - centre).T)
-    assert distance[element] == distance.min()
+    assert len(nearest) <= 4  # in the middle between four
+    np.testing.assert_array_equal(distance[nearest], distance.min())
 
 
 @pytest.mark.parametrize("corner", [(0.0, 0.0), (0.1, 0.1), (0.0, 0.07)])
@@ -120,7 +121,7 @@ def test_a_region_at_the_rim_is_what_lies_on_the_skin(corner):
     assert 3 <= len(scanned(scanner)) <= 8
 
 
-@pytest.mark.parametrize("gone", [None, np.full(2, np.nan), np.array([0.05, np.inf])])
+@pytest.mark.parametrize("gone", [np.full(2, np.nan), np.array([0.05, np.inf])])
 def test_without_a_contact_everything_is_scanned(gone):
     scanner = Scanner(SENSOR, Region("skin", radius=0.02))
     assert len(scanned(scanner)) == 100
