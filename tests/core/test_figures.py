@@ -95,7 +95,7 @@ def test_each_figure_is_a_two_column_svg_whose_text_is_text(folder, name) -> Non
 
     assert root.tag == f"{SVG}svg"
     assert float(root.get("width").removesuffix("pt")) / 72 == pytest.approx(DOUBLE_COLUMN)
-    assert re.search(r"x \[mm\]", words)
+    assert re.search(r"\[(mm|1/m)\]", words)
     assert "matplotlib" not in (folder / f"{name}.svg").read_text().lower().split("<defs>")[0]
 
 
@@ -263,6 +263,41 @@ def test_fig6_shows_both_surfaces_on_one_scale(drawn) -> None:
         height = axes.collections[0]._faces[..., 2]  # noqa: SLF001 - there is no other way to them
         assert axes.get_zlim()[0] <= height.min() + 0.01 < height.max() < axes.get_zlim()[1]
         assert height.max() == pytest.approx(4.70, abs=0.1)
+
+
+def test_fig8_tells_the_gaps_and_the_line_of_the_loops_it_draws(drawn) -> None:
+    loop = drawn["fig8"][0].axes[0]
+    x, there = line(loop, "way there")
+    applied, read = line(loop, "second prototype")
+    slope, offset = np.polyfit(applied, read, 1)
+
+    ends, drawn_line = line(loop, "least-squares line")
+    np.testing.assert_allclose(drawn_line, offset + slope * ends, atol=1e-9)
+    back = dict(line(loop, "way back").T)
+    pairs = [
+        (k, (back[k] - reading) / slope) for k, reading in zip(x, there, strict=True) if k in back
+    ]
+    inner = max(abs(gap) for k, gap in pairs if k > 0)
+    outer = max(abs(gap) for k, gap in pairs if k < 0)
+    assert f"second {inner:.1f} / {outer:.1f} 1/m" in said(drawn, "fig8")
+    assert 6.5 < inner < 7.5  # the paper's "about 7 1/m"
+    assert outer < inner
+
+
+def test_fig8_tells_errors_on_cylinders_that_were_not_calibrated_on(drawn) -> None:
+    loop, errors = drawn["fig8"][0].axes
+    calibrated = np.round(line(loop, "second prototype")[0], 6)
+    rms = {}
+    for drawn_line in errors.get_lines()[1:]:
+        applied, error = drawn_line.get_data()
+        assert set(calibrated) & set(np.round(applied, 6)) == {0.0}
+        told = f"RMS {np.sqrt(np.mean(error**2)):.2f} 1/m"
+        assert drawn_line.get_label().endswith(told)
+        rms[drawn_line.get_label().split(":")[0]] = np.sqrt(np.mean(error**2))
+
+    # Noise of 0.23 1/m, averaged over 50 frames.
+    assert 0.23 / math.sqrt(50) < rms["loops undone"] < 0.15
+    assert rms["line alone"] > 2
 
 
 def test_fig9_draws_what_least_squares_makes_of_ten_readings(drawn) -> None:

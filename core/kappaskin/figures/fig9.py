@@ -1,23 +1,15 @@
 """The paper's Fig. 9: a fingertip's arc at rest, pressed, and as ten noisy readings tell it."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.bases import SineBasis
-from kappaskin.effects import UniformNoise
+from kappaskin.bases import basis_for
 from kappaskin.figures import style
 from kappaskin.fit import LeastSquares
 from kappaskin.frames import Array
-from kappaskin.layout import SensorLayout
-from kappaskin.mechanics import Plate, PointLoad
-from kappaskin.patch import Patch
-from kappaskin.scene import scaled_to
+from kappaskin.studies.tables import APPLIED, RADIUS, fingertip_scene
 
-R0 = 12.9e-3
-SKIN = Patch(math.pi * R0, 20e-3, R0, strip=True)
-DEFLECTIONS = (0.63e-3, 1.27e-3, 1.90e-3)
 NOISE = 4.5
 """RMS of a reading's noise in 1/m (Table 2)."""
 SEED = 2
@@ -50,31 +42,30 @@ class _Load:
         return float(np.sqrt(np.mean((self.fitted - self.true) ** 2)))
 
 
-def run(deflection: float, rng: np.random.Generator) -> _Load:
-    """The true shape is Eq. 10 as corrected, one Ritz term; 8 functions fit 10 readings of it."""
-    plate, term = Plate(SKIN), SineBasis(SKIN, 3, 1)
-    load = scaled_to(plate, PointLoad(SKIN.a / 2, SKIN.b / 2), deflection, term)
-    truth = plate.deflection([load], term).ravel()
-    layout, basis = SensorLayout.regular(SKIN, 10, 1), SineBasis(SKIN, 8, 1)
-    curvature = (layout.curvature_operator(term) @ truth).reshape(3, -1)
-    fit = LeastSquares(basis, layout, sigma=NOISE)(
-        UniformNoise(NOISE).start(curvature.shape, rng)(curvature, 0.0)
-    )
-    s = np.column_stack([np.linspace(0, SKIN.a, 181), np.full(181, SKIN.b / 2)])
+def run(applied: float, rng: np.random.Generator) -> _Load:
+    """Table 2's strip with a load that moves it by `applied` mm, 8 functions fitted to it."""
+    scene = fingertip_scene(applied)
+    patch, layout, (noise,) = scene.plate.patch, scene.layout, scene.effects
+    truth = scene.plate.deflection(scene.loads, scene.basis).ravel()
+    curvature = (layout.curvature_operator(scene.basis) @ truth).reshape(3, -1)
+    basis = basis_for(patch, scene.edge, 8, 1)
+    readings = noise.start(curvature.shape, rng)(curvature, 0.0)
+    fit = LeastSquares(basis, layout, sigma=NOISE)(readings)
+    s = np.column_stack([np.linspace(0, patch.a, 181), np.full(181, patch.b / 2)])
     at, c = basis.at(s), fit.coefficients.ravel()
     return _Load(
-        s[:, 0] / R0,
-        term.at(s) @ truth,
+        s[:, 0] / patch.radius,
+        scene.basis.at(s) @ truth,
         at @ c,
         np.sqrt(np.einsum("pi,ij,pj->p", at, fit.covariance, at)),
-        layout.positions[:, 0] / R0,
+        layout.positions[:, 0] / patch.radius,
         basis.at(layout.positions) @ c,
     )
 
 
 def _arc(theta: Array, inward: Array) -> tuple[Array, Array]:
     """x, z in mm of the skin moved `inward` (in m) at `theta`, from the middle of its base."""
-    r = 1e3 * (R0 - inward)
+    r = 1e3 * (RADIUS - inward)
     return -r * np.cos(theta), r * np.sin(theta)
 
 
@@ -82,14 +73,14 @@ def draw(figure: style.Figure) -> None:
     """Three loads side by side: above the skin, true to scale, below its deflection inward."""
     rng = np.random.default_rng(SEED)
     style.resize(figure, style.DOUBLE, 88)
-    for column, deflection in enumerate(DEFLECTIONS):
-        load = run(deflection, rng)
+    for column, applied in enumerate(APPLIED):
+        load = run(applied, rng)
         left = 12 + 55 * column
         shape = style.place(figure, (left, 50, 48, 30))
         shown = style.place(figure, (left, 16, 48, 25))
         _draw_shape(shape, load)
         _draw_deflection(shown, load)
-        style.letter(figure, left - 11, 87, "abc"[column], f"{1e3 * deflection:.2f} mm applied")
+        style.letter(figure, left - 11, 87, "abc"[column], f"{applied:.2f} mm applied")
         if column == 0:
             shape.set_ylabel("z [mm]")
             shown.set_ylabel("deflection u [mm]")
@@ -108,7 +99,7 @@ def _draw_shape(axes: style.Axes, load: _Load) -> None:
     axes.plot(*at, **_ELEMENT, label="elements")
     axes.set(aspect="equal", xlim=(-16, 16), ylim=(-1, 18.5), xlabel="x [mm]")
     axes.set(xticks=range(-15, 16, 5), yticks=range(0, 16, 5))
-    top = 1e3 * (R0 - load.true[90]) + 0.35
+    top = 1e3 * (RADIUS - load.true[90]) + 0.35
     style.arrow(axes, (0, top + 4.5), (0, top))
     axes.text(0.8, top + 4.5, "Q", va="top", style="italic")
     told = f"found {load.found}\nRMS error {1e3 * load.rms:.2f} mm"

@@ -5,12 +5,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kappaskin.errors import Refusal
-from kappaskin.figures import fig1, fig2, fig6, fig9, style
+from kappaskin.figures import fig1, fig2, fig6, fig8, fig9, style
 
 FIGURES: dict[str, Callable[[style.Figure], None]] = {
     "fig1": fig1.draw,
     "fig2": fig2.draw,
     "fig6": fig6.draw,
+    "fig8": fig8.draw,
     "fig9": fig9.draw,
 }
 """What draws each figure on an empty matplotlib.figure.Figure; fig1 to fig9 are the paper's."""

@@ -18,7 +18,7 @@ Axes = Any
 SINGLE, DOUBLE = 85.0, 174.0
 """Widths in mm of one column and of two."""
 
-INK, FAINT, LINE, FILL = "#16191d", "#5b6470", "#c6ccd4", "#e9edf2"
+INK, FAINT, GREY, LINE, FILL = "#16191d", "#5b6470", "#9aa3ad", "#c6ccd4", "#e9edf2"
 BLUE, ORANGE = "#2166ac", "#bd5a14"
 DIVERGING = ("#08306b", "#2166ac", "#5b9fd0", "#b6d5ea", "#f6f6f4", "#f9cfa5", "#e8954a",
              "#bd5a14", "#6e2a04")  # fmt: skip
