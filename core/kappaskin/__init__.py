@@ -6,6 +6,7 @@ from kappaskin.bases import CurvatureMap as CurvatureMap
 from kappaskin.bases import SineBasis as SineBasis
 from kappaskin.bases import ValueMap as ValueMap
 from kappaskin.bases import basis_for as basis_for
+from kappaskin.bases import edges_of as edges_of
 from kappaskin.calibration import ADVICE as ADVICE
 from kappaskin.calibration import RADII as RADII
 from kappaskin.calibration import Calibration as Calibration
@@ -56,7 +57,9 @@ from kappaskin.mechanics import Load as Load
 from kappaskin.mechanics import Plate as Plate
 from kappaskin.mechanics import PointLoad as PointLoad
 from kappaskin.mechanics import RectangleLoad as RectangleLoad
+from kappaskin.patch import Disk as Disk
 from kappaskin.patch import Patch as Patch
+from kappaskin.patch import Polygon as Polygon
 from kappaskin.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline import Setup as Setup
 from kappaskin.region import Bargain as Bargain

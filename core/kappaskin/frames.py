@@ -188,10 +188,11 @@ class Estimate:
 
     `curvature` and `residual` (3, P) in 1/m, NaN where a reading is missing; `fresh` (3, P) which
     readings this frame brought: the others are held from earlier ones; `coefficients`
-    (Ni, Nj) in m; `surface` (ny, nx) in m; `noise` is the standard deviation of a reading in 1/m
-    as the residual tells it; `geometry` is that of the skin at the contact. `true_surface`,
-    `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a simulation made the
-    frame. `ready_time` is when the estimate was done, on the clock of `host_time`.
+    (Ni, Nj) in m; `surface` (ny, nx) in m, NaN off the skin; `noise` is the standard deviation of
+    a reading in 1/m as the residual tells it; `geometry` is that of the skin at the contact.
+    `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a
+    simulation made the frame. `ready_time` is when the estimate was done, on the clock of
+    `host_time`.
     """
 
     generation: int

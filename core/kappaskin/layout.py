@@ -45,17 +45,21 @@ class SensorLayout:
         if outside.size:
             p, (x, y) = int(outside[0]), P[outside[0]]
             raise Refusal(
-                f"{outside.size} of {len(P)} elements lie outside the patch of {self.patch.a:g} x "
-                f"{self.patch.b:g} m: element {p} is at ({x:g}, {y:g}) m; positions are in metres "
-                "from the corner x = y = 0"
+                f"{outside.size} of {len(P)} elements lie outside the {self.patch.name}: element "
+                f"{p} is at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0"
             )
 
     @classmethod
     def regular(cls, patch: Patch, m: int, n: int) -> "SensorLayout":
-        """Elements at the centres of an m x n tiling."""
+        """Elements at the centres of an m x n tiling; those off a disk or a polygon are left out.
+
+        A layout that lacks some has no shape.
+        """
         x, y = patch.cell_centres(m, n)
         positions = np.column_stack([np.tile(x, n), np.repeat(y, m)])
-        return cls(patch, positions, _channels(patch, m * n), (m, n))
+        on = patch.contains(positions)
+        shape = (m, n) if on.all() else None
+        return cls(patch, positions[on], _channels(patch, int(on.sum())), shape)
 
     @classmethod
     def scattered(cls, patch: Patch, positions: ArrayLike) -> "SensorLayout":

@@ -1,12 +1,19 @@
-"""The skin's own coordinates: a rectangle, x in [0, a], y in [0, b], flat or bent along x."""
+"""The skin's own coordinates: x in [0, a], y in [0, b], and the outline that it fills of them."""
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
+from kappaskin.outline import checked, depth, feet, inside, inward_normals
+
+_MARGIN = 1e-3  # of a side: how near its rim a point may be and still move with the skin
+_CORNER = 0.02  # of an edge: how near to its ends no place is looked for along it
+_ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this far outside
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,12 @@ class Patch:
             )
 
     @property
+    def name(self) -> str:
+        """What it is, as messages call it."""
+        what = f"{'strip' if self.strip else 'patch'} of {self.a:g} x {self.b:g} m"
+        return f"{what} bent to {self.radius:g} m" if self.base_curvature else what
+
+    @property
     def base_curvature(self) -> float:
         """1 / radius in 1/m; zero when flat."""
         return 1 / self.radius
@@ -65,6 +78,26 @@ class Patch:
         """Which of `positions` (P, 2) in m lie on the patch, edges included."""
         return np.all((positions >= 0) & (positions <= (self.a, self.b)), axis=-1)
 
+    def depth(self, positions: Array) -> Array:
+        """How far inside the rim `positions` (P, 2) lie, (P,) in m; below zero off the skin."""
+        far = np.minimum(positions, (self.a, self.b) - positions)
+        return far[:, 0] if self.strip else far.min(axis=-1)
+
+    def inward(self, x: float, y: float) -> tuple[float, float]:
+        """(x, y) in m, or the nearest place to it a thousandth of a side inside the rim."""
+        dx, dy = _MARGIN * self.a, _MARGIN * self.b
+        return min(max(x, dx), self.a - dx), min(max(y, dy), self.b - dy)
+
+    def near_rim(self, x: float, y: float) -> list[tuple[float, float, float]]:
+        """The place next to (x, y) just inside each held edge, and how far as share of a side."""
+        a, b, (dx, dy) = self.a, self.b, (_MARGIN * self.a, _MARGIN * self.b)
+        ends = [(dx, y, x / a), (a - dx, y, 1 - x / a)]
+        return ends if self.strip else [*ends, (x, dy, y / b), (x, b - dy, 1 - y / b)]
+
+    def moves(self, positions: Array) -> Mask:
+        """Which of `positions` (P, 2) are so far inside the rim that the skin moves there."""
+        return self.depth(positions) >= 0.9 * _MARGIN * min(self.a, self.b)
+
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points (..., 3) in m of the skin at rest and its outward normals (..., 3) there."""
         s, y = positions[..., 0] - self.a / 2, positions[..., 1]
@@ -75,3 +108,85 @@ class Patch:
         points = np.stack([x + self.a / 2, y, z], axis=-1)
         normals = np.stack([np.sin(angle), np.zeros_like(s), np.cos(angle)], axis=-1)
         return points, normals
+
+
+@dataclass(frozen=True, init=False)
+class Disk(Patch):
+    """A flat round skin of `rim_radius` in m, held along its rim; it touches x = 0 and y = 0."""
+
+    def __init__(self, rim_radius: float) -> None:
+        if not 0 < rim_radius < math.inf:
+            raise Refusal(f"expected a disk with a radius above zero in metres, got {rim_radius}")
+        super().__init__(2 * rim_radius, 2 * rim_radius)
+
+    @property
+    def rim_radius(self) -> float:
+        """Half of its sides, in m."""
+        return self.a / 2
+
+    @property
+    def name(self) -> str:
+        return f"disk of radius {self.rim_radius:g} m"
+
+    def contains(self, positions: Array) -> Mask:
+        return self.depth(positions) >= -_ROUNDING * self.a
+
+    def depth(self, positions: Array) -> Array:
+        r = self.rim_radius
+        return r - np.hypot(positions[:, 0] - r, positions[:, 1] - r)
+
+    def inward(self, x: float, y: float) -> tuple[float, float]:
+        r = self.rim_radius
+        away = math.hypot(x - r, y - r)
+        share = min(1.0, (1 - 2 * _MARGIN) * r / away) if away else 1.0
+        return r + share * (x - r), r + share * (y - r)
+
+    def near_rim(self, x: float, y: float) -> list[tuple[float, float, float]]:
+        r = self.rim_radius
+        away = math.hypot(x - r, y - r)
+        out = (1 - 2 * _MARGIN) * r / away if away else 0.0
+        return [(r + out * (x - r), r + out * (y - r), (r - away) / self.a)] if away else []
+
+
+@dataclass(frozen=True, init=False)
+class Polygon(Patch):
+    """A flat skin with the corners `vertices` (V, 2) in m, given either way round.
+
+    Its box begins at x = y = 0.
+    """
+
+    vertices: tuple[tuple[float, float], ...]
+
+    def __init__(self, vertices: ArrayLike) -> None:
+        corners = checked(vertices)
+        super().__init__(*corners.max(axis=0).tolist())
+        object.__setattr__(self, "vertices", tuple((x, y) for x, y in corners.tolist()))
+
+    @property
+    def name(self) -> str:
+        return f"polygon of {len(self.vertices)} corners in {self.a:g} x {self.b:g} m"
+
+    @cached_property
+    def corners(self) -> Array:
+        """The vertices (V, 2) in m, counter-clockwise."""
+        return np.array(self.vertices)
+
+    def contains(self, positions: Array) -> Mask:
+        found = inside(self.corners, positions)
+        found[~found] = self.depth(positions[~found]) >= -_ROUNDING * max(self.a, self.b)
+        return found
+
+    def depth(self, positions: Array) -> Array:
+        return depth(self.corners, positions)
+
+    def inward(self, x: float, y: float) -> tuple[float, float]:
+        if self.depth(np.array([[x, y]]))[0] >= _MARGIN * min(self.a, self.b):
+            return x, y
+        return min(self.near_rim(x, y), key=lambda foot: foot[2])[:2]
+
+    def near_rim(self, x: float, y: float) -> list[tuple[float, float, float]]:
+        shorter, normals = min(self.a, self.b), inward_normals(self.corners)
+        near = feet(self.corners, np.array([[x, y]]), _CORNER)[0] + _MARGIN * shorter * normals
+        near = near[self.contains(near)]
+        share = np.hypot(near[:, 0] - x, near[:, 1] - y) / shorter
+        return [(float(u), float(v), float(s)) for (u, v), s in zip(near, share, strict=True)]

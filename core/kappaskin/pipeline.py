@@ -11,7 +11,7 @@ import numpy as np
 from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector
 from kappaskin.errors import RankDeficient
-from kappaskin.fit import Fit, LeastSquares
+from kappaskin.fit import RIM_SD, Fit, LeastSquares
 from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.geometry import contact_geometry
 from kappaskin.hold import Hold
@@ -27,7 +27,8 @@ class Setup:
 
     `edge` says which functions; empty, those for the edge that the sensor says it has. A channel
     that a frame leaves out keeps its last reading until that is `hold` s old. Readings are
-    corrected by the `calibration`, which must be the sensor's own.
+    corrected by the `calibration`, which must be the sensor's own. A rim that gives is expected to
+    move by `rim_sd` in m.
     """
 
     Ni: int = 8
@@ -37,6 +38,7 @@ class Setup:
     edge: str = ""
     hold: float = 0.1
     calibration: Calibration | None = None
+    rim_sd: float = RIM_SD
 
 
 class Pipeline:
@@ -58,9 +60,12 @@ class Pipeline:
         edge = setup.edge or sensor.edge
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
-        self.fit = LeastSquares(self.basis, sensor.layout)
+        self.fit = LeastSquares(self.basis, sensor.layout, rim_sd=setup.rim_sd)
         self._loosest = _LOOSE * math.sqrt(np.trace(self.fit.unit_covariance()))
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
+        points = np.stack(np.meshgrid(self._x, self._y), axis=-1).reshape(-1, 2)
+        on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
+        self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
         self._hold = Hold(sensor.channels, setup.hold)
@@ -131,7 +136,7 @@ class Pipeline:
             self._truths[key] = basis, basis.on_grid(self._x, self._y)
         basis, true_map = self._truths[key]
         true_surface = true_map(truth.coefficients)
-        rms = math.sqrt(float(np.mean((surface - true_surface) ** 2)))
+        rms = math.sqrt(float(np.mean((surface - true_surface)[self._skin] ** 2)))
         here = truth.contact[None]
         at_load = float(
             self.basis.at(here)[0] @ coefficients.ravel()

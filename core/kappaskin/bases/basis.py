@@ -20,7 +20,8 @@ class ValueMap(Protocol):
 class Basis(Protocol):
     """Ni x Nj functions on a patch that meet its edge conditions, one or some of them together.
 
-    Coefficients are (Ni, Nj) arrays in metres; flattened, j runs fastest.
+    Coefficients are (Ni, Nj) arrays in metres; flattened, j runs fastest. Where functions are no
+    products they are the first Ni Nj, in the order of their frequencies, row by row.
     """
 
     @property
@@ -34,14 +35,22 @@ class Basis(Protocol):
 
     @property
     def free(self) -> Array | None:
-        """The combinations (N, F) of functions that the edges allow; None when all do."""
+        """The combinations (N, F) of functions that a fit may use; None when all.
+
+        The edges allow these and the `unseen` ones.
+        """
+        ...
+
+    @property
+    def unseen(self) -> Array | None:
+        """Shapes (N, q) with unit RMS along the rim that change no curvature; None when all do."""
         ...
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, N), at `positions` (P, 2).
 
-        `dx` = -1 is the integral along x, zero on average at the two ends, and `dx` = -2 the
-        integral of that one along x, zero on average between them.
+        Off a disk or a polygon it is NaN. `dx` = -1 is the integral along x, zero on average at
+        the two ends, and `dx` = -2 the integral of that one along x, zero on average between them.
         """
         ...
 

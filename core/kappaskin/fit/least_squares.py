@@ -13,6 +13,9 @@ from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
+RIM_SD = 0.2e-3
+"""How far in m a rim that gives is expected to move, unless said otherwise."""
+
 _REMEMBERED = 8  # sets of missing readings whose operators are kept
 _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits: factor anew
@@ -25,7 +28,8 @@ class Fit:
     `coefficients` (..., Ni, Nj) in m, with their standard deviations `unit_sd` for unit noise;
     `residual` (..., 3, P) in 1/m, NaN where a reading is missing; `noise` (...) the standard
     deviation of a reading in 1/m as the residual tells it, NaN when every reading was spent on a
-    coefficient, 1 when the fit was made with `sigma`.
+    coefficient, 1 when the fit was made with `sigma`. Where the rim gives, how far it may have
+    moved is in every standard deviation but `unit_sd`.
     """
 
     arrays: ClassVar = ("coefficients", "unit_sd", "residual", "noise")
@@ -39,7 +43,9 @@ class Fit:
     @property
     def sd(self) -> Array:
         """Standard deviations (..., Ni, Nj) of the coefficients in m."""
-        return self.noise[..., None, None] * self.unit_sd
+        seen = self.noise[..., None, None] * self.unit_sd
+        undecided = np.linalg.norm(self.estimator.undecided, axis=1)
+        return np.hypot(seen, undecided.reshape(self.estimator.basis.shape))
 
     @property
     def covariance(self) -> Array:
@@ -49,8 +55,17 @@ class Fit:
             self.estimator.unit_covariance(gone)
             for gone in missing.reshape(-1, *missing.shape[-2:])
         ]
-        N = self.estimator.basis.size
-        return self.noise[..., None, None] ** 2 * np.reshape(units, (*self.noise.shape, N, N))
+        N, U = self.estimator.basis.size, self.estimator.undecided
+        seen = self.noise[..., None, None] ** 2 * np.reshape(units, (*self.noise.shape, N, N))
+        return seen + U @ U.T
+
+    def sd_of(self, rows: Array) -> Array:
+        """Standard deviations (..., R) of `rows` (R, N) times the flattened coefficients."""
+        return np.sqrt(np.sum((rows @ self.covariance) * rows, axis=-1))
+
+    def surface_sd(self, positions: Array) -> Array:
+        """Standard deviations (..., P) of the displacement in m at `positions` (P, 2)."""
+        return self.sd_of(self.estimator.basis.at(positions))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,10 +90,24 @@ class LeastSquares:
     readings weigh the same and their noise is estimated from the residual. An infinite sigma
     leaves a reading out. Where the basis leaves only some combinations free, c = W g, only those
     are fitted. Raises `RankDeficient` when the readings do not decide the coefficients.
+
+    `rim_sd` in m is how far a rim that gives is expected to move: the standard deviation of each
+    shape that no reading sees, by RMS along the rim.
     """
 
-    def __init__(self, basis: Basis, layout: SensorLayout, sigma: ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        basis: Basis,
+        layout: SensorLayout,
+        sigma: ArrayLike | None = None,
+        rim_sd: float = RIM_SD,
+    ) -> None:
+        if not 0 <= rim_sd < np.inf:
+            raise Refusal(f"expected a rim_sd of at least zero in m, got {rim_sd}")
         self.basis, self.layout = basis, layout
+        unseen = np.empty((basis.size, 0)) if basis.unseen is None else basis.unseen
+        self.undecided = rim_sd * unseen
+        """Shapes (N, q) in m that no reading sees, each as far as it is expected to go."""
         self._sigma_known = sigma is not None
         self._weight = self._weights(1.0 if sigma is None else sigma)
         self.unknowns = basis.size if basis.free is None else basis.free.shape[1]

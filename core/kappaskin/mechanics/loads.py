@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.patch import Patch
+from kappaskin.patch import Patch, Polygon
 
 
 class Load(Protocol):
@@ -46,7 +46,7 @@ def check_on(load: Load, patch: Patch, points: ArrayLike) -> None:
         raise Refusal(f"expected a finite force in N, got {load.force}")
     if not patch.contains(np.asarray(points)).all():
         raise Refusal(
-            f"expected a load on the patch of {patch.a:g} x {patch.b:g} m, got {load}; "
+            f"expected a load on the {patch.name}, got {load}; "
             "positions are in metres from the corner x = y = 0"
         )
 
@@ -94,6 +94,13 @@ class LineLoad:
 
     def check(self, patch: Patch) -> None:
         check_on(self, patch, [(self.x0, self.y0), (self.x1, self.y1)])
+        if isinstance(patch, Polygon):  # what else there is has no inward corner
+            check_on(self, patch, self._along())
+
+    def _along(self) -> Array:
+        """The points (G, 2) that stand for the line."""
+        s = _LINE[0][:, None]
+        return (1 - s) * (self.x0, self.y0) + s * (self.x1, self.y1)
 
     def shifted(self, dx: float, dy: float) -> "LineLoad":
         x0, y0, x1, y1, force = (getattr(self, f.name) for f in fields(self))
@@ -104,10 +111,7 @@ class LineLoad:
 
     def modal(self, basis: Basis) -> Array:
         if not isinstance(basis, SineBasis) or basis.patch.strip:
-            along, weights = _LINE
-            ends = np.array([[self.x0, self.y0], [self.x1, self.y1]])
-            points = np.column_stack([1 - along, along]) @ ends
-            return self.force * (weights @ basis.at(points)).reshape(basis.shape)
+            return self.force * (_LINE[1] @ basis.at(self._along())).reshape(basis.shape)
         # The mean over s in [0, 1] of sin(A + B s) sin(C + F s): the product is half a difference
         # of cosines, and the mean of a cosine is its value at the middle times a sinc.
         ki, kj = basis.wavenumbers

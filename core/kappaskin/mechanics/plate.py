@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kappaskin.bases import Basis, SineBasis
+from kappaskin.bases import Basis, ElasticBasis, SineBasis
 from kappaskin.bases.basis import curvature_at
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -59,7 +59,9 @@ class Plate:
     A drum head has `tension` T in N/m and may have no rigidity, a foam below it has the
     `foundation` modulus k_f in N/m^3, a fluid below it keeps its volume. `poisson` matters where
     an edge gives or the skin is bent. A cylinder skin that stretches along its axis as it bends
-    costs the `axial_stiffness` C in N/m, of an even sheet E h; at zero it stretches freely.
+    costs the `axial_stiffness` C in N/m, of an even sheet E h; at zero it stretches freely. A rim
+    that gives rests on springs, `rim_stiffness` in N/m per m of it; the default lets it give by
+    0.2 mm under a load that presses the default skin of 0.1 x 0.1 m in by 5 mm.
     """
 
     patch: Patch
@@ -69,12 +71,14 @@ class Plate:
     fluid: bool = False
     poisson: float = 0.3
     axial_stiffness: float = 0.0
+    rim_stiffness: float = 2e3
 
     def __post_init__(self) -> None:
         for value, expected in (
             (self.tension, "a tension of at least zero in N/m"),
             (self.foundation, "a foundation of at least zero in N/m^3"),
             (self.axial_stiffness, "an axial stiffness of at least zero in N/m"),
+            (self.rim_stiffness, "a rim stiffness of at least zero in N/m^2"),
         ):
             if not 0 <= value < np.inf:
                 raise Refusal(f"expected {expected}, got {value}")
@@ -149,6 +153,10 @@ class Plate:
         slopes = product(fx, fx) + product(fy, fy)
         whole = self.rigidity * bending + self.tension * (slopes - H**2 * squares)
         whole += self.foundation * squares
+        if isinstance(basis, ElasticBasis):
+            along, per_length = basis.rim()
+            rim = basis.at(along)
+            whole += self.rim_stiffness * (rim.T * per_length) @ rim
         if H and self.axial_stiffness and not self.patch.strip:
             strain = H * basis.at(points, -2, 2)
             whole += self.axial_stiffness * product(strain, strain)
@@ -157,13 +165,16 @@ class Plate:
     def _by_ritz(self, basis: Basis) -> Array:
         """The inverse (N, N) of the stiffness, on what the edges leave free."""
         K, bare = self._stiffness(basis)
-        W = np.eye(basis.size) if basis.free is None else basis.free
+        free = np.eye(basis.size) if basis.free is None else basis.free
+        W = free if basis.unseen is None else np.hstack([free, basis.unseen])
         scale = np.sqrt(np.diag(W.T @ bare @ W))
+        scale[scale == 0] = np.inf
         values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))
         if not values[0] > 1e-13 * values[-1]:
             raise Refusal(
                 "the skin moves as a whole without bending: expected edges that hold it; pin the "
-                "ends of the arc, open it by less than 180 degrees, or put foam below it"
+                "ends of the arc, open it by less than 180 degrees, put springs below a rim that "
+                "gives, or foam below the skin"
             )
         V = W @ (vectors / scale[:, None])
         return (V / values) @ V.T

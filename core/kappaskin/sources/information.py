@@ -8,11 +8,11 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from kappaskin.bases import basis_for
+from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
-from kappaskin.patch import Patch
+from kappaskin.patch import Disk, Patch, Polygon
 from kappaskin.sensor import Sensor
 from kappaskin.transduction import Amplifier, Converter, HalfBridge, Multiplexer, Transduction
 
@@ -32,6 +32,7 @@ def to_json(sensor: Sensor) -> str:
             "size": [layout.patch.a, layout.patch.b],
             "base_curvature": layout.patch.base_curvature,
             "strip": layout.patch.strip,
+            **_outline(layout.patch),
             "edge": sensor.edge,
             "fluid": sensor.plate.fluid,
             **{name: getattr(sensor.plate, name) for name in _OF_THE_PLATE},
@@ -43,9 +44,16 @@ def to_json(sensor: Sensor) -> str:
     )
 
 
+def _outline(patch: Patch) -> dict[str, Any]:
+    """The outline as JSON has it: none for a rectangle, "disk", or the corners of a polygon."""
+    if isinstance(patch, Disk):
+        return {"outline": "disk"}
+    return {"outline": patch.vertices} if isinstance(patch, Polygon) else {}
+
+
 _Part = TypeVar("_Part", HalfBridge, Multiplexer, Amplifier, Converter)
 
-_OF_THE_PLATE = ("tension", "foundation", "poisson", "axial_stiffness")
+_OF_THE_PLATE = ("tension", "foundation", "poisson", "axial_stiffness", "rim_stiffness")
 # What a flat plate hinged along its edges need not say.
 UNSAID: dict[str, Any] = {
     "base_curvature": 0.0,
@@ -56,6 +64,7 @@ UNSAID: dict[str, Any] = {
     "fluid": False,
     "poisson": 0.3,
     "axial_stiffness": 0.0,
+    "rim_stiffness": 2e3,
 }
 _KINDS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "a text": (str, ("name", "serial_number", "firmware", "edge")),
@@ -108,10 +117,24 @@ def _transduction(said: dict[str, Any]) -> Transduction:
     )
 
 
+def _patch(said: dict[str, Any]) -> Patch:
+    size, H = [float(side) for side in said["size"]], float(said["base_curvature"])
+    if "outline" not in said:
+        return Patch(*size, radius=1 / H if H else math.inf, strip=said["strip"])
+    outline, (a, _) = said["outline"], size
+    if outline != "disk" and not isinstance(outline, list):
+        raise Refusal(f"expected the outline 'disk' or a list of corners, got {outline!r:.80}")
+    patch = Disk(a / 2) if outline == "disk" else Polygon(said["outline"])
+    if H or said["strip"] or size != [patch.a, patch.b]:
+        raise Refusal(
+            f"expected a flat {patch.name}, of size {[patch.a, patch.b]}, got size {size}, base "
+            f"curvature {H:g} and strip {said['strip']}"
+        )
+    return patch
+
+
 def _layout(said: dict[str, Any]) -> SensorLayout:
-    H = float(said["base_curvature"])
-    radius = 1 / H if H else math.inf
-    patch = Patch(*(float(side) for side in said["size"]), radius=radius, strip=said["strip"])
+    patch = _patch(said)
     if "grid" in said:
         m, n = (index(count) for count in said["grid"])
         if m * n > 2**16 // 3:
@@ -140,7 +163,7 @@ def from_json(text: str) -> Sensor:
         said = _parsed(text)
         layout = _layout(said)
         edge = said["edge"]
-        basis_for(layout.patch, edge, 2, 1)  # refuses an edge that there is not
+        check_edge(layout.patch, edge)
         return Sensor(
             layout,
             _transduction(said),

@@ -18,7 +18,6 @@ _FUNCTIONS = 15  # along each side, of the shape a point load makes: Table 1's d
 _STEPS = 20  # of Gauss-Newton at most; 2 or 3 do but for the last millimetres at the rim
 _CONVERGED = 1e-4  # of a side: the step after one as short is shorter than 1e-6
 _RIDGE = 1e-12  # keeps a load on the rim, which moves nothing, solvable
-_RIM = 1e-3  # of a side: as close as a contact is placed to the rim, where no force moves the skin
 _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
 _REMEMBERED = 8  # sets of missing readings whose tables are kept
 
@@ -67,7 +66,9 @@ class PointContact:
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
         self._map = self.basis.on_grid(self._x, self._y)
-        self._functions = self.basis.at(np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2))
+        points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
+        self._still = ~self.patch.moves(points).reshape(len(self._y), -1)
+        self._functions = np.where(self._still.reshape(-1, 1), 0.0, self.basis.at(points))
         self._remembered: OrderedDict[bytes, _Tables] = OrderedDict()
         self._tables(self._live)
 
@@ -77,8 +78,8 @@ class PointContact:
         if key not in self._remembered:
             M = self._M[used]
             G = M.T @ M
-            squares = np.vecdot(self._functions @ G, self._functions)
-            self._remembered[key] = _Tables(G, squares.reshape(len(self._y), len(self._x)))
+            squares = np.vecdot(self._functions @ G, self._functions).reshape(self._still.shape)
+            self._remembered[key] = _Tables(G, np.where(self._still, 1.0, squares))
             if len(self._remembered) > _REMEMBERED:
                 self._remembered.popitem(last=False)
         return self._remembered[key]
@@ -89,13 +90,14 @@ class PointContact:
         K = np.where(used, curvature.ravel(), 0.0)
         tables, readings = self._tables(used), _Readings(K @ self._M, float(K @ K), int(used.sum()))
         explained = self._map(readings.h.reshape(self.basis.shape)) ** 2 / tables.norm
+        explained[self._still] = 0.0
         row, column = divmod(int(explained.argmax()), len(self._x))
         least = _threshold(readings.count - fit.estimator.unknowns) * float(fit.noise) ** 2
         if not explained[row, column] > least:
             return NO_TOUCH
         x = _highest(self._x, explained[row], column)
         y = _highest(self._y, explained[:, column], row)
-        return self._refined(x, y, readings, tables.G, fit)
+        return self._refined(*self.patch.inward(x, y), readings, tables.G, fit)
 
     def _refined(self, x: float, y: float, readings: _Readings, G: Array, fit: Fit) -> Touch:
         x, y, place = self._climbed(x, y, readings.h, G)
@@ -120,8 +122,8 @@ class PointContact:
         place = self._place(x, y, h, G)
         for _ in range(_STEPS):
             dx, dy = place.step
-            x = _between(_RIM * a, x + _between(-a / 50, dx, a / 50), (1 - _RIM) * a)
-            y = _between(_RIM * b, y + _between(-b / 50, dy, b / 50), (1 - _RIM) * b)
+            x, y = x + _between(-a / 50, dx, a / 50), y + _between(-b / 50, dy, b / 50)
+            x, y = self.patch.inward(x, y)
             if abs(dx) < _CONVERGED * a and abs(dy) < _CONVERGED * b:
                 break
             place = self._place(x, y, h, G)
@@ -140,27 +142,17 @@ class PointContact:
         Or whether a load on the rim beside it explains `least` or more of the readings, as well as
         one here: the force goes to infinity there.
         """
-        for x_rim, y_rim, share in self._feet(x, y):
+        if self.basis.unseen is not None:
+            return False
+        for x_rim, y_rim, share in self.patch.near_rim(x, y):
+            if share > _DOUBTFUL:
+                continue
             if share < 1 / _FUNCTIONS:
                 return True
             t = self.basis.with_slopes(x_rim, y_rim)[0]
             if float(h @ t) ** 2 > least * float(t @ G @ t):
                 return True
         return False
-
-    def _feet(self, x: float, y: float) -> list[tuple[float, float, float]]:
-        """Places on the rim that a contact at (x, y) may be taken for, how far as share of a side.
-
-        Along a strip's sides nothing holds it.
-        """
-        a, b = self.patch.a, self.patch.b
-        feet = [
-            (_RIM * a, y, x / a),
-            ((1 - _RIM) * a, y, 1 - x / a),
-            (x, _RIM * b, y / b),
-            (x, (1 - _RIM) * b, 1 - y / b),
-        ]
-        return [foot for foot in feet[: 2 if self.patch.strip else 4] if foot[2] < _DOUBTFUL]
 
     def _displacement(self, fit: Fit, x: float, y: float, place: "_Place") -> tuple[float, float]:
         """Displacement in m at (x, y), of the fitted shape, and how far it may be off.
@@ -170,10 +162,10 @@ class PointContact:
         """
         b = fit.estimator.basis.with_slopes(x, y)[0]
         fitted = float(b @ fit.coefficients.ravel())
-        variance = float(b @ fit.estimator.unit_covariance(np.isnan(fit.residual)) @ b)
+        seen = float(fit.sd_of(b[None])[0])
         t = place.functions
         loaded = place.force * float(t @ self._compliance.after(t[None])[0])
-        return fitted, math.hypot(float(fit.noise) * math.sqrt(variance), fitted - loaded)
+        return fitted, math.hypot(seen, fitted - loaded)
 
 
 class _Place:

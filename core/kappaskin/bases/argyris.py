@@ -1,0 +1,151 @@
+"""An outline to the modes of a plate on it, by Argyris' finite element."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_array
+from scipy.sparse.linalg import eigsh
+
+from kappaskin.bases.mesh import Mesh, meshed
+from kappaskin.bases.modes import ORDERS
+from kappaskin.bases.quintic import Quintics, quintics, triangle_quadrature
+from kappaskin.frames import Array
+from kappaskin.outline import turn
+
+_SPACING = 1.1  # of the mean distance between the highest mode's nodes
+_FEWEST = 16  # modes that a mesh is made for
+
+# Argyris' element: on each triangle a quintic, 21 numbers: value, slopes and second derivatives at
+# the corners and the slope across at the middle of the sides. Triangles that share them join with
+# continuous slopes. Its shape functions are found in each triangle's own coordinates: as sums of
+# powers of x and y they lose eleven digits on triangles of a hundredth of the skin.
+
+
+@dataclass(frozen=True, eq=False)
+class PlateModes:
+    """Modes as `functions`, and the `points` (Q, 2) in m and `weights` (Q,) that integrate them."""
+
+    functions: Quintics
+    points: Array
+    weights: Array
+
+
+@lru_cache(8)
+def plate_modes(vertices: tuple[tuple[float, float], ...], count: int, clamped: bool) -> PlateModes:
+    """The first `count` modes of a plate on an outline, their mean square 1/4.
+
+    They make the bending energy, the integral of w_xx^2 + 2 w_xy^2 + w_yy^2, stationary for a
+    given mean square; along straight edges that do not move Poisson's ratio adds nothing to it.
+    """
+    corners = np.array(vertices)
+    size = np.sqrt(turn(np.zeros(2), corners, np.roll(corners, -1, axis=0)).sum() / 2)
+    space = _Space(meshed(corners / size, _SPACING / np.sqrt(max(count, _FEWEST))))
+    modes = _lowest(*space.energies(), space.allowed(clamped), count) / 2
+    coefficients = space.shapes @ modes[space.unknowns]
+    points, weights = space.quadrature()
+    functions = Quintics(size * space.origins, space.inverse / size, coefficients)
+    return PlateModes(functions, size * points.reshape(-1, 2), size**2 * weights.ravel())
+
+
+class _Space:
+    """Argyris' functions on a mesh: the unknowns of triangle t are `unknowns` (T, 21)."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh, corners = mesh, mesh.points[mesh.triangles]
+        self.origins, self._sides = (
+            corners[:, 0],
+            np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2),
+        )
+        self.inverse = np.asarray(np.linalg.inv(self._sides), float)
+        ends = np.sort(mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=-1)
+        self._ends, which, self._sharing = np.unique(
+            ends.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
+        )
+        side = 6 * len(mesh.points) + which.reshape(-1, 3)
+        at_corners = 6 * mesh.triangles[..., None] + np.arange(6)
+        self.unknowns = np.hstack([at_corners.reshape(-1, 18), side])
+        self.size = 6 * len(mesh.points) + len(self._ends)
+        self.shapes = self._shapes(which.reshape(-1, 3))
+
+    def _shapes(self, side: NDArray[np.intp]) -> Array:
+        """The quintics (T, 21, 21) whose unknowns are one and otherwise zero."""
+        scale = np.sqrt(np.abs(np.linalg.det(self._sides)))
+        G, T = scale[:, None, None] * self.inverse, len(scale)  # slopes per size of the triangle
+        rows = [
+            quintics(G, np.tile(corner, (T, 1)), order)
+            for corner in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+            for order in ORDERS
+        ]
+        along = self._mesh.points[self._ends[:, 1]] - self._mesh.points[self._ends[:, 0]]
+        across = along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
+        for k, middle in enumerate(((0.5, 0.0), (0.5, 0.5), (0.0, 0.5))):
+            xi, n = np.tile(middle, (T, 1)), across[side[:, k]]
+            slopes = [quintics(G, xi, order) for order in ORDERS[1:3]]
+            rows.append(n[:, :1] * slopes[0] + n[:, 1:] * slopes[1])
+        orders = [sum(order) for order in ORDERS] * 3 + [1] * 3
+        return np.linalg.inv(np.stack(rows, axis=1)) * scale[:, None, None] ** orders
+
+    def quadrature(self) -> tuple[Array, Array]:
+        """Points (T, 36, 2) and weights (T, 36)."""
+        xi, w = triangle_quadrature()
+        points = self.origins[:, None] + xi @ np.swapaxes(self._sides, 1, 2)
+        return points, np.multiply.outer(np.abs(np.linalg.det(self._sides)), w)
+
+    def energies(self) -> tuple[csc_array, csc_array]:
+        """The matrices (D, D) of the bending energy and of the mean square."""
+        xi, _ = triangle_quadrature()
+        weights = self.quadrature()[1]
+        T, Q = weights.shape
+        G, everywhere = np.repeat(self.inverse, Q, axis=0), np.tile(xi, (T, 1))
+
+        def assembled(*orders: tuple[float, tuple[int, int]]) -> csc_array:
+            element = np.zeros((T, 21, 21))
+            for factor, order in orders:
+                values = quintics(G, everywhere, order).reshape(T, Q, 21) @ self.shapes
+                element += np.swapaxes(values, 1, 2) @ (factor * weights[..., None] * values)
+            rows = np.repeat(self.unknowns, 21, axis=1).ravel()
+            columns = np.tile(self.unknowns, 21).ravel()
+            return csc_array(coo_array((element.ravel(), (rows, columns)), (self.size, self.size)))
+
+        return assembled((1, (2, 0)), (2, (1, 1)), (1, (0, 2))), assembled((1, (0, 0)))
+
+    def allowed(self, clamped: bool) -> csc_array:
+        """The combinations (D, F) of unknowns that the edge allows."""
+        rim, points = self._mesh.rim, len(self._mesh.points)
+        blocks: list[Any] = [_free_at(self._mesh, point, clamped) for point in range(rim)]
+        blocks += [np.eye(6)] * (points - rim)
+        sides = eye_array(len(self._ends)).tocsc()
+        blocks.append(sides[:, np.flatnonzero((self._sharing == 2) | (not clamped))])
+        return csc_array(cast("Any", block_diag(blocks)))
+
+
+def _free_at(mesh: Mesh, point: int, clamped: bool) -> Array:
+    """What (6, F) of w, w_x, w_y, w_xx, w_xy, w_yy at a point of the rim its two edges leave free.
+
+    Along an edge with direction t the deflection vanishes, w = w_t = w_tt = 0; clamped, its slope
+    across does so too, w_n = w_tn = 0.
+    """
+    held = list[list[float]]()
+    for other in ((point + 1) % mesh.rim, (point - 1) % mesh.rim):
+        along = mesh.points[other] - mesh.points[point]
+        tx, ty = along / np.linalg.norm(along)
+        held += [[1, 0, 0, 0, 0, 0], [0, tx, ty, 0, 0, 0], [0, 0, 0, tx * tx, 2 * tx * ty, ty * ty]]
+        if clamped:
+            held += [[0, -ty, tx, 0, 0, 0], [0, 0, 0, -tx * ty, tx * tx - ty * ty, tx * ty]]
+    _, s, Vt = np.linalg.svd(np.array(held))
+    return Vt[int(np.sum(s > 1e-8)) :].T
+
+
+def _lowest(K: Any, M: Any, allowed: csc_array, count: int) -> Array:
+    """The lowest modes (D, N) of K v = lambda M v among the combinations `allowed` (D, F)."""
+    scale = diags_array(1 / np.sqrt((allowed.T @ K @ allowed).diagonal()))
+    scaled = allowed @ scale  # values, slopes and second derivatives alike
+    start = np.random.default_rng(0).normal(size=scaled.shape[1])  # the same modes every time
+    squares, vectors = cast(
+        "tuple[Array, Array]",
+        eigsh(scaled.T @ K @ scaled, count, scaled.T @ M @ scaled, sigma=0, v0=start),
+    )
+    return np.asarray(scaled @ vectors[:, np.argsort(squares)])

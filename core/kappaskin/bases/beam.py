@@ -1,0 +1,74 @@
+"""Products of clamped beams' modes: the shapes of a skin whose edges hold its slope too."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kappaskin.bases.product import ProductBasis
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+
+
+@dataclass(frozen=True)
+class ClampedBasis(ProductBasis):
+    """The Ni x Nj products of the modes of clamped beams: zero along the edges, with their slope.
+
+    Between the edges they are nearly sines, so that elements at cell centres tell them apart as
+    well; a smooth shape's coefficients fall as 1/k^5, its curvature converges as N^(-5/2). Their
+    mean square is a sine's, 1/2 along each side. A bent skin is inextensible: f has no mean along
+    the arc.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.patch.base_curvature and self.Ni < 2:
+            raise Refusal(
+                "a clamped inextensible arc cannot bend in its first function alone: expected at "
+                "least 2 functions along x, got 1"
+            )
+
+    @property
+    def free(self) -> Array | None:
+        """On an arc, that the mean along x vanishes leaves Ni - 1 of Ni."""
+        return self._inextensible if self.patch.base_curvature else None
+
+    @cached_property
+    def _inextensible(self) -> Array:
+        ends = self._along_x(np.array([0.0, self.patch.a]), -1)
+        return self._without_mean(ends[1] - ends[0])
+
+    def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
+        s, ends = x / length - 0.5, np.array([-0.5, 0.5])
+        values = _beam(s, count, derivative)
+        if derivative < 0:
+            middle = _beam(ends, count, -1).mean(axis=0)
+            if derivative == -1:
+                values -= middle
+            else:
+                values -= np.multiply.outer(s, middle) + np.diff(_beam(ends, count, -3), axis=0)
+        return values * length**-derivative
+
+
+def _beam(s: Array, count: int, derivative: int) -> Array:
+    """The derivative of the first `count` modes of a clamped beam of length 1, at s in [-1/2, 1/2].
+
+    Even ones are cos(k s)/cos(k/2) - cosh(k s)/cosh(k/2), odd ones the same with sin and sinh,
+    over sqrt(2); cosh and sinh as decaying exponentials from either end, so that nothing overflows
+    or cancels.
+    """
+    k, even = _roots(count), np.arange(count) % 2 == 0
+    ks, phase = np.multiply.outer(s, k), np.where(even, np.pi / 2, 0.0)
+    sign = np.where(even, 1.0, -1.0)
+    wave = np.sin(ks + phase + derivative * np.pi / 2) / np.sin(k / 2 + phase)
+    from_ends = np.exp(ks - k / 2) + sign * (-1.0) ** derivative * np.exp(-ks - k / 2)
+    return k**derivative * (wave - from_ends / (1 + sign * np.exp(-k))) / np.sqrt(2)
+
+
+def _roots(count: int) -> Array:
+    """The first roots k of cos k cosh k = 1 above zero, near (i + 1/2) pi, by Newton's method."""
+    k = (np.arange(1.0, count + 1) + 0.5) * np.pi
+    for _ in range(4):
+        sech = 2 * np.exp(-k) / (1 + np.exp(-2 * k))
+        k -= (np.cos(k) - sech) / (sech * np.tanh(k) - np.sin(k))
+    return k

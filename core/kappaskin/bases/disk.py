@@ -1,0 +1,143 @@
+"""Modes of a round plate: Bessel functions of the radius times cosines and sines of the angle."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import ive, jn_zeros, jv
+
+from kappaskin.bases.modes import ModeBasis, Order
+from kappaskin.bases.product import gauss
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.patch import Disk
+
+_POISSON = 0.3  # of the plate whose hinged modes these are
+
+
+@dataclass(frozen=True)
+class DiskBasis(ModeBasis):
+    """The plate modes of a disk, hinged or `clamped` along its rim.
+
+    With r = 1 at the rim they are (J_m(k r) - J_m(k)/I_m(k) I_m(k r)) times cos m theta and, for
+    m > 0, sin m theta. All vanish at the rim. Clamped, J_m+1(k)/J_m(k) + I_m+1(k)/I_m(k) = 0 makes
+    their slope vanish too; hinged, that sum is 2 k/(1 - nu) with nu = 0.3, and the bending moment
+    across the rim vanishes.
+
+    Either set spans every shape of finite bending energy that its edge allows, whatever the skin's
+    own nu, and so do membrane modes J_m(k r). But the curvature of a loaded plate converges as
+    n^(-5/2) with n functions of r when it has the same nu, else as n^(-1/2); with membrane modes,
+    whose Laplacian vanishes at the rim, always as n^(-1/2), with three times the error.
+    """
+
+    clamped: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.patch, Disk):
+            raise Refusal(f"expected a disk, got a {self.patch.name}")
+
+    @cached_property
+    def _modes(self) -> "_Modes":
+        return _modes(self.size, self.clamped)
+
+    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> list[Array]:
+        R = self.patch.a / 2
+        z = (positions[:, 0] - R + 1j * (positions[:, 1] - R)) / R
+        return [
+            values / R ** sum(order)
+            for order, values in zip(orders, self._modes(z, orders), strict=True)
+        ]
+
+    def quadrature(self) -> tuple[Array, Array]:
+        """Points (Q, 2) in m and weights (Q,) in m^2: Gauss along the radius, even in angle."""
+        R, modes = self.patch.a / 2, self._modes
+        r, w = gauss(1.0, int(modes.k[-1]) + 20)
+        count = 2 * int(modes.m.max()) + 8
+        angle = 2 * np.pi * np.arange(count) / count
+        direction = np.column_stack([np.cos(angle), np.sin(angle)])
+        points = R + R * np.multiply.outer(r, direction).reshape(-1, 2)
+        return points, np.repeat(R**2 * w * r * 2 * np.pi / count, count)
+
+
+# With z = x + i y the derivatives of J_m(k r) e^(i m theta) along D- = d/dx - i d/dy and
+# D+ = d/dx + i d/dy are k J_m-1 e^(i (m-1) theta) and -k J_m+1 e^(i (m+1) theta), those of I_m the
+# same with +: no division by r, so that they are regular at the centre. Each derivative along x
+# and y as a sum of factors times D-^p D+^q:
+_LADDERS: dict[Order, dict[tuple[int, int], complex]] = {
+    (0, 0): {(0, 0): 1},
+    (1, 0): {(1, 0): 0.5, (0, 1): 0.5},
+    (0, 1): {(1, 0): 0.5j, (0, 1): -0.5j},
+    (2, 0): {(2, 0): 0.25, (1, 1): 0.5, (0, 2): 0.25},
+    (1, 1): {(2, 0): 0.25j, (0, 2): -0.25j},
+    (0, 2): {(2, 0): -0.25, (1, 1): 0.5, (0, 2): -0.25},
+}
+
+
+class _Modes:
+    """The first `count` modes on the disk of radius 1, their radial parts as Chebyshev series."""
+
+    def __init__(self, count: int, clamped: bool) -> None:
+        self.k, self.m, self._columns = _lowest(count, clamped)
+        self._degrees = np.arange(int(self.k[-1] / 2) + 33)  # resolve k r, then to rounding
+        r, w = gauss(1.0, int(self.k[-1]) + 20)
+        around = np.where(self.m > 0, 0.5, 1.0)
+        mean_square = 2 * (w * r) @ self._radial(r, 0, 0) ** 2 * around
+        nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
+        to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
+        to_series[0] /= 2
+        self._series = {
+            step: to_series @ self._radial((1 + np.cos(nodes)) / 2, *step) / (2 * mean_square**0.5)
+            for step in {step for ladder in _LADDERS.values() for step in ladder}
+        }
+
+    def _radial(self, r: Array, p: int, q: int) -> Array:
+        """The radial part of D-^p D+^q of the pairs of modes, (P, U), at `r` (P,)."""
+        k, m, kr = self.k, self.m, np.multiply.outer(r, self.k)
+        growing: Array = ive(m - p + q, kr) / ive(m, k) * np.exp(kr - k)  # I_m-p+q(k r)/I_m(k)
+        return k ** (p + q) * ((-1.0) ** q * jv(m - p + q, kr) - jv(m, k) * growing)
+
+    def __call__(self, z: NDArray[np.complex128], orders: Sequence[Order]) -> list[Array]:
+        """For each order the derivatives (P, N) at the points z = x + i y (P,) of the disk."""
+        r, angle = np.abs(z), np.angle(z)
+        t = np.arccos(np.clip(2 * r - 1, -1, 1))
+        polynomials = np.cos(np.multiply.outer(t, self._degrees))
+        turned, unit = np.exp(1j * np.multiply.outer(angle, self.m)), np.exp(1j * angle)[:, None]
+        steps = {step for order in orders for step in _LADDERS[order]}
+        parts = {(p, q): polynomials @ self._series[p, q] * unit ** (q - p) for p, q in steps}
+
+        def of(order: Order) -> Array:
+            values = sum(factor * parts[step] for step, factor in _LADDERS[order].items()) * turned
+            return values.view(float)[:, self._columns]  # cosines are real, sines imaginary parts
+
+        return [of(order) for order in orders]
+
+
+_modes = lru_cache(8)(_Modes)
+
+
+def _lowest(count: int, clamped: bool) -> tuple[Array, Array, NDArray[np.intp]]:
+    """k and m (U,) of the pairs of modes, and which real (2 u) or imaginary part each mode is."""
+    most = 2 * np.sqrt(count) + 6  # Weyl's law, with room for the edge
+    found = [(k, m) for m in range(int(most) + 1) for k in _frequencies(m, most, clamped)]
+    k, m = np.array(sorted(found)).T
+    parts = np.flatnonzero(np.column_stack([np.ones_like(m), m]).ravel())[:count]
+    pairs = parts[-1] // 2 + 1
+    return k[:pairs], m[:pairs], parts
+
+
+def _frequencies(m: int, most: float, clamped: bool) -> list[float]:
+    """The roots k up to `most` of the edge's equation, one between two zeros of J_m."""
+
+    def edge(k: float) -> float:
+        turning = 0.0 if clamped else 2 * k / (1 - _POISSON)
+        return float(jv(m + 1, k) + jv(m, k) * (ive(m + 1, k) / ive(m, k) - turning))
+
+    zeros = jn_zeros(m, int(most / np.pi) + 2)
+    low = zeros[:-1] if clamped else [max(m, 1), *zeros[:-1]]
+    high = zeros[1:] if clamped else zeros
+    roots = [brentq(edge, a, b, xtol=1e-13) for a, b in zip(low, high, strict=True) if a < most]
+    return [root for root in roots if root <= most]

@@ -1,0 +1,90 @@
+"""Bases of whole modes, not products: values at points and on the part of a grid on the skin."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.patch import Patch
+
+Order = tuple[int, int]
+ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+"""Derivatives along x and y that modes have."""
+
+_MOST = 1024  # modes: more take minutes to make
+
+
+@dataclass(frozen=True, eq=False)
+class PointMap:
+    """A map from coefficients to values on a grid, as one dense product; NaN off the skin."""
+
+    values: Array
+    grid: tuple[int, int]
+
+    def __call__(self, coefficients: Array) -> Array:
+        """Values (..., ny, nx) for `coefficients` (..., Ni, Nj)."""
+        flat = coefficients.reshape(*coefficients.shape[:-2], -1)
+        return np.dot(flat, self.values.T).reshape(*flat.shape[:-1], *self.grid)
+
+
+@dataclass(frozen=True)
+class ModeBasis(ABC):
+    """The first Ni x Nj modes, by frequency, of a flat skin; their mean square is 1/4 as sines'."""
+
+    patch: Patch
+    Ni: int
+    Nj: int
+
+    def __post_init__(self) -> None:
+        if not (self.Ni > 0 and self.Nj > 0 and self.size <= _MOST):
+            raise Refusal(
+                f"expected 1 x 1 to {_MOST} functions on a {self.patch.name}, got "
+                f"{self.Ni} x {self.Nj}"
+            )
+
+    @abstractmethod
+    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> list[Array]:
+        """For each of `orders` the derivatives (P, N) of all modes at `positions` on the skin."""
+
+    @abstractmethod
+    def quadrature(self) -> tuple[Array, Array]:
+        """Points (Q, 2) in m and weights (Q,) in m^2 that integrate products of two functions."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.Ni, self.Nj
+
+    @property
+    def size(self) -> int:
+        return self.Ni * self.Nj
+
+    @property
+    def free(self) -> Array | None:
+        return None
+
+    @property
+    def unseen(self) -> Array | None:
+        return None
+
+    def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
+        """Every function's derivative of order `dx`, `dy`, (P, N), at `positions`; NaN off it."""
+        if (dx, dy) not in ORDERS:
+            raise Refusal(
+                f"expected derivatives up to second order, got order {dx} along x and {dy} along y"
+            )
+        values = np.full((len(positions), self.size), np.nan)
+        on = self.patch.contains(positions)
+        values[on] = self._derivatives(positions[on], [(dx, dy)])[0]
+        return values
+
+    def with_slopes(self, x: float, y: float) -> Array:
+        """Every function and its slopes along x and y at one point on the skin, (3, N)."""
+        return np.vstack(self._derivatives(np.array([[x, y]]), ORDERS[:3]))
+
+    def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> PointMap:
+        """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""
+        points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+        return PointMap(self.at(points, dx, dy), (len(y), len(x)))

@@ -1,0 +1,57 @@
+"""Modes of a plate with corners."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kappaskin.bases.argyris import PlateModes, plate_modes
+from kappaskin.bases.modes import ModeBasis, Order
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.outline import turning
+from kappaskin.patch import Polygon
+
+_STRAIGHT, _BLUNT = 1e-6, math.radians(20)  # turns at a corner: none, and too little to be one
+
+
+@dataclass(frozen=True)
+class PolygonBasis(ModeBasis):
+    """The plate modes of a polygon, hinged or `clamped` along its edges, by finite elements.
+
+    They meet the edge exactly and have continuous slopes. A hinged polygon with ever more corners
+    does not become a hinged round plate: where two edges meet the slope vanishes, so that it turns
+    as stiff as a clamped one (Babuska's paradox); blunt corners are refused.
+    """
+
+    clamped: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        angle = np.abs(turning(self._outline.corners))
+        blunt = (angle > _STRAIGHT) & (angle < _BLUNT)
+        if blunt.any() and not self.clamped:
+            raise Refusal(
+                f"the outline turns by only {math.degrees(angle[blunt][0]):.3g} degrees at vertex "
+                f"{int(np.argmax(blunt))}: hinged there it would be as stiff as clamped; take a "
+                "disk, fewer corners, or clamp its edges"
+            )
+
+    @property
+    def _outline(self) -> Polygon:
+        if not isinstance(self.patch, Polygon):
+            raise Refusal(f"expected a polygon, got a {self.patch.name}")
+        return self.patch
+
+    @cached_property
+    def _modes(self) -> PlateModes:
+        return plate_modes(self._outline.vertices, self.size, self.clamped)
+
+    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> list[Array]:
+        return self._modes.functions.derivatives(positions, orders)
+
+    def quadrature(self) -> tuple[Array, Array]:
+        """Points (Q, 2) in m and weights (Q,) in m^2: exact for two quintics on each triangle."""
+        return self._modes.points, self._modes.weights
