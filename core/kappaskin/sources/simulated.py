@@ -43,7 +43,8 @@ class SimulatedSource:
         """Be the device of `scene`, whose next frame is due at device time `due` in s."""
         self._simulator, self._sensor = Simulator(scene), scene.sensor()
         # Since frame `_first`, due at device time `_since`, frames come at `_rate`.
-        self._first, self._since, self._rate = self._n, due, self._sensor.rate
+        self._first, self._since = self._n, due
+        self._rate: float = self._sensor.rate
         self._all = self._sensor.scan()
         self._scanner: Scanner | None = None
         patch = scene.plate.patch
