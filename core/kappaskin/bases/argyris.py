@@ -11,7 +11,7 @@ from scipy.sparse.linalg import eigsh
 
 from kappaskin.bases.mesh import Mesh, meshed
 from kappaskin.bases.modes import ORDERS
-from kappaskin.bases.quintic import Quintics, quintics, triangle_quadrature
+from kappaskin.bases.quintic import Quintics, chained, monomials, triangle_quadrature
 from kappaskin.frames import Array
 from kappaskin.outline import turn
 
@@ -73,20 +73,15 @@ class _Space:
     def _shapes(self, side: NDArray[np.intp]) -> Array:
         """The quintics (T, 21, 21) whose unknowns are one and otherwise zero."""
         scale = np.sqrt(np.abs(np.linalg.det(self._sides)))
-        G, T = scale[:, None, None] * self.inverse, len(scale)  # slopes per size of the triangle
-        rows = [
-            quintics(G, np.tile(corner, (T, 1)), order)
-            for corner in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
-            for order in ORDERS
-        ]
+        chain = chained(scale[:, None, None] * self.inverse)  # slopes per size of the triangle
+        at_corners = [chain @ monomials(corner) for corner in np.array([[0, 0], [1, 0], [0, 1]])]
         along = self._mesh.points[self._ends[:, 1]] - self._mesh.points[self._ends[:, 0]]
         across = along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
-        for k, middle in enumerate(((0.5, 0.0), (0.5, 0.5), (0.0, 0.5))):
-            xi, n = np.tile(middle, (T, 1)), across[side[:, k]]
-            slopes = [quintics(G, xi, order) for order in ORDERS[1:3]]
-            rows.append(n[:, :1] * slopes[0] + n[:, 1:] * slopes[1])
+        slopes = chain[:, None, 1:3] @ monomials(np.array([[0.5, 0], [0.5, 0.5], [0, 0.5]]))
+        at_sides = np.einsum("tsd,tsdm->tsm", across[side], slopes)
         orders = [sum(order) for order in ORDERS] * 3 + [1] * 3
-        return np.linalg.inv(np.stack(rows, axis=1)) * scale[:, None, None] ** orders
+        unknowns = np.concatenate([*at_corners, at_sides], axis=1)
+        return np.linalg.inv(unknowns) * scale[:, None, None] ** orders
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (T, 36, 2) and weights (T, 36)."""
@@ -96,21 +91,23 @@ class _Space:
 
     def energies(self) -> tuple[csc_array, csc_array]:
         """The matrices (D, D) of the bending energy and of the mean square."""
-        xi, _ = triangle_quadrature()
-        weights = self.quadrature()[1]
-        T, Q = weights.shape
-        G, everywhere = np.repeat(self.inverse, Q, axis=0), np.tile(xi, (T, 1))
+        at = monomials(triangle_quadrature()[0]) @ self.shapes[:, None]
+        w, _, _, w_xx, w_xy, w_yy = np.moveaxis(chained(self.inverse)[:, None] @ at, 2, 0)
+        weights = self.quadrature()[1][..., None]
 
-        def assembled(*orders: tuple[float, tuple[int, int]]) -> csc_array:
-            element = np.zeros((T, 21, 21))
-            for factor, order in orders:
-                values = quintics(G, everywhere, order).reshape(T, Q, 21) @ self.shapes
-                element += np.swapaxes(values, 1, 2) @ (factor * weights[..., None] * values)
-            rows = np.repeat(self.unknowns, 21, axis=1).ravel()
-            columns = np.tile(self.unknowns, 21).ravel()
-            return csc_array(coo_array((element.ravel(), (rows, columns)), (self.size, self.size)))
+        def product(v: Array) -> Array:
+            return np.swapaxes(v, 1, 2) @ (weights * v)
 
-        return assembled((1, (2, 0)), (2, (1, 1)), (1, (0, 2))), assembled((1, (0, 0)))
+        return (
+            self._assembled(product(w_xx) + 2 * product(w_xy) + product(w_yy)),
+            self._assembled(product(w)),
+        )
+
+    def _assembled(self, element: Array) -> csc_array:
+        """The matrix (D, D) of all unknowns from that of each triangle's, (T, 21, 21)."""
+        rows, columns = np.repeat(self.unknowns, 21, axis=1).ravel(), np.tile(self.unknowns, 21)
+        entries = element.ravel(), (rows, columns.ravel())
+        return csc_array(coo_array(entries, (self.size, self.size)))
 
     def allowed(self, clamped: bool) -> csc_array:
         """The combinations (D, F) of unknowns that the edge allows."""

@@ -1,7 +1,7 @@
 """Products of clamped beams' modes: the shapes of a skin whose edges hold its slope too."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -57,18 +57,33 @@ def _beam(s: Array, count: int, derivative: int) -> Array:
     over sqrt(2); cosh and sinh as decaying exponentials from either end, so that nothing overflows
     or cancels.
     """
-    k, even = _roots(count), np.arange(count) % 2 == 0
-    ks, phase = np.multiply.outer(s, k), np.where(even, np.pi / 2, 0.0)
-    sign = np.where(even, 1.0, -1.0)
-    wave = np.sin(ks + phase + derivative * np.pi / 2) / np.sin(k / 2 + phase)
-    from_ends = np.exp(ks - k / 2) + sign * (-1.0) ** derivative * np.exp(-ks - k / 2)
-    return k**derivative * (wave - from_ends / (1 + sign * np.exp(-k))) / np.sqrt(2)
+    modes = _modes(count)
+    ks = np.multiply.outer(s, modes.k)
+    wave = np.sin(ks + (modes.phase + derivative * np.pi / 2)) * modes.waves
+    decaying = np.exp(ks - modes.k / 2) * modes.decays
+    decaying += np.exp(-ks - modes.k / 2) * ((-1.0) ** derivative * modes.sign * modes.decays)
+    return modes.k**derivative * (wave - decaying)
 
 
-def _roots(count: int) -> Array:
+@dataclass(frozen=True, eq=False)
+class _Modes:
+    """Wave numbers k (N,), the phase that makes a sine even, the factors of waves and decays."""
+
+    k: Array
+    phase: Array
+    sign: Array
+    waves: Array
+    decays: Array
+
+
+@lru_cache(32)
+def _modes(count: int) -> _Modes:
     """The first roots k of cos k cosh k = 1 above zero, near (i + 1/2) pi, by Newton's method."""
     k = (np.arange(1.0, count + 1) + 0.5) * np.pi
     for _ in range(4):
         sech = 2 * np.exp(-k) / (1 + np.exp(-2 * k))
         k -= (np.cos(k) - sech) / (sech * np.tanh(k) - np.sin(k))
-    return k
+    sign = np.where(np.arange(count) % 2, -1.0, 1.0)
+    phase = (1 + sign) * np.pi / 4
+    waves, decays = 1 / np.sin(k / 2 + phase), 1 / (1 + sign * np.exp(-k))
+    return _Modes(k, phase, sign, waves / np.sqrt(2), decays / np.sqrt(2))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ive, jn_zeros, jv
 
-from kappaskin.bases.modes import ModeBasis, Order
+from kappaskin.bases.modes import ORDERS, ModeBasis, Order
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -44,13 +44,10 @@ class DiskBasis(ModeBasis):
     def _modes(self) -> "_Modes":
         return _modes(self.size, self.clamped)
 
-    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> list[Array]:
+    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> Array:
         R = self.patch.a / 2
         z = (positions[:, 0] - R + 1j * (positions[:, 1] - R)) / R
-        return [
-            values / R ** sum(order)
-            for order, values in zip(orders, self._modes(z, orders), strict=True)
-        ]
+        return self._modes(z, orders) / R ** np.sum(orders, axis=1)[:, None, None]
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: Gauss along the radius, even in angle."""
@@ -66,15 +63,19 @@ class DiskBasis(ModeBasis):
 # With z = x + i y the derivatives of J_m(k r) e^(i m theta) along D- = d/dx - i d/dy and
 # D+ = d/dx + i d/dy are k J_m-1 e^(i (m-1) theta) and -k J_m+1 e^(i (m+1) theta), those of I_m the
 # same with +: no division by r, so that they are regular at the centre. Each derivative along x
-# and y as a sum of factors times D-^p D+^q:
-_LADDERS: dict[Order, dict[tuple[int, int], complex]] = {
-    (0, 0): {(0, 0): 1},
-    (1, 0): {(1, 0): 0.5, (0, 1): 0.5},
-    (0, 1): {(1, 0): 0.5j, (0, 1): -0.5j},
-    (2, 0): {(2, 0): 0.25, (1, 1): 0.5, (0, 2): 0.25},
-    (1, 1): {(2, 0): 0.25j, (0, 2): -0.25j},
-    (0, 2): {(2, 0): -0.25, (1, 1): 0.5, (0, 2): -0.25},
-}
+# and y as a sum of factors times the steps D-^p D+^q:
+_STEPS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+_BY_STEPS = np.array(
+    [
+        [1, 0, 0, 0, 0, 0],
+        [0, 1 / 2, 1 / 2, 0, 0, 0],
+        [0, 1j / 2, -1j / 2, 0, 0, 0],
+        [0, 0, 0, 1 / 4, 1 / 2, 1 / 4],
+        [0, 0, 0, 1j / 4, 0, -1j / 4],
+        [0, 0, 0, -1 / 4, 1 / 2, -1 / 4],
+    ]
+)
+_TURNS = np.array([[q - p] for p, q in _STEPS])
 
 
 class _Modes:
@@ -89,10 +90,8 @@ class _Modes:
         nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
         to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
         to_series[0] /= 2
-        self._series = {
-            step: to_series @ self._radial((1 + np.cos(nodes)) / 2, *step) / (2 * mean_square**0.5)
-            for step in {step for ladder in _LADDERS.values() for step in ladder}
-        }
+        at_nodes = np.stack([self._radial((1 + np.cos(nodes)) / 2, *step) for step in _STEPS])
+        self._series = to_series @ at_nodes / (2 * np.sqrt(mean_square))
 
     def _radial(self, r: Array, p: int, q: int) -> Array:
         """The radial part of D-^p D+^q of the pairs of modes, (P, U), at `r` (P,)."""
@@ -100,20 +99,19 @@ class _Modes:
         growing: Array = ive(m - p + q, kr) / ive(m, k) * np.exp(kr - k)  # I_m-p+q(k r)/I_m(k)
         return k ** (p + q) * ((-1.0) ** q * jv(m - p + q, kr) - jv(m, k) * growing)
 
-    def __call__(self, z: NDArray[np.complex128], orders: Sequence[Order]) -> list[Array]:
-        """For each order the derivatives (P, N) at the points z = x + i y (P,) of the disk."""
+    def __call__(self, z: NDArray[np.complex128], orders: Sequence[Order]) -> Array:
+        """For each order the derivatives (O, P, N) at the points z = x + i y (P,) of the disk."""
         r, angle = np.abs(z), np.angle(z)
         t = np.arccos(np.clip(2 * r - 1, -1, 1))
         polynomials = np.cos(np.multiply.outer(t, self._degrees))
-        turned, unit = np.exp(1j * np.multiply.outer(angle, self.m)), np.exp(1j * angle)[:, None]
-        steps = {step for order in orders for step in _LADDERS[order]}
-        parts = {(p, q): polynomials @ self._series[p, q] * unit ** (q - p) for p, q in steps}
-
-        def of(order: Order) -> Array:
-            values = sum(factor * parts[step] for step, factor in _LADDERS[order].items()) * turned
-            return values.view(float)[:, self._columns]  # cosines are real, sines imaginary parts
-
-        return [of(order) for order in orders]
+        rows = _BY_STEPS[[ORDERS.index(order) for order in orders]]
+        used = np.flatnonzero(rows.any(axis=0))
+        steps = polynomials @ (self._series if len(used) == 6 else self._series[used])
+        turned = np.exp(1j * (_TURNS[used] * angle))[..., None] * steps
+        values = np.tensordot(rows[:, used], turned, 1) * np.exp(
+            1j * np.multiply.outer(angle, self.m)
+        )
+        return values.view(float)[..., self._columns]  # cosines are real, sines imaginary parts
 
 
 _modes = lru_cache(8)(_Modes)

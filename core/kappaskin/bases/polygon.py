@@ -49,7 +49,7 @@ class PolygonBasis(ModeBasis):
     def _modes(self) -> PlateModes:
         return plate_modes(self._outline.vertices, self.size, self.clamped)
 
-    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> list[Array]:
+    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> Array:
         return self._modes.functions.derivatives(positions, orders)
 
     def quadrature(self) -> tuple[Array, Array]:

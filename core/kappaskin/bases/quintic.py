@@ -3,14 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.special import perm
 
-from kappaskin.bases.modes import Order
+from kappaskin.bases.modes import ORDERS, Order
 from kappaskin.bases.product import gauss
 from kappaskin.frames import Array
 
@@ -20,27 +19,29 @@ _ROUNDING = 1e-9  # of a triangle
 Indices = NDArray[np.intp]
 
 _I, _J = np.array([(i, j) for i in range(6) for j in range(6 - i)]).T
+_FACTORS = np.array([perm(_I, a) * perm(_J, b) for a, b in ORDERS], float)
+_POWERS = np.array([(np.maximum(_I - a, 0), np.maximum(_J - b, 0)) for a, b in ORDERS])
 
 
-def _monomials(xi: Array, a: int, b: int) -> Array:
-    """The derivative of order a, b of the 21 monomials xi^i eta^j at `xi` (P, 2), (P, 21)."""
-    factor = np.asarray(perm(_I, a) * perm(_J, b), float)
-    return factor * xi[:, :1] ** np.maximum(_I - a, 0) * xi[:, 1:] ** np.maximum(_J - b, 0)
+def monomials(xi: Array) -> Array:
+    """The 21 monomials xi^i eta^j of `xi` (..., 2), with their derivatives, (..., 6, 21)."""
+    powers = xi[..., None] ** np.arange(6)
+    return _FACTORS * powers[..., 0, _POWERS[:, 0]] * powers[..., 1, _POWERS[:, 1]]
 
 
-def quintics(inverse: Array, xi: Array, order: Order) -> Array:
-    """The derivative of every monomial along x and y, (P, 21), by the chain rule.
+def chained(inverse: Array) -> Array:
+    """The chain rule (..., 6, 6): derivatives along x, y from those along xi, eta.
 
-    `inverse` (P, 2, 2) or (2, 2) holds the derivatives of xi (P, 2) along x and y.
+    `inverse` (..., 2, 2) holds the derivatives of xi along x and y.
     """
-    directions = [0] * order[0] + [1] * order[1]
-    total = np.zeros((len(xi), 21))
-    for steps in product((0, 1), repeat=len(directions)):
-        factor = np.ones(len(xi))
-        for step, direction in zip(steps, directions, strict=True):
-            factor = factor * inverse[..., step, direction]
-        total += factor[:, None] * _monomials(xi, steps.count(0), steps.count(1))
-    return total
+    (p, q), (r, s) = np.moveaxis(inverse, (-2, -1), (0, 1))  # xi_x, xi_y; eta_x, eta_y
+    C = np.zeros((*inverse.shape[:-2], 6, 6))
+    C[..., 0, 0] = 1
+    C[..., 1:3, 1:3] = np.swapaxes(inverse, -1, -2)
+    C[..., 3, 3:] = np.stack([p * p, 2 * p * r, r * r], axis=-1)
+    C[..., 4, 3:] = np.stack([p * q, p * s + q * r, r * s], axis=-1)
+    C[..., 5, 3:] = np.stack([q * q, 2 * q * s, s * s], axis=-1)
+    return C
 
 
 def triangle_quadrature() -> tuple[Array, Array]:
@@ -66,35 +67,50 @@ class Quintics:
     def _tree(self) -> KDTree:
         return KDTree(self.origins + np.linalg.inv(self.inverse).sum(axis=-1) / 3)
 
-    def _local(self, positions: Array, triangles: Indices) -> tuple[Indices, Array, Array]:
-        """The best of the `triangles` (P, K) for each position, xi there, how far inside (P,)."""
-        offset = positions[:, None] - self.origins[triangles]
-        xi = np.einsum("pkij,pkj->pki", self.inverse[triangles], offset)
-        inside = np.minimum(xi.min(axis=-1), 1 - xi.sum(axis=-1))
-        best = np.arange(len(xi)), inside.argmax(axis=1)
-        return triangles[best], xi[best], inside[best]
+    @cached_property
+    def _chained(self) -> Array:
+        return chained(self.inverse)
 
-    def located(self, positions: Array) -> tuple[Indices, Array]:
-        """The triangle (P,) that each position lies in, or nearest to, and xi (P, 2) there."""
-        T = len(self.origins)
+    @cached_property
+    def _depths(self) -> Array:
+        """How far (3 T, 3) a point (x, y, 1) is from the sides of every triangle, inward."""
+        slopes = np.concatenate([self.inverse, -self.inverse.sum(axis=1, keepdims=True)], axis=1)
+        at_origin = np.array([0.0, 0.0, 1.0]) - np.einsum("tij,tj->ti", slopes, self.origins)
+        return np.concatenate([slopes, at_origin[..., None]], axis=-1).reshape(-1, 3)
+
+    def _nearest(self, position: Array) -> int:
+        """The triangle that a position (2,) is deepest inside of."""
+        depths = self._depths @ np.append(position, 1.0)
+        return int(depths.reshape(-1, 3).min(axis=1).argmax())
+
+    def _located(self, positions: Array) -> Indices:
+        """The triangle (P,) that each position lies in, or nearest to."""
         if len(positions) == 1:  # a tree takes longer
-            found, xi, _ = self._local(positions, np.arange(T)[None])
-            return found, xi
-        nearest = self._tree.query(positions, min(_NEAREST, T))[1].reshape(len(positions), -1)
-        found, xi, inside = self._local(positions, nearest)
-        for p in np.flatnonzero(inside < -_ROUNDING):  # in none of those with the nearest centres
-            found[p : p + 1], xi[p : p + 1], _ = self._local(
-                positions[p : p + 1], np.arange(T)[None]
-            )
-        return found, xi
+            return np.array([self._nearest(positions[0])])
+        some = min(_NEAREST, len(self.origins))
+        near = self._tree.query(positions, some)[1].reshape(len(positions), some)
+        xi = self._local(positions[:, None], near)
+        depth = np.minimum(xi.min(axis=-1), 1 - xi.sum(axis=-1))
+        found = near[np.arange(len(near)), depth.argmax(axis=1)]
+        for p in np.flatnonzero(depth.max(axis=1) < -_ROUNDING):  # in none with so near a centre
+            found[p] = self._nearest(positions[p])
+        return found
 
-    def derivatives(self, positions: Array, orders: Sequence[Order]) -> list[Array]:
-        """For each of `orders` the derivatives (P, N) at `positions` (P, 2) in the mesh."""
-        triangle, xi = self.located(positions)
-        rows = np.stack([quintics(self.inverse[triangle], xi, o) for o in orders], axis=1)
-        values = np.empty((len(positions), len(orders), self.coefficients.shape[-1]))
+    def _local(self, positions: Array, triangles: Indices) -> Array:
+        """The coordinates xi (..., 2) of `positions` in `triangles`."""
+        offset = positions - self.origins[triangles]
+        return np.einsum("...ij,...j->...i", self.inverse[triangles], offset)
+
+    def derivatives(self, positions: Array, orders: Sequence[Order]) -> Array:
+        """For each of `orders` the derivatives (O, P, N) at `positions` (P, 2) in the mesh."""
+        triangle, which = self._located(positions), [ORDERS.index(order) for order in orders]
+        rows = self._chained[triangle][:, which] @ monomials(self._local(positions, triangle))
+        if len(positions) == 1:
+            return (rows[0] @ self.coefficients[triangle[0]])[:, None]
+        values = np.empty((len(orders), len(positions), self.coefficients.shape[-1]))
         sorted_by = np.argsort(triangle, kind="stable")
         starts = np.flatnonzero(np.diff(triangle[sorted_by], prepend=-1))
         for group in np.split(sorted_by, starts)[1:]:
-            values[group] = rows[group] @ self.coefficients[triangle[group[0]]]
-        return list(np.moveaxis(values, 1, 0))
+            here = rows[group] @ self.coefficients[triangle[group[0]]]
+            values[:, group] = np.swapaxes(here, 0, 1)
+        return values
