@@ -1,16 +1,28 @@
 """Between the window and the engine: settings go down, what came of them comes up."""
 
+import math
 import time
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from kappaskin import CurvatureMap, Engine, Estimate, Refusal, Setup, Status, basis_for
+from kappaskin import (
+    Bargain,
+    CurvatureMap,
+    Engine,
+    Estimate,
+    PointLoad,
+    Refusal,
+    Setup,
+    Status,
+    bargain,
+    basis_for,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
-from kappaskin_app.settings import LOAD_CASES, SceneSettings, Settings, part
-from kappaskin_app.simulation import scene_of
+from kappaskin_app.settings import LOAD_CASES, Scanning, SceneSettings, Settings, part
+from kappaskin_app.simulation import region_of, scene_of
 from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE, WAITING
 
 Array = NDArray[np.float64]
@@ -42,6 +54,7 @@ class Session(QObject):
         self.engine = engine
         self.scene = scene_of(history.settings)
         engine.set_up(_setup_of(history.settings))
+        engine.scan(region_of(history.settings))
         self.status = Status()
         self.estimate: Estimate | None = None
         self.source = ""
@@ -79,6 +92,8 @@ class Session(QObject):
         was, self._settings = self._settings, settings
         if _setup_of(settings) != _setup_of(was):
             self.engine.set_up(_setup_of(settings))
+        if part(settings, Scanning) != part(was, Scanning):
+            self.engine.scan(region_of(settings))
         if self.simulating and part(settings, SceneSettings) != part(was, SceneSettings):
             self._play()
 
@@ -91,6 +106,20 @@ class Session(QObject):
             why = str(refusal)
         self.engine.play(self.scene)
         self.refused.emit(why)
+
+    def bargain(self) -> Bargain | None:
+        """What scanning the region in use buys and costs, while a contact tells where it is."""
+        region, estimate, sensor = self.status.region, self.estimate, self.status.sensor
+        if region.around == "off" or estimate is None or sensor is None:
+            return None
+        touch = estimate.touch
+        if not (touch.present and math.isfinite(estimate.noise)):
+            return None
+        try:
+            contact = PointLoad(*(float(x) for x in touch.position), touch.force)
+            return bargain(sensor, region, contact, estimate.noise)
+        except Refusal:  # elements chosen on another skin: the status says so
+            return None
 
     @guarded
     def tick(self) -> None:

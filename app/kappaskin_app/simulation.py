@@ -8,16 +8,25 @@ from typing import Any
 import numpy as np
 
 from kappaskin import (
+    FIRST_GENERATION,
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION,
+    SECOND_GENERATION_LOOPS,
     Basis,
     Compliance,
+    Creep,
     GaussianNoise,
+    Hysteresis,
     LineLoad,
     Load,
     Orbit,
     Plate,
     PointLoad,
+    Region,
     Scene,
     SensorLayout,
+    Tolerance,
+    Transduction,
     UniformNoise,
     basis_for,
     load_scene,
@@ -32,11 +41,47 @@ _MOST_BENT = 14.0  # 1/m at an element: twice that, as a load passes over one, i
 _REMEMBERED = 8  # skins whose compliance need not be computed again
 
 
-def _effects(settings: Settings) -> tuple[UniformNoise | GaussianNoise, ...]:
-    kinds = {"uniform": UniformNoise, "gaussian": GaussianNoise}
-    if settings.noise_kind not in kinds or not settings.noise_rms:
-        return ()
-    return (kinds[settings.noise_kind](settings.noise_rms),)
+_CHAINS = {
+    "modern": Transduction(),
+    "second": SECOND_GENERATION,
+    "first": FIRST_GENERATION,
+}
+_LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
+_CREEPING = 5.0  # s, the time constant of the creep
+_OFFSET = 10.0  # 1/m of offset for a gain that is off by 1
+
+_Effect = UniformNoise | GaussianNoise | Hysteresis | Creep | Tolerance
+
+
+def _effects(settings: Settings) -> tuple[_Effect, ...]:
+    """What spoils a reading, in the order in which it comes about: gage, bridge, noise."""
+    s, kinds = settings, {"uniform": UniformNoise, "gaussian": GaussianNoise}
+    found: list[_Effect] = []
+    if s.loops in _LOOPS:
+        found.append(_LOOPS[s.loops])
+    if s.creep:
+        found.append(Creep(s.creep, _CREEPING))
+    if s.tolerance:
+        found.append(Tolerance(s.tolerance, _OFFSET * s.tolerance))
+    if s.noise_kind in kinds and s.noise_rms:
+        found.append(kinds[s.noise_kind](s.noise_rms))
+    return tuple(found)
+
+
+def _transduction(settings: Settings) -> Transduction:
+    chain = _CHAINS[settings.electronics]
+    converter = replace(
+        chain.converter, bits=settings.bits, conversion_time=settings.conversion_time
+    )
+    return replace(chain, converter=converter)
+
+
+def region_of(settings: Settings) -> Region:
+    """Which elements every frame scans; all of them until some are chosen."""
+    s = settings
+    if s.region == "elements" and not s.region_elements:
+        return Region()
+    return Region(s.region, s.region_elements, s.region_radius, s.region_share)
 
 
 def _free_loads(settings: Settings) -> tuple[PointLoad | LineLoad, ...]:
@@ -119,6 +164,7 @@ def scene_of(settings: Settings) -> Scene:
         loads,
         motion,
         _effects(settings),
+        _transduction(settings),
         seed=settings.noise_seed,
         reference=_REFERENCE,
         edge=settings.edge,
@@ -142,6 +188,11 @@ def with_consequences(settings: Settings, name: str, value: Any) -> dict[str, An
     changed: dict[str, Any] = {name: value}
     if name == "shape":
         changed |= SHAPES[value].begins
+    if name == "electronics":
+        converter = _CHAINS[value].converter
+        changed |= {"bits": converter.bits, "conversion_time": converter.conversion_time}
+    if name in ("elements_x", "elements_y"):
+        changed["region_elements"] = ()  # they were chosen among others
     for side, places in (("side_x", ("x", "x_end")), ("side_y", ("y", "y_end"))):
         if side in changed:
             longer = changed[side] / getattr(settings, side)

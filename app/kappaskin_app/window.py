@@ -18,11 +18,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Engine, Status, serial_ports
+from kappaskin import FIGURES, Engine, Status, serial_ports
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.columns import column, widen
 from kappaskin_app.display import Display
+from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.panels.panels import Panels
@@ -33,6 +34,7 @@ from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.wishes import Wishes
 
+_BARGAIN = 1.0  # s between two looks at what a region buys
 _HINT = "Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom; F1: shortcuts"
 
 
@@ -50,6 +52,7 @@ class MainWindow(QMainWindow):
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
+        self._next_bargain = 0.0
         # There from the start, or its first message would push the rest up.
         self.statusBar().addWidget(QLabel(_HINT))
         self.setCentralWidget(self._centre())
@@ -98,6 +101,7 @@ class MainWindow(QMainWindow):
     def _make_actions(self) -> None:
         add, stack, wishes = self.actions_by_name.add, self.history.stack, self.wishes
         file, edit, source, view, help_ = "&File", "&Edit", "&Source", "&View", "&Help"
+        figures = "Fi&gures"
         add("picture", file, "Save &picture", self._save_picture, "Ctrl+S")
         add("quit", file, "&Quit", self.close, "Ctrl+Q")
         undo, redo = stack.createUndoAction(self), stack.createRedoAction(self)
@@ -128,6 +132,8 @@ class MainWindow(QMainWindow):
         for dock in self._docks:
             name = f"dock-{dock.objectName()}"
             self.actions_by_name.register(name, view, dock.toggleViewAction())
+        for name in FIGURES:
+            add(name, figures, TITLES.get(name, name), partial(self._draw, name))
         add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
 
     def _wire(self) -> None:
@@ -148,6 +154,7 @@ class MainWindow(QMainWindow):
         drag.given_up.connect(guarded(wishes.give_up))
         for name, heatmap in self.heatmaps.items():
             heatmap.pointed.connect(guarded(self.display.point))
+            heatmap.chosen.connect(guarded(wishes.choose))
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
         guard.on_failure(self._tell)
@@ -188,6 +195,10 @@ class MainWindow(QMainWindow):
     def _show_status(self, status: Status) -> None:
         self.display.show_status(status)
         simulating = self.session.simulating and status.state == "streaming"
+        now = time.monotonic()
+        if now >= self._next_bargain:
+            self._next_bargain = now + _BARGAIN
+            self.panels.region.show_bargain(self.session.bargain())
         self.panels.show_status(status, simulating)
 
     # Small things.
@@ -203,6 +214,10 @@ class MainWindow(QMainWindow):
         path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png"))
         done = self.picture(path)
         self._tell(f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}")
+
+    def _draw(self, name: str) -> None:
+        """Draw a figure of the paper from a run of its own, in a window beside this one."""
+        FigureWindow(name, self).show()
 
     def _show_shortcuts(self) -> None:
         if self._shortcuts is None:

@@ -22,6 +22,13 @@ class Wishes:
         changed = with_consequences(self._history.settings, name, value)
         self._history.wish(name, label, **changed)
 
+    def choose(self, element: int) -> None:
+        """Take an element into the region of those chosen, or out of it."""
+        settings = self._history.settings
+        if settings.region == "elements":
+            chosen = set(settings.region_elements) ^ {element}
+            self._history.change("Choose elements", region_elements=tuple(sorted(chosen)))
+
     def toggle(self, name: str) -> None:
         self.wish(name, not getattr(self._history.settings, name))
 

@@ -11,13 +11,14 @@ from kappaskin_app.panels.basis import BasisPanel
 from kappaskin_app.panels.connection import ConnectionPanel
 from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.panel import Panel
+from kappaskin_app.panels.sensor import ElectronicsPanel, RegionPanel, SpoilsPanel
 from kappaskin_app.panels.skin import ElementsPanel, ShapePanel, SupportPanel
 from kappaskin_app.panels.view import ViewPanel
 from kappaskin_app.settings import Settings
 from kappaskin_app.theme import Theme
 
 _Some = TypeVar("_Some", bound=Panel)
-_LIVE, _SKIN = "&Live", "S&kin"
+_LIVE, _SKIN, _SENSOR = "&Live", "S&kin", "Se&nsor"
 
 
 class Panels(QTabWidget):
@@ -36,6 +37,9 @@ class Panels(QTabWidget):
         self.shape = self._add(_SKIN, ShapePanel())
         self.elements = self._add(_SKIN, ElementsPanel())
         self.support = self._add(_SKIN, SupportPanel())
+        self.electronics = self._add(_SENSOR, ElectronicsPanel())
+        self.spoils = self._add(_SENSOR, SpoilsPanel())
+        self.region = self._add(_SENSOR, RegionPanel())
         for title, panels in self._pages.items():
             self.addTab(scrolled(*panels), title)
         self.setUsesScrollButtons(False)  # every title is to be seen

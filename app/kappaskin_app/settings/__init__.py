@@ -12,22 +12,25 @@ from kappaskin_app.settings.load import LOAD_CASES as LOAD_CASES
 from kappaskin_app.settings.load import TABLE_1_CASES as TABLE_1_CASES
 from kappaskin_app.settings.load import TWO_ENDED as TWO_ENDED
 from kappaskin_app.settings.load import Load, Noise
+from kappaskin_app.settings.sensor import Electronics as Electronics
+from kappaskin_app.settings.sensor import Scanning as Scanning
+from kappaskin_app.settings.sensor import Spoils as Spoils
 from kappaskin_app.settings.shown import COLOURS as COLOURS
 from kappaskin_app.settings.shown import Fit, View
 from kappaskin_app.settings.skin import Skin
 
 
 @dataclass(frozen=True)
-class SceneSettings(Skin, Load, Noise):
+class SceneSettings(Skin, Load, Noise, Electronics, Spoils):
     """Those that make the simulated scene."""
 
 
 @dataclass(frozen=True)
-class Settings(SceneSettings, Fit, View):
+class Settings(SceneSettings, Fit, View, Scanning):
     """Everything a person may change, in SI units; a change is a new `Settings`."""
 
 
-def part(settings: Settings, kind: type[SceneSettings | Fit | View]) -> tuple[Any, ...]:
+def part(settings: Settings, kind: type[SceneSettings | Fit | View | Scanning]) -> tuple[Any, ...]:
     """The values of the settings that belong to `kind`."""
     return tuple(getattr(settings, field.name) for field in fields(kind))
 

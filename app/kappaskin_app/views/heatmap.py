@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, QSize, Signal
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
@@ -14,6 +14,8 @@ from kappaskin_app.views.colour_bar import ColourBar, LockButton
 from kappaskin_app.views.line import Line
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 
 def coloured(values: Array, limits: tuple[float, float], colours: Colours, missing: str) -> Colours:
@@ -33,6 +35,7 @@ class _Cells(QWidget):
     """The elements, drawn as cells that tile a regular grid or as squares where they are."""
 
     pointed = Signal(int)
+    chosen = Signal(int)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -40,6 +43,7 @@ class _Cells(QWidget):
         self._colours: Colours = np.empty((0, 3), np.uint8)
         self._line = QColor("#888888")
         self._under, self._faded = -1, False
+        self._marks: tuple[list[int], list[int]] = ([], [])
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(90, 90)
@@ -49,7 +53,7 @@ class _Cells(QWidget):
 
     def show_layout(self, layout: SensorLayout) -> None:
         self._layout = layout
-        self._under = -1
+        self._under, self._marks = -1, ([], [])
 
     def _spacing(self) -> float:
         """What separates the two nearest elements, in m: squares of that side hide none."""
@@ -63,6 +67,13 @@ class _Cells(QWidget):
     def show_cells(self, rgb: Colours) -> None:
         self._colours = rgb
         self.update()
+
+    def show_marks(self, crossed: Indices, dotted: Indices) -> None:
+        """Cross out and dot elements by number."""
+        marks = (crossed.tolist(), dotted.tolist())
+        if marks != self._marks:
+            self._marks = marks
+            self.update()
 
     def show_faded(self, faded: bool) -> None:
         if faded != self._faded:
@@ -115,11 +126,23 @@ class _Cells(QWidget):
         painter.setOpacity(1.0)
         painter.setPen(QPen(self._line, 1))
         painter.drawRect(area)
+        self._paint_marks(painter, area)
         if self._under >= 0:
             cell = self._cell(area, self._under)
             for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # seen on every colour
                 painter.setPen(QPen(QColor(colour), width))
                 painter.drawRect(cell)
+
+    def _paint_marks(self, painter: QPainter, area: QRectF) -> None:
+        crossed, dotted = self._marks
+        for colour, width in (("#16191d", 3), ("#ffffff", 1)):  # seen on every colour
+            painter.setPen(QPen(QColor(colour), width))
+            for element in crossed:
+                cell = self._cell(area, element)
+                painter.drawLine(cell.topLeft(), cell.bottomRight())
+                painter.drawLine(cell.bottomLeft(), cell.topRight())
+            for element in dotted:
+                painter.drawEllipse(self._cell(area, element).center(), 2.0, 2.0)
 
     def _cell(self, area: QRectF, element: int) -> QRectF:
         if self._layout is None or not self._layout.shape:
@@ -139,6 +162,11 @@ class _Cells(QWidget):
         ]
         return int(np.argmin(np.linalg.norm(layout.positions - position, axis=1)))
 
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        element = self._element_at(event.position())
+        if element >= 0 and event.button() == Qt.MouseButton.LeftButton:
+            self.chosen.emit(element)
+
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         self.point_at(self._element_at(event.position()))
         self.pointed.emit(self._under)
@@ -157,6 +185,7 @@ class Heatmap(QWidget):
     """One curvature component, element by element; says which element is pointed at."""
 
     pointed = Signal(int)
+    chosen = Signal(int)
     lock_wanted = Signal(float)
 
     def __init__(self, component: str, tip: str, parent: QWidget | None = None) -> None:
@@ -170,6 +199,7 @@ class Heatmap(QWidget):
         self.lock.wanted.connect(lambda locked: self.lock_wanted.emit(self._limit * locked))
         self.cells, self.bar = _Cells(), ColourBar()
         self.cells.pointed.connect(self.pointed)
+        self.cells.chosen.connect(self.chosen)
         self._limit, self._layout, self._element = 1.0, None, -1
         self._missing = "#888888"
         top = QHBoxLayout()
@@ -204,6 +234,10 @@ class Heatmap(QWidget):
         limits = (-limit, limit)
         self.cells.show_cells(coloured(values, limits, DIVERGING, self._missing))
         self.bar.show_scale(DIVERGING, limits, "1/m")
+
+    def show_marks(self, crossed: Mask, dotted: Mask) -> None:
+        """Cross out elements (P,) bent beyond their strain limit, dot those chosen to scan."""
+        self.cells.show_marks(np.flatnonzero(crossed), np.flatnonzero(dotted))
 
     def show_lost(self, lost: bool) -> None:
         """Fade the cells while what they show is not coming in any more."""

@@ -1,0 +1,93 @@
+"""The simulated electronics and what spoils them; which elements are scanned, and at what cost."""
+
+from PySide6.QtWidgets import QLabel, QWidget
+
+from kappaskin import Bargain, Sensor, Status
+from kappaskin_app.panels.form import Form
+from kappaskin_app.panels.load import SimulationForm
+from kappaskin_app.settings import Settings
+
+_CHOOSE = "Click elements on a heatmap to choose them."
+
+
+def _facts(sensor: Sensor) -> tuple[str, str, str]:
+    """What the electronics come to: frame rate, smallest step and range, strain limit."""
+    chain = sensor.transduction
+    most = min(abs(limit) for limit in chain.limits) * chain.resolution
+    return (
+        f"{sensor.channels} channels, {1 / chain.scan_time(sensor.channels):.0f}/s",
+        f"{chain.resolution:.2g} 1/m, to \N{PLUS-MINUS SIGN}{most:.0f} 1/m",
+        f"1 % at {chain.strain_limit_curvature:.0f} 1/m",
+    )
+
+
+class ElectronicsPanel(SimulationForm):
+    """Asks for the electronics; says how fast, how fine and how far they read."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Electronics", ("electronics", "bits", "conversion_time"), parent)
+        self._facts = [QLabel() for _ in range(3)]
+        rows = (
+            ("Frame", "The most frames per second: one over the time of all channels."),
+            ("Step", "The curvature of one count, and how far the converter reads."),
+            ("Strain", "Where a gage strains by 1 %, beyond which metal foil is not elastic."),
+        )
+        for (name, tip), fact in zip(rows, self._facts, strict=True):
+            label = QLabel(name)
+            for widget in (label, fact):
+                widget.setToolTip(tip)
+            self.form.addRow(label, fact)
+        self._sensor: Sensor | None = None
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        super().show_status(status, simulating)
+        if status.sensor is not None and status.sensor is not self._sensor:
+            self._sensor = status.sensor
+            for label, text in zip(self._facts, _facts(status.sensor), strict=True):
+                label.setText(text)
+
+
+class SpoilsPanel(SimulationForm):
+    """Asks for hysteresis, creep and tolerance."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Gages", ("loops", "creep", "tolerance"), parent)
+
+
+class RegionPanel(Form):
+    """Asks for a region of interest; says what it buys and costs, or why there can be none."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Scan", ("region", "region_radius", "region_share"), parent)
+        self._region, self._chosen = "off", 0
+        self._told = ""
+
+    def show_settings(self, settings: Settings) -> None:
+        super().show_settings(settings)
+        self._region, self._chosen = settings.region, len(settings.region_elements)
+        round_a_contact = settings.region in ("skin", "intrinsic")
+        rows = {"region"} | ({"region_radius"} if round_a_contact else set())
+        self.show_rows(rows | ({"region_share"} if settings.region != "off" else set()))
+
+    def show_bargain(self, bargain: Bargain | None) -> None:
+        """What the region in use buys and costs; None while that is not known."""
+        self._told = "" if bargain is None else _words(bargain)
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        if status.region_refusal:
+            self.show_message(f"{status.region_refusal}.")
+        elif self._region == "elements" and not self._chosen:
+            self.show_message(_CHOOSE, hint=True)
+        else:
+            self.show_message(self._told if self._region != "off" else "", hint=True)
+
+
+def _words(bargain: Bargain) -> str:
+    mm = 1e3 * max(bargain.bound[:2])
+    full = 1e3 * max(bargain.full_bound[:2])
+    return (
+        f"{bargain.channels} channels a frame: {bargain.rate:.0f} instead of "
+        f"{bargain.full_rate:.0f} frames/s, {bargain.gain:.1f} times. One frame tells the contact "
+        f"to \N{PLUS-MINUS SIGN}{mm:.2f} mm at best, all channels to "
+        f"\N{PLUS-MINUS SIGN}{full:.2f} mm."
+    )
