@@ -116,7 +116,8 @@ class Session(QObject):
         if not (touch.present and math.isfinite(estimate.noise)):
             return None
         try:
-            contact = PointLoad(*(float(x) for x in touch.position), touch.force)
+            x, y = (float(place) for place in touch.position)
+            contact = PointLoad(x, y, touch.force)
             return bargain(sensor, region, contact, estimate.noise)
         except Refusal:  # elements chosen on another skin: the status says so
             return None
