@@ -22,6 +22,7 @@ from kappaskin import (
 )
 from kappaskin.cli import main
 from kappaskin.figures import fig2, fig9, style
+from kappaskin.studies.initial_curvature import initial_curvature
 from kappaskin_app import theme
 
 DOUBLE_COLUMN = 174 / 25.4
@@ -332,6 +333,26 @@ def test_fig9_is_true_to_scale(drawn) -> None:
         assert x1 - x0 == pytest.approx(z1 - z0)
         x, z = line(axes, "at rest")
         np.testing.assert_allclose(np.hypot(x, z), 12.9)
+
+
+def test_initial_curvature_draws_the_rows_of_the_study(drawn) -> None:
+    readings, shape = drawn["initial-curvature"][0].axes
+    pinned = [row for row in initial_curvature() if row["ends"] == "pinned"]
+    shown = (
+        (readings, "first cycle", "reading_rms", 1),
+        (readings, "settled cycle", "reading_rms", 1),
+        (shape, "first cycle", "rms_mm", 1e3),
+        (shape, "settled cycle", "rms_mm", 1e3),
+        (shape, "once released", "rest_rms_mm", 1e3),
+    )
+    for axes, label, column, unit in shown:
+        rows = [
+            row for row in pinned if row["cycle"] == ("first" if "first" in label else "settled")
+        ]
+        x, y = line(axes, label)
+        np.testing.assert_array_equal(x, [row["base_curvature"] for row in rows])
+        np.testing.assert_array_equal(y, [unit * row[column] for row in rows])
+        assert 0 < y.min() < y.max() < axes.get_ylim()[1]
 
 
 # refusals

@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kappaskin.errors import Refusal
-from kappaskin.figures import fig1, fig2, fig6, fig8, fig9, style
+from kappaskin.figures import fig1, fig2, fig6, fig8, fig9, initial_curvature, style
 
 FIGURES: dict[str, Callable[[style.Figure], None]] = {
     "fig1": fig1.draw,
@@ -13,6 +13,7 @@ FIGURES: dict[str, Callable[[style.Figure], None]] = {
     "fig6": fig6.draw,
     "fig8": fig8.draw,
     "fig9": fig9.draw,
+    "initial-curvature": initial_curvature.draw,
 }
 """What draws each figure on an empty matplotlib.figure.Figure; fig1 to fig9 are the paper's."""
 
