@@ -12,7 +12,7 @@ from kappaskin_app.settings import Settings
 from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, PULLED, SEQUENTIAL, Colours, Theme
 from kappaskin_app.views.badge import LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.views.colour_bar import SkinScale
-from kappaskin_app.views.heatmap import Heatmap, Mask
+from kappaskin_app.views.heatmap import Array, Heatmap, Mask
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.readouts import Health, Readouts
 
@@ -126,17 +126,17 @@ class Display:
         self.scale.show_times(times)
         if now >= self._next_heatmaps:
             self._next_heatmaps = now + _HEATMAPS
-            crossed, dotted = self._marks(estimate)
+            crossed, dotted = self.marks(estimate.curvature)
             for row, (name, heatmap) in enumerate(self.heatmaps.items()):
                 readings = estimate.curvature[row]
                 heatmap.show_marks(crossed, dotted)
                 heatmap.show_values(readings, self.ranges.limit(name, readings, settings, now))
 
-    def _marks(self, estimate: Estimate) -> tuple[Mask, Mask]:
+    def marks(self, curvature: Array) -> tuple[Mask, Mask]:
         """Which elements are bent beyond their strain limit, and which were chosen to scan."""
         sensor, settings = self._session.status.sensor, self._settings
-        none = np.zeros(estimate.curvature.shape[1], bool)
-        crossed = none if sensor is None else sensor.transduction.overstrained(estimate.curvature)
+        none = np.zeros(curvature.shape[1], bool)
+        crossed = none if sensor is None else sensor.transduction.overstrained(curvature)
         dotted = none.copy()
         if settings.region == "elements":
             dotted[[p for p in settings.region_elements if p < len(none)]] = True

@@ -96,7 +96,7 @@ def _whole(how: Range, said: Callable[[Any], None]) -> _Editor:
 
 
 def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
-    if not how.decimals:
+    if not how.decimals and how.scale == 1:
         return _whole(how, said)
     box = _RealBox()
     box.setLocale(QLocale.c())

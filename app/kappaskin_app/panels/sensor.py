@@ -58,7 +58,7 @@ class RegionPanel(Form):
     """Asks for a region of interest; says what it buys and costs, or why there can be none."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Scan", ("region", "region_radius", "region_share"), parent)
+        super().__init__("Region of interest", ("region", "region_radius", "region_share"), parent)
         self._region, self._chosen = "off", 0
         self._told = ""
 

@@ -51,7 +51,8 @@ class Skin:
         Choice(
             "Edge",
             "How the skin is held along its edges. Hinged: it cannot move there but turns freely, "
-            "and a bent one keeps its length; sliding: the ends of a bent one are free to slide.",
+            "and a bent one keeps its length; sliding: the ends of a bent one are free to slide; "
+            "clamped: it cannot turn either; elastic: a flat one's rim gives.",
             EDGE_NAMES,
         ),
     )

@@ -141,8 +141,10 @@ class _Cells(QWidget):
                 cell = self._cell(area, element)
                 painter.drawLine(cell.topLeft(), cell.bottomRight())
                 painter.drawLine(cell.bottomLeft(), cell.topRight())
+            painter.setBrush(QColor(colour))
             for element in dotted:
-                painter.drawEllipse(self._cell(area, element).center(), 2.0, 2.0)
+                painter.drawEllipse(self._cell(area, element).center(), 1.5, 1.5)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
 
     def _cell(self, area: QRectF, element: int) -> QRectF:
         if self._layout is None or not self._layout.shape:

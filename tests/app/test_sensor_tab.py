@@ -1,0 +1,93 @@
+"""Electronics, gages and the region to scan: from settings to the scene and to what is told."""
+
+import numpy as np
+import pytest
+
+from kappaskin import (
+    SECOND_GENERATION,
+    SECOND_GENERATION_LOOPS,
+    Creep,
+    Region,
+    Tolerance,
+    UniformNoise,
+)
+from kappaskin_app.settings import Settings
+from kappaskin_app.simulation import region_of, scene_of, with_consequences
+
+
+def test_the_default_gages_spoil_nothing_but_the_noise():
+    assert scene_of(Settings()).effects == (UniformNoise(0.231),)
+
+
+def test_effects_stand_in_the_order_in_which_they_come_about():
+    settings = Settings(loops="second", creep=0.1, tolerance=0.05)
+
+    effects = scene_of(settings).effects
+
+    assert effects[0] is SECOND_GENERATION_LOOPS
+    assert effects[1:3] == (Creep(0.1, 5.0), Tolerance(0.05, 0.5))
+
+
+def test_a_prototype_brings_its_converter_and_its_frame_rate():
+    changed = with_consequences(Settings(), "electronics", "second")
+    settings = Settings(**changed)
+
+    scene = scene_of(settings)
+
+    assert scene.transduction == SECOND_GENERATION
+    assert scene.rate == 166  # 300 channels of 20 us
+
+
+def test_other_elements_are_no_longer_those_chosen():
+    changed = with_consequences(Settings(region_elements=(99,)), "elements_x", 5)
+
+    assert changed == {"elements_x": 5, "region_elements": ()}
+
+
+def test_until_elements_are_chosen_all_are_scanned():
+    assert region_of(Settings(region="elements")) == Region()
+    assert region_of(Settings(region="elements", region_elements=(3,))).elements == (3,)
+
+
+def test_a_click_chooses_an_element_and_another_lets_it_go(window):
+    window.wishes.wish("region", "elements")
+    for _ in range(3):
+        window.heatmaps["xx"].chosen.emit(44)
+
+    assert window.history.settings.region_elements == (44,)
+
+    window.history.stack.undo()
+    assert window.history.settings.region_elements == ()
+
+
+def test_a_click_chooses_nothing_while_no_elements_are_asked_for(window):
+    window.heatmaps["yy"].chosen.emit(44)
+
+    assert window.history.settings.region_elements == ()
+
+
+def test_a_region_says_what_it_buys_and_costs(window, until):
+    window.wishes.wish("electronics", "second")
+    window.wishes.wish("region", "skin")
+
+    until(lambda: "instead of 167 frames/s" in window.panels.region.message.text())
+    assert "One frame tells the contact to" in window.panels.region.message.text()
+    until(lambda: window.session.estimate is not None and not window.session.estimate.fresh.all())
+
+
+@pytest.mark.parametrize("name", ["creep", "tolerance", "region_share"])
+def test_a_share_is_shown_in_per_cent(window, name):
+    window.wishes.wish(name, 0.15)
+
+    panel = window.panels.region if name == "region_share" else window.panels.spoils
+    assert panel.editor(name).text() == "15 %"
+
+
+def test_elements_bent_beyond_their_limit_are_crossed_out(window, until):
+    until(lambda: window.session.estimate is not None)
+    estimate = window.session.estimate
+    limit = window.session.status.sensor.transduction.strain_limit_curvature
+    curvature = np.zeros_like(estimate.curvature)
+    curvature[0, 7] = 1.1 * limit
+
+    assert np.flatnonzero(window.display.marks(curvature)[0]).tolist() == [7]
