@@ -254,6 +254,17 @@ def test_a_load_that_spills_over_the_edge_is_refused(load):
         load.check(PATCH)
 
 
+@spread
+def test_a_load_over_a_notch_in_the_skin_is_refused(load):
+    class Notched(AnyBasis):
+        def __init__(self):
+            super().__init__(BASIS)
+            self.at = lambda p: np.where(abs(p[:, :1] - load.x) < 1e-3, np.nan, BASIS.at(p))
+
+    with pytest.raises(Refusal, match="expected a load that lies wholly on the skin"):
+        load.modal(Notched())
+
+
 @pytest.mark.parametrize("size", [0.0, -0.01, math.nan, math.inf])
 @pytest.mark.parametrize("kind", [DiscLoad, GaussianLoad])
 def test_a_load_of_no_size_is_refused_with_what_to_take_instead(kind, size):

@@ -214,6 +214,17 @@ def test_coefficients_tend_to_the_flat_plates_as_the_square_of_the_curvature(C):
     assert off(100.0) == pytest.approx(off(10.0) / 100, rel=0.1)
 
 
+@pytest.mark.parametrize("held", [{"tension": 30.0}, {"foundation": 2e4}, {"fluid": True}])
+def test_what_else_holds_it_counts_on_a_slightly_bent_skin_as_on_the_flat_one(held):
+    load, shape = GaussianLoad(0.04, 0.03, 0.006, 2.0), (9, 9)
+    flat, bent = Patch(0.1, 0.06), Patch(0.1, 0.06, 1e3)
+
+    exact = Plate(flat, 3e-4, **held).deflection([load], SineBasis(flat, *shape))
+    by_ritz = Plate(bent, 3e-4, **held).deflection([load], SineBasis(bent, *shape, sliding=True))
+
+    np.testing.assert_allclose(by_ritz, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
+
+
 def test_pinning_the_ends_never_lets_the_skin_deflect_further():
     load = PointLoad(0.3 * ARC, 0.01)
     patch = Patch(0.9 * ARC, 0.03, R)

@@ -61,7 +61,12 @@ class SpreadLoad(ABC):
             k, l = np.meshgrid(*basis.wavenumbers, indexing="ij")
             return PointLoad(self.x, self.y, self.force).modal(basis) * self._wave(k, l)
         points, weights = self._quadrature(max(basis.shape))
-        return self.force * (weights @ basis.at(self.centre() + points)).reshape(basis.shape)
+        felt = weights @ basis.at(self.centre() + points)
+        if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
+            raise Refusal(
+                f"expected a load that lies wholly on the skin, got {self}; make it smaller"
+            )
+        return self.force * felt.reshape(basis.shape)
 
 
 def _check_size(load: SpreadLoad, *sizes: float) -> None:
