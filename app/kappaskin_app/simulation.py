@@ -191,8 +191,8 @@ def settings_for(source: str) -> Settings:
 def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -> dict[str, Any]:
     """The settings that change when a person changes `name` while `scene` is played.
 
-    A shape brings its usual size, force and height. Where the skin gets longer, loads move to keep their
-    share of it. A free load presses as the one did that it follows.
+    A shape brings its usual size, force and height. Where the skin gets longer, loads move to keep
+    their share of it. A free load presses as the one did that it follows.
     """
     changed: dict[str, Any] = {name: value}
     if name == "shape":
