@@ -41,6 +41,7 @@ _TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid")
 _MARGIN = 0.03  # share of the patch along each edge that a dragged load keeps out of
 _REFERENCE = (15, 15)  # functions of the true shape, by which Table 1 defines its truth
 _MOST_BENT = 27.0  # 1/m, under the load: a moving one bends more in places, and 38 is a rail
+_LEAST = 1e-12  # m/N that a skin gives where it is free to move
 _DRAWN = 0.28  # of the shorter side or the radius that a skin is drawn deep, as at first
 _REMEMBERED = 8  # skins whose compliance need not be computed again
 
@@ -149,7 +150,13 @@ def _ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit 
     size = min(along_x, along_y)
     moved = _moved(paper.loads[0], paper.basis, _compliance(paper.plate, paper.edge))
     load, basis = _stretched(paper.loads[0], along_x, along_y), basis_for(patch, edge, *_REFERENCE)
-    load = load.scaled(size * moved / abs(_moved(load, basis, compliance)))
+    gives = abs(_moved(load, basis, compliance))
+    if not gives > _LEAST:
+        raise Refusal(
+            f"the skin does not move where the load presses, at {load.centre()} m: expected it "
+            "further inside; choose a free load and drag it there"
+        )
+    load = load.scaled(size * moved / gives)
     bent = SensorLayout.regular(patch, 21, 21).curvature_operator(basis)
     most = float(np.abs(bent @ compliance(load.modal(basis)).ravel()).max())
     motion = paper.motion and replace(paper.motion, radius=paper.motion.radius * size)
