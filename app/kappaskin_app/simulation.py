@@ -16,12 +16,14 @@ from kappaskin import (
     Compliance,
     Creep,
     GaussianNoise,
+    HalfBridge,
     Hysteresis,
     LineLoad,
     Load,
     Orbit,
     Plate,
     PointLoad,
+    Refusal,
     Region,
     Scene,
     SensorLayout,
@@ -34,10 +36,13 @@ from kappaskin import (
 from kappaskin_app.settings import FREE_CASES, LOAD_CASES, Settings
 from kappaskin_app.skins import SHAPES
 
+_THICKNESS = HalfBridge().thickness
 _TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid")
 _MARGIN = 0.03  # share of the patch along each edge that a dragged load keeps out of
 _REFERENCE = (15, 15)  # functions of the true shape, by which Table 1 defines its truth
-_MOST_BENT = 14.0  # 1/m at an element: twice that, as a load passes over one, is still read
+_MOST_BENT = 27.0  # 1/m, under the load: a moving one bends more in places, and 38 is a rail
+_LEAST = 1e-12  # m/N that a skin gives where it is free to move
+_DRAWN = 0.28  # of the shorter side or the radius that a skin is drawn deep, as at first
 _REMEMBERED = 8  # skins whose compliance need not be computed again
 
 
@@ -94,10 +99,14 @@ def _free_loads(settings: Settings) -> tuple[PointLoad | LineLoad, ...]:
 
 
 def plate_of(settings: Settings) -> Plate:
-    """The skin that `settings` describe, without its elements."""
+    """The skin that `settings` describe, without its elements; a bent one is an even sheet."""
     shape = SHAPES[settings.shape]
     patch = shape.make(*(getattr(settings, name) for name in shape.begins))
-    return Plate(patch, tension=settings.tension, foundation=settings.foam, fluid=settings.fluid)
+    plate = Plate(patch, tension=settings.tension, foundation=settings.foam, fluid=settings.fluid)
+    if not patch.base_curvature:
+        return plate
+    stretch = 12 * (1 - plate.poisson**2) * plate.rigidity / _THICKNESS**2  # E h, of D
+    return replace(plate, axial_stiffness=stretch)
 
 
 def is_table_1(settings: Settings) -> bool:
@@ -131,7 +140,7 @@ def _ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit 
     """Loads and motion of a ready scene; on another skin, at the same shares of its sides.
 
     What moves by W on the patch of side L moves by W s there, whose shorter side is s L: the slopes
-    stay as they are. It moves less where the skin would bend more than in Table 1.
+    stay as they are. It moves less where it would bend so much that elements stand on a rail.
     """
     paper = load_scene(case)
     compliance, patch = _compliance(plate, edge), plate.patch
@@ -141,8 +150,14 @@ def _ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit 
     size = min(along_x, along_y)
     moved = _moved(paper.loads[0], paper.basis, _compliance(paper.plate, paper.edge))
     load, basis = _stretched(paper.loads[0], along_x, along_y), basis_for(patch, edge, *_REFERENCE)
-    load = load.scaled(size * moved / _moved(load, basis, compliance))
-    bent = SensorLayout.regular(patch, 10, 10).curvature_operator(basis)
+    gives = abs(_moved(load, basis, compliance))
+    if not gives > _LEAST:
+        raise Refusal(
+            f"the skin does not move where the load presses, at {load.centre()} m: expected it "
+            "further inside; choose a free load and drag it there"
+        )
+    load = load.scaled(size * moved / gives)
+    bent = SensorLayout.regular(patch, 21, 21).curvature_operator(basis)
     most = float(np.abs(bent @ compliance(load.modal(basis)).ravel()).max())
     motion = paper.motion and replace(paper.motion, radius=paper.motion.radius * size)
     return (load.scaled(min(1.0, _MOST_BENT / most)),), motion
@@ -180,14 +195,16 @@ def settings_for(source: str) -> Settings:
     return Settings(load_case=case) if ready else Settings()
 
 
-def with_consequences(settings: Settings, name: str, value: Any) -> dict[str, Any]:
-    """The settings that change when a person changes `name`.
+def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -> dict[str, Any]:
+    """The settings that change when a person changes `name` while `scene` is played.
 
-    A shape brings its usual size; where the skin gets longer, loads move to keep their share.
+    A shape brings its usual size, force and height. Where the skin gets longer, loads move to keep
+    their share of it. A free load presses as the one did that it follows.
     """
     changed: dict[str, Any] = {name: value}
     if name == "shape":
         changed |= SHAPES[value].begins
+        changed |= _usual(replace(settings, **changed))
     if name == "electronics":
         converter = _CHAINS[value].converter
         changed |= {"bits": converter.bits, "conversion_time": converter.conversion_time}
@@ -197,7 +214,23 @@ def with_consequences(settings: Settings, name: str, value: Any) -> dict[str, An
         if side in changed:
             longer = changed[side] / getattr(settings, side)
             changed |= {place: getattr(settings, place) * longer for place in places}
+    if name == "load_case" and value in FREE_CASES and settings.load_case not in FREE_CASES:
+        changed["force"] = scene.loads[0].force
     return changed
+
+
+def _usual(settings: Settings) -> dict[str, float]:
+    """The force of a ready load in the middle, and the height that shows well what it does."""
+    plate = plate_of(settings)
+    try:
+        (load,), _ = _ready("centre", plate, settings.edge)
+    except Refusal:
+        return {}  # the scene says why
+    patch = plate.patch
+    basis = basis_for(patch, settings.edge, *_REFERENCE)
+    moved = abs(_moved(load, basis, _compliance(plate, settings.edge)))
+    times = round(_DRAWN * min(patch.a, patch.b, patch.radius) / moved)
+    return {"force": float(f"{load.force:.3g}"), "exaggeration": float(min(max(times, 1), 50))}
 
 
 def dragged(

@@ -19,7 +19,7 @@ class Wishes:
     def wish(self, name: str, value: Any) -> None:
         """Make the setting `name` what is wished, and what follows from it."""
         label = ask_of(name).label if not name.startswith("range_") else "colour range"
-        changed = with_consequences(self._history.settings, name, value)
+        changed = with_consequences(self._history.settings, self._session.scene, name, value)
         self._history.wish(name, label, **changed)
 
     def choose(self, element: int) -> None:

@@ -56,28 +56,41 @@ def test_the_shading_is_normal_to_the_drawn_surface(patch: Patch) -> None:
 
 @PATCHES
 def test_the_whole_of_a_rectangle_is_covered_by_squares(patch: Patch) -> None:
-    faces = DrawnSkin(patch, 5, 4).faces().reshape(-1, 5)
+    skin = DrawnSkin(patch, 5, 4)
+    faces = skin.faces()
     assert len(faces) == 12
     assert (faces[:, 0] == 4).all()
     assert set(faces[:, 1:].ravel()) == set(range(20))
+    assert [len(line) for line in skin.lines(2)] == [5] * 2 + [4] * 3
+    values = np.arange(20.0).reshape(4, 5)
+    np.testing.assert_array_equal(skin.values(values), values.ravel())
 
 
-def test_what_lies_off_the_skin_is_not_drawn() -> None:
+def area_of(skin: DrawnSkin) -> float:
+    """Signed area in mm^2 of the faces, above zero where they are seen from outside."""
+    x, y, _ = np.moveaxis(skin.points()[skin.faces()[:, 1:]], -1, 0)
+    x_next, y_next = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
+    return float(np.sum(x * y_next - y * x_next) / 2)
+
+
+def test_a_round_skin_is_drawn_up_to_its_rim_and_no_further() -> None:
     skin = DrawnSkin(Disk(0.1, 0.1), 41, 41)
-    faces, at, area, used = skin.faces(), 0, 0.0, set()
-    points = skin.points()
-    while at < len(faces):
-        corners = faces[at + 1 : at + 1 + faces[at]]
-        x, y, _ = points[corners].T
-        area += 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))  # positive: seen from outside
-        used |= set(corners.tolist())
-        at += 1 + faces[at]
-    assert used <= set(np.flatnonzero(skin.on))
-    assert area == pytest.approx(np.pi * 50**2, rel=0.05)
+    used = skin.points()[np.unique(skin.faces()[:, 1:])]
+    far = np.linalg.norm(used[:, :2] - 50, axis=1)
+    assert far.max() <= 50 * (1 + 1e-9)
+    assert np.sum(far > 50 * (1 - 1e-5)) > 100  # all around
+    assert area_of(skin) == pytest.approx(np.pi * 50**2, rel=3e-3)
     for line in skin.lines(8):
-        assert skin.on.ravel()[line].all()
-        assert len(line) > 1
+        ends = skin.points()[line[[0, -1]]]
+        np.testing.assert_allclose(np.linalg.norm(ends[:, :2] - 50, axis=1), 50, rtol=1e-5)
         assert set(np.diff(line)) <= {1, 41}  # neighbours only: no line across a gap
+
+
+def test_the_rim_has_the_colour_of_what_lies_beside_it() -> None:
+    skin = DrawnSkin(Disk(0.1, 0.1), 41, 41)
+    values = np.where(skin.on, 7.0, np.nan)
+    shown = skin.values(values)
+    assert (shown[skin.faces()[:, 1:]] == 7.0).all()
 
 
 def test_a_line_is_cut_where_the_skin_has_a_gap() -> None:
@@ -87,7 +100,8 @@ def test_a_line_is_cut_where_the_skin_has_a_gap() -> None:
 
     skin = DrawnSkin(Split(0.1, 0.1), 11, 11)
     along_x = [line for line in skin.lines(10) if np.diff(line)[0] == 1]
-    assert [len(line) for line in along_x] == [4, 4] * 2
+    assert [len(line) for line in along_x] == [5, 5] * 2  # up to both rims
+    assert area_of(skin) == pytest.approx(6000, rel=1e-5)
 
 
 @PATCHES

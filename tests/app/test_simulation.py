@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import EDGES, LineLoad, PointLoad, Refusal, Simulator, load_scene
+from kappaskin import EDGES, LineLoad, Plate, PointLoad, Refusal, Simulator, load_scene
 from kappaskin_app.settings import LOAD_CASES, Settings
 from kappaskin_app.simulation import dragged, is_table_1, scene_of, with_consequences
 from kappaskin_app.skins import SHAPES
@@ -15,7 +15,7 @@ READY = ["circle", "centre", "off-centre", "line"]
 
 
 def on(shape: str, **more: object) -> Settings:
-    return replace(Settings(), **with_consequences(Settings(), "shape", shape) | more)
+    return replace(Settings(), **with_consequences(Settings(), load_scene(), "shape", shape) | more)
 
 
 @pytest.mark.parametrize("case", READY)
@@ -47,6 +47,13 @@ def test_what_is_below_and_how_it_is_held_is_in_the_scene() -> None:
     plate = scene.plate
     assert (plate.tension, plate.foundation, plate.fluid) == (5.0, 2e4, True)
     assert (scene.edge, scene.sensor().edge) == ("sliding", "sliding")
+
+
+def test_a_bent_skin_is_an_even_sheet_as_thick_as_its_gages() -> None:
+    plate = scene_of(on("cylinder")).plate
+    E = 12 * (1 - plate.poisson**2) * plate.rigidity / 250e-6**3
+    sheet = Plate.of_material(plate.patch, E, plate.poisson, 250e-6)
+    assert plate.axial_stiffness == pytest.approx(sheet.axial_stiffness)
 
 
 def test_the_fingertip_is_half_a_circle_of_the_papers_radius() -> None:
@@ -113,19 +120,38 @@ def test_only_the_first_skin_is_table_1s() -> None:
 
 
 def test_choosing_a_shape_brings_its_size_and_choosing_the_first_again_all_of_it() -> None:
-    settings = Settings()
+    settings, first = Settings(), Settings()
     for shape in ("cylinder", "flat"):
-        settings = replace(settings, **with_consequences(settings, "shape", shape))
+        settings = replace(settings, **with_consequences(settings, load_scene(), "shape", shape))
         for name, value in SHAPES[shape].begins.items():
             assert getattr(settings, name) == value
+    assert (settings.force, settings.exaggeration) == (first.force, first.exaggeration)
     assert scene_of(settings).plate == load_scene().plate
 
 
 def test_loads_keep_their_share_of_a_skin_that_grows() -> None:
     settings = Settings(x=0.02, x_end=0.08, y=0.03)
-    changed = with_consequences(settings, "side_x", 0.2)
+    changed = with_consequences(settings, load_scene(), "side_x", 0.2)
     assert changed == {"side_x": 0.2, "x": pytest.approx(0.04), "x_end": pytest.approx(0.16)}
-    assert with_consequences(settings, "theme", "light") == {"theme": "light"}
+    alone = with_consequences(settings, load_scene(), "theme", "light")
+    assert alone == {"theme": "light"}
+
+
+def test_a_free_load_presses_as_the_one_did_that_it_follows() -> None:
+    for shape in SHAPES:
+        settings = on(shape, load_case="off-centre")
+        was = scene_of(settings)
+        settings = replace(settings, **with_consequences(settings, was, "load_case", "point"))
+        assert scene_of(settings).loads[0].force == was.loads[0].force
+        other = with_consequences(settings, scene_of(settings), "load_case", "free-line")
+        assert other == {"load_case": "free-line"}
+
+
+def test_a_free_load_presses_every_shape_so_that_it_shows() -> None:
+    for shape in SHAPES:
+        scene = scene_of(on(shape, load_case="point"))
+        counts = Simulator(scene).frame(0, lambda: 0.0).counts
+        assert 3 < np.abs(scene.transduction.curvature(counts)).max() < 38
 
 
 @given(

@@ -42,8 +42,8 @@ class Load:
             "Force",
             "Total force of a free load; the other cases have the force that displaces Table 1's "
             "patch as there, and another skin no more steeply.",
-            -3.0,
-            3.0,
+            -50.0,
+            50.0,
             0.01,
             1.0,
             "N",

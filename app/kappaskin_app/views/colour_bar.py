@@ -14,7 +14,7 @@ class ColourBar(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._colours, self.limits, self._unit = DIVERGING, (-1.0, 1.0), "1/m"
-        self.setFixedWidth(64)
+        self.setFixedWidth(70)
 
     def show_scale(self, colours: Colours, limits: tuple[float, float], unit: str) -> None:
         if (self.limits, self._unit) != (limits, unit) or self._colours is not colours:

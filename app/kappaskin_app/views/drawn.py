@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin import Patch
+from kappaskin_app.views.rim import onto_rim
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -25,10 +26,13 @@ class DrawnSkin:
         self.patch = patch
         x, y = patch.grid(nx, ny)
         self._cell = np.array([x[1] - x[0], y[1] - y[0]])
-        positions = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        self._rest, self._out = self.at_rest(positions)
-        self.on = patch.contains(positions).reshape(ny, nx)
+        grid = np.stack(np.meshgrid(x, y), axis=-1)
+        self.on = patch.contains(grid.reshape(-1, 2)).reshape(ny, nx)
         """Which points (ny, nx) are on the skin."""
+        self._shown: Indices | None = None
+        if not self.on.all():
+            grid, self._shown = onto_rim(patch, grid, self.on)
+        self._rest, self._out = self.at_rest(grid.reshape(-1, 2))
         self.height: Array = np.zeros((ny, nx))
         """How far out each point is drawn, in mm."""
 
@@ -56,27 +60,29 @@ class DrawnSkin:
     # Its faces and lines, over the points of the grid.
 
     def faces(self) -> Indices:
-        """Squares between four points on the skin and triangles between three, VTK's way."""
+        """Squares (k, 5) with a corner on the skin, VTK's way; the others are on its rim."""
         index = np.arange(self.on.size).reshape(self.on.shape)
         around = (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
         corners = np.stack(around, axis=-1).reshape(-1, 4)
-        there = self.on.ravel()[corners]
-        count = there.sum(axis=1)
-        cells = [
-            np.insert(corners[count == n][there[count == n]].reshape(-1, n), 0, n, axis=1).ravel()
-            for n in (4, 3)
-        ]
-        return np.concatenate(cells)
+        corners = corners[self.on.ravel()[corners].any(axis=1)]
+        return np.insert(corners, 0, 4, axis=1)
 
     def lines(self, stride: int) -> list[Indices]:
         """Every so many lines of the grid along x and y, as the points that they run through."""
         index = np.arange(self.on.size).reshape(self.on.shape)
         found: list[Indices] = []
         for line in (*index[::stride], *index[:, ::stride].T):
-            gaps = np.flatnonzero(~self.on.ravel()[line])
-            pieces = np.split(line, gaps)
-            found += [p[self.on.ravel()[p]] for p in pieces]
-        return [line for line in found if len(line) > 1]
+            on = self.on.ravel()[line]
+            drawn = on.copy()  # and as far as the rim
+            drawn[1:] |= on[:-1]
+            drawn[:-1] |= on[1:]
+            ends = np.flatnonzero(np.diff(drawn, prepend=False, append=False)).reshape(-1, 2)
+            found += [line[begin:end] for begin, end in ends]
+        return found
+
+    def values(self, values: Array) -> Array:
+        """What to colour every point by, of `values` (ny, nx) that are known on the skin."""
+        return values.ravel() if self._shown is None else values.ravel()[self._shown]
 
     # Its shape.
 

@@ -110,12 +110,12 @@ class MembraneView(QWidget):
         patch = sensor.layout.patch
         another = self._surface_actor is None or self.skin.patch != patch
         self.skin = self.drag.skin = skin = DrawnSkin(patch, nx, ny)
-        self._mesh = pv.PolyData(skin.points(), faces=skin.faces())
+        self._mesh = pv.PolyData(skin.points(), faces=skin.faces().ravel())
         self._mesh.point_data["value"] = np.zeros(nx * ny)
         self._mesh.point_data.active_normals = skin.shading()
+        self._lift = _LIFT * skin.size
         self._wire = self._wireframe(skin)
         self._put_into_scene()
-        self._lift = _LIFT * skin.size
         self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
         self._contact.scale = skin.size
         self._arrays = self._changing()
@@ -165,7 +165,8 @@ class MembraneView(QWidget):
         self._wire_points = np.concatenate(lines)
         ends = np.cumsum([len(line) for line in lines])
         cells = [np.r_[len(x), np.arange(e - len(x), e)] for x, e in zip(lines, ends, strict=True)]
-        return pv.PolyData(skin.points(self._wire_points), lines=np.concatenate(cells))
+        points = skin.points(self._wire_points, np.full(len(self._wire_points), self._lift))
+        return pv.PolyData(points, lines=np.concatenate(cells))
 
     def _place_elements(self, positions: Array) -> None:
         self._elements_at_rest = self.skin.at_rest(positions)
@@ -217,7 +218,7 @@ class MembraneView(QWidget):
         skin.height = -MM * times * np.nan_to_num(estimate.surface)
         self._arrays["points"][:] = skin.points()
         self._arrays["normals"][:] = skin.shading()
-        self._arrays["values"][:] = values.ravel()
+        self._arrays["values"][:] = skin.values(values)
         self._surface_actor.mapper.scalar_range = limits
         self._show_truth(skin, estimate.true_surface, times)
         if self._elements_actor.visibility:
@@ -230,7 +231,7 @@ class MembraneView(QWidget):
 
     def _show_truth(self, skin: DrawnSkin, surface: Array, times: float) -> None:
         true = surface.ravel()[self._wire_points]
-        self._wire_actor.visibility = bool(np.isfinite(true[0])) and self._want_truth
+        self._wire_actor.visibility = bool(np.isfinite(true).any()) and self._want_truth
         if self._wire_actor.visibility:
             height = -MM * times * np.nan_to_num(true) + self._lift
             self._arrays["wire"][:] = skin.points(self._wire_points, height)
