@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 
 _SETTLE = 0.2  # s after asking for a step that its readings begin to count
 _SILENCE = 5.0  # s without a reading after which a step is given up
+_FEWEST_FRAMES = 10  # of one step, however short: their spread tells the noise
 _MOST_FRAMES = 5000  # kept of one step, evenly: more tell no more
 _HEADROOM = 1.3  # times its curvature that a cylinder may read, by tolerances, and be on no rail
 _LADDER = 5  # cylinders for a sensor that cannot read the usual ones
@@ -217,7 +218,7 @@ class Calibrating(QObject):
         try:
             if self._status.sensor is None:
                 raise Refusal(f"{path}: no sensor is connected; connect the one it is of, first")
-            now = datetime.now(timezone.utc)
+            now = datetime.now(UTC)
             calibration = load_calibration(path, self._status.sensor, now)
         except Refusal as refusal:
             self._tell(str(refusal))
@@ -252,7 +253,7 @@ class Calibrating(QObject):
         often = self._wanted() / _MOST_FRAMES
         if not kept or estimate.device_time - kept[-1].device_time >= often:
             kept.append(estimate)
-        if self._heard - self._begun >= self._wanted():
+        if self._heard - self._begun >= self._wanted() and len(kept) >= _FEWEST_FRAMES:
             self._take(kept)
         else:
             self.changed.emit()
@@ -320,7 +321,7 @@ class Calibrating(QObject):
     def _compute(self, procedure: Procedure) -> None:
         """Begin to work it out, beside the drawing."""
         worker = ThreadPoolExecutor(1, "calibration")
-        now = datetime.now(timezone.utc)
+        now = datetime.now(UTC)
         self._computed = worker.submit(calibrate, procedure.sweep(), procedure.sensor, now)
         worker.shutdown(wait=False)
         self.unattended = False

@@ -116,6 +116,9 @@ class MainWindow(QMainWindow):
         add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
         add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
         add("ports", source, "&Look for ports", self._find_ports, "F5")
+        calibrating = self.calibrating
+        add("calibrate", source, "C&alibrate", self.panels.show_calibration, "Ctrl+L")
+        add("take-step", source, "&Take the step of the calibration", calibrating.take, "Ctrl+K")
         for number, (value, words) in enumerate(COLOURS, 1):
             colour = partial(wishes.wish, "colour_by", value)
             add(f"colour-{value}", view, f"Colour by {words.lower()}", colour, f"Ctrl+{number}")

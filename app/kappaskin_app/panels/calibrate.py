@@ -101,7 +101,9 @@ class _Start(QWidget):
         self.radii.setToolTip(
             "Radii in mm of the cylinders that you have, in any order; at least three."
         )
-        self.seconds = _seconds("seconds", 0.1, 1.0, "How long the readings of a step are averaged.")
+        self.seconds = _seconds(
+            "seconds", 0.1, 1.0, "How long the readings of a step are averaged."
+        )
         self.hold = _seconds(
             "hold",
             0.0,
@@ -327,14 +329,14 @@ class _Outcome(QWidget):
             f"<tr><td>Widest loop</td><td align=right>{wide:.2f}</td>"
             f"<td align=right>{left:.2f} 1/m</td></tr></table>"
         )
-        P = len(layout)
+        elements = len(layout)
         failures = dict(report.calibration.failures)
         order = np.argsort(np.where(good, -report.fitted.left_out, -np.inf), kind="stable")
         worst = [int(channel) for channel in order[:_WORST]]
         self.worst.setText(
             "Worst:<br>"
             + "<br>".join(
-                f'<a href="{c}">{_named(c, P)}</a>: '
+                f'<a href="{c}">{_named(c, elements)}</a>: '
                 + failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m")
                 for c in worst
             )

@@ -62,6 +62,10 @@ class Panels(QTabWidget):
         self.setCurrentIndex((self.currentIndex() + pages) % self.count())
         self.tabBar().setFocus(Qt.FocusReason.TabFocusReason)
 
+    def show_calibration(self) -> None:
+        """Show the page that guides through a calibration."""
+        self.setCurrentIndex(list(self._pages).index(_CALIBRATE))
+
     def show_settings(self, settings: Settings) -> None:
         for panel in self.all():
             panel.show_settings(settings)

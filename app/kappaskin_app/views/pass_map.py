@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 _TITLE = 17  # px above each map
 _GAP = 8
+_TIP = "Which channels passed. Click one, or use the arrow keys, to see its readings below."
 _SHARE = 0.86  # of the distance between elements that a square fills
 _WAYS = {
     Qt.Key.Key_Left: (-1.0, 0.0),
@@ -81,17 +82,17 @@ class PassMap(QWidget):
         if layout is None:
             return
         painter = QPainter(self)
-        width, P = (self.width() - 2 * _GAP) / 3, len(layout)
+        width, elements = (self.width() - 2 * _GAP) / 3, len(layout)
         for c, name in enumerate(COMPONENTS):
             painter.setPen(QColor(theme.text))
             title = QRectF(c * (width + _GAP), 0, width, _TITLE - 2)
-            failed = sum(1 for channel in self._failures if channel // P == c)
-            passed = f"{name}  {P - failed} of {P}"
+            failed = sum(1 for channel in self._failures if channel // elements == c)
+            passed = f"{name}  {elements - failed} of {elements}"
             painter.drawText(title, Qt.AlignmentFlag.AlignCenter, passed)
             for element, square in enumerate(self._squares(c)):
-                self._paint_channel(painter, square, c * P + element)
-        if self._channel < 3 * P:
-            component, element = divmod(self._channel, P)
+                self._paint_channel(painter, square, c * elements + element)
+        if self._channel < 3 * elements:
+            component, element = divmod(self._channel, elements)
             painter.setPen(QPen(QColor(theme.text), 3 if self.hasFocus() else 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRect(self._squares(component)[element].adjusted(-1, -1, 1, 1))
@@ -145,9 +146,7 @@ class PassMap(QWidget):
     def event(self, event: QEvent) -> bool:
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
             channel = self._channel_at(QPointF(event.pos()))
-            text = self._tips[channel] if 0 <= channel < len(self._tips) else (
-                "Which channels passed. Click one, or use the arrow keys, to see its readings below."
-            )
+            text = self._tips[channel] if 0 <= channel < len(self._tips) else _TIP
             QToolTip.showText(event.globalPos(), text, self)
             return True
         return super().event(event)
