@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtGui import QColor, QKeyEvent
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFileDialog,
@@ -293,7 +293,10 @@ class _Outcome(QWidget):
         )
         self.map, self.plot, self.channel = PassMap(), LoopPlot(), _label()
         self.worst = _label(tip="Click one to see its readings.")
-        self.worst.setTextInteractionFlags(Qt.TextInteractionFlag.LinksAccessibleByMouse)
+        self.worst.setTextInteractionFlags(
+            Qt.TextInteractionFlag.LinksAccessibleByMouse
+            | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
+        )
         self.use = _button("Use", "use", "Correct the readings by it from now on (Ctrl+Z undoes).")
         self.save = _button(f"Save{_ELLIPSIS}", "save", "Write it to a file.")
         self.leave = _button("New", "leave", "Begin another one; what is not saved is forgotten.")
@@ -307,6 +310,7 @@ class _Outcome(QWidget):
         self.map.chosen.connect(guarded(self.show_channel))
         self.worst.linkActivated.connect(guarded(lambda link: self.show_channel(int(link))))
         self._result: Result | None = None
+        self._link, self._worst = "", []
 
     def show_result(self, result: Result) -> None:
         if result is self._result:
@@ -329,26 +333,30 @@ class _Outcome(QWidget):
             f"<tr><td>Widest loop</td><td align=right>{wide:.2f}</td>"
             f"<td align=right>{left:.2f} 1/m</td></tr></table>"
         )
-        elements = len(layout)
         failures = dict(report.calibration.failures)
         order = np.argsort(np.where(good, -report.fitted.left_out, -np.inf), kind="stable")
         worst = [int(channel) for channel in order[:_WORST]]
-        self.worst.setText(
-            "Worst:<br>"
-            + "<br>".join(
-                f'<a href="{c}">{_named(c, elements)}</a>: '
-                + failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m")
-                for c in worst
-            )
-        )
+        self._worst = worst
+        self._show_worst()
         self.map.show_channels(layout, failures, [self._told(c) for c in range(total)])
         self.show_channel(worst[0])
 
+    def _show_worst(self) -> None:
+        if self._result is None:
+            return
+        report = self._result.report
+        elements, failures = len(report.passed) // 3, dict(report.calibration.failures)
+        lines = [
+            f'<a href="{c}" style="color: {self._link}">{_named(c, elements)}</a>: '
+            + failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m")
+            for c in self._worst
+        ]
+        self.worst.setText("<br>".join(["Worst:", *lines]))
+
     def show_colour(self, link: str) -> None:
         """The colour of what can be clicked."""
-        palette = self.worst.palette()
-        palette.setColor(palette.ColorRole.Link, QColor(link))
-        self.worst.setPalette(palette)
+        self._link = link
+        self._show_worst()
 
     def _told(self, channel: int) -> str:
         """A channel in words."""

@@ -87,7 +87,7 @@ class PassMap(QWidget):
             painter.setPen(QColor(theme.text))
             title = QRectF(c * (width + _GAP), 0, width, _TITLE - 2)
             failed = sum(1 for channel in self._failures if channel // elements == c)
-            passed = f"{name}  {elements - failed} of {elements}"
+            passed = f"{name}: {elements - failed} pass" if failed else f"{name}: all pass"
             painter.drawText(title, Qt.AlignmentFlag.AlignCenter, passed)
             for element, square in enumerate(self._squares(c)):
                 self._paint_channel(painter, square, c * elements + element)
