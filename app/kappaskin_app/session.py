@@ -2,6 +2,8 @@
 
 import math
 import time
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +15,13 @@ from kappaskin import (
     Engine,
     Estimate,
     PointLoad,
+    Presentation,
     Refusal,
+    Region,
+    Sensor,
     Setup,
     Status,
+    Step,
     bargain,
     basis_for,
 )
@@ -32,8 +38,14 @@ _TICK = 4  # ms between two looks for a new estimate
 _STATUS = 0.05  # s between two looks at the status
 
 
-def _setup_of(settings: Settings) -> Setup:
-    return Setup(settings.functions_x, settings.functions_y, edge=settings.fit_edge)
+def _setup_of(settings: Settings, sensor: Sensor | None = None) -> Setup:
+    """The setup asked for, with the calibration if it is one of `sensor`."""
+    setup = Setup(settings.functions_x, settings.functions_y, edge=settings.fit_edge)
+    if settings.calibration is not None and sensor is not None:
+        with suppress(Refusal):
+            settings.calibration.check(sensor)
+            return replace(setup, calibration=settings.calibration)
+    return setup
 
 
 class Session(QObject):
@@ -53,8 +65,10 @@ class Session(QObject):
         self._settings = history.settings
         self.engine = engine
         self.scene = scene_of(history.settings)
-        engine.set_up(_setup_of(history.settings))
+        self._asked = _setup_of(history.settings)
+        engine.set_up(self._asked)
         engine.scan(region_of(history.settings))
+        self._laid: Step | None = None
         self.status = Status()
         self.estimate: Estimate | None = None
         self.source = ""
@@ -90,18 +104,45 @@ class Session(QObject):
 
     def _follow(self, settings: Settings) -> None:
         was, self._settings = self._settings, settings
-        if _setup_of(settings) != _setup_of(was):
-            self.engine.set_up(_setup_of(settings))
+        self._set_up()
         if part(settings, Scanning) != part(was, Scanning):
-            self.engine.scan(region_of(settings))
+            self._scan()
         if self.simulating and part(settings, SceneSettings) != part(was, SceneSettings):
+            self._play()
+
+    def _set_up(self) -> None:
+        """Have the engine compute with what is asked for now, if that is something else."""
+        setup = _setup_of(self._settings, self.status.sensor)
+        if self._laid is not None:
+            setup = replace(setup, calibration=None)
+        if setup != self._asked:
+            self._asked = setup
+            self.engine.set_up(setup)
+
+    def _scan(self) -> None:
+        """Scan the region asked for, or everything while the skin lies on cylinders."""
+        self.engine.scan(Region() if self._laid else region_of(self._settings))
+
+    def lay(self, step: Step | None) -> None:
+        """Lay the simulated skin on the cylinder of `step`.
+
+        Until None, readings are nominal and every frame has all of them.
+        """
+        begins_or_ends = (step is None) != (self._laid is None)
+        self._laid = step
+        self._set_up()
+        if begins_or_ends:
+            self._scan()
+        if self.simulating:
             self._play()
 
     def _play(self) -> None:
         """Simulate what the settings describe, or go on as before and say why."""
         why = ""
         try:
-            self.scene = scene_of(self._history.settings)
+            scene = scene_of(self._history.settings)
+            laid = self._laid and Presentation((self._laid,), 1.0)
+            self.scene = replace(scene, loads=(), motion=None, laid=laid) if laid else scene
         except Refusal as refusal:
             why = str(refusal)
         self.engine.play(self.scene)
@@ -133,6 +174,7 @@ class Session(QObject):
             was, self.status = self.status, self.engine.status()
             if self.status.meetings != was.meetings:
                 self.estimate = None  # what the last sensor showed is not this one's
+                self._set_up()
             self.reported.emit(self.status)
         estimate = self.engine.latest(self.status)
         if estimate is not None and (estimate.generation, estimate.sequence) != self._shown:

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from kappaskin import FIGURES, Engine, Status, serial_ports
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
+from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.columns import column, widen
 from kappaskin_app.display import Display
 from kappaskin_app.figures import TITLES, FigureWindow
@@ -48,6 +49,7 @@ class MainWindow(QMainWindow):
         self.history = History(settings_for(source), self)
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
+        self.calibrating = Calibrating(self.history, self)
         self.panels, self.display = Panels(), Display(self.session)
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
@@ -114,6 +116,9 @@ class MainWindow(QMainWindow):
         add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
         add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
         add("ports", source, "&Look for ports", self._find_ports, "F5")
+        calibrating = self.calibrating
+        add("calibrate", source, "C&alibrate", self.panels.show_calibration, "Ctrl+L")
+        add("take-step", source, "&Take the step of the calibration", calibrating.take, "Ctrl+K")
         for number, (value, words) in enumerate(COLOURS, 1):
             colour = partial(wishes.wish, "colour_by", value)
             add(f"colour-{value}", view, f"Colour by {words.lower()}", colour, f"Ctrl+{number}")
@@ -145,6 +150,11 @@ class MainWindow(QMainWindow):
         self.history.changed.connect(guarded(self._follow))
         session.estimated.connect(guarded(self.display.show_estimate))
         session.reported.connect(guarded(self._show_status))
+        self.calibrating.laid.connect(guarded(session.lay))
+        session.reported.connect(guarded(self.calibrating.follow))
+        session.estimated.connect(guarded(self.calibrating.receive))
+        panels.calibrate.attend(self.calibrating)
+        panels.in_use.attend(self.calibrating)
         session.refused.connect(guarded(panels.shape.show_refusal))
         # Queued: the next look comes after the picture is out, and need not wait for the timer.
         self.membrane.drawn.connect(session.tick, Qt.ConnectionType.QueuedConnection)

@@ -40,7 +40,8 @@ class Wishes:
         self.wish("exaggeration", float(min(max(wanted, 1), 50)))
 
     def reset(self) -> None:
-        self._history.change("Reset settings", -1, **vars(Settings()))
+        kept = self._history.settings.calibration  # minutes of work, and no matter of taste
+        self._history.change("Reset settings", -1, **vars(Settings(calibration=kept)))
 
     def grab(self, x: float, y: float) -> None:
         """Take hold of the load at (x, y) in m: what is dragged until it is let go is one step."""

@@ -10,7 +10,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Sensor, Status
+from kappaskin import Calibration, Sensor, Status
+from kappaskin_app.panels.calibrate import said
 from kappaskin_app.panels.panel import Panel
 
 _SIMULATED = ("sim:", "Simulated skin")
@@ -82,7 +83,7 @@ class ConnectionPanel(Panel):
     def show_status(self, status: Status, simulating: bool) -> None:
         text = ""
         if status.sensor is not None and status.state == "streaming":
-            text = _said(status.sensor)
+            text = _said(status.sensor, status.setup.calibration)
         elif status.state == "waiting":
             text = "Waiting for the device to say what it is\N{HORIZONTAL ELLIPSIS}"
         if text != self.device.text():
@@ -92,13 +93,14 @@ class ConnectionPanel(Panel):
         self.disconnect_button.setEnabled(status.state != "off")
 
 
-def _said(sensor: Sensor) -> str:
+def _said(sensor: Sensor, calibration: Calibration | None) -> str:
     """What a sensor is, in words."""
     patch, dead = sensor.layout.patch, int((~sensor.layout.live).sum())
     a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
     bent = f", radius {radius:g} mm" if patch.base_curvature else ""
     health = f"\n{dead} of {sensor.channels} channels dead" if dead else ""
+    calibrated = f"\n{said(calibration)}" if calibration else ""
     return (
         f"{sensor.name} ({sensor.serial_number})\n{sensor.layout}, {sensor.edge}{health}\n"
-        f"{a:g} x {b:g} mm{bent}, up to {sensor.rate:g} frames/s"
+        f"{a:g} x {b:g} mm{bent}, up to {sensor.rate:g} frames/s{calibrated}"
     )

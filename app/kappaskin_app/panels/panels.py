@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 from kappaskin import Status
 from kappaskin_app.columns import scrolled
 from kappaskin_app.panels.basis import BasisPanel
+from kappaskin_app.panels.calibrate import CalibratePanel, InUsePanel
 from kappaskin_app.panels.connection import ConnectionPanel
 from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.panel import Panel
@@ -18,7 +19,7 @@ from kappaskin_app.settings import Settings
 from kappaskin_app.theme import Theme
 
 _Some = TypeVar("_Some", bound=Panel)
-_LIVE, _SKIN, _SENSOR = "&Live", "S&kin", "Se&nsor"
+_LIVE, _SKIN, _SENSOR, _CALIBRATE = "&Live", "S&kin", "Se&nsor", "C&alibrate"
 
 
 class Panels(QTabWidget):
@@ -40,6 +41,8 @@ class Panels(QTabWidget):
         self.electronics = self._add(_SENSOR, ElectronicsPanel())
         self.spoils = self._add(_SENSOR, SpoilsPanel())
         self.region = self._add(_SENSOR, RegionPanel())
+        self.in_use = self._add(_CALIBRATE, InUsePanel())
+        self.calibrate = self._add(_CALIBRATE, CalibratePanel())
         for title, panels in self._pages.items():
             self.addTab(scrolled(*panels), title)
         self.setUsesScrollButtons(False)  # every title is to be seen
@@ -58,6 +61,10 @@ class Panels(QTabWidget):
         """Show the page so many further on, round and round."""
         self.setCurrentIndex((self.currentIndex() + pages) % self.count())
         self.tabBar().setFocus(Qt.FocusReason.TabFocusReason)
+
+    def show_calibration(self) -> None:
+        """Show the page that guides through a calibration."""
+        self.setCurrentIndex(list(self._pages).index(_CALIBRATE))
 
     def show_settings(self, settings: Settings) -> None:
         for panel in self.all():

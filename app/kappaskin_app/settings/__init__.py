@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
+from kappaskin import Calibration
 from kappaskin_app.settings.asks import Ask as Ask
 from kappaskin_app.settings.asks import Choice as Choice
 from kappaskin_app.settings.asks import Range as Range
@@ -27,7 +28,12 @@ class SceneSettings(Skin, Load, Noise, Electronics, Spoils):
 
 @dataclass(frozen=True)
 class Settings(SceneSettings, Fit, View, Scanning):
-    """Everything a person may change, in SI units; a change is a new `Settings`."""
+    """Everything a person may change, in SI units; a change is a new `Settings`.
+
+    `calibration` is in use whenever the sensor that it is of is connected.
+    """
+
+    calibration: Calibration | None = None
 
 
 def part(settings: Settings, kind: type[SceneSettings | Fit | View | Scanning]) -> tuple[Any, ...]:

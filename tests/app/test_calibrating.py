@@ -1,0 +1,377 @@
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from kappaskin import (
+    RADII,
+    Amplifier,
+    Calibration,
+    Estimate,
+    Presentation,
+    Refusal,
+    Sensor,
+    Setup,
+    Simulator,
+    Status,
+    Step,
+    Tolerance,
+    Transduction,
+    load_scene,
+)
+from kappaskin.calibration.calibration import fingerprint
+from kappaskin_app.calibrating import Calibrating, parsed_radii, suggested_radii
+from kappaskin_app.history import History
+from kappaskin_app.settings import Settings
+from kappaskin_app.window import MainWindow
+
+THREE = (0.1, 0.05, 0.02)
+SCENE = load_scene("calibration")
+
+
+@dataclass
+class Bench:
+    """A calibration of a simulated skin that reads without waiting."""
+
+    calibrating: Calibrating
+    history: History
+    now: float
+    status: Status
+    laid: list[Step | None]
+    simulator: Simulator
+    frame: int = 0
+
+    def tell(self, **changed: object) -> None:
+        self.status = replace(self.status, **changed)  # pyright: ignore[reportArgumentType]
+        self.calibrating.follow(self.status)
+
+    def read(self, n: int = 60, blank: bool = False, ago: float = 0.0) -> None:
+        """Let the next `n` estimates come, 50 a second."""
+        step = next((step for step in reversed(self.laid) if step), None) or Step(1)
+        self.simulator.change(replace(SCENE, laid=Presentation((step,), 1.0)))
+        sensor = SCENE.sensor()
+        for _ in range(n):
+            self.frame, self.now = self.frame + 1, self.now + 0.02
+            frame = self.simulator.scanned(sensor.scan(), self.frame, self.now - ago, lambda: 0.0)
+            k = sensor.nominal(frame).reshape(3, -1)
+            k = np.full_like(k, np.nan) if blank else k
+            estimate = SimpleNamespace(
+                generation=1, device_time=frame.device_time, host_time=self.now, curvature=k
+            )
+            self.calibrating.receive(cast("Estimate", estimate))
+
+
+@pytest.fixture
+def bench(qapp: QApplication) -> Bench:
+    history, laid = History(Settings()), []
+    made = Bench(cast("Any", None), history, 100.0, Status(), laid, Simulator(SCENE))
+    made.calibrating = Calibrating(history, clock=lambda: made.now)
+    made.calibrating.laid.connect(laid.append)
+    made.tell(state="streaming", sensor=SCENE.sensor(), meetings=1, generation=1)
+    return made
+
+
+def done(bench: Bench, until: Callable[..., None]) -> None:
+    def told() -> bool:
+        bench.calibrating.follow(bench.status)
+        return not bench.calibrating.computing
+
+    until(told)
+
+
+def test_suggested_cylinders_are_those_that_the_sensor_reads() -> None:
+    wide, narrow = SCENE.sensor(), load_scene("circle").sensor()
+    assert suggested_radii(wide) == RADII
+    radii = suggested_radii(narrow)
+    assert len(radii) == 5
+    electronics = narrow.transduction
+    assert np.isfinite(electronics.curvature(electronics.counts(1.29 / np.array(radii)))).all()
+    assert np.isnan(electronics.curvature(electronics.counts(1.4 / np.array([min(radii)])))).all()
+
+
+def test_no_suggested_cylinder_strains_the_gages_too_far() -> None:
+    scene = replace(SCENE, transduction=Transduction(amplifier=Amplifier(gain=5.0)))
+    sensor: Sensor = scene.sensor()
+    assert 1 / min(suggested_radii(sensor)) <= sensor.transduction.strain_limit_curvature
+
+
+def test_radii_are_a_list_in_millimetres() -> None:
+    assert parsed_radii("100, 50;20.5") == pytest.approx((0.1, 0.05, 0.0205))
+    with pytest.raises(Refusal, match="radii in mm"):
+        parsed_radii("100, fifty")
+
+
+@pytest.mark.parametrize(
+    ("radii", "seconds", "why"),
+    [
+        ((0.1, 0.05), 1.0, "at least 3"),
+        ((0.1, 0.05, -0.02), 1.0, "above zero"),
+        ((0.1, 0.05, float("nan")), 1.0, "above zero"),
+        ((0.1, 0.05, 0.01), 1.0, "elastic limit"),
+        (THREE, 0.0, "a time above zero"),
+    ],
+)
+def test_what_cannot_be_begun_is_refused(
+    bench: Bench, radii: tuple[float, ...], seconds: float, why: str
+) -> None:
+    bench.calibrating.begin(radii, seconds)
+    assert why in bench.calibrating.message
+    assert bench.calibrating.procedure is None
+    assert bench.laid == []
+
+
+def test_without_a_sensor_nothing_begins(bench: Bench) -> None:
+    bench.tell(state="off", sensor=None)
+    bench.calibrating.begin(THREE, 1.0)
+    assert "no sensor is connected" in bench.calibrating.message
+
+
+def test_a_step_averages_the_readings_of_its_time_and_goes_on(bench: Bench) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 1.0)
+    bench.read(20)
+    assert not calibrating.taking
+    calibrating.take()
+    bench.read(55)
+    assert calibrating.taking
+    assert 0.8 < calibrating.share < 1
+    bench.read(8)
+    assert not calibrating.taking
+    assert calibrating.step is not None
+    assert calibrating.step.number == 2
+    assert calibrating.procedure is not None
+    assert 49 <= calibrating.procedure.taken[0].frames <= 52
+    assert bench.laid[-1] == calibrating.step
+
+
+def test_readings_with_a_calibration_or_of_another_setup_do_not_count(bench: Bench) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.1)
+    calibrating.take()
+    bench.tell(setup=Setup(calibration=cast("Calibration", object())))
+    bench.read(40)
+    assert calibrating.taking
+    bench.tell(setup=Setup(), generation=2)
+    bench.read(40)
+    assert calibrating.taking
+    bench.tell(generation=1)
+    bench.read(40)
+    assert not calibrating.taking
+
+
+def test_the_last_step_can_be_taken_again(bench: Bench) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.2)
+    calibrating.redo()
+    calibrating.take()
+    bench.read()
+    calibrating.take()
+    calibrating.redo()
+    assert not calibrating.taking
+    assert calibrating.step is not None
+    assert calibrating.step.number == 1
+    assert bench.laid[-1] == calibrating.step
+
+
+def test_a_step_on_the_rails_is_refused_and_asked_for_again(bench: Bench) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.2)
+    calibrating.take_all()
+    bench.read(30, blank=True)
+    assert "on a rail" in calibrating.message
+    assert calibrating.message.endswith("The same step again.")
+    assert not calibrating.unattended
+    assert calibrating.step is not None
+    assert calibrating.step.number == 1
+
+
+def test_a_step_without_readings_is_given_up(bench: Bench) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.2)
+    calibrating.take()
+    bench.now += 6.0
+    bench.tell()
+    assert "no reading came" in calibrating.message.lower()
+    assert not calibrating.taking
+    assert calibrating.procedure is not None
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"meetings": 2}, "another device"),
+        ({"state": "lost", "message": "unplugged"}, "unplugged"),
+        ({"state": "off"}, "connection ended"),
+    ],
+)
+def test_another_device_or_none_ends_the_procedure(
+    bench: Bench, changed: dict[str, object], why: str
+) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.2)
+    calibrating.take()
+    bench.read(5)
+    bench.tell(**changed)
+    assert why in calibrating.message.lower()
+    assert calibrating.procedure is None
+    assert not calibrating.taking
+    assert bench.laid[-1] is None
+
+
+@pytest.mark.parametrize("before", [0, 5])
+def test_a_device_that_restarts_ends_the_procedure(bench: Bench, before: int) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.2)
+    calibrating.take()
+    bench.read()
+    calibrating.take()
+    bench.read(10 + before)
+    bench.read(40, ago=90.0)
+    assert "restarted" in calibrating.message
+    assert calibrating.procedure is None
+
+
+def test_a_hold_is_laid_on_only_when_it_is_taken(bench: Bench) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.2, hold=2.0)
+    calibrating.take()
+    bench.read()
+    assert calibrating.step is not None
+    assert calibrating.step.hold == 2.0
+    assert bench.laid[-1] != calibrating.step
+    hold = calibrating.step
+    calibrating.take()
+    assert bench.laid[-1] == hold
+    bench.read(90)
+    assert calibrating.taking
+    bench.read(15)
+    assert not calibrating.taking
+
+
+def test_unattended_steps_make_a_calibration_that_can_be_used_undone_saved_and_loaded(
+    bench: Bench, until: Callable[..., None], tmp_path: Path
+) -> None:
+    calibrating, history = bench.calibrating, bench.history
+    calibrating.begin(RADII[::2], 0.2)
+    calibrating.take_all()
+    while calibrating.step is not None:
+        bench.read(5)
+    done(bench, until)
+    assert calibrating.procedure is None
+    assert bench.laid[-1] is None
+    result = calibrating.result
+    assert result is not None
+    assert result.report.passed.all()
+    tolerance = next(e for e in SCENE.effects if isinstance(e, Tolerance))
+    gain, _ = tolerance.errors((300,))
+    np.testing.assert_allclose(result.report.calibration.gain / gain, 1.0, atol=0.1)
+    calibrating.use()
+    used = history.settings.calibration
+    assert used == result.report.calibration
+    history.stack.undo()
+    assert history.settings.calibration is None
+    calibrating.save(tmp_path / "it.toml")
+    assert calibrating.message == ""
+    calibrating.load(tmp_path / "it.toml")
+    assert history.settings.calibration == used
+    calibrating.stop_using()
+    assert history.settings.calibration is None
+    history.stack.undo()
+    assert history.settings.calibration == used
+
+
+def test_a_file_that_is_no_calibration_of_this_sensor_is_refused(
+    bench: Bench, tmp_path: Path
+) -> None:
+    path = tmp_path / "it.toml"
+    path.write_text("damaged")
+    bench.calibrating.load(path)
+    assert "it.toml" in bench.calibrating.message
+    assert bench.history.settings.calibration is None
+    bench.tell(sensor=None)
+    bench.calibrating.load(path)
+    assert "no sensor is connected" in bench.calibrating.message
+
+
+def test_cancelling_forgets_what_was_taken(bench: Bench) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.2)
+    calibrating.take()
+    bench.read()
+    calibrating.cancel()
+    assert calibrating.procedure is None
+    assert calibrating.result is None
+    assert bench.laid[-1] is None
+
+
+# In the window.
+
+
+def _error(window: MainWindow, until: Callable[..., None]) -> float:
+    """RMS error of the shape in m, over the next estimates."""
+    found: list[float] = []
+    window.session.estimated.connect(lambda estimate: found.append(estimate.error_rms))
+    until(lambda: len(found) > 40)
+    return float(np.median(found))
+
+
+def test_a_calibration_taken_in_the_window_mends_the_shape(
+    opened: Callable[[str], MainWindow],
+    until: Callable[..., None],
+    colours_in: Callable[..., int],
+) -> None:
+    window = opened("sim:centre")
+    until(lambda: len(window.membrane.ages) > 3 and window.session.estimate is not None)
+    window.history.change("Spoil", loops="second", tolerance=0.1)
+    until(lambda: window.session.status.meetings > 0 and not window.session.status.computing)
+    nominal = _error(window, until)
+    panels, panel = window.panels, window.panels.calibrate
+    panels.show_calibration()
+    panel.start.radii.setText("150, 80, 45")
+    panel.start.seconds.setValue(0.1)
+    panel.start.begin.click()
+    assert panel.steps.take.isVisible()
+    panel.steps.all.click()
+    until(lambda: panel.outcome.use.isVisible(), 240.0)
+    assert "of 300 channels pass" in panel.outcome.passed.text()
+    for view in (panel.outcome.map, panel.outcome.plot):
+        assert colours_in(window, view) > 3
+    panel.outcome.use.click()
+    until(lambda: window.session.status.setup.calibration is not None)
+    calibrated = _error(window, until)
+    print(nominal, calibrated)
+    assert calibrated < 0.6 * nominal
+    assert "channels" in panels.connection.device.text()
+    window.history.stack.undo()
+    until(lambda: window.session.status.setup.calibration is None)
+    assert _error(window, until) > 0.8 * nominal
+
+
+def test_a_calibration_rests_while_another_skin_is_connected(
+    window: MainWindow, until: Callable[..., None]
+) -> None:
+    sensor, ones = window.session.scene.sensor(), np.ones(300)
+    window.history.change(
+        "Use",
+        calibration=Calibration(
+            sensor.name,
+            sensor.serial_number,
+            "",
+            fingerprint(sensor.layout),
+            datetime.now(UTC),
+            *(ones, 0 * ones, ones, ones),
+        ),
+    )
+    until(lambda: window.session.status.setup.calibration is not None)
+    window.history.change("Fewer", elements_x=8)
+    until(lambda: window.session.status.setup.calibration is None)
+    until(lambda: window.session.estimate is not None)
+    until(lambda: "Not in use" in window.panels.in_use.message.text())
+    window.history.stack.undo()
+    until(lambda: window.session.status.setup.calibration is not None)
