@@ -116,6 +116,10 @@ class Session(QObject):
         if self._laid is not None:
             setup = replace(setup, calibration=None)
         if setup != self._asked:
+            if self.simulating and setup.calibration and not self._asked.calibration:
+                # A calibration follows the loops of a skin from rest on: these effects start anew.
+                self.engine.play(replace(self.scene, effects=()))
+                self.engine.play(self.scene)
             self._asked = setup
             self.engine.set_up(setup)
 

@@ -345,8 +345,7 @@ def test_a_calibration_taken_in_the_window_mends_the_shape(
     panel.outcome.use.click()
     until(lambda: window.session.status.setup.calibration is not None)
     calibrated = _error(window, until)
-    print(nominal, calibrated)
-    assert calibrated < 0.6 * nominal
+    assert calibrated < 0.2 * nominal
     assert "channels" in panels.connection.device.text()
     window.history.stack.undo()
     until(lambda: window.session.status.setup.calibration is None)

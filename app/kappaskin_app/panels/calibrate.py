@@ -297,7 +297,12 @@ class _Outcome(QWidget):
             Qt.TextInteractionFlag.LinksAccessibleByMouse
             | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
         )
-        self.use = _button("Use", "use", "Correct the readings by it from now on (Ctrl+Z undoes).")
+        self.use = _button(
+            "Use",
+            "use",
+            "Correct the readings by it from now on (Ctrl+Z undoes). Loops are followed from a "
+            "skin at rest: bend a real one back and forth first, less and less.",
+        )
         self.save = _button(f"Save{_ELLIPSIS}", "save", "Write it to a file.")
         self.leave = _button("New", "leave", "Begin another one; what is not saved is forgotten.")
         around = QVBoxLayout(self)
