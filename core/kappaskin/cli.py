@@ -85,13 +85,15 @@ def reconstruct(
     grid: _Pair | None = None,
     edge: str = "hinged",
     method: str = METHODS[0],
+    contact: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Turn a file of curvature readings into a file of shapes.
 
     READINGS is an NPZ with `size` (2,) m, `positions` (P, 2) m, `curvature` (T, 3, P) or (3, P) in
     1/m with NaN for a missing reading, and optionally `sigma` in 1/m and `radius` in m, the base
     radius along x (infinite when flat). A `size` (1,) with `positions` (P, 1) is a strip, of whose
-    curvature only xx is read.
+    curvature only xx is read. An `outline` (V, 2) m is that of a polygon, one number the radius of
+    a disk; a `rigidity` in N m tells forces.
 
     Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`
 
@@ -109,9 +111,11 @@ def reconstruct(
         How the skin is held.
     method
         How the coefficients are found.
+    contact
+        Write the contact of each frame too, and the skin's geometry there.
     """
     points = _pair(grid, "a grid") if grid else None
-    found = reconstructed(readings, _pair(basis, "a basis"), points, edge, method)
+    found = reconstructed(readings, _pair(basis, "a basis"), points, edge, method, contact)
     try:
         with out.open("wb") as file:
             np.savez(file, **found)  # pyright: ignore[reportArgumentType]

@@ -12,8 +12,11 @@ from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.fit import Fit, LeastSquares
 from kappaskin.frames import Array
+from kappaskin.geometry import contact_geometry
 from kappaskin.layout import SensorLayout
-from kappaskin.patch import Patch
+from kappaskin.mechanics import Plate
+from kappaskin.patch import Disk, Patch, Polygon
+from kappaskin.touch import PointContact
 
 _NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
 
@@ -42,7 +45,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         archive = np.load(file, allow_pickle=False)
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise ValueError("it holds a single array")
-        names = ("size", "positions", "curvature", "sigma", "radius")
+        names = ("size", "positions", "curvature", "sigma", "radius", "outline", "rigidity")
         return {name: archive[name] for name in names if name in archive}
 
 
@@ -63,8 +66,23 @@ def _read(path: Path) -> dict[str, Array]:
     return {name: values.astype(float) for name, values in found.items()}
 
 
-def _patch(path: Path, size: Array, radius: Array) -> Patch:
-    """The skin of `size` (2,), or of size (1,) a strip, bent to one `radius`."""
+def _patch(path: Path, size: Array, radius: Array, outline: Array | None) -> Patch:
+    """The skin of `size` (2,), or of size (1,) a strip, bent to one `radius`.
+
+    With an `outline`, (V, 2) in m or one number, it is a polygon, or a disk of that radius.
+    """
+    if outline is not None:
+        skin = Disk(float(outline.item())) if outline.size == 1 else Polygon(outline)
+        if (
+            size.shape != (2,)
+            or not np.allclose(size, (skin.a, skin.b))
+            or np.any(radius != np.inf)
+        ):
+            raise Refusal(
+                f"{path}: expected a flat skin of size {skin.a:g} x {skin.b:g} m, the box of its "
+                f"outline, got size {size} and radius {radius}"
+            )
+        return skin
     if size.shape not in ((1,), (2,)):
         raise Refusal(
             f"{path}: expected size of shape (2,) in m, or (1,) for a strip, got {size.shape}"
@@ -124,18 +142,20 @@ def reconstruct(
     grid: tuple[int, int] | None = None,
     edge: str = "hinged",
     method: str = METHODS[0],
+    contact: bool = False,
 ) -> dict[str, Array]:
     """What `kappaskin reconstruct` writes: `coefficients`, `sd`, `residual` and the surface.
 
     `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m; with a `grid` of nx x ny
     points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
-    `method` one of `METHODS`.
+    `method` one of `METHODS`. With `contact` also what `_contacts` gives.
     """
     if method not in METHODS:
         raise Refusal(f"expected a method among {', '.join(METHODS)}; got {method!r}")
     found = _read(readings)
     curvature, sigma = found["curvature"], found.get("sigma")
-    patch = _patch(readings, found["size"], found.get("radius", np.array(np.inf)))
+    radius = found.get("radius", np.array(np.inf))
+    patch = _patch(readings, found["size"], radius, found.get("outline"))
     layout = _layout(readings, patch, found["positions"])
     if curvature.ndim == 2:
         curvature = curvature[None]
@@ -157,4 +177,34 @@ def reconstruct(
     if grid is not None:
         x, y = patch.grid(*grid)
         out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(fit.coefficients)}
+    if contact:
+        out |= _contacts(LeastSquares(functions, layout), edge, curvature, found.get("rigidity"))
+    return out
+
+
+def _contacts(
+    fit: LeastSquares, edge: str, curvature: Array, rigidity: Array | None
+) -> dict[str, Array]:
+    """The contact of each frame and the skin's geometry there; NaN where there is none.
+
+    `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m; `normal`
+    (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with a
+    `rigidity` in N m also `force` and `force_sd` (T,) in N. All readings weigh the same.
+    """
+    if rigidity is not None and rigidity.size != 1:
+        raise Refusal(f"expected one rigidity in N m, got shape {rigidity.shape}")
+    plate = Plate(fit.layout.patch, 1.0 if rigidity is None else float(rigidity.item()))
+    touch_of = PointContact(plate, fit.layout, edge)
+    fits = [fit(frame) for frame in curvature]
+    touches = [touch_of(frame, one) for frame, one in zip(curvature, fits, strict=True)]
+    there = [contact_geometry(one, touch) for one, touch in zip(fits, touches, strict=True)]
+    names = ["displacement", "displacement_sd"]
+    names += [] if rigidity is None else ["force", "force_sd"]
+    out = {
+        "contact": np.stack([touch.position for touch in touches]),
+        "contact_sd": np.stack([touch.position_sd for touch in touches]),
+    }
+    out |= {name: np.array([getattr(touch, name) for touch in touches]) for name in names}
+    for name in ("normal", "curvature_form", "torsion_form", "principal"):
+        out[name] = np.stack([getattr(geometry, name) for geometry in there])
     return out

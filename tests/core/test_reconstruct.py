@@ -12,7 +12,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import RankDeficient, Refusal
+from kappaskin import (
+    Disk,
+    Patch,
+    Plate,
+    PointLoad,
+    RankDeficient,
+    Refusal,
+    SensorLayout,
+    SineBasis,
+    basis_for,
+)
 from kappaskin.reconstruct import reconstruct
 
 RNG = np.random.default_rng(7)
@@ -457,10 +467,51 @@ def test_a_cylinder_skin_is_not_read_as_a_flat_one(saved) -> None:
         ({"radius": np.nan}, {}, "goes once round at a radius of"),
         ({"radius": [1.0, 2.0]}, {}, r"one radius in m, got shape \(2,\)"),
         ({"size": [0.1]}, {}, r"positions of shape \(P, 1\)"),
-        ({}, {"edge": "glued"}, "an edge among .*got 'glued'"),
+        ({}, {"edge": "glued"}, "expected an edge of .* among hinged.*got 'glued'"),
         ({}, {"method": "magic"}, "a method among least-squares.*got 'magic'"),
     ],
 )
 def test_what_no_skin_or_no_method_is_is_refused(saved, changes, arguments, reason) -> None:
     with pytest.raises(Refusal, match=reason):
         reconstruct(saved(**changes), (NI, NJ), **arguments)
+
+
+def test_the_contact_of_each_frame_is_written_with_the_geometry_there(saved) -> None:
+    patch = Patch(0.1, 0.1)
+    layout, truth = SensorLayout.regular(patch, 10, 10), SineBasis(patch, 15, 15)
+    plate = Plate(patch, 5e-3)
+    loads = [PointLoad(0.03, 0.06, 0.2), PointLoad(0.05, 0.05, 0.1)]
+    curvature = np.stack(
+        [
+            layout.curvature_operator(truth) @ plate.deflection([load], truth).ravel()
+            for load in loads
+        ]
+    ).reshape(2, 3, 100)
+    path = saved(size=[0.1, 0.1], positions=layout.positions, curvature=curvature, rigidity=5e-3)
+
+    found = reconstruct(path, (8, 8), contact=True)
+
+    assert np.allclose(found["contact"], [[0.03, 0.06], [0.05, 0.05]], atol=2e-5)
+    assert np.allclose(found["force"], [0.2, 0.1], rtol=1e-3)
+    assert found["normal"][1] == pytest.approx([0, 0, 1], abs=1e-3)
+    assert np.all(found["principal"] < 0)  # pressed in, it is hollow seen from outside
+    assert "force" not in reconstruct(saved(), (NI, NJ), contact=True)
+
+
+def test_a_disk_and_a_polygon_are_read_by_their_outline(saved) -> None:
+    disk = Disk(0.05)
+    layout, basis = SensorLayout.regular(disk, 10, 10), basis_for(disk, "clamped", 4, 4)
+    c = np.random.default_rng(3).normal(0, 1e-4, basis.size)
+    curvature = (layout.curvature_operator(basis) @ c).reshape(3, -1)
+    path = saved(size=[0.1, 0.1], positions=layout.positions, curvature=curvature, outline=0.05)
+
+    found = reconstruct(path, (4, 4), (21, 21), edge="clamped")
+
+    assert np.allclose(found["coefficients"].ravel(), c, rtol=0, atol=1e-12)
+    assert np.isnan(found["w"][0, 0, 0])
+    centre = float(basis.at(np.array([[0.05, 0.05]]))[0] @ c)
+    assert found["w"][0, 10, 10] == pytest.approx(centre, abs=1e-10)  # drawn in single precision
+    with pytest.raises(Refusal, match="the box of its outline"):
+        reconstruct(saved(outline=0.07), (4, 4))
+    with pytest.raises(Refusal, match="cross"):
+        reconstruct(saved(outline=[[0, 0], [0.1, 0.1], [0.1, 0], [0, 0.1]]), (4, 4))
