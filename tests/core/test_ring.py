@@ -204,8 +204,8 @@ def test_a_status_comes_back_as_written(ring, writer) -> None:
 
 def test_too_large_a_status_is_refused_and_the_last_one_stays(ring, writer) -> None:
     writer.write_status("fits")
-    with pytest.raises(Refusal, match="at most 2097152 bytes"):
-        writer.write_status(bytes(2**21))
+    with pytest.raises(Refusal, match="at most 8388608 bytes"):
+        writer.write_status(bytes(2**23))
     assert ring.read_status() == "fits"
 
 
