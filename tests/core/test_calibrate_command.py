@@ -73,8 +73,8 @@ def test_a_simulation_lays_itself_on_every_cylinder(run, tmp_path) -> None:
 
     assert code == 0
     assert "Simulated skin SIM-0001: 300 of 300 channels passed" in printed
-    assert told.count("\n    xx ") == len(STEPS) == 49
-    assert "2/49  Cylinder of radius 100 mm, bent along x, inner face on it" in told
+    assert told.count("\n    xx ") == len(STEPS) == 55
+    assert "4/55  Cylinder of radius 100 mm, bent along x, inner face on it" in told
     gain, offset = TOLERANCE.errors((300,))
     found = from_toml(tmp_path / "s.toml")
     # Each mean is of 11 frames: 0.07 1/m, over curvatures of up to 67 1/m, half of it for twist.
@@ -215,13 +215,13 @@ def test_a_person_is_asked_for_each_cylinder_and_shown_what_was_read(monkeypatch
     sensor, sweep = guided(rig, monkeypatch)
 
     assert rig.closed
-    assert len(rig.asked) == 49
+    assert len(rig.asked) == 55
     assert rig.asked[0] == (
-        "1/49  Flat table, nothing pressing on the skin: press Enter when it lies still: "
+        "1/55  Flat table, nothing pressing on the skin: press Enter when it lies still: "
     )
     assert rig.asked[1].endswith("or r and Enter to take the last one again: ")
     assert rig.told[0] == ADVICE
-    assert re.match(r" +xx \+\d+\.\d \(cylinder \+10\.0\), .* noise 0\.0\d", rig.told[2])
+    assert re.match(r" +xx \+\d+\.\d \(cylinder \+10\.0\), .* noise 0\.0\d", rig.told[4])
     expected = np.repeat(sweep.curvature, 16, axis=1)
     assert np.abs(sweep.readings - expected).max() < 0.3
     report = calibrate(sweep, sensor, datetime.now(UTC))
@@ -351,7 +351,7 @@ def test_a_device_whose_line_is_lost_in_the_middle_leaves_no_file(run, tmp_path)
     found = run("calibrate", device.port, "--out", tmp_path / "s.toml", "--dwell", 0.05, *FAST[:2])
     closer.join()
     refused(found, "the line is gone", tmp_path)
-    assert "3/49" in found[2]
+    assert "3/55" in found[2]
 
 
 def test_a_device_that_is_already_on_its_way_is_refused(run, tmp_path) -> None:
@@ -374,7 +374,7 @@ def test_closed_standard_input_is_refused_with_what_to_do(tmp_path) -> None:
     with serving(dwell=1.0) as port:
         process = started(port, tmp_path / "s.toml", stdin=subprocess.DEVNULL)
         printed, told = process.communicate(timeout=30)
-    assert "1/97  Flat table" in told
+    assert "1/103  Flat table" in told
     code = process.returncode
     refused(
         (code, printed, told),

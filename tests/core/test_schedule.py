@@ -42,13 +42,14 @@ def test_a_cylinder_has_one_principal_curvature_and_bends_as_it_lies(along, face
 def test_each_direction_goes_from_large_to_small_and_back_on_one_face_then_on_the_other():
     steps = schedule((0.025, 0.1, 0.05))
 
-    told = [(s.along, s.face, round(1e3 * s.radius), s.back) for s in steps if not s.flat]
-    ways = [(100, False), (50, False), (25, False), (50, True), (100, True)]
+    told = [(s.along, s.face, round(1e3 * s.radius), s.way) for s in steps if not s.flat]
+    ways = [(100, "there"), (50, "there"), (25, "there"), (50, "back"), (100, "back")]
+    sweep = [(face, *way) for face in (1, -1) for way in ways]
     assert told == [
-        (along, face, *way) for along in ("x", "y", "diagonal") for face in (1, -1) for way in ways
+        (along, *step) for along in ("x", "y", "diagonal") for step in ((-1, 25, "first"), *sweep)
     ]
-    assert [step.number for step in steps] == list(range(1, 38))
-    assert [step.number for step in steps if step.flat] == [1, 7, 13, 19, 25, 31, 37]
+    assert [step.number for step in steps] == list(range(1, 44))
+    assert [step.number for step in steps if step.flat][:5] == [1, 3, 9, 15, 17]
 
 
 def test_a_strip_is_bent_along_x_alone():
@@ -74,13 +75,18 @@ def test_the_ready_radii_stay_within_the_elastic_limit_and_reach_the_papers_fing
     [
         (Step(1), "Flat table, nothing pressing on the skin"),
         (
-            Step(5, 0.025, "x", 1, True),
+            Step(5, 0.025, "x", 1, "back"),
             "Cylinder of radius 25 mm, bent along x, inner face on it, on the way back",
         ),
         (
             Step(5, 0.0145, "diagonal", -1),
             "Cylinder of radius 14.5 mm, bent along the diagonal from corner x = y = 0, "
             "outer face on it, on the way there",
+        ),
+        (
+            Step(2, 0.013, "y", -1, "first"),
+            "Cylinder of radius 13 mm, bent along y, outer face on it, first of all, to wipe out "
+            "its past",
         ),
         (
             Step(2, 0.02, "y", hold=60.0),
@@ -122,7 +128,7 @@ def test_a_cylinder_that_strains_the_gages_beyond_their_limit_is_refused_before_
 
 @given(
     st.floats(0.01, 100),
-    st.integers(0, 36),
+    st.integers(0, 42),
     st.sampled_from((0.01, 0.3, 0.49, 0.51, 0.94, 0.96, 0.99)),
 )
 def test_each_step_is_presented_for_its_dwell(dwell, number, share):
@@ -131,6 +137,14 @@ def test_each_step_is_presented_for_its_dwell(dwell, number, share):
     assert laid.index(time) == number
     np.testing.assert_array_equal(laid.curvature(time), SHORT[number].curvature)
     assert laid.settled(time) == (0.5 < share < 0.95)
+
+
+@pytest.mark.parametrize("dwell", [0.1, 0.06, 1 / 3])
+def test_a_frame_that_is_due_when_a_step_ends_is_read_on_the_next(dwell):
+    laid = Presentation(SHORT, dwell)
+    for number in range(1, 43):
+        for time in (number * dwell, round(number * dwell, 6)):
+            assert laid.index(time) == number
 
 
 def test_after_the_last_step_it_stays():
@@ -167,7 +181,7 @@ def test_the_procedure_goes_through_all_steps_and_gives_their_means():
     expected = np.repeat(sweep.curvature, 100, axis=1)
     assert np.abs(sweep.readings - expected).max() < 5 * 0.1 / math.sqrt(5)
     assert sweep.noise.mean() == pytest.approx(0.1 * 0.94, rel=0.01)  # c4(5): means of deviations
-    np.testing.assert_allclose(sweep.times, np.arange(1, 38) + 0.02)
+    np.testing.assert_allclose(sweep.times, np.arange(1, 44) + 0.02)
 
 
 def test_redo_goes_back_by_one_step():
@@ -195,8 +209,8 @@ def test_a_channel_on_a_rail_in_any_frame_has_no_reading_of_that_step():
 
 def test_what_was_taken_is_told_beside_the_cylinder():
     procedure = Procedure(SENSOR, SHORT)
-    procedure.take(*frames(SHORT[0]))
-    told = str(procedure.take(*frames(SHORT[1], noise=0.0)))
+    for step in SHORT[:4]:
+        told = str(procedure.take(*frames(step, noise=0.0)))
     assert told == (
         "xx +20.0 (cylinder +20.0), yy +0.0 (cylinder +0.0), xy +0.0 (cylinder +0.0) 1/m, "
         "noise 0 1/m in 5 frames"
@@ -242,7 +256,7 @@ def test_frames_that_make_no_reading_are_refused_and_the_step_stays():
 
 def test_a_sweep_is_given_when_all_is_done_and_not_before():
     procedure = Procedure(SENSOR, SHORT)
-    with pytest.raises(Refusal, match="37 steps are still to be taken"):
+    with pytest.raises(Refusal, match="43 steps are still to be taken"):
         procedure.sweep()
     with pytest.raises(Refusal, match="every step is done"):
         all_taken().take(*frames(SHORT[0], time=99.0))
@@ -250,9 +264,9 @@ def test_a_sweep_is_given_when_all_is_done_and_not_before():
 
 def test_a_sweep_of_mixed_shapes_or_of_infinities_is_refused():
     sweep = all_taken().sweep()
-    with pytest.raises(Refusal, match="for 37 steps, got"):
+    with pytest.raises(Refusal, match="for 43 steps, got"):
         replace(sweep, readings=sweep.readings[1:])
-    with pytest.raises(Refusal, match="for 37 steps, got"):
+    with pytest.raises(Refusal, match="for 43 steps, got"):
         replace(sweep, course=np.zeros((3, 300)))
     with pytest.raises(Refusal, match="got infinity"):
         replace(sweep, readings=sweep.readings + np.inf)

@@ -28,6 +28,8 @@ def identify_creep(moments: Array, course: Array, least: float) -> StandardLinea
     from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
 
     known = np.isfinite(course).all(axis=0)
+    if not known.any():
+        raise Refusal("every channel was on a rail during the hold; lower the amplifier's gain")
     bent = _bent_at(course[:, known])
     t = moments - moments[bent]
     length = float(t[-1])

@@ -8,6 +8,7 @@ from kappaskin.calibration.lines import Lines
 from kappaskin.effects import PrandtlIshlinskii
 from kappaskin.frames import Array, Mask
 
+_PLAYS = 10  # at most, up to half of the range
 _STEPS = 12  # of Gauss-Newton at most, in log a
 _LONGEST = 0.3  # step in log a
 _CONVERGED = 1e-5  # step in log a
@@ -15,15 +16,17 @@ _DECISIVE = 0.5  # share of a reading that the fit leaves to others, below which
 _MOST = np.log(4.0)  # log a: loops of one side at most four times as wide as the other's
 
 
-def thresholds(x: Array) -> Array:
-    """Thresholds (J,) in 1/m that a sweep over curvatures `x` (S,) can tell apart.
+def thresholds(x: Array, radii: int) -> Array:
+    """Thresholds (J,) in 1/m that a sweep of so many `radii` over curvatures `x` (S,) tells apart.
 
-    A play reverses over twice its threshold, so loops tell those up to half of the range. The first
-    way from rest tells wider ones, badly: they are there so that the gain's error bars know of
-    them. Without them a twist gage, bent half as far, had its gain wrong by four standard errors.
+    A play reverses over twice its threshold, so the loops on one face tell those up to half of its
+    range, two for each radius. The way from one face to the other tells wider ones, badly: they are
+    there so that the error bars know of them. Without them half of the offsets of twist gages,
+    which are bent half as far, lay beyond two standard errors.
     """
     most = np.abs(x).max() or 1.0  # any will do for channels that were never bent
-    return most * np.array([*np.arange(1, 11) / 20, 0.6, 0.75, 0.9])
+    count = min(2 * radii, _PLAYS)
+    return most * np.array([*np.arange(1, count + 1) / (2 * count), 0.6, 0.75, 0.9])
 
 
 def positions(u: Array, slope: Array, r: Array) -> tuple[Array, Array]:
@@ -42,29 +45,35 @@ def positions(u: Array, slope: Array, r: Array) -> tuple[Array, Array]:
     return w, dw
 
 
-def _columns(x: Array, y: Array, r: Array, log_a: Array, o: Array) -> tuple[Array, Array]:
-    """What readings `y` (S, C) are linear in, and its derivative along log a, (S, J + 1, C).
+def _columns(
+    x: Array, y: Array, used: Mask, r: Array, log_a: Array, o: Array
+) -> tuple[Array, Array]:
+    """What readings `y` (S, C) are linear in, and its derivative along log a, (U, J + 1, C).
 
-    reading = o + E(G_0 u + sum_j G_j w_j), u = E^-1(x). Since E(g z) = g E(z) for every gain g
-    above zero, gain times weight is one number G_j; and the sign that E looks at is that of y - o.
+    Of the U steps that are `used` (S,). reading = o + E(G_0 u + sum_j G_j w_j), u = E^-1(x). Since
+    E(g z) = g E(z) for every gain g above zero, gain times weight is one number G_j; and the sign
+    that E looks at is that of y - o.
     """
     a = np.exp(log_a)
     above = x[:, None] > 0
     u = np.where(above, x[:, None] / a, x[:, None])
     du = np.where(above, -u, 0.0)
     w, dw = positions(u, du, r)
+    # A play that never moves is an offset, and its weight anything.
+    moves = np.ptp(w[used], axis=0) > 0
+    w, dw = w * moves, dw * moves
     E = np.where(y > o, a, 1.0)[:, None]
     dE = np.where(y > o, a, 0.0)[:, None]
     moved = np.concatenate([u[:, None], w], axis=1)
     turned = np.concatenate([du[:, None], dw], axis=1)
-    return E * moved, E * turned + dE * moved
+    return (E * moved)[used], (E * turned + dE * moved)[used]
 
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """One channel's fit: o, G (J + 1,), log a, columns A, the residual e (U,) and slopes J (U, k).
+    """One channel's fit to U readings: o, G (J + 1,), log a, columns A, residual e, slopes J.
 
-    The columns of J belong to the G above zero, to o and to log a.
+    The columns of J (U, k) belong to the G above zero, to o and to log a.
     """
 
     o: float
@@ -95,16 +104,16 @@ def _fitted(A: Array, dA: Array, y: Array, log_a: float) -> _Fitted:
     return _Fitted(o, G, log_a, A, y - o - A @ G, J)
 
 
-def _fits(x: Array, y: Array, used: Mask, offset: Array) -> list[_Fitted]:
+def _fits(x: Array, y: Array, used: Mask, r: Array, offset: Array) -> list[_Fitted]:
     """The best fit of every channel: least squares in G and o, Gauss-Newton in log a."""
-    r, C = thresholds(x), y.shape[1]
+    C = y.shape[1]
     log_a, o = np.zeros(C), offset.copy()
     best: list[_Fitted | None] = [None] * C
     for _ in range(_STEPS if C else 0):
-        A, dA = _columns(x, y, r, log_a, o)
+        A, dA = _columns(x, y, used, r, log_a, o)
         step = np.zeros(C)
         for c in range(C):
-            fit = _fitted(A[used, :, c], dA[used, :, c], y[used, c], float(log_a[c]))
+            fit = _fitted(A[:, :, c], dA[:, :, c], y[used, c], float(log_a[c]))
             before = best[c]
             if before is None or fit.squares < before.squares:
                 best[c] = fit
@@ -142,46 +151,50 @@ def _left_out(fit: _Fitted, h: Array) -> Array:
     return out
 
 
+def _errors(fit: _Fitted) -> tuple[float, float]:
+    """Standard errors of the gain and of o.
+
+    A weight that came out zero is not known to be zero: the columns of all plays that move count,
+    for the same reason as wide `thresholds` do. Nine in ten errors are within two of these or more.
+    """
+    n, k = fit.J.shape
+    moving = fit.A[:, np.abs(fit.A).max(axis=0) > 0]
+    R = np.linalg.qr(np.column_stack([moving, fit.J[:, -2:]]))[1]
+    spread = np.sqrt(fit.squares / (n - k)) * np.linalg.pinv(R)
+    of_gain, of_o = spread[:-2].sum(axis=0), spread[-2]
+    return float(np.linalg.norm(of_gain)), float(np.linalg.norm(of_o))
+
+
 def _numbers(fit: _Fitted) -> tuple[float, ...]:
     """The fields of `Lines` for one channel: its gain is that of a long way, the sum of G."""
-    n, k = fit.J.shape
-    Q, R = np.linalg.qr(fit.J)
-    spread = np.sqrt(fit.squares / (n - k)) * np.linalg.pinv(R)
     gain = float(fit.G.sum())
-    left = _left_out(fit, (Q**2).sum(axis=1))
-    return (
-        gain,
-        fit.o,
-        float(np.linalg.norm(spread[: k - 2].sum(axis=0))),
-        float(np.linalg.norm(spread[k - 2])),
-        float(np.sqrt(fit.squares / n)) / gain,
-        float(np.sqrt(np.mean(left**2))) / gain,
-    )
+    leverage = (np.linalg.qr(fit.J)[0] ** 2).sum(axis=1)
+    left = np.stack([fit.e, _left_out(fit, leverage)])
+    rms, left_out = np.sqrt((left**2).mean(axis=1)) / gain
+    return gain, fit.o, *_errors(fit), float(rms), float(left_out)
 
 
 def identify(
-    x: Array, y: Array, used: Mask, line: Lines, least: float
+    x: Array, y: Array, used: Mask, r: Array, line: Lines, least: float
 ) -> tuple[Lines, PrandtlIshlinskii]:
     """The loops in readings `y` (S, C) on curvatures `x` (S,) in 1/m, and what the fits are worth.
 
-    The channels share nothing but the thresholds. Glue and bonding differ from gage to gage, which
-    the paper blames for the loops and their asymmetry, and a sweep of n radii tells each channel
-    some 4 n to 8 n readings, good to a hundredth of a loop's width, for at most 16 numbers. A
-    channel that a line explains as well keeps its `line`. The skin was at rest before the first
-    step; steps that are not `used` (S,) only move the plays. No reading is known better than to
-    `least` in 1/m.
+    The channels share nothing but the thresholds `r` (J,) in 1/m. Glue and bonding differ from gage
+    to gage, which the paper blames for the loops and their asymmetry, and a sweep of n radii tells
+    each channel some 4 n to 8 n readings, good to a hundredth of a loop's width, for at most 16
+    numbers. A channel that a line explains as well keeps its `line`. Steps that are not `used` (S,)
+    only move the plays. No reading is known better than to `least` in 1/m.
     """
     C = y.shape[1]
-    r = np.tile(thresholds(x)[:, None], C)
-    p, q, a = np.zeros_like(r), np.ones(C), np.ones(C)
+    p, q, a = np.zeros((len(r), C)), np.ones(C), np.ones(C)
     numbers = np.stack(
         [line.gain, line.offset, line.gain_sd, line.offset_sd, line.rms, line.left_out]
     )
     known = np.flatnonzero(np.isfinite(line.rms))
-    for c, fit in zip(known, _fits(x, y[:, known], used, line.offset[known]), strict=True):
+    for c, fit in zip(known, _fits(x, y[:, known], used, r, line.offset[known]), strict=True):
         straight = used.sum() * (line.rms[c] * line.gain[c]) ** 2
         if _needed(fit, float(straight), least):
             numbers[:, c] = _numbers(fit)
             shares = fit.G / fit.G.sum()
             q[c], p[:, c], a[c] = shares[0], shares[1:], np.exp(fit.log_a)
-    return Lines(*numbers), PrandtlIshlinskii(r, p, q, a)
+    return Lines(*numbers), PrandtlIshlinskii(np.tile(r[:, None], C), p, q, a)

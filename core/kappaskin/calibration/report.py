@@ -11,7 +11,7 @@ from kappaskin.calibration.calibration import Calibration, fingerprint
 from kappaskin.calibration.holds import identify_creep
 from kappaskin.calibration.judge import DEAD, Limits, failures_of
 from kappaskin.calibration.lines import Lines, lines
-from kappaskin.calibration.loops import identify
+from kappaskin.calibration.loops import identify, thresholds
 from kappaskin.calibration.procedure import Sweep
 from kappaskin.calibration.schedule import FACES, FEWEST_RADII, Step, check_strain, pairs
 from kappaskin.effects import PrandtlIshlinskii, Running, StandardLinearSolid
@@ -154,16 +154,28 @@ def _creep(sweep: Sweep, least: float) -> tuple[StandardLinearSolid | None, Arra
     return creep, _in_time(sweep, lambda reading, time: restore(reading - rest, time) + rest)
 
 
+def _telling(x: Array, flat: Mask) -> Mask:
+    """Which steps (S,) tell of the channels with curvature `x` (S,), some of them `flat` (S,).
+
+    Those that do not bend them would blame on them what bending across them does. And before the
+    skin was first bent as far as it ever was, its loops are those of an unknown past: then every
+    play is dragged along, wherever it was.
+    """
+    since = np.arange(len(x)) >= np.argmax(np.abs(x) > (1 - 1e-9) * np.abs(x).max())
+    return since & (flat | (x != 0))
+
+
 def _by_component(
     sweep: Sweep, readings: Array, least: float
 ) -> tuple[Lines, Lines, PrandtlIshlinskii]:
     """Lines, fits and loops of all channels, fitted component by component."""
     flat = np.array([step.flat for step in sweep.steps])
+    radii = len({step.radius for step in sweep.steps if not step.flat})
     parts: list[tuple[Lines, Lines, PrandtlIshlinskii]] = []
     for x, y in zip(sweep.curvature.T, np.split(readings, 3, axis=1), strict=True):
-        used = flat | (x != 0)  # the others would blame on the line what bending across it does
+        used = _telling(x, flat)
         line = lines(x[used], y[used])
-        parts.append((line, *identify(x, y, used, line, least)))
+        parts.append((line, *identify(x, y, used, thresholds(x, radii), line, least)))
     of_lines, fitted, loops = zip(*parts, strict=True)
     return _joined(Lines, of_lines), _joined(Lines, fitted), _joined(PrandtlIshlinskii, loops)
 

@@ -16,15 +16,22 @@ RADII = (0.1, 0.05, 0.033, 0.025, 0.02, 0.017, 0.0145, 0.013)
 """Radii in m whose curvatures are about 10 1/m apart, up to the paper's fingertip's 77 1/m."""
 
 FEWEST_RADII = 3
+_ROUNDING = 1e-6  # s by which a time may be off that was summed up, or sent on a line
 
 FACES = {1: "inner face", -1: "outer face"}
 """Which side of the skin lies on the cylinder, by the sign of the curvature."""
 
 ADVICE = (
-    "Slide the skin from each cylinder to the next without letting it spring back, and wait until "
-    "it lies still: what it reads depends on the way it came."
+    "What the skin reads depends on the way it came: slide it from each cylinder to the next "
+    "without letting it spring back, and wait until it lies still."
 )
 """What a person must know before the first step."""
+
+WAYS = {
+    "there": "on the way there",
+    "back": "on the way back",
+    "first": "first of all, to wipe out its past",
+}
 
 _BENT = {
     "x": ("bent along x", (1.0, 0.0, 0.0)),
@@ -40,20 +47,24 @@ class Step:
 
     `along` is x, y or diagonal, the direction in which the skin bends. `face` is 1 when the inner
     face lies on the cylinder, so that the skin is convex seen from outside and its curvature
-    positive, and -1 for the outer face, which objects touch. `back` tells the way to larger radii
-    from the way there. The skin stays for `hold` s, or no longer than a reading takes.
+    positive, and -1 for the outer face, which objects touch. `way` is there, to smaller radii,
+    back, or first. The skin stays for `hold` s, or no longer than a reading takes.
     """
 
     number: int
     radius: float = math.inf
     along: str = "x"
     face: int = 1
-    back: bool = False
+    way: str = "there"
     hold: float = 0.0
 
     @property
     def flat(self) -> bool:
         return math.isinf(self.radius)
+
+    @property
+    def back(self) -> bool:
+        return self.way == "back"
 
     @property
     def curvature(self) -> Array:
@@ -64,10 +75,10 @@ class Step:
         if self.flat:
             return "Flat table, nothing pressing on the skin"
         face = FACES[self.face]
-        way = "back" if self.back else "there"
+        way = f"held for {self.hold:g} s" if self.hold else WAYS[self.way]
         return (
             f"Cylinder of radius {1e3 * self.radius:g} mm, {_BENT[self.along][0]}, {face} on it, "
-            + (f"held for {self.hold:g} s" if self.hold else f"on the way {way}")
+            f"{way}"
         )
 
 
@@ -77,8 +88,10 @@ def schedule(
     """The steps with cylinders of `radii` in m, as the paper took them (section 5).
 
     For each direction of bending, on a `strip` x alone: from large to small radii and back with
-    one face, then with the other, flat before and after each. A `hold` in s above zero begins with
-    a stay of so long on the smallest cylinder, which bends every channel and shows its creep.
+    one face, then with the other, flat before and after each. First of all the skin is bent as far
+    as it will be, the other way: whatever loops its past left it in, they are wiped out. A `hold`
+    in s above zero begins with a stay of so long on the smallest cylinder, which bends every
+    channel and shows its creep.
     """
     radii = tuple(sorted({float(radius) for radius in radii}, reverse=True))
     if not all(0 < radius < math.inf for radius in radii):
@@ -94,11 +107,13 @@ def schedule(
     if hold:
         steps += [Step(2, radii[-1], "x" if strip else "diagonal", hold=hold), Step(3)]
     for along in ("x",) if strip else _BENT:
+        stays = [[(radii[-1], -1, "first")]]
         for face in (1, -1):
-            ways = [(radius, False) for radius in radii]
-            ways += [(radius, True) for radius in reversed(radii[:-1])]
-            for radius, back in ways:
-                steps.append(Step(len(steps) + 1, radius, along, face, back))
+            there = [(radius, face, "there") for radius in radii]
+            stays.append(there + [(radius, face, "back") for radius in reversed(radii[:-1])])
+        for stay in stays:
+            for radius, face, way in stay:
+                steps.append(Step(len(steps) + 1, radius, along, face, way))
             steps.append(Step(len(steps) + 1))
     return tuple(steps)
 
@@ -114,11 +129,11 @@ def pairs(steps: tuple[Step, ...], x: Array, face: int) -> list[tuple[int, int]]
     found: list[tuple[int, int]] = []
     for k, step in enumerate(steps):
         key = (step.along, step.radius)
-        if step.face != face or not x[k] or step.hold:
+        if step.face != face or not x[k]:
             continue
-        if not step.back:
+        if step.way == "there":
             there[key] = k
-        elif key in there:
+        elif step.back and key in there:
             found.append((there[key], k))
     return found
 
@@ -157,7 +172,7 @@ class Presentation:
 
     def index(self, time: float) -> int:
         """Which step is presented at `time` in s, their number once all are over."""
-        return bisect_right(self._ends, time)
+        return bisect_right(self._ends, time + _ROUNDING)
 
     def settled(self, time: float) -> bool:
         """Whether what is read at `time` in s counts: that of a hold, or once the skin lies still.

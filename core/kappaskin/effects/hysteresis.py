@@ -130,13 +130,15 @@ class Hysteresis:
         return lambda curvature, _: plays(curvature.ravel()).reshape(shape)
 
 
-# Over a sweep from rest to 80 1/m, back, to -80 1/m and back, which is 1 % strain in a skin of
-# 250 um, these loops are 7.0 1/m wide on positive curvature (the paper's section 6.2) and 4.7
-# on negative curvature, away from zero.
+# A loop that swings to both sides is 2 a sum p_j r_j wide on the positive one and 2 sum p_j r_j on
+# the other, as soon as it is wider than the plays: 7 1/m (the paper's section 6.2) and 4.4 here,
+# over +-80 1/m, which is 1 % strain in a skin of 250 um. From rest the first one is 6.5 wide.
 _THRESHOLDS = tuple(2.5 * j for j in range(1, 9))
+_ASYMMETRY = 1.6
+_WEIGHT = 7 / (2 * _ASYMMETRY * sum(_THRESHOLDS))
 
-SECOND_GENERATION_LOOPS = Hysteresis(_THRESHOLDS, (0.209 / 8,) * 8, 1.6)
+SECOND_GENERATION_LOOPS = Hysteresis(_THRESHOLDS, (_WEIGHT,) * 8, _ASYMMETRY)
 """The paper's second prototype (Fig. 8): loops up to 7 1/m wide, less on negative curvature."""
 
-FIRST_GENERATION_LOOPS = Hysteresis(_THRESHOLDS, (3 * 0.209 / 8,) * 8, 1.6)
+FIRST_GENERATION_LOOPS = Hysteresis(_THRESHOLDS, (3 * _WEIGHT,) * 8, _ASYMMETRY)
 """The paper's first prototype (Fig. 7): loops three times as wide."""

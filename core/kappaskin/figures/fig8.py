@@ -93,15 +93,16 @@ def draw(figure: style.Figure) -> None:
 
 
 def _draw_loop(axes: style.Axes, first: _Run, second: _Run) -> None:
-    applied, read = second.sweep.curvature[:, 0], second.sweep.readings[:, PAIR]
+    since = slice(1, None)  # the first bend; before it the skin has an unknown past
+    applied, read = second.sweep.curvature[since, 0], second.sweep.readings[since, PAIR]
     line = second.report.line
     ends = np.array([-85.0, 85.0])
-    axes.plot(first.sweep.curvature[:, 0], first.sweep.readings[:, PAIR], color=style.GREY,
-              lw=0.8, label="first prototype")  # fmt: skip
+    axes.plot(first.sweep.curvature[since, 0], first.sweep.readings[since, PAIR],
+              color=style.GREY, lw=0.8, label="first prototype")  # fmt: skip
     axes.plot(ends, line.offset[PAIR] + line.gain[PAIR] * ends, color=style.INK, lw=0.8,
               label="least-squares line")  # fmt: skip
     axes.plot(applied, read, color=style.BLUE, lw=0.8, label="second prototype")
-    back = np.array([step.back for step in second.sweep.steps])
+    back = np.array([step.back for step in second.sweep.steps[since]])
     for way, fill, name in ((~back, style.BLUE, "way there"), (back, "white", "way back")):
         axes.plot(applied[way], read[way], ls="", marker="o", mfc=fill, color=style.BLUE, mew=0.7,
                   label=name)  # fmt: skip
