@@ -23,8 +23,9 @@ from kappaskin.reconstruct import METHODS
 from kappaskin.reconstruct import reconstruct as reconstructed
 from kappaskin.scene import load_scene
 from kappaskin.studies.as_printed import misprints
+from kappaskin.studies.regions import regions as measured_regions
 from kappaskin.studies.tables import table_1, table_2
-from kappaskin.studies.text import misprints_text, tables_text
+from kappaskin.studies.text import misprints_text, regions_text, tables_text
 
 FAILED = 1
 """Exit code of a command that was done, with something in the result that failed."""
@@ -198,6 +199,24 @@ def calibrate(
     else:
         print(*summary(report), sep="\n")
     return FAILED if report.failed else 0
+
+
+@app.command
+def regions(*, json: Annotated[bool, Parameter(negative="")] = False) -> None:
+    """Measure what scanning a region of interest buys and costs, on a contact that moves.
+
+    Example: `kappaskin regions --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    """
+    rows = measured_regions()
+    if json:
+        _print_json(rows)
+    else:
+        print(regions_text(rows))
 
 
 @app.command
