@@ -33,6 +33,11 @@ _FILES = "Calibration (*.toml)"
 _WORST = 5
 _ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 _BENT = {"x": "bent along x", "y": "bent along y", "diagonal": "bent along the diagonal"}
+_WAYS = {
+    "there": "on the way there",
+    "back": "on the way back",
+    "first": "first of all, to wipe out its past",
+}
 _EQUATION_8 = (
     "Nominal curvature, as Eq. 8 reads it from the voltage: kappa = 4 V / (V_in GF (t_s + t_g) G). "
 )
@@ -261,8 +266,7 @@ def _how(step: Step) -> str:
     face = "inner face on it" if step.face > 0 else "outer face on it"
     if step.hold:
         return f"{_BENT[step.along]}, {face}: press Take, then lay it on; it stays {step.hold:g} s"
-    way = "back" if step.back else "there"
-    return f"{_BENT[step.along]}, {face},\non the way {way}"
+    return f"{_BENT[step.along]}, {face},\n{_WAYS[step.way]}"
 
 
 def _median(values: np.ndarray) -> float:
@@ -387,11 +391,15 @@ class _Outcome(QWidget):
 
 
 def _loop(result: Result, channel: int) -> Loop:
-    """What `channel` read wherever its component was bent, or all was flat."""
+    """What `channel` read wherever its component was bent, or all was flat.
+
+    Without the steps that only wipe out the past.
+    """
     sweep, report = result.sweep, result.report
     applied = sweep.curvature[:, channel // (len(report.passed) // 3)]
     flat = np.array([step.flat for step in sweep.steps])
-    used = np.flatnonzero(flat | (applied != 0))
+    counts = np.array([step.way != "first" for step in sweep.steps])
+    used = np.flatnonzero(counts & (flat | (applied != 0)))
     steps = [sweep.steps[k] for k in used]
     return Loop(
         applied[used],
