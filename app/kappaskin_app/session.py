@@ -25,6 +25,7 @@ from kappaskin import (
     bargain,
     basis_for,
 )
+from kappaskin_app.ahead import Ahead
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.settings import LOAD_CASES, Scanning, SceneSettings, Settings, part
@@ -65,6 +66,7 @@ class Session(QObject):
         self._settings = history.settings
         self.engine = engine
         self.scene = scene_of(history.settings)
+        self._ahead = Ahead()
         self._asked = _setup_of(history.settings)
         engine.set_up(self._asked)
         engine.scan(region_of(history.settings))
@@ -142,6 +144,9 @@ class Session(QObject):
 
     def _play(self) -> None:
         """Simulate what the settings describe, or go on as before and say why."""
+        if not self._ahead.ready(self._history.settings):
+            self.refused.emit("computing what this one needs")
+            return
         why = ""
         try:
             scene = scene_of(self._history.settings)
@@ -172,6 +177,8 @@ class Session(QObject):
         """Look for news; everything that shows it hangs on the two signals."""
         if self.closed:
             return  # asked for by a picture drawn while closing
+        if self._ahead.finished():
+            self._play()
         now = time.monotonic()
         if now >= self._next_status:
             self._next_status = now + _STATUS
@@ -197,7 +204,7 @@ class Session(QObject):
             return WAITING
         last = max(status.last_frame, self.estimate.host_time if self.estimate else 0.0)
         if status.sensor is None or now - last > STALE_AFTER:
-            return STALE
+            return WAITING if status.computing else STALE
         return SIM if status.sensor.simulated else LIVE
 
     def surface_values(self, estimate: Estimate, colour_by: str) -> Array:
@@ -216,4 +223,5 @@ class Session(QObject):
     def close(self) -> None:
         self._timer.stop()
         self.closed = True
+        self._ahead.close()
         self.engine.close()

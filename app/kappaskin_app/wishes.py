@@ -4,9 +4,10 @@ import math
 from typing import Any
 
 from kappaskin_app.history import History
+from kappaskin_app.pressing import dragged
 from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings, ask_of
-from kappaskin_app.simulation import dragged, with_consequences
+from kappaskin_app.simulation import with_consequences
 
 
 class Wishes:

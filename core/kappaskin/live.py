@@ -146,12 +146,14 @@ class Loop:
     def _play(self, scene: Scene) -> None:
         if not isinstance(self._source, SimulatedSource):
             return
-        message = ""
+        message, building = "", self._status.computing
+        self._status = replace(self._status, computing=True)
+        self._report()  # another skin may take a while
         try:
             self._source.play(scene)
         except Refusal as refusal:
             message = str(refusal)
-        self._status = replace(self._status, message=message)
+        self._status = replace(self._status, message=message, computing=building)
 
     def _steer(self) -> None:
         """Let the source scan the region asked for, or say why it does not."""

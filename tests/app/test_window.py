@@ -8,6 +8,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QImage, QWheelEvent
 from PySide6.QtWidgets import QApplication, QCheckBox, QDockWidget, QPushButton
 
+from kappaskin import Disk
 from kappaskin_app.panels.form import Form
 from kappaskin_app.settings import Settings
 from kappaskin_app.window import MainWindow
@@ -306,18 +307,29 @@ def test_too_few_elements_for_the_basis_are_said_where_they_are_chosen(
     assert len(window.heatmaps["xx"].cells.grab().toImage().size().toTuple()) == 2
 
 
-def test_every_way_to_hold_a_bent_skin_is_played_and_a_wrong_belief_costs(
-    window: MainWindow, until
+def test_a_wrong_belief_about_the_edge_costs(window: MainWindow, until) -> None:
+    window.history.change("Still", -1, load_case="centre", noise_kind="none")
+    until(lambda: window.session.estimate.error_rms < 2e-5)
+    window.history.change("Belief", -1, fit_edge="clamped")
+    until(lambda: window.session.estimate.error_rms > 1e-3)
+    window.history.change("Truth", -1, edge="clamped")
+    until(lambda: window.session.status.sensor.edge == "clamped")
+    until(lambda: window.session.estimate and window.session.estimate.error_rms < 2e-5)
+
+
+def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
+    window: MainWindow, until, colours_in
 ) -> None:
-    window.wishes.wish("shape", "cylinder")
-    window.history.change("Still", -1, load_case="centre", noise_kind="none", edge="sliding")
-    _met(window, until)
-    until(lambda: window.session.status.sensor.edge == "sliding")
-    until(lambda: window.session.estimate and window.session.estimate.error_rms < 2e-5)
-    window.history.change("Belief", -1, fit_edge="hinged")
-    until(lambda: window.session.estimate and window.session.estimate.error_rms > 2e-4)
-    window.history.stack.undo()
-    until(lambda: window.session.estimate and window.session.estimate.error_rms < 2e-5)
+    window.wishes.wish("shape", "disk")
+    message = window.panels.shape.message
+    until(lambda: "computing" in message.text())
+    until(lambda: isinstance(window.membrane.skin.patch, Disk))
+    until(lambda: window.session.estimate is not None and not message.text())
+    until(lambda: colours_in(window, window.membrane) > 300)
+    assert window.session.estimate.curvature.shape == (3, 88)
+    window.wishes.wish("edge", "elastic")
+    until(lambda: "elastic" in message.text())
+    assert window.session.scene.edge == "hinged"
 
 
 def test_a_load_dragged_on_a_bent_skin_is_where_the_mouse_let_go(
@@ -450,7 +462,8 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
                 window.history.stack.undo()
                 obeyed.add(editor.objectName())
     asked = {f.name for f in fields(Settings) if "ask" in f.metadata}
-    assert asked - obeyed == ({"base_radius"} if shape == "flat" else set())
+    hidden = {"base_radius", "rim_radius"} if shape == "flat" else {"rim_radius"}
+    assert asked - obeyed == hidden
 
 
 def test_the_heatmaps_keep_their_share_of_a_wider_window(window: MainWindow, qtbot) -> None:

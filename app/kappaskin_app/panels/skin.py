@@ -10,7 +10,7 @@ from kappaskin_app.panels.load import SimulationForm
 from kappaskin_app.settings import Settings
 from kappaskin_app.skins import SHAPES
 
-_NUMBERS = ("side_x", "side_y", "base_radius")
+_NUMBERS = ("side_x", "side_y", "base_radius", "rim_radius")
 
 
 class ShapePanel(SimulationForm):
@@ -26,7 +26,7 @@ class ShapePanel(SimulationForm):
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
-        asked = set(SHAPES[settings.shape].begins)
+        asked = set(SHAPES[settings.shape].asks)
         self.show_rows({"shape", "edge"} | asked)
         self.form.setRowVisible(self.opening, "base_radius" in asked)
         degrees = math.degrees(settings.side_x / settings.base_radius)

@@ -27,8 +27,9 @@ class Skin:
         "flat",
         Choice(
             "Shape",
-            "The flat patch of the paper's Table 1, or its fingertip: half a circle, bent along x "
-            "and straight along y. Choosing one brings its usual size.",
+            "The flat patch of the paper's Table 1; its fingertip: half a circle, bent along x and "
+            "straight along y; or a flat tile, round or with six corners. Choosing one brings its "
+            "usual size, force and height.",
             tuple((name, shape.label) for name, shape in SHAPES.items()),
         ),
     )
@@ -46,13 +47,25 @@ class Skin:
             decimals=1,
         ),
     )
+    rim_radius: float = asked(
+        0.05,
+        Range(
+            "Rim radius",
+            "From the middle of the skin to its rim, or to its corners.",
+            0.005,
+            0.5,
+            0.001,
+            *MILLIMETRES,
+            decimals=1,
+        ),
+    )
     edge: str = asked(
         "hinged",
         Choice(
             "Edge",
             "How the skin is held along its edges. Hinged: it cannot move there but turns freely, "
             "and a bent one keeps its length; sliding: the ends of a bent one are free to slide; "
-            "clamped: it cannot turn either; elastic: a flat one's rim gives.",
+            "clamped: it cannot turn either; elastic: the rim of a flat rectangle gives.",
             EDGE_NAMES,
         ),
     )

@@ -1,0 +1,137 @@
+"""What presses on a simulated skin of any shape: ready loads, free ones, and those dragged."""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from kappaskin import (
+    Basis,
+    Compliance,
+    LineLoad,
+    Load,
+    Orbit,
+    Patch,
+    Plate,
+    PointLoad,
+    Refusal,
+    Scene,
+    SensorLayout,
+    basis_for,
+    load_scene,
+)
+from kappaskin_app.settings import FREE_CASES, LOAD_CASES, Settings
+
+REFERENCE = (15, 15)
+"""Functions of the true shape, by which Table 1 defines its truth."""
+_MARGIN = 0.03  # share of the patch along each edge that a dragged load keeps out of
+_MOST_BENT = 27.0  # 1/m, under the load: a moving one bends more in places, and 38 is a rail
+_LEAST = 1e-12  # m/N that a skin gives where it is free to move
+_REMEMBERED = 8  # skins whose compliance need not be computed again
+
+
+def free_loads(settings: Settings) -> tuple[PointLoad | LineLoad, ...]:
+    s = settings
+    if s.load_case == "free-line":
+        return (LineLoad(s.x, s.y, s.x_end, s.y_end, s.force),)
+    if s.load_case == "two-points":
+        return PointLoad(s.x, s.y, s.force / 2), PointLoad(s.x_end, s.y_end, s.force / 2)
+    return (PointLoad(s.x, s.y, s.force),)
+
+
+@lru_cache(_REMEMBERED)
+def _tried(plate: Plate, edge: str) -> Compliance | Refusal:
+    try:
+        return plate.compliance(basis_for(plate.patch, edge, *REFERENCE))
+    except Refusal as refusal:
+        return refusal
+
+
+def compliance_of(plate: Plate, edge: str) -> Compliance:
+    """How the true shape gives, remembered; raises `Refusal` for a skin that nothing holds."""
+    found = _tried(plate, edge)
+    if isinstance(found, Refusal):
+        raise found
+    return found
+
+
+def _moved(load: Load, basis: Basis, compliance: Compliance) -> float:
+    """How far the skin moves in m where the load presses."""
+    return float(basis.at(load.centre()[None])[0] @ compliance(load.modal(basis)).ravel())
+
+
+def _placed(load: Load, was: Patch, patch: Patch) -> PointLoad | LineLoad:
+    """The load at the same shares of the sides of `patch`, or nearer to its middle."""
+    ends = [[load.x0, load.y0], [load.x1, load.y1]] if isinstance(load, LineLoad) else load.centre()
+    shares = np.reshape(ends, (-1, 2)) / (was.a, was.b) - 0.5
+    places = [(0.5 + s * shares) * (patch.a, patch.b) for s in np.linspace(1.0, 0.0, 11)]
+    place = next(p for p in places if patch.contains(p).all())
+    return (
+        LineLoad(*place.ravel().tolist())
+        if isinstance(load, LineLoad)
+        else PointLoad(*place[0].tolist())
+    )
+
+
+@lru_cache(len(LOAD_CASES) * _REMEMBERED)
+def ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit | None]:
+    """Loads and motion of a ready scene; on another skin, at the same shares of its sides.
+
+    What moves by W on the patch of side L moves by W s there, whose shorter side is s L: the slopes
+    stay as they are. It moves less where it would bend so much that elements stand on a rail.
+    """
+    paper = load_scene(case)
+    compliance, patch = compliance_of(plate, edge), plate.patch
+    if (plate, edge) == (paper.plate, paper.edge):
+        return paper.loads, paper.motion
+    was = paper.plate.patch
+    size = min(patch.a / was.a, patch.b / was.b)
+    moved = _moved(paper.loads[0], paper.basis, compliance_of(paper.plate, paper.edge))
+    load, basis = _placed(paper.loads[0], was, patch), basis_for(patch, edge, *REFERENCE)
+    gives = abs(_moved(load, basis, compliance))
+    if not gives > _LEAST:
+        raise Refusal(
+            f"the skin does not move where the load presses, at {load.centre()} m: expected it "
+            "further inside; choose a free load and drag it there"
+        )
+    load = load.scaled(size * moved / gives)
+    bent = SensorLayout.regular(patch, 21, 21).curvature_operator(basis)
+    most = float(np.abs(bent @ compliance(load.modal(basis)).ravel()).max())
+    motion = paper.motion and replace(paper.motion, radius=paper.motion.radius * size)
+    return (load.scaled(min(1.0, _MOST_BENT / most)),), motion
+
+
+def dragged(
+    settings: Settings, scene: Scene, x: float, y: float, grabbed_end: bool
+) -> dict[str, Any]:
+    """The settings that change when a load of `scene` is dragged to (x, y) in m.
+
+    It becomes a free one of the same force. A line moves as a whole, of two points the one that
+    was grabbed.
+    """
+    if not scene.loads:
+        return {}  # it lies on a cylinder
+    patch, load = scene.plate.patch, scene.loads[0]
+    x, y = _inside(patch, x, y)
+    if settings.load_case == "two-points":
+        return {"x_end": x, "y_end": y} if grabbed_end else {"x": x, "y": y}
+    kept = {} if settings.load_case in FREE_CASES else {"force": load.force}
+    if not isinstance(load, LineLoad):
+        return {"load_case": "point", "x": x, "y": y, **kept}
+    half_x, half_y = (load.x1 - load.x0) / 2, (load.y1 - load.y0) / 2
+    x = min(max(x, abs(half_x)), patch.a - abs(half_x))
+    y = min(max(y, abs(half_y)), patch.b - abs(half_y))
+    ends = {"x": x - half_x, "y": y - half_y, "x_end": x + half_x, "y_end": y + half_y}
+    if not patch.contains(np.reshape(list(ends.values()), (2, 2))).all():
+        return {}
+    return {"load_case": "free-line", **ends, **kept}
+
+
+def _inside(patch: Patch, x: float, y: float) -> tuple[float, float]:
+    """The place nearest to (x, y) in m a little inside the rim."""
+    middle = np.array([patch.a, patch.b]) / 2
+    x, y = np.clip([x, y], 2 * _MARGIN * middle, 2 * (1 - _MARGIN) * middle)
+    if patch.depth(np.array([[x, y]]))[0] < 0.99 * _MARGIN * min(patch.a, patch.b):
+        x, y = middle + (1 - 2 * _MARGIN) * (np.array(patch.inward(x, y)) - middle)
+    return float(x), float(y)
