@@ -29,7 +29,7 @@ def test_effects_stand_in_the_order_in_which_they_come_about():
 
 
 def test_a_prototype_brings_its_converter_and_its_frame_rate():
-    changed = with_consequences(Settings(), "electronics", "second")
+    changed = with_consequences(Settings(), scene_of(Settings()), "electronics", "second")
     settings = Settings(**changed)
 
     scene = scene_of(settings)
@@ -39,7 +39,9 @@ def test_a_prototype_brings_its_converter_and_its_frame_rate():
 
 
 def test_other_elements_are_no_longer_those_chosen():
-    changed = with_consequences(Settings(region_elements=(99,)), "elements_x", 5)
+    settings = Settings(region_elements=(99,))
+
+    changed = with_consequences(settings, scene_of(settings), "elements_x", 5)
 
     assert changed == {"elements_x": 5, "region_elements": ()}
 
