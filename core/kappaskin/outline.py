@@ -13,44 +13,52 @@ _CLOSEST = 2e-3  # of the longer side: between a corner and an edge that it is n
 _SHARPEST = math.radians(10)
 
 
-def feet(corners: Array, positions: Array, short: float = 0.0) -> Array:
-    """The point (P, V, 2) of every edge, that share `short` of its ends, nearest to each position.
+class Outline:
+    """A closed line through `corners` (V, 2), counter-clockwise; edge v runs to the next corner."""
 
-    Edge v runs from corner v of `corners` (V, 2) to the next.
-    """
-    along = np.roll(corners, -1, axis=0) - corners
-    share = np.sum((positions[:, None] - corners) * along, axis=-1) / np.sum(along**2, axis=-1)
-    return corners + np.clip(share, short, 1 - short)[..., None] * along
+    def __init__(self, corners: Array) -> None:
+        self.corners, self.ends = corners, np.roll(corners, -1, axis=0)
+        self.along: Array = self.ends - corners
+        """The edges (V, 2) as vectors, with their `lengths` (V,)."""
+        self.lengths: Array = np.sqrt(np.sum(self.along**2, axis=1))
+        level = np.where(self.along[:, 1] == 0, 1.0, self.along[:, 1])
+        self._leaning = self.along[:, 0] / level
 
+    @property
+    def normals(self) -> Array:
+        """Unit normals (V, 2) of the edges, inward."""
+        return self.along[:, ::-1] * (-1, 1) / self.lengths[:, None]
 
-def inside(corners: Array, positions: Array) -> Mask:
-    """Which of `positions` (P, 2) a ray towards +x leaves through an odd number of edges."""
-    (x0, y0), (x1, y1) = corners.T, np.roll(corners, -1, axis=0).T
-    x, y = positions[:, :1], positions[:, 1:]
-    height = np.where(y1 == y0, 1.0, y1 - y0)
-    passed = ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) / height * (x1 - x0))
-    return np.sum(passed, axis=1) % 2 == 1
+    @property
+    def turns(self) -> Array:
+        """The angle (V,) in rad that it turns by at each corner, above zero where it is convex."""
+        before = np.roll(self.along, 1, axis=0)
+        onward = np.sum(before * self.along, axis=1)
+        return np.angle(onward + 1j * turn(self.corners - before, self.corners, self.ends))
 
+    @property
+    def area(self) -> float:
+        return float(np.sum(turn(np.zeros(2), self.corners, self.ends))) / 2
 
-def depth(corners: Array, positions: Array) -> Array:
-    """Distance (P,) of `positions` (P, 2) from the outline, below zero outside."""
-    with np.errstate(all="ignore"):  # of points that are not finite
-        away: Array = np.linalg.norm(positions[:, None] - feet(corners, positions), axis=-1)
-        away = away.min(axis=1)
-        return np.where(inside(corners, positions), away, -away)
+    def feet(self, positions: Array, short: float = 0.0) -> Array:
+        """The place (P, V, 2) on each edge, that share `short` off its ends, nearest to each."""
+        offset = positions[:, None] - self.corners
+        share = (offset * self.along).sum(axis=-1) / self.lengths**2
+        share = np.minimum(np.maximum(share, short), 1 - short)
+        return self.corners + share[..., None] * self.along
 
+    def inside(self, positions: Array) -> Mask:
+        """Which of `positions` (P, 2) a ray towards +x leaves through an odd number of edges."""
+        x, y = positions[:, :1], positions[:, 1:]
+        (x0, y0), y1 = self.corners.T, self.ends[:, 1]
+        passed = ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * self._leaning)
+        return np.count_nonzero(passed, axis=1) % 2 == 1
 
-def turning(corners: Array) -> Array:
-    """The angle (V,) in rad that the outline turns by at each corner, to the left above zero."""
-    before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
-    along = np.sum((corners - before) * (after - corners), axis=1)
-    return np.angle(along + 1j * turn(before, corners, after))
-
-
-def inward_normals(corners: Array) -> Array:
-    """Unit normals (V, 2) of the edges of counter-clockwise `corners`."""
-    along = np.roll(corners, -1, axis=0) - corners
-    return along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
+    def depth(self, positions: Array) -> Array:
+        """Distance (P,) of `positions` (P, 2) from the outline, below zero outside."""
+        away = positions[:, None] - self.feet(positions)
+        distance: Array = np.sqrt((away**2).sum(axis=-1).min(axis=1))
+        return np.where(self.inside(positions), distance, -distance)
 
 
 def turn(a: Array, b: Array, c: Array) -> Array:
@@ -79,32 +87,31 @@ def checked(vertices: ArrayLike) -> Array:
         )
     if not corners.max(axis=0).all():
         raise Refusal("expected an outline that encloses an area, got vertices on one line")
-    shape = corners / corners.max()
-    for check in (_check_crossings, _check_distances, _check_corners):
-        check(shape)
-    area = np.sum(turn(np.zeros(2), shape, np.roll(shape, -1, axis=0)))
-    return corners if area > 0 else np.roll(corners[::-1], 1, axis=0)
+    shape = Outline(corners / corners.max())
+    with np.errstate(invalid="ignore"):  # edges of no length, refused next
+        _check_crossings(shape)
+    _check_distances(shape)
+    _check_corners(shape)
+    return corners if shape.area > 0 else np.roll(corners[::-1], 1, axis=0)
 
 
-def _check_crossings(corners: Array) -> None:
-    ends = np.roll(corners, -1, axis=0)
-    a, b, c, d = corners[:, None], ends[:, None], corners[None], ends[None]
+def _check_crossings(line: Outline) -> None:
+    a, b, c, d = line.corners[:, None], line.ends[:, None], line.corners[None], line.ends[None]
     crossed = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
     if crossed.any():
         i, j = np.argwhere(crossed)[0]
         raise Refusal(f"edges {i} and {j} of the outline cross; give its corners in order")
 
 
-def _check_distances(corners: Array) -> None:
-    V, limit = len(corners), f"a {1 / _CLOSEST:.0f}th of the longer side"
-    short = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1) < _CLOSEST
-    if short.any():
+def _check_distances(line: Outline) -> None:
+    V, limit = len(line.corners), f"a {1 / _CLOSEST:.0f}th of the longer side"
+    if (short := line.lengths < _CLOSEST).any():
         i = int(np.argmax(short))
         raise Refusal(
             f"vertices {i} and {(i + 1) % V} of the outline are the same or nearer than {limit}; "
             "leave one out (the last need not repeat the first)"
         )
-    gap = np.linalg.norm(corners[:, None] - feet(corners, corners), axis=-1)
+    gap = np.linalg.norm(line.corners[:, None] - line.feet(line.corners), axis=-1)
     own = np.arange(V)
     gap[own, own] = gap[own, own - 1] = np.inf
     if (near := gap < _CLOSEST).any():
@@ -115,8 +122,8 @@ def _check_distances(corners: Array) -> None:
         )
 
 
-def _check_corners(corners: Array) -> None:
-    sharp = np.abs(turning(corners)) > math.pi - _SHARPEST
+def _check_corners(line: Outline) -> None:
+    sharp = np.abs(line.turns) > math.pi - _SHARPEST
     if sharp.any():
         raise Refusal(
             f"the corner at vertex {int(np.argmax(sharp))} of the outline is sharper than "

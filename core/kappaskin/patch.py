@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
-from kappaskin.outline import checked, depth, feet, inside, inward_normals
+from kappaskin.outline import Outline, checked
 
 _MARGIN = 1e-3  # of a side: how near its rim a point may be and still move with the skin
 _CORNER = 0.02  # of an edge: how near to its ends no place is looked for along it
+_CELLS = 64  # along each side of a raster that tells quickly whether a point is far inside
 _ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this far outside
 
 
@@ -88,11 +89,16 @@ class Patch:
         dx, dy = _MARGIN * self.a, _MARGIN * self.b
         return min(max(x, dx), self.a - dx), min(max(y, dy), self.b - dy)
 
-    def near_rim(self, x: float, y: float) -> list[tuple[float, float, float]]:
-        """The place next to (x, y) just inside each held edge, and how far as share of a side."""
+    def near_rim(self, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
+        """Places just inside the held edges next to (x, y), and how far as share of a side.
+
+        One for each edge that is no farther than `within` of a side.
+        """
         a, b, (dx, dy) = self.a, self.b, (_MARGIN * self.a, _MARGIN * self.b)
-        ends = [(dx, y, x / a), (a - dx, y, 1 - x / a)]
-        return ends if self.strip else [*ends, (x, dy, y / b), (x, b - dy, 1 - y / b)]
+        places = [(dx, y, x / a), (a - dx, y, 1 - x / a)]
+        if not self.strip:
+            places += [(x, dy, y / b), (x, b - dy, 1 - y / b)]
+        return [place for place in places if place[2] <= within]
 
     def moves(self, positions: Array) -> Mask:
         """Which of `positions` (P, 2) are so far inside the rim that the skin moves there."""
@@ -141,11 +147,13 @@ class Disk(Patch):
         share = min(1.0, (1 - 2 * _MARGIN) * r / away) if away else 1.0
         return r + share * (x - r), r + share * (y - r)
 
-    def near_rim(self, x: float, y: float) -> list[tuple[float, float, float]]:
+    def near_rim(self, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
         r = self.rim_radius
         away = math.hypot(x - r, y - r)
-        out = (1 - 2 * _MARGIN) * r / away if away else 0.0
-        return [(r + out * (x - r), r + out * (y - r), (r - away) / self.a)] if away else []
+        if (share := (r - away) / self.a) > within or not away:
+            return []
+        out = (1 - 2 * _MARGIN) * r / away
+        return [(r + out * (x - r), r + out * (y - r), share)]
 
 
 @dataclass(frozen=True, init=False)
@@ -167,26 +175,43 @@ class Polygon(Patch):
         return f"polygon of {len(self.vertices)} corners in {self.a:g} x {self.b:g} m"
 
     @cached_property
-    def corners(self) -> Array:
-        """The vertices (V, 2) in m, counter-clockwise."""
-        return np.array(self.vertices)
+    def outline(self) -> Outline:
+        return Outline(np.array(self.vertices))
 
     def contains(self, positions: Array) -> Mask:
-        found = inside(self.corners, positions)
+        found = self.outline.inside(positions)
         found[~found] = self.depth(positions[~found]) >= -_ROUNDING * max(self.a, self.b)
         return found
 
     def depth(self, positions: Array) -> Array:
-        return depth(self.corners, positions)
+        with np.errstate(all="ignore"):  # of positions that are not finite
+            return self.outline.depth(positions)
+
+    @cached_property
+    def _raster(self) -> list[list[float]]:
+        """At least how deep in m every point of a cell of the box lies, by row and column."""
+        centres = np.stack(np.meshgrid(*self.cell_centres(_CELLS, _CELLS)), axis=-1)
+        least = self.depth(centres.reshape(-1, 2)) - math.hypot(self.a, self.b) / 2 / _CELLS
+        return least.reshape(_CELLS, _CELLS).tolist()
+
+    def _is_deep(self, x: float, y: float, depth: float) -> bool:
+        """Whether (x, y) is known to lie deeper than `depth` in m without a look at every edge."""
+        column, row = int(_CELLS * x / self.a), int(_CELLS * y / self.b)
+        on = 0 <= row < _CELLS and 0 <= column < _CELLS
+        return on and self._raster[row][column] > depth
 
     def inward(self, x: float, y: float) -> tuple[float, float]:
-        if self.depth(np.array([[x, y]]))[0] >= _MARGIN * min(self.a, self.b):
+        margin = _MARGIN * min(self.a, self.b)
+        if self._is_deep(x, y, margin) or self.depth(np.array([[x, y]]))[0] >= margin:
             return x, y
-        return min(self.near_rim(x, y), key=lambda foot: foot[2])[:2]
+        return min(self.near_rim(x, y, math.inf), key=lambda place: place[2])[:2]
 
-    def near_rim(self, x: float, y: float) -> list[tuple[float, float, float]]:
-        shorter, normals = min(self.a, self.b), inward_normals(self.corners)
-        near = feet(self.corners, np.array([[x, y]]), _CORNER)[0] + _MARGIN * shorter * normals
+    def near_rim(self, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
+        shorter, line = min(self.a, self.b), self.outline
+        if self._is_deep(x, y, within * shorter):
+            return []
+        near = line.feet(np.array([[x, y]]), _CORNER)[0] + _MARGIN * shorter * line.normals
         near = near[self.contains(near)]
         share = np.hypot(near[:, 0] - x, near[:, 1] - y) / shorter
-        return [(float(u), float(v), float(s)) for (u, v), s in zip(near, share, strict=True)]
+        places = zip(near.tolist(), share.tolist(), strict=True)
+        return [(u, v, far) for (u, v), far in places if far <= within]

@@ -13,7 +13,7 @@ from kappaskin.bases.mesh import Mesh, meshed
 from kappaskin.bases.modes import ORDERS
 from kappaskin.bases.quintic import Quintics, chained, monomials, triangle_quadrature
 from kappaskin.frames import Array
-from kappaskin.outline import turn
+from kappaskin.outline import Outline
 
 _SPACING = 1.1  # of the mean distance between the highest mode's nodes
 _FEWEST = 16  # modes that a mesh is made for
@@ -41,8 +41,8 @@ def plate_modes(vertices: tuple[tuple[float, float], ...], count: int, clamped: 
     given mean square; along straight edges that do not move Poisson's ratio adds nothing to it.
     """
     corners = np.array(vertices)
-    size = np.sqrt(turn(np.zeros(2), corners, np.roll(corners, -1, axis=0)).sum() / 2)
-    space = _Space(meshed(corners / size, _SPACING / np.sqrt(max(count, _FEWEST))))
+    size = np.sqrt(Outline(corners).area)
+    space = _Space(meshed(Outline(corners / size), _SPACING / np.sqrt(max(count, _FEWEST))))
     modes = _lowest(*space.energies(), space.allowed(clamped), count) / 2
     coefficients = space.shapes @ modes[space.unknowns]
     points, weights = space.quadrature()

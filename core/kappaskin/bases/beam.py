@@ -40,50 +40,61 @@ class ClampedBasis(ProductBasis):
 
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
         s, ends = x / length - 0.5, np.array([-0.5, 0.5])
-        values = _beam(s, count, derivative)
+        values = _beam(s, count, derivative)[0]
         if derivative < 0:
-            middle = _beam(ends, count, -1).mean(axis=0)
+            middle = _beam(ends, count, -1)[0].mean(axis=0)
             if derivative == -1:
                 values -= middle
             else:
-                values -= np.multiply.outer(s, middle) + np.diff(_beam(ends, count, -3), axis=0)
+                third = _beam(ends, count, -3)[0]
+                values -= np.multiply.outer(s, middle) + third[1] - third[0]
         return values * length**-derivative
 
+    def _jet(self, x: float, length: float, count: int) -> Array:
+        jet = _beam(np.array([x / length - 0.5]), count, 0, 1, 2)[:, 0]
+        jet[1] /= length
+        jet[2] /= length**2
+        return jet
 
-def _beam(s: Array, count: int, derivative: int) -> Array:
-    """The derivative of the first `count` modes of a clamped beam of length 1, at s in [-1/2, 1/2].
 
-    Even ones are cos(k s)/cos(k/2) - cosh(k s)/cosh(k/2), odd ones the same with sin and sinh,
-    over sqrt(2); cosh and sinh as decaying exponentials from either end, so that nothing overflows
-    or cancels.
+def _beam(s: Array, count: int, *orders: int) -> Array:
+    """The derivatives (O, S, N) of the first `count` modes of a clamped beam of length 1.
+
+    With `s` (S,) from -1/2 to 1/2, even ones are cos(k s)/cos(k/2) - cosh(k s)/cosh(k/2), odd ones
+    the same with sin and sinh, over sqrt(2); cosh and sinh as decaying exponentials from either
+    end, so that nothing overflows or cancels.
     """
-    modes = _modes(count)
-    ks = np.multiply.outer(s, modes.k)
-    wave = np.sin(ks + (modes.phase + derivative * np.pi / 2)) * modes.waves
-    decaying = np.exp(ks - modes.k / 2) * modes.decays
-    decaying += np.exp(-ks - modes.k / 2) * ((-1.0) ** derivative * modes.sign * modes.decays)
-    return modes.k**derivative * (wave - decaying)
+    modes = _modes(count, orders)
+    ks, half = np.multiply.outer(s, modes.k), modes.k / 2
+    wave = modes.waves * np.sin(ks + modes.phases)
+    return wave - modes.decays * (np.exp(ks - half) + modes.far * np.exp(-ks - half))
 
 
 @dataclass(frozen=True, eq=False)
 class _Modes:
-    """Wave numbers k (N,), the phase that makes a sine even, the factors of waves and decays."""
+    """Wave numbers k (N,); phases and factors (O, 1, N) of the waves, the decays and far ends."""
 
     k: Array
-    phase: Array
-    sign: Array
+    phases: Array
     waves: Array
     decays: Array
+    far: Array
 
 
-@lru_cache(32)
-def _modes(count: int) -> _Modes:
-    """The first roots k of cos k cosh k = 1 above zero, near (i + 1/2) pi, by Newton's method."""
-    k = (np.arange(1.0, count + 1) + 0.5) * np.pi
+@lru_cache(64)
+def _modes(count: int, orders: tuple[int, ...]) -> _Modes:
+    """What the derivatives of `orders` share; k are the roots of cos k cosh k = 1 above zero."""
+    k = (np.arange(1.0, count + 1) + 0.5) * np.pi  # nearly: Newton's method does the rest
     for _ in range(4):
         sech = 2 * np.exp(-k) / (1 + np.exp(-2 * k))
         k -= (np.cos(k) - sech) / (sech * np.tanh(k) - np.sin(k))
+    d = np.array(orders, float)[:, None, None]
     sign = np.where(np.arange(count) % 2, -1.0, 1.0)
-    phase = (1 + sign) * np.pi / 4
-    waves, decays = 1 / np.sin(k / 2 + phase), 1 / (1 + sign * np.exp(-k))
-    return _Modes(k, phase, sign, waves / np.sqrt(2), decays / np.sqrt(2))
+    phase, scale = (1 + sign) * np.pi / 4, k**d / np.sqrt(2)
+    return _Modes(
+        k,
+        phase + d * np.pi / 2,
+        scale / np.sin(k / 2 + phase),
+        scale / (1 + sign * np.exp(-k)),
+        sign * (-1.0) ** d,
+    )

@@ -1,6 +1,7 @@
 """Modes of a round plate: Bessel functions of the radius times cosines and sines of the angle."""
 
-from collections.abc import Sequence
+import cmath
+import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -15,6 +16,9 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.patch import Disk
 
+Complex = NDArray[np.complex128]
+
+_ROUNDING = 1e-12  # of the radius: a point on the rim as computed may stand this far outside
 _POISSON = 0.3  # of the plate whose hinged modes these are
 
 
@@ -44,10 +48,21 @@ class DiskBasis(ModeBasis):
     def _modes(self) -> "_Modes":
         return _modes(self.size, self.clamped)
 
-    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> Array:
+    def _derivative(self, positions: Array, order: Order) -> Array:
         R = self.patch.a / 2
         z = (positions[:, 0] - R + 1j * (positions[:, 1] - R)) / R
-        return self._modes(z, orders) / R ** np.sum(orders, axis=1)[:, None, None]
+        z = np.where(np.abs(z) <= 1 + _ROUNDING, z, np.nan)
+        return self._modes.derivative(z, order) / R ** sum(order)
+
+    def _place(self, x: float, y: float) -> Array:
+        R = self.patch.a / 2
+        z = complex(x - R, y - R) / R
+        if not abs(z) <= 1 + _ROUNDING:
+            return np.full((len(ORDERS), self.size), np.nan)
+        jet = self._modes.jet(z)
+        jet[1:3] /= R
+        jet[3:] /= R * R
+        return jet
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: Gauss along the radius, even in angle."""
@@ -75,7 +90,7 @@ _BY_STEPS = np.array(
         [0, 0, 0, -1 / 4, 1 / 2, -1 / 4],
     ]
 )
-_TURNS = np.array([[q - p] for p, q in _STEPS])
+_TURNS = np.array([q - p for p, q in _STEPS])
 
 
 class _Modes:
@@ -92,6 +107,7 @@ class _Modes:
         to_series[0] /= 2
         at_nodes = np.stack([self._radial((1 + np.cos(nodes)) / 2, *step) for step in _STEPS])
         self._series = to_series @ at_nodes / (2 * np.sqrt(mean_square))
+        self._flat = np.hstack(list(self._series))
 
     def _radial(self, r: Array, p: int, q: int) -> Array:
         """The radial part of D-^p D+^q of the pairs of modes, (P, U), at `r` (P,)."""
@@ -99,19 +115,28 @@ class _Modes:
         growing: Array = ive(m - p + q, kr) / ive(m, k) * np.exp(kr - k)  # I_m-p+q(k r)/I_m(k)
         return k ** (p + q) * ((-1.0) ** q * jv(m - p + q, kr) - jv(m, k) * growing)
 
-    def __call__(self, z: NDArray[np.complex128], orders: Sequence[Order]) -> Array:
-        """For each order the derivatives (O, P, N) at the points z = x + i y (P,) of the disk."""
-        r, angle = np.abs(z), np.angle(z)
-        t = np.arccos(np.clip(2 * r - 1, -1, 1))
+    def derivative(self, z: Complex, order: Order) -> Array:
+        """The derivatives (P, N) of one order at the points z = x + i y (P,) of the disk."""
+        t = np.arccos(np.clip(2 * np.abs(z) - 1, -1, 1))
         polynomials = np.cos(np.multiply.outer(t, self._degrees))
-        rows = _BY_STEPS[[ORDERS.index(order) for order in orders]]
-        used = np.flatnonzero(rows.any(axis=0))
-        steps = polynomials @ (self._series if len(used) == 6 else self._series[used])
-        turned = np.exp(1j * (_TURNS[used] * angle))[..., None] * steps
-        values = np.tensordot(rows[:, used], turned, 1) * np.exp(
-            1j * np.multiply.outer(angle, self.m)
-        )
-        return values.view(float)[..., self._columns]  # cosines are real, sines imaginary parts
+        turn = np.exp(1j * np.angle(z))[:, None]
+        values = np.zeros((len(z), len(self.m)), complex)
+        for step, factor in enumerate(_BY_STEPS[ORDERS.index(order)]):
+            if factor:
+                values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
+        return self._parts(values * np.exp(1j * np.multiply.outer(np.angle(z), self.m)))
+
+    def jet(self, z: complex) -> Array:
+        """All derivatives (6, N) at one point z = x + i y of the disk."""
+        r, angle = cmath.polar(z)
+        t = math.acos(min(max(2 * r - 1, -1.0), 1.0))
+        steps = (np.cos(t * self._degrees) @ self._flat).reshape(6, -1)
+        turned: Complex = _BY_STEPS * np.exp(1j * angle * _TURNS)
+        return self._parts((turned @ steps) * np.exp(1j * angle * self.m))
+
+    def _parts(self, values: Complex) -> Array:
+        """The modes (..., N): the real parts of `values` (..., U) are cosines, the others sines."""
+        return values.view(float)[..., self._columns]
 
 
 _modes = lru_cache(8)(_Modes)

@@ -39,14 +39,15 @@ class ElasticBasis(ProductBasis):
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
         if derivative < 0:
             raise Refusal("a flat skin needs no integral along x; expected an order of at least 0")
-        line = np.zeros((len(x), 2))
-        if derivative == 0:
-            line[:, 0], line[:, 1] = 1, 2 * x / length - 1
-        elif derivative == 1:
-            line[:, 1] = 2 / length
-        k = np.arange(1.0, count - 1) * np.pi / length
-        sines = k**derivative * np.sin(np.multiply.outer(x, k) + derivative * np.pi / 2)
-        return np.hstack([line, sines])
+        return np.stack([self._jet(float(place), length, count)[derivative] for place in x])
+
+    def _jet(self, x: float, length: float, count: int) -> Array:
+        jet = np.zeros((3, count))
+        jet[:2, :2] = (1, 2 * x / length - 1), (0, 2 / length)
+        k = np.arange(1.0, count - 1) * (np.pi / length)
+        jet[0, 2:] = sine = np.sin(k * x)
+        jet[1, 2:], jet[2, 2:] = k * np.cos(k * x), -(k**2) * sine
+        return jet
 
     def rim(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m that integrate products along the rim."""

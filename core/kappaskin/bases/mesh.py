@@ -8,10 +8,11 @@ from scipy.spatial import Delaunay
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.outline import depth, turn, turning
+from kappaskin.outline import Outline, turn
 
 _FINEST = 1 / 16  # of the spacing, at a corner that points inward: curvature is unbounded there
 _GROWTH = 0.6  # of the spacing per distance
+_STRAIGHT = 1e-6  # rad: a corner that turns by less is none
 _FREE = 0.6  # of the spacing: how near to the rim no point is put
 _SMOOTHINGS = 5
 _ROUNDS = 60
@@ -28,15 +29,15 @@ class Mesh:
     rim: int
 
 
-def meshed(corners: Array, spacing: float) -> Mesh:
-    """Triangles with sides of about `spacing` inside the outline with `corners` (V, 2).
+def meshed(line: Outline, spacing: float) -> Mesh:
+    """Triangles with sides of about `spacing` inside an outline that touches x = 0 and y = 0.
 
     Points along the rim and inside it are joined by Delaunay's triangulation, where edges of the
     outline are missing from it they are halved, and the points inside are moved to the mean of
     their neighbours.
     """
-    rim = _along_rim(corners, spacing)
-    inner = _inside(corners, rim, spacing)
+    rim = _along_rim(line, spacing)
+    inner = _inside(line, rim, spacing)
     smoothed = 0
     for _ in range(_ROUNDS):
         points = np.vstack([rim, inner])
@@ -45,13 +46,13 @@ def meshed(corners: Array, spacing: float) -> Mesh:
             middle = (rim[cut] + np.roll(rim, -1, axis=0)[cut]) / 2
             rim = np.insert(rim, cut + 1, middle, axis=0)
             continue
-        triangles = triangles[depth(corners, points[triangles].mean(axis=1)) > 0]
+        triangles = triangles[line.depth(points[triangles].mean(axis=1)) > 0]
         if smoothed == _SMOOTHINGS:
             return Mesh(points, triangles, len(rim))
-        inner, smoothed = _smoothed(corners, points, triangles)[len(rim) :], smoothed + 1
+        inner, smoothed = _smoothed(line, points, triangles)[len(rim) :], smoothed + 1
     raise Refusal(
-        f"an outline of {len(corners)} corners could not be divided into triangles; leave out its "
-        "finest details"
+        f"an outline of {len(line.corners)} corners could not be divided into triangles; leave out "
+        "its finest details"
     )
 
 
@@ -61,31 +62,31 @@ def _sizes(points: Array, around: Array, sizes: Array | float, most: float) -> A
     return (sizes + _GROWTH * distance).min(axis=1, initial=most)
 
 
-def _along_rim(corners: Array, spacing: float) -> Array:
+def _along_rim(line: Outline, spacing: float) -> Array:
     """Points along the outline, its corners among them."""
-    inward = corners[turning(corners) < 0]
+    inward = line.corners[line.turns < -_STRAIGHT]
     share, parts = np.linspace(0, 1, 257), list[Array]()
-    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        line = start + share[:, None] * (end - start)
-        wanted = np.linalg.norm(end - start) / _sizes(line, inward, _FINEST * spacing, spacing)
+    for start, along, length in zip(line.corners, line.along, line.lengths, strict=True):
+        sizes = _sizes(start + share[:, None] * along, inward, _FINEST * spacing, spacing)
+        wanted = length / sizes
         steps = np.append(0.0, np.cumsum((wanted[1:] + wanted[:-1]) / 2)) / 256
         count = int(np.ceil(steps[-1] - 1e-9))
         at = np.asarray(np.interp(np.arange(count) / count * steps[-1], steps, share), float)
-        parts.append(start + at[:, None] * (end - start))
+        parts.append(start + at[:, None] * along)
     return np.vstack(parts)
 
 
-def _inside(corners: Array, rim: Array, spacing: float) -> Array:
+def _inside(line: Outline, rim: Array, spacing: float) -> Array:
     """Centres of squares that are quartered until they are as small as wanted."""
     sizes = np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1)
     sizes = np.maximum(sizes, np.roll(sizes, -1))
-    box, side = corners.max(axis=0), spacing
+    box, side = line.corners.max(axis=0), spacing
     nx, ny = (int(np.ceil(length / side)) for length in box)
     first = (box - np.array([nx - 1, ny - 1]) * side) / 2
     squares: Array = first + side * np.indices((nx, ny)).reshape(2, -1).T
     quarters, kept = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]]) / 4, list[Array]()
     while len(squares):
-        wanted, far = _sizes(squares, rim, sizes, spacing), depth(corners, squares)
+        wanted, far = _sizes(squares, rim, sizes, spacing), line.depth(squares)
         small = side <= 1.01 * wanted
         kept.append(squares[small & (far > _FREE * wanted)])
         squares = squares[~small & (far > -side)]
@@ -108,7 +109,7 @@ def _cut(triangles: Triangles, rim: int) -> Triangles:
     return np.flatnonzero(~np.isin(steps @ (most, 1), sides @ (most, 1)))
 
 
-def _smoothed(corners: Array, points: Array, triangles: Triangles) -> Array:
+def _smoothed(line: Outline, points: Array, triangles: Triangles) -> Array:
     """Every point at the mean of its neighbours, unless that is much nearer to the rim."""
     total, count = np.zeros_like(points), np.zeros(len(points))
     for i in range(3):
@@ -116,5 +117,5 @@ def _smoothed(corners: Array, points: Array, triangles: Triangles) -> Array:
             np.add.at(total, triangles[:, i], points[triangles[:, j]])
             np.add.at(count, triangles[:, i], 1)
     mean = total / np.maximum(count, 1)[:, None]
-    kept = depth(corners, mean) > 0.5 * depth(corners, points)
+    kept = line.depth(mean) > 0.5 * line.depth(points)
     return np.where(kept[:, None], mean, points)

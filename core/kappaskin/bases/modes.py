@@ -1,16 +1,14 @@
 """Bases of whole modes, not products: values at points and on the part of a grid on the skin."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from abc import abstractmethod
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin.bases.functions import FunctionBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.patch import Patch
 
 Order = tuple[int, int]
 ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
@@ -38,12 +36,8 @@ class PointMap:
 
 
 @dataclass(frozen=True)
-class ModeBasis(ABC):
+class ModeBasis(FunctionBasis[Array]):
     """The first Ni x Nj modes, by frequency, of a flat skin; their mean square is 1/4 as sines'."""
-
-    patch: Patch
-    Ni: int
-    Nj: int
 
     def __post_init__(self) -> None:
         if not (self.Ni > 0 and self.Nj > 0 and self.size <= _MOST):
@@ -53,40 +47,12 @@ class ModeBasis(ABC):
             )
 
     @abstractmethod
-    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> Array:
-        """For each of `orders` the derivatives (O, P, N) of all modes at `positions` on it."""
+    def _derivative(self, positions: Array, order: Order) -> Array:
+        """The derivative (P, N) of one order at `positions` (P, 2); NaN off the skin."""
 
     @abstractmethod
-    def quadrature(self) -> tuple[Array, Array]:
-        """Points (Q, 2) in m and weights (Q,) in m^2 that integrate products of two functions."""
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self.Ni, self.Nj
-
-    @property
-    def size(self) -> int:
-        return self.Ni * self.Nj
-
-    @property
-    def free(self) -> Array | None:
-        return None
-
-    @property
-    def unseen(self) -> Array | None:
-        return None
-
-    @cached_property
-    def _jet(self) -> Callable[[float, float], Array]:
-        """All derivatives (6, N) at one point, which is asked for one after the other."""
-
-        def jet(x: float, y: float) -> Array:
-            position = np.array([[x, y]])
-            if not self.patch.contains(position)[0]:
-                return np.full((len(ORDERS), self.size), np.nan)
-            return self._derivatives(position, ORDERS)[:, 0]
-
-        return lru_cache(4)(jet)
+    def _place(self, x: float, y: float) -> Array:
+        """All derivatives (6, N) at one point; NaN off the skin."""
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, N), at `positions`; NaN off it."""
@@ -95,15 +61,12 @@ class ModeBasis(ABC):
                 f"expected derivatives up to second order, got order {dx} along x and {dy} along y"
             )
         if len(positions) == 1:
-            return self._jet(*positions[0].tolist())[None, ORDERS.index((dx, dy))]
-        values = np.full((len(positions), self.size), np.nan)
-        on = self.patch.contains(positions)
-        values[on] = self._derivatives(positions[on], [(dx, dy)])[0]
-        return values
+            return self._at_point(*positions[0].tolist())[None, ORDERS.index((dx, dy))]
+        return self._derivative(positions, (dx, dy))
 
     def with_slopes(self, x: float, y: float) -> Array:
         """Every function and its slopes along x and y at one point, (3, N)."""
-        return self._jet(x, y)[:3]
+        return self._at_point(x, y)[:3]
 
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> PointMap:
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""

@@ -1,7 +1,6 @@
 """Modes of a plate with corners."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +10,6 @@ from kappaskin.bases.argyris import PlateModes, plate_modes
 from kappaskin.bases.modes import ModeBasis, Order
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.outline import turning
 from kappaskin.patch import Polygon
 
 _STRAIGHT, _BLUNT = 1e-6, math.radians(20)  # turns at a corner: none, and too little to be one
@@ -30,7 +28,7 @@ class PolygonBasis(ModeBasis):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        angle = np.abs(turning(self._outline.corners))
+        angle = np.abs(self._polygon.outline.turns)
         blunt = (angle > _STRAIGHT) & (angle < _BLUNT)
         if blunt.any() and not self.clamped:
             raise Refusal(
@@ -40,17 +38,20 @@ class PolygonBasis(ModeBasis):
             )
 
     @property
-    def _outline(self) -> Polygon:
+    def _polygon(self) -> Polygon:
         if not isinstance(self.patch, Polygon):
             raise Refusal(f"expected a polygon, got a {self.patch.name}")
         return self.patch
 
     @cached_property
     def _modes(self) -> PlateModes:
-        return plate_modes(self._outline.vertices, self.size, self.clamped)
+        return plate_modes(self._polygon.vertices, self.size, self.clamped)
 
-    def _derivatives(self, positions: Array, orders: Sequence[Order]) -> Array:
-        return self._modes.functions.derivatives(positions, orders)
+    def _derivative(self, positions: Array, order: Order) -> Array:
+        return self._modes.functions.derivative(positions, order)
+
+    def _place(self, x: float, y: float) -> Array:
+        return self._modes.functions.jet(x, y)
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: exact for two quintics on each triangle."""

@@ -1,13 +1,13 @@
 """Bases whose functions are products of one in x and one in y: values, slopes, grids."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 
+from kappaskin.bases.functions import FunctionBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.patch import Patch
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +25,11 @@ class GridMap:
 
 
 @dataclass(frozen=True)
-class ProductBasis(ABC):
+class ProductBasis(FunctionBasis[tuple[Array, Array]]):
     """Ni x Nj products of Ni functions of x and Nj functions of y on a rectangle.
 
     On a strip they are the Ni functions of x alone, alike along y (Nj = 1).
     """
-
-    patch: Patch
-    Ni: int
-    Nj: int
 
     def __post_init__(self) -> None:
         if self.Ni < 1 or self.Nj < 1:
@@ -52,6 +48,10 @@ class ProductBasis(ABC):
         integral of that one whose mean is zero.
         """
 
+    @abstractmethod
+    def _jet(self, x: float, length: float, count: int) -> Array:
+        """Values, slopes and second derivatives (3, count) of the same at one place."""
+
     def _along_x(self, x: Array, derivative: int) -> Array:
         if derivative not in (-2, -1, 0, 1, 2):
             raise Refusal(f"expected a derivative of order -2 to 2, got {derivative}")
@@ -64,29 +64,27 @@ class ProductBasis(ABC):
             return np.full((len(y), 1), float(derivative == 0))
         return self._along(y, self.patch.b, self.Nj, derivative)
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self.Ni, self.Nj
-
-    @property
-    def size(self) -> int:
-        return self.Ni * self.Nj
-
-    @property
-    def unseen(self) -> Array | None:
-        return None
+    def _place(self, x: float, y: float) -> tuple[Array, Array]:
+        X = self._jet(x, self.patch.a, self.Ni)
+        if self.patch.strip:
+            return X, np.array([[1.0], [0.0], [0.0]])
+        return X, self._jet(y, self.patch.b, self.Nj)
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, Ni Nj), at `positions` (P, 2)."""
+        if len(positions) == 1 and dx in (0, 1, 2) and dy in (0, 1, 2):
+            in_x, in_y = self._at_point(*positions[0].tolist())
+            return np.multiply.outer(in_x[dx], in_y[dy]).reshape(1, self.size)
         X, Y = self._along_x(positions[:, 0], dx), self._along_y(positions[:, 1], dy)
         return (X[:, :, None] * Y[:, None, :]).reshape(len(positions), self.size)
 
     def with_slopes(self, x: float, y: float) -> Array:
         """Every function and its slopes along x and y at one point, (3, Ni Nj)."""
-        X, slope_x = (self._along_x(np.array([x]), order)[0] for order in (0, 1))
-        Y, slope_y = (self._along_y(np.array([y]), order)[0] for order in (0, 1))
-        pairs = ((X, Y), (slope_x, Y), (X, slope_y))
-        return np.stack([np.multiply.outer(*pair).ravel() for pair in pairs])
+        X, Y = self._at_point(x, y)
+        found = np.empty((3, self.Ni, self.Nj))
+        for values, (dx, dy) in zip(found, ((0, 0), (1, 0), (0, 1)), strict=True):
+            np.multiply.outer(X[dx], Y[dy], out=values)
+        return found.reshape(3, self.size)
 
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> GridMap:
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""

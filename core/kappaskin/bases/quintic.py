@@ -1,6 +1,5 @@
 """Functions that are quintic on each triangle of a mesh: their values and derivatives at points."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,7 +13,8 @@ from kappaskin.bases.product import gauss
 from kappaskin.frames import Array
 
 _NEAREST = 10  # triangles that a point is looked for in first
-_ROUNDING = 1e-9  # of a triangle
+_ROUNDING = 1e-8  # of a triangle: a point on the rim as computed may stand this far outside
+_FAR = 1e9  # m: off any skin
 
 Indices = NDArray[np.intp]
 
@@ -73,44 +73,51 @@ class Quintics:
 
     @cached_property
     def _depths(self) -> Array:
-        """How far (3 T, 3) a point (x, y, 1) is from the sides of every triangle, inward."""
+        """xi, eta and 1 - xi - eta, one after the other for all triangles (3 T, 3), of (x, y, 1).
+
+        They are how deep a point is inside of each triangle, counted from its three sides.
+        """
         slopes = np.concatenate([self.inverse, -self.inverse.sum(axis=1, keepdims=True)], axis=1)
-        at_origin = np.array([0.0, 0.0, 1.0]) - np.einsum("tij,tj->ti", slopes, self.origins)
-        return np.concatenate([slopes, at_origin[..., None]], axis=-1).reshape(-1, 3)
+        at_zero = np.array([0.0, 0.0, 1.0]) - np.einsum("tij,tj->ti", slopes, self.origins)
+        rows = np.concatenate([slopes, at_zero[..., None]], axis=-1)
+        return np.swapaxes(rows, 0, 1).reshape(-1, 3)
 
-    def _nearest(self, position: Array) -> int:
-        """The triangle that a position (2,) is deepest inside of."""
-        depths = self._depths @ np.append(position, 1.0)
-        return int(depths.reshape(-1, 3).min(axis=1).argmax())
+    def _searched(self, x: float, y: float) -> tuple[int, Array, float]:
+        """The triangle that (x, y) is deepest inside of, xi (2,) there, and how deep."""
+        depths = (self._depths @ np.array([x, y, 1.0])).reshape(3, -1)
+        deepest = depths.min(axis=0)
+        t = int(deepest.argmax())
+        return t, depths[:2, t], float(deepest[t])
 
-    def _located(self, positions: Array) -> Indices:
-        """The triangle (P,) that each position lies in, or nearest to."""
-        if len(positions) == 1:  # a tree takes longer
-            return np.array([self._nearest(positions[0])])
+    def _located(self, positions: Array) -> tuple[Indices, Array, Array]:
+        """The triangle (P,) that each position lies in, xi (P, 2) there, and how deep (P,)."""
         some = min(_NEAREST, len(self.origins))
         near = self._tree.query(positions, some)[1].reshape(len(positions), some)
-        xi = self._local(positions[:, None], near)
-        depth = np.minimum(xi.min(axis=-1), 1 - xi.sum(axis=-1))
-        found = near[np.arange(len(near)), depth.argmax(axis=1)]
-        for p in np.flatnonzero(depth.max(axis=1) < -_ROUNDING):  # in none with so near a centre
-            found[p] = self._nearest(positions[p])
-        return found
+        offset = positions[:, None] - self.origins[near]
+        xi = np.einsum("pkij,pkj->pki", self.inverse[near], offset)
+        depths = np.minimum(xi.min(axis=-1), 1 - xi.sum(axis=-1))
+        best = np.arange(len(near)), depths.argmax(axis=1)
+        triangle, local, depth = near[best], xi[best], depths[best]
+        for p in np.flatnonzero(depth < 0):  # in none whose centre is so near
+            triangle[p], local[p], depth[p] = self._searched(*positions[p])
+        return triangle, local, depth
 
-    def _local(self, positions: Array, triangles: Indices) -> Array:
-        """The coordinates xi (..., 2) of `positions` in `triangles`."""
-        offset = positions - self.origins[triangles]
-        return np.einsum("...ij,...j->...i", self.inverse[triangles], offset)
+    def jet(self, x: float, y: float) -> Array:
+        """All derivatives (6, N) at one point; NaN off the mesh."""
+        t, xi, depth = self._searched(x, y)
+        if not depth > -_ROUNDING:
+            return np.full((len(ORDERS), self.coefficients.shape[-1]), np.nan)
+        return self._chained[t] @ monomials(xi) @ self.coefficients[t]
 
-    def derivatives(self, positions: Array, orders: Sequence[Order]) -> Array:
-        """For each of `orders` the derivatives (O, P, N) at `positions` (P, 2) in the mesh."""
-        triangle, which = self._located(positions), [ORDERS.index(order) for order in orders]
-        rows = self._chained[triangle][:, which] @ monomials(self._local(positions, triangle))
-        if len(positions) == 1:
-            return (rows[0] @ self.coefficients[triangle[0]])[:, None]
-        values = np.empty((len(orders), len(positions), self.coefficients.shape[-1]))
-        sorted_by = np.argsort(triangle, kind="stable")
-        starts = np.flatnonzero(np.diff(triangle[sorted_by], prepend=-1))
-        for group in np.split(sorted_by, starts)[1:]:
-            here = rows[group] @ self.coefficients[triangle[group[0]]]
-            values[:, group] = np.swapaxes(here, 0, 1)
+    def derivative(self, positions: Array, order: Order) -> Array:
+        """The derivative (P, N) of one order at `positions` (P, 2); NaN off the mesh."""
+        finite = np.isfinite(positions).all(axis=-1, keepdims=True)
+        triangle, xi, depth = self._located(np.where(finite, positions, _FAR))
+        rows = self._chained[triangle, None, ORDERS.index(order)] @ monomials(xi)
+        values = np.full((len(positions), self.coefficients.shape[-1]), np.nan)
+        inside = np.flatnonzero(depth > -_ROUNDING)
+        inside = inside[np.argsort(triangle[inside], kind="stable")]
+        starts = np.flatnonzero(np.diff(triangle[inside], prepend=-1))
+        for group in np.split(inside, starts)[1:]:
+            values[group] = rows[group, 0] @ self.coefficients[triangle[group[0]]]
         return values

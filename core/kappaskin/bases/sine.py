@@ -1,7 +1,7 @@
 """Sine products: the shapes of a skin that is hinged along its edges."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -45,8 +45,8 @@ class SineBasis(ProductBasis):
     @cached_property
     def wavenumbers(self) -> tuple[Array, Array]:
         """Wave numbers i pi/a (Ni,) and j pi/b (Nj,) in rad/m; 0 along y of a strip."""
-        i, j = np.arange(1.0, self.Ni + 1), np.arange(1.0, self.Nj + 1)
-        return i * np.pi / self.patch.a, j * np.pi / self.patch.b * (not self.patch.strip)
+        ki, kj = _wavenumbers(self.patch.a, self.Ni), _wavenumbers(self.patch.b, self.Nj)
+        return ki, kj * (not self.patch.strip)
 
     @cached_property
     def laplacian(self) -> Array:
@@ -55,7 +55,7 @@ class SineBasis(ProductBasis):
         return np.add.outer(ki**2, kj**2)
 
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
-        k = np.arange(1.0, count + 1) * np.pi / length
+        k = _wavenumbers(length, count)
         kx = np.multiply.outer(x, k)
         end = np.cos(k * length)
         if derivative == -2:
@@ -67,10 +67,16 @@ class SineBasis(ProductBasis):
             return np.sin(kx)
         return k * np.cos(kx) if derivative == 1 else -(k**2) * np.sin(kx)
 
-    def with_slopes(self, x: float, y: float) -> Array:
-        """Every function and its slopes along x and y at one point, (3, Ni Nj)."""
-        ki, kj = self.wavenumbers  # four times as fast as by the products of any functions
-        X, slope_x, slope_y = np.sin(ki * x), ki * np.cos(ki * x), kj * np.cos(kj * y)
-        Y = np.ones(1) if self.patch.strip else np.sin(kj * y)
-        pairs = ((X, Y), (slope_x, Y), (X, slope_y))
-        return np.stack([np.multiply.outer(*pair).ravel() for pair in pairs])
+    def _jet(self, x: float, length: float, count: int) -> Array:
+        k, jet = _wavenumbers(length, count), np.empty((3, count))
+        kx = k * x
+        np.sin(kx, out=jet[0])
+        np.multiply(k, np.cos(kx), out=jet[1])
+        np.multiply(-k * k, jet[0], out=jet[2])
+        return jet
+
+
+@lru_cache(64)
+def _wavenumbers(length: float, count: int) -> Array:
+    """The wave numbers i pi/length (count,) in rad/m, from i = 1 on."""
+    return np.arange(1.0, count + 1) * np.pi / length

@@ -144,9 +144,7 @@ class PointContact:
         """
         if self.basis.unseen is not None:
             return False
-        for x_rim, y_rim, share in self.patch.near_rim(x, y):
-            if share > _DOUBTFUL:
-                continue
+        for x_rim, y_rim, share in self.patch.near_rim(x, y, _DOUBTFUL):
             if share < 1 / _FUNCTIONS:
                 return True
             t = self.basis.with_slopes(x_rim, y_rim)[0]

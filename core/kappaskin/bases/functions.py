@@ -1,0 +1,51 @@
+"""What bases have in common: their numbers of functions, and what these are at one point."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, TypeVar
+
+from kappaskin.frames import Array
+from kappaskin.patch import Patch
+
+Place = TypeVar("Place")
+
+
+@dataclass(frozen=True)
+class FunctionBasis(ABC, Generic[Place]):
+    """Ni x Nj functions on a patch, all of them free, each with some curvature."""
+
+    patch: Patch
+    Ni: int
+    Nj: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.Ni, self.Nj
+
+    @property
+    def size(self) -> int:
+        return self.Ni * self.Nj
+
+    @property
+    def free(self) -> Array | None:
+        return None
+
+    @property
+    def unseen(self) -> Array | None:
+        return None
+
+    @abstractmethod
+    def _place(self, x: float, y: float) -> Place:
+        """What every derivative at the point (x, y) follows from."""
+
+    @cached_property
+    def _last(self) -> dict[tuple[float, float], Place]:
+        return {}
+
+    def _at_point(self, x: float, y: float) -> Place:
+        """The same, remembered: one point is asked for one derivative after the other."""
+        if (x, y) not in self._last:
+            self._last.clear()
+            self._last[x, y] = self._place(x, y)
+        return self._last[x, y]
