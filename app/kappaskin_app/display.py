@@ -98,10 +98,15 @@ class Display:
                 status.skipped,
             )
         )
-        estimate = None if lost else self._session.estimate
+        estimate = self.estimate_shown()
         self.readouts.show_estimate(estimate)
         for row, heatmap in enumerate(self.heatmaps.values()):
             heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
+
+    def estimate_shown(self) -> Estimate | None:
+        """The newest estimate, None while what it shows is not coming in any more."""
+        lost = self._session.badge() in (LOST, OFF, STALE, WAITING)
+        return None if lost else self._session.estimate
 
     def show_estimate(self, estimate: Estimate) -> None:
         if not self.membrane.ready:

@@ -27,16 +27,19 @@ from kappaskin_app.display import Display
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
+from kappaskin_app.naming import Naming
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
 from kappaskin_app.simulation import settings_for
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
+from kappaskin_app.views.line import Line
 from kappaskin_app.wishes import Wishes
 
+_WORDS = 0.2  # s between two looks at what touches the skin
 _BARGAIN = 1.0  # s between two looks at what a region buys
-_HINT = "Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom; F1: shortcuts"
+_HINT = "Drag the red arrow to move the load; F1: shortcuts"
 
 
 class MainWindow(QMainWindow):
@@ -54,9 +57,15 @@ class MainWindow(QMainWindow):
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
-        self._next_bargain = 0.0
+        self._next_bargain = self._next_words = 0.0
         # There from the start, or its first message would push the rest up.
         self.statusBar().addWidget(QLabel(_HINT))
+        self.object = Line()
+        self.object.setToolTip(
+            "What the readings say touches the skin, with 95 % interval and the runner-up's "
+            "probability; and the principal curvatures of the skin at the contact."
+        )
+        self.statusBar().addPermanentWidget(self.object, 1)
         self.setCentralWidget(self._centre())
         self._make_header()
         left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
@@ -72,6 +81,8 @@ class MainWindow(QMainWindow):
         self._find_ports()
         self.resize(1280, 800)
         self.panels.connection.show_source(source)
+        self.naming = Naming(self)
+        self.naming.named.connect(guarded(self.object.show_text))
         self.session.connect_to(source, already=engine is not None)
 
     def _centre(self) -> QWidget:
@@ -206,6 +217,9 @@ class MainWindow(QMainWindow):
         self.display.show_status(status)
         simulating = self.session.simulating and status.state == "streaming"
         now = time.monotonic()
+        if now >= self._next_words:
+            self._next_words = now + _WORDS
+            self.naming.look(status, self.display.estimate_shown())
         if now >= self._next_bargain:
             self._next_bargain = now + _BARGAIN
             self.panels.region.show_bargain(self.session.bargain())
@@ -246,5 +260,6 @@ class MainWindow(QMainWindow):
         if not self.session.closed:
             guard.forget(self._tell)
             self.session.close()
+            self.naming.close()
             self.membrane.close_plotter()
         super().closeEvent(event)

@@ -74,6 +74,9 @@ from kappaskin.scene import Scene as Scene
 from kappaskin.scene import load_scene as load_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
+from kappaskin.touch import NO_OBJECT as NO_OBJECT
+from kappaskin.touch import ContactObject as ContactObject
+from kappaskin.touch import ObjectFinder as ObjectFinder
 from kappaskin.touch import PointContact as PointContact
 from kappaskin.transduction import FIRST_GENERATION as FIRST_GENERATION
 from kappaskin.transduction import SECOND_GENERATION as SECOND_GENERATION

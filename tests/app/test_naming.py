@@ -1,0 +1,34 @@
+"""What touches the skin, in words, beside the picture."""
+
+import time
+from dataclasses import replace
+
+from kappaskin import LineLoad, Pipeline, PointLoad, Setup, Simulator, load_scene
+from kappaskin_app.naming import curved
+
+
+def _estimate(*loads):
+    scene = replace(load_scene("centre"), loads=loads)
+    return Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, time.monotonic))
+
+
+def test_the_curvature_at_a_contact_is_told_with_its_error_bars():
+    words = curved(_estimate(PointLoad(0.05, 0.05, 0.15)))
+
+    assert words.startswith("skin there curves by \N{MINUS SIGN}")
+    assert words.endswith("1/m")
+    assert words.count("\N{PLUS-MINUS SIGN}") == 2
+
+
+def test_nothing_is_told_of_a_skin_that_nothing_touches():
+    assert curved(_estimate()) == ""
+
+
+def test_the_window_says_what_touches_the_skin(window, until):
+    window.history.change("Line", -1, load_case="line", noise_kind="none")
+    assert isinstance(window.session.scene.loads[0], LineLoad)
+
+    until(lambda: "edge" in window.object.text() and "skin there curves" in window.object.text())
+
+    window.session.disconnect_from()
+    until(lambda: not window.object.text())
