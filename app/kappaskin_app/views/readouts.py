@@ -52,7 +52,7 @@ FIELDS = {
 _WIDTHS = {
     "contact": 6,
     "rate": 5,
-    "lost": 5,
+    "lost": 6,
     "force": 5,
     "depth": 5,
     "age": 3,
