@@ -10,6 +10,7 @@ from kappaskin_app.settings import Settings
 
 Array = NDArray[np.float64]
 
+_CLEARLY = 1.5  # times as far out as in, or in as out, before the colours change sides
 _PATIENCE = 2.0  # s that the values must stay small before the range narrows
 
 
@@ -50,11 +51,14 @@ class Ranges:
         self._pulled = False
 
     def pulled(self, displacement: Array) -> bool:
-        """Whether the skin is pulled out rather than pressed in; a skin at rest keeps its side."""
+        """Whether the skin is pulled out rather than pressed in; in doubt it keeps its side."""
         seen = np.nan_to_num(displacement)
-        out, into = -np.min(seen), np.max(seen)
+        out, into = -float(np.min(seen)), float(np.max(seen))
         if max(out, into) > self._steady["displacement"].least:
-            self._pulled = bool(out > into)
+            if self._pulled and into > _CLEARLY * out:
+                self._pulled = False
+            elif not self._pulled and out > _CLEARLY * into:
+                self._pulled = True
         return self._pulled
 
     def deepest(self) -> float:

@@ -40,3 +40,9 @@ def test_a_skin_at_rest_keeps_its_side() -> None:
         ranges.pulled(np.array(w)) for w in ([0.1, 3.0], [-0.05, 0.04], [-3.0, 0.1], [0.0, 0.05])
     ]
     assert sides == [False, False, True, True]
+
+
+def test_a_skin_that_bulges_nearly_as_far_as_it_is_pressed_keeps_its_side() -> None:
+    ranges = Ranges(side=100.0)
+    sides = [ranges.pulled(np.array(w)) for w in ([-3.1, 3.0], [-5.0, 3.0], [-3.0, 3.1], [-1, 3])]
+    assert sides == [False, True, True, False]

@@ -326,7 +326,7 @@ def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
     until(lambda: isinstance(window.membrane.skin.patch, Disk))
     until(lambda: window.session.estimate is not None and not message.text())
     until(lambda: colours_in(window, window.membrane) > 300)
-    assert window.session.estimate.curvature.shape == (3, 80)  # whose middles are on it
+    assert window.session.estimate.curvature.shape == (3, 80)
     window.wishes.wish("edge", "elastic")
     until(lambda: "elastic" in message.text())
     assert window.session.scene.edge == "hinged"
@@ -438,9 +438,7 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     window: MainWindow, qtbot, shape: str
 ) -> None:
     window.wishes.wish("shape", shape)
-    window.history.change(
-        "All", -1, load_case="two-points", side_x=0.03, x=0.02, tension=5.0, region="skin"
-    )
+    window.history.change("All", -1, load_case="two-points", side_x=0.03, x=0.02, region="skin")
     obeyed = set()
     for page in range(window.panels.count()):
         window.panels.setCurrentIndex(page)

@@ -121,8 +121,11 @@ class _Cells(QWidget):
             rgb = np.ascontiguousarray(self._colours.reshape(n, m, 3)[::-1])
             painter.drawImage(area, QImage(rgb.tobytes(), m, n, 3 * m, QImage.Format.Format_RGB888))
         else:
+            painter.setPen(QPen(self._line, 1))  # or those near zero are lost on a light ground
             for square, rgb in zip(self._squares(area), self._colours, strict=True):
-                painter.fillRect(square, QColor(*(int(v) for v in rgb)))
+                painter.setBrush(QColor(*(int(v) for v in rgb)))
+                painter.drawRect(square)
+            painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setOpacity(1.0)
         painter.setPen(QPen(self._line, 1))
         painter.drawRect(area)

@@ -52,7 +52,7 @@ FIELDS = {
 _WIDTHS = {
     "contact": 6,
     "rate": 5,
-    "lost": 5,
+    "lost": 6,
     "force": 5,
     "depth": 5,
     "age": 3,
@@ -114,8 +114,9 @@ class Readouts(QWidget):
         age = f"{health.age * 1e3:.0f} ms" if math.isfinite(health.age) else NONE
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
         self._write("age", age)
-        skipped = f", {health.skipped} skipped" if health.skipped else ""
-        self._write("lost", f"{health.lost} frames, {health.discarded} B{skipped}")
+        also = ((health.discarded, "B"), (health.skipped, "skipped"))
+        lost = [f"{health.lost} frames", *(f"{count} {what}" for count, what in also if count)]
+        self._write("lost", ", ".join(lost))
 
     def show_estimate(self, estimate: Estimate | None) -> None:
         if estimate is None:
