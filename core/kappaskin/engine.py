@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -17,9 +18,14 @@ from kappaskin.region import Region
 from kappaskin.ring import Ring
 from kappaskin.scene import Scene
 
+_SWITCH = 2e-4  # s that one thread may keep the interpreter from another
+
 
 def _serve(requests: "Connection[Request, Request]", name: str) -> None:
     """What the child process does."""
+    # The thread that reads the line needs the interpreter three times for 4 KiB: with Python's 5 ms
+    # for each, a loop that always computes would starve it below the rate of the line.
+    sys.setswitchinterval(_SWITCH)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
     ring = Ring.attach(name)
     try:
