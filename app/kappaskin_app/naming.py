@@ -4,39 +4,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import (
-    NO_OBJECT,
-    ContactObject,
-    Estimate,
-    Fit,
-    LeastSquares,
-    ObjectFinder,
-    RankDeficient,
-    Status,
-    basis_for,
-)
-
-_Key = tuple[int, int]
-
-
-class _Finder:
-    """What depends on sensor and setup: made once, in the thread that names."""
-
-    def __init__(self, status: Status) -> None:
-        sensor, setup = status.sensor, status.setup
-        if sensor is None:
-            raise ValueError("expected a status with a sensor")
-        layout, edge = sensor.layout, setup.edge or sensor.edge
-        across = 1 if layout.patch.strip else setup.Nj
-        self._fit = LeastSquares(basis_for(layout.patch, edge, setup.Ni, across), layout)
-        self._find = ObjectFinder(sensor.plate, layout, edge)
-
-    def __call__(self, estimate: Estimate) -> ContactObject:
-        try:
-            fit: Fit = self._fit(estimate.curvature)
-        except RankDeficient:
-            return NO_OBJECT
-        return self._find(estimate.curvature, fit, estimate.touch)
+from kappaskin import Estimate, ObjectFinder, Refusal, Status
 
 
 def curved(estimate: Estimate) -> str:
@@ -64,8 +32,8 @@ class Naming(QObject):
         super().__init__(parent)
         self._thread = ThreadPoolExecutor(1, "object-naming")
         self._busy: Future[str] | None = None
-        self._key: _Key | None = None
-        self._finder: _Finder | None = None
+        self._key: tuple[int, str] | None = None
+        self._finder: ObjectFinder | str = ""
 
     def look(self, status: Status, estimate: Estimate | None) -> None:
         """Take up what was named, and the next estimate to be named."""
@@ -80,11 +48,24 @@ class Naming(QObject):
             self._busy = self._thread.submit(self._words, status, estimate)
 
     def _words(self, status: Status, estimate: Estimate) -> str:
-        key = status.meetings, status.generation
-        if self._finder is None or key != self._key:
-            self._finder, self._key = _Finder(status), key
-        found = self._finder(estimate)
+        self._meet(status)
+        if isinstance(self._finder, str):
+            return "; ".join(filter(None, [self._finder, curved(estimate)]))
+        found = self._finder(estimate.curvature, estimate.noise, estimate.touch)
         return "; ".join(filter(None, [found.describe(), curved(estimate)]))
+
+    def _meet(self, status: Status) -> None:
+        """Make what depends on the sensor and how its edge is held, or keep why it cannot be."""
+        sensor = status.sensor
+        if sensor is None:
+            return
+        key = status.meetings, status.setup.edge or sensor.edge
+        if key != self._key:
+            self._key = key
+            try:
+                self._finder = ObjectFinder(sensor.plate, sensor.layout, key[1])
+            except Refusal as refusal:
+                self._finder = str(refusal)
 
     def close(self) -> None:
         self._thread.shutdown(wait=True, cancel_futures=True)

@@ -32,3 +32,9 @@ def test_the_window_says_what_touches_the_skin(window, until):
 
     window.session.disconnect_from()
     until(lambda: not window.object.text())
+
+
+def test_a_skin_that_objects_cannot_be_told_on_says_so(window, until):
+    window.history.change("Elements", -1, elements_x=50, elements_y=50)
+
+    until(lambda: "at most 2000 elements to tell objects by" in window.object.text())

@@ -91,7 +91,7 @@ def test_the_object_takes_as_long_as_scipys_contact(medians, figure) -> None:
 
     def found():
         K, fit = next(all_of)
-        return finder(K, fit, contact(K, fit))
+        return finder(K, float(fit.noise), contact(K, fit))
 
     object_, scipys = medians(found, lambda: by_scipy(next(all_of)[0], basis, M), turns=20, calls=2)
     figure(

@@ -10,12 +10,15 @@ import pytest
 from scipy import linalg, optimize
 
 from kappaskin import (
+    Disk,
     LeastSquares,
+    LineLoad,
     ObjectFinder,
     Patch,
     Plate,
     PointContact,
     PointLoad,
+    Polygon,
     Refusal,
     SensorLayout,
     SineBasis,
@@ -118,13 +121,13 @@ class Skin:
     def __init__(self, patch=Patch(SIDE, SIDE), plate=None, elements=10):  # noqa: B008
         plate = plate or Plate(patch)
         self.layout = SensorLayout.regular(patch, elements, elements)
-        self.fit = LeastSquares(SineBasis(patch, 8, 8), self.layout)
+        self.fit = LeastSquares(basis_for(patch, "hinged", 8, 8), self.layout)
         self.contact = PointContact(plate, self.layout)
         self.finder = ObjectFinder(plate, self.layout)
 
     def find(self, readings):
         fit = self.fit(readings)
-        return self.finder(readings, fit, self.contact(readings, fit))
+        return self.finder(readings, float(fit.noise), self.contact(readings, fit))
 
     def finds(self, readings, draws, seed=0, noise=NOISE):
         rng = np.random.default_rng(seed)
@@ -329,7 +332,7 @@ def test_a_few_readings_tell_nothing():
     K[:, 44:50] = noisy(BALLS[0])[:, 44:50]
     fit = LeastSquares(SineBasis(Patch(SIDE, SIDE), 2, 2), PAPER.layout)(K)
 
-    found = PAPER.finder(K, fit, PAPER.contact(K, fit))
+    found = PAPER.finder(K, float(fit.noise), PAPER.contact(K, fit))
 
     assert not found.probability
 
@@ -431,6 +434,28 @@ def test_one_line_describes_it():
         (replace(rod, radius_95=(math.inf, math.inf)), r"cylinder, flat or hollow, axis .*"),
     ):
         assert re.fullmatch(pattern, found.describe())
+
+
+HEXAGON = [(0.025, 0), (0.075, 0), (0.1, 0.0433), (0.075, 0.0866), (0.025, 0.0866), (0, 0.0433)]
+
+
+@pytest.mark.parametrize("patch", [Disk(0.05), Polygon(HEXAGON)], ids=["disk", "hexagon"])
+def test_objects_on_other_outlines_are_told_apart(patch):
+    skin, truth = Skin(patch), basis_for(patch, "hinged", 20, 20)
+    bent = skin.layout.curvature_operator(truth)
+
+    def found(load):
+        modal = Plate(patch).compliance(truth)(load.modal(truth))
+        return skin.finds((bent @ modal.ravel()).reshape(3, -1), 3)
+
+    for tip in found(PointLoad(0.04, 0.045, 0.15)):
+        assert tip.kind == "sphere"
+        np.testing.assert_allclose(tip.position, [0.04, 0.045], atol=1e-3)
+    for edge in found(LineLoad(0.03, 0.03, 0.05, 0.045, 0.15)):
+        assert edge.probability["edge"] + edge.probability["cylinder"] > 0.9
+        assert abs(math.remainder(edge.axis - math.atan2(0.015, 0.02), math.pi)) < 0.2
+    for rim in found(PointLoad(0.0485, 0.002, 0.3)):  # forces beside it would lie off the skin
+        assert math.hypot(*(rim.position - [0.0485, 0.002])) < 3e-3
 
 
 def test_a_skin_that_cannot_tell_is_refused():

@@ -7,10 +7,10 @@ from typing import cast
 import numpy as np
 from scipy import special
 
-from kappaskin.fit import Fit
 from kappaskin.frames import Array, Touch
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
+from kappaskin.patch import Patch
 from kappaskin.touch.climb import Optimum
 from kappaskin.touch.hypotheses import SHARE, Hypotheses, hypotheses
 from kappaskin.touch.inside import Hypothesis, Width
@@ -24,7 +24,7 @@ KINDS = ("plane", "cylinder", "sphere", "edge")
 _RADII = (0.02, 5.0)
 
 _COARSE = 15  # functions along each side, at first
-_FINE, _FINE_BY_RITZ = 40, 20  # and then, where they do not mix and where they do
+_FINE, _FINE_MIXED = 40, 20  # and then: of waves that do not mix, and of any others
 _WELL = 1.2  # times the residual of the fitted shape that an object may leave
 _ENOUGH = 20  # readings at least
 _INEXACT = 0.02  # of a curvature: what a ring or arcs leave out of a real contact
@@ -112,19 +112,22 @@ class ObjectFinder:
     """
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
-        plain = edge == "hinged" and not plate.patch.base_curvature
-        fine = _FINE if plain else _FINE_BY_RITZ
+        patch = plate.patch
+        waves = type(patch) is Patch and edge == "hinged" and not patch.base_curvature
         self._coarse = ElasticSkin(plate, layout, edge, _COARSE)
-        self._skin = ElasticSkin(plate, layout, edge, fine)
+        self._skin = ElasticSkin(plate, layout, edge, _FINE if waves else _FINE_MIXED)
         self._live = layout.live.ravel()
 
-    def __call__(self, curvature: Array, fit: Fit, touch: Touch) -> ContactObject:
-        """The object for `curvature` (3, P) in 1/m, NaN where missing, its `fit` and `touch`."""
+    def __call__(self, curvature: Array, noise: float, touch: Touch) -> ContactObject:
+        """The object for `curvature` (3, P) in 1/m, NaN where missing, and the `touch` in it.
+
+        `noise` in 1/m is the standard deviation of a reading, as the fitted shape leaves it.
+        """
         used = self._live & np.isfinite(curvature).ravel()
         if not touch.present or used.sum() < _ENOUGH:
             return NO_OBJECT
         K = np.where(used, curvature.ravel(), 0.0)
-        noise = max(float(fit.noise), _QUIET * float(np.abs(K).max()))
+        noise = max(noise, _QUIET * float(np.abs(K).max()))
         return _judged(
             self._skin, hypotheses(self._coarse, self._skin, K, used, noise, touch), noise
         )

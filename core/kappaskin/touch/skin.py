@@ -14,7 +14,6 @@ from kappaskin.mechanics import Plate
 from kappaskin.touch.contacts import PointForces
 
 _MOST = 2000  # elements: 100 MB
-_RIM = 1e-3  # of a side: as close as a force is placed to the rim
 _SEARCHED = np.array([0.025, 0.045, 0.07, 0.1, 0.14, 0.19, 0.26, 0.35])  # of the shorter side
 _ANGLES = 16
 _SOFT, _HEAVY = 1e-7, 1e3  # of a compliance: keep places apart, and the sum of the forces
@@ -47,8 +46,7 @@ class ElasticSkin:
         """What the curvature inside a ring or an arc loses per N and e-fold of its size, in 1/m."""
 
     def _on_skin(self, points: Array) -> Array:
-        rim = _RIM * np.array([self.patch.a, self.patch.b])
-        return np.clip(points, rim, [self.patch.a, self.patch.b] - rim)
+        return np.array([self.patch.inward(x, y) for x, y in points.tolist()])
 
     def _felt(self, points: Array) -> Array:
         return self._basis.at(self._on_skin(points))
