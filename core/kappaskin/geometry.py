@@ -4,16 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from kappaskin.bases import Basis
+from kappaskin.bases import ORDERS, Basis
 from kappaskin.errors import Refusal
 from kappaskin.fit import Fit
 from kappaskin.frames import Array, LocalGeometry, Touch
 from kappaskin.patch import Patch
 
 Number = Any  # a float, or an array of P real or, to be differentiated, complex numbers
-Jet = list[Number]  # the displacement and its derivatives, in the order below
+Jet = list[Number]  # the displacement f and its derivatives f_x, f_y, f_xx, f_xy, f_yy
 
-_ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1))  # f, f_x, f_y, f_xx, f_yy, f_xy
 _TINY = 1e-100  # an imaginary step whose square vanishes: derivatives exact to rounding
 
 NO_GEOMETRY = LocalGeometry(
@@ -55,13 +54,15 @@ def surface_geometry(
             f"expected coefficients of shape {basis.shape} and positions of shape "
             f"(P, 2) in m, got {coefficients.shape} and {positions.shape}"
         )
-    points = positions if positions.ndim == 2 else positions[None]
-    B = np.array([basis.at(points, *order) for order in _ORDERS])
-    values, H = B @ coefficients.ravel(), basis.patch.base_curvature
-    # For a single point, numbers: a tenth of the time of arrays of one.
-    jet = list(values) if positions.ndim == 2 else values[:, 0].tolist()
+    if positions.ndim == 2:
+        at = np.stack([basis.at(positions, *order) for order in ORDERS], axis=1)
+        jet: Jet = list((at @ coefficients.ravel()).T)
+    else:  # numbers, in a tenth of the time of arrays of one
+        at = basis.jet(*positions.tolist())
+        jet = (at @ coefficients.ravel()).tolist()
+    H = basis.patch.base_curvature
     xx, yy, xy = _curvature_form(jet, H)
-    to_form = _sensitivity(jet, H) @ (B.swapaxes(0, 1) if positions.ndim == 2 else B[:, 0])
+    to_form = _sensitivity(jet, H) @ at
     return LocalGeometry(
         *_frame(basis.patch, positions, jet),
         _matrix(xx, xy, xy, yy),
@@ -105,7 +106,7 @@ def _lengths(jet: Jet, H: float) -> tuple[Number, Number, Number, Number]:
 def _curvature_form(jet: Jet, H: float) -> tuple[Number, Number, Number]:
     """xx, yy and xy of K = [x y]' [n_x n_y] [metric]^-1, where n_x . r_y = -n . r_xy."""
     s, L, m, W = _lengths(jet, H)
-    _, fx, fy, fxx, fyy, fxy = jet
+    _, fx, fy, fxx, fxy, fyy = jet
     bxx = (2 * H * fx * fx + s * (fxx + H * s)) / W
     bxy, byy = (H * fx * fy + s * fxy) / W, s * fyy / W
     k = L / W
@@ -115,7 +116,7 @@ def _curvature_form(jet: Jet, H: float) -> tuple[Number, Number, Number]:
 def _torsion_form(jet: Jet, H: float) -> tuple[Number, Number]:
     """T = y' [x_x x_y] [metric]^-1."""
     s, L, m, W = _lengths(jet, H)
-    _, fx, fy, fxx, _, fxy = jet
+    _, fx, fy, fxx, fxy, _ = jet
     # y . r_xx / L and y . r_xy / L, with y = (r_y - m r_x) L / W.
     turn_x = (fy * (fxx + H * s) - m * fx * (fxx - H * s)) / W
     turn_y = (fy * fxy - m * (fx * fxy - H * s * fy)) / W

@@ -106,13 +106,15 @@ class Patch:
 
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points (..., 3) in m of the skin at rest and its outward normals (..., 3) there."""
-        s, y = positions[..., 0] - self.a / 2, positions[..., 1]
-        H = self.base_curvature
-        angle = H * s
-        # R sin(s/R) and R (cos(s/R) - 1), with their flat limits s and 0.
-        x, z = s * np.sinc(angle / np.pi), -s * np.sinc(angle / 2 / np.pi) * np.sin(angle / 2)
-        points = np.stack([x + self.a / 2, y, z], axis=-1)
-        normals = np.stack([np.sin(angle), np.zeros_like(s), np.cos(angle)], axis=-1)
+        points, normals = np.zeros((2, *positions.shape[:-1], 3))
+        points[..., :2] = positions
+        if not self.base_curvature:
+            normals[..., 2] = 1.0
+            return points, normals
+        angle = (positions[..., 0] - self.a / 2) / self.radius
+        normals[..., 0], normals[..., 2] = np.sin(angle), np.cos(angle)
+        points[..., 0] = self.a / 2 + self.radius * normals[..., 0]
+        points[..., 2] = -2 * self.radius * np.sin(angle / 2) ** 2
         return points, normals
 
 

@@ -137,9 +137,9 @@ class Pipeline:
         basis, true_map = self._truths[key]
         true_surface = true_map(truth.coefficients)
         rms = math.sqrt(float(np.mean((surface - true_surface)[self._skin] ** 2)))
-        here = truth.contact[None]
+        x, y = truth.contact.tolist()
         at_load = float(
-            self.basis.at(here)[0] @ coefficients.ravel()
-            - basis.at(here)[0] @ truth.coefficients.ravel()
+            self.basis.jet(x, y)[0] @ coefficients.ravel()
+            - basis.jet(x, y)[0] @ truth.coefficients.ravel()
         )
         return true_surface, truth.contact, at_load, rms

@@ -136,7 +136,7 @@ def contact_bound(
     basis = basis_for(layout.patch, sensor.edge, _FUNCTIONS, across)
     compliance = sensor.plate.compliance(basis)
     by_force, by_x, by_y = (
-        compliance(f.reshape(basis.shape)).ravel() for f in basis.with_slopes(contact.x, contact.y)
+        compliance(f.reshape(basis.shape)).ravel() for f in basis.jet(contact.x, contact.y)[:3]
     )
     slopes = np.stack([contact.force * by_x, contact.force * by_y, by_force], axis=1)
     weights = np.where(layout.live, 1.0 if weight is None else weight, 0.0)

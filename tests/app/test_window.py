@@ -320,7 +320,7 @@ def test_a_wrong_belief_about_the_edge_costs(window: MainWindow, until) -> None:
 def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
     window: MainWindow, until, colours_in
 ) -> None:
-    window.wishes.wish("shape", "disk")
+    window.history.change("Disk", -1, shape="disk", rim_radius=0.043)  # no other test made it
     message = window.panels.shape.message
     until(lambda: "computing" in message.text())
     until(lambda: isinstance(window.membrane.skin.patch, Disk))

@@ -22,6 +22,7 @@ from kappaskin import (
     load_scene,
     local_geometry,
 )
+from kappaskin.bases import ORDERS
 from kappaskin.geometry import surface_geometry
 
 FLAT = Patch(0.1, 0.08)
@@ -31,15 +32,18 @@ HERE = np.array([[0.031, 0.052], [0.07, 0.01], [0.05, 0.04], [0.0, 0.08]])
 
 @dataclass
 class Surface:
-    """One function on a patch, by its derivatives: f, f_x, f_y, f_xx, f_yy, f_xy."""
+    """One function on a patch, by its derivatives: f, f_x, f_y, f_xx, f_xy, f_yy."""
 
     patch: Patch
-    jet: object
+    values: object
     shape = (1, 1)
 
     def at(self, positions, dx=0, dy=0):
-        number = ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1)).index((dx, dy))
-        return np.broadcast_to(self.jet(*positions.T)[number], len(positions))[:, None]
+        found = self.values(*positions.T)[ORDERS.index((dx, dy))]
+        return np.broadcast_to(found, len(positions))[:, None]
+
+    def jet(self, x, y):
+        return np.array(self.values(x, y))[:, None]
 
     def geometry(self, positions):
         return surface_geometry(self, np.ones((1, 1)), positions, np.zeros((1, 1)))
@@ -53,14 +57,13 @@ def polynomial(c, angle=0.0, patch=FLAT):
     def jet(x, y):
         x, y = x - 0.05, y - 0.04
         u, v = cos * x + sin * y, -sin * x + cos * y
-        orders = ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1))
-        f, u1, v1, uu, vv, uv = (
-            P.polyval2d(u, v, P.polyder(P.polyder(c, i, axis=0), j, axis=1)) for i, j in orders
+        f, u1, v1, uu, uv, vv = (
+            P.polyval2d(u, v, P.polyder(P.polyder(c, i, axis=0), j, axis=1)) for i, j in ORDERS
         )
         xx = cos**2 * uu - 2 * cos * sin * uv + sin**2 * vv
         yy = sin**2 * uu + 2 * cos * sin * uv + cos**2 * vv
         xy = cos * sin * (uu - vv) + (cos**2 - sin**2) * uv
-        return f, cos * u1 - sin * v1, sin * u1 + cos * v1, xx, yy, xy
+        return f, cos * u1 - sin * v1, sin * u1 + cos * v1, xx, xy, yy
 
     return Surface(patch, jet)
 
@@ -84,7 +87,7 @@ def dome(R):
         x, y = x - 0.05, y - 0.04
         q = np.sqrt(R**2 - x**2 - y**2)
         xx, yy, xy = 1 / q + x**2 / q**3, 1 / q + y**2 / q**3, x * y / q**3
-        return R - q, x / q, y / q, xx, yy, xy
+        return R - q, x / q, y / q, xx, xy, yy
 
     return Surface(FLAT, jet)
 
@@ -97,7 +100,7 @@ def trough(R, angle):
         u = c * (x - 0.05) + s * (y - 0.04)
         q = np.sqrt(R**2 - u**2)
         slope, bend = -u / q, -(R**2) / q**3
-        return q - R, c * slope, s * slope, c**2 * bend, s**2 * bend, c * s * bend
+        return q - R, c * slope, s * slope, c**2 * bend, c * s * bend, s**2 * bend
 
     return Surface(FLAT, jet)
 
@@ -165,7 +168,7 @@ def test_mean_and_gaussian_curvature_are_those_of_a_graph(seed):
     surface = steep(seed)
     geometry = surface.geometry(HERE)
 
-    _, fx, fy, fxx, fyy, fxy = surface.jet(*HERE.T)
+    _, fx, fy, fxx, fxy, fyy = surface.values(*HERE.T)
     W = np.sqrt(1 + fx**2 + fy**2)
     mean = ((1 + fy**2) * fxx - 2 * fx * fy * fxy + (1 + fx**2) * fyy) / (2 * W**3)
     scale = np.abs(geometry.principal).max() + 1
@@ -184,7 +187,7 @@ def by_differences(surface, x, y, h=2e-5):
 
     def position(x, y):
         point, normal = surface.patch.at_rest(np.array([x, y]))
-        return point - float(surface.jet(np.array([x]), np.array([y]))[0][0]) * normal
+        return point - float(surface.values(x, y)[0]) * normal
 
     def frame(x, y):
         rx = (position(x + h, y) - position(x - h, y)) / (2 * h)

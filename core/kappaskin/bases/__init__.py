@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
+from kappaskin.bases.basis import ORDERS as ORDERS
 from kappaskin.bases.basis import Basis as Basis
 from kappaskin.bases.basis import CurvatureMap as CurvatureMap
 from kappaskin.bases.basis import ValueMap as ValueMap

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
 
+from kappaskin.bases.basis import ORDERS
 from kappaskin.bases.mesh import Mesh, meshed
-from kappaskin.bases.modes import ORDERS
 from kappaskin.bases.quintic import Quintics, chained, monomials, triangle_quadrature
 from kappaskin.frames import Array
 from kappaskin.outline import Outline

@@ -8,6 +8,10 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.patch import Patch
 
+Order = tuple[int, int]
+ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+"""Orders of derivatives along x and y, as every basis tells them at one point."""
+
 
 class ValueMap(Protocol):
     """A map from coefficients to values on a grid, made once and called per frame."""
@@ -54,8 +58,8 @@ class Basis(Protocol):
         """
         ...
 
-    def with_slopes(self, x: float, y: float) -> Array:
-        """Every function and its slopes along x and y at one point, (3, N)."""
+    def jet(self, x: float, y: float) -> Array:
+        """Every function's derivatives at one point, (6, N), in the order of `ORDERS`."""
         ...
 
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> ValueMap:

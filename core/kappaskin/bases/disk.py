@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ive, jn_zeros, jv
 
-from kappaskin.bases.modes import ORDERS, ModeBasis, Order
+from kappaskin.bases.basis import ORDERS, Order
+from kappaskin.bases.modes import ModeBasis
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array

@@ -3,16 +3,13 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, TypeVar
 
 from kappaskin.frames import Array
 from kappaskin.patch import Patch
 
-Place = TypeVar("Place")
-
 
 @dataclass(frozen=True)
-class FunctionBasis(ABC, Generic[Place]):
+class FunctionBasis(ABC):
     """Ni x Nj functions on a patch, all of them free, each with some curvature."""
 
     patch: Patch
@@ -36,15 +33,15 @@ class FunctionBasis(ABC, Generic[Place]):
         return None
 
     @abstractmethod
-    def _place(self, x: float, y: float) -> Place:
-        """What every derivative at the point (x, y) follows from."""
+    def _place(self, x: float, y: float) -> Array:
+        """Every function's derivatives at one point, (6, N), in the order of `ORDERS`."""
 
     @cached_property
-    def _last(self) -> dict[tuple[float, float], Place]:
+    def _last(self) -> dict[tuple[float, float], Array]:
         return {}
 
-    def _at_point(self, x: float, y: float) -> Place:
-        """The same, remembered: one point is asked for one derivative after the other."""
+    def jet(self, x: float, y: float) -> Array:
+        """Every function's derivatives at one point, (6, N); the last point's are remembered."""
         if (x, y) not in self._last:
             self._last.clear()
             self._last[x, y] = self._place(x, y)

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.functions import FunctionBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-
-Order = tuple[int, int]
-ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-"""Derivatives along x and y that modes have."""
 
 _MOST = 1024  # modes: more take minutes to make
 
@@ -36,7 +33,7 @@ class PointMap:
 
 
 @dataclass(frozen=True)
-class ModeBasis(FunctionBasis[Array]):
+class ModeBasis(FunctionBasis):
     """The first Ni x Nj modes, by frequency, of a flat skin; their mean square is 1/4 as sines'."""
 
     def __post_init__(self) -> None:
@@ -50,23 +47,13 @@ class ModeBasis(FunctionBasis[Array]):
     def _derivative(self, positions: Array, order: Order) -> Array:
         """The derivative (P, N) of one order at `positions` (P, 2); NaN off the skin."""
 
-    @abstractmethod
-    def _place(self, x: float, y: float) -> Array:
-        """All derivatives (6, N) at one point; NaN off the skin."""
-
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, N), at `positions`; NaN off it."""
         if (dx, dy) not in ORDERS:
             raise Refusal(
                 f"expected derivatives up to second order, got order {dx} along x and {dy} along y"
             )
-        if len(positions) == 1:
-            return self._at_point(*positions[0].tolist())[None, ORDERS.index((dx, dy))]
         return self._derivative(positions, (dx, dy))
-
-    def with_slopes(self, x: float, y: float) -> Array:
-        """Every function and its slopes along x and y at one point, (3, N)."""
-        return self._at_point(x, y)[:3]
 
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> PointMap:
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""

@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from kappaskin.bases.argyris import PlateModes, plate_modes
-from kappaskin.bases.modes import ModeBasis, Order
+from kappaskin.bases.basis import Order
+from kappaskin.bases.modes import ModeBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.patch import Polygon

@@ -5,9 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kappaskin.bases.basis import ORDERS
 from kappaskin.bases.functions import FunctionBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+
+_IN_X, _IN_Y = np.array(ORDERS).T
+_ALIKE = np.array([[1.0], [0.0], [0.0]])  # along y of a strip
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +29,7 @@ class GridMap:
 
 
 @dataclass(frozen=True)
-class ProductBasis(FunctionBasis[tuple[Array, Array]]):
+class ProductBasis(FunctionBasis):
     """Ni x Nj products of Ni functions of x and Nj functions of y on a rectangle.
 
     On a strip they are the Ni functions of x alone, alike along y (Nj = 1).
@@ -64,27 +68,15 @@ class ProductBasis(FunctionBasis[tuple[Array, Array]]):
             return np.full((len(y), 1), float(derivative == 0))
         return self._along(y, self.patch.b, self.Nj, derivative)
 
-    def _place(self, x: float, y: float) -> tuple[Array, Array]:
+    def _place(self, x: float, y: float) -> Array:
         X = self._jet(x, self.patch.a, self.Ni)
-        if self.patch.strip:
-            return X, np.array([[1.0], [0.0], [0.0]])
-        return X, self._jet(y, self.patch.b, self.Nj)
+        Y = _ALIKE if self.patch.strip else self._jet(y, self.patch.b, self.Nj)
+        return (X[_IN_X, :, None] * Y[_IN_Y, None, :]).reshape(6, self.size)
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, Ni Nj), at `positions` (P, 2)."""
-        if len(positions) == 1 and dx in (0, 1, 2) and dy in (0, 1, 2):
-            in_x, in_y = self._at_point(*positions[0].tolist())
-            return np.multiply.outer(in_x[dx], in_y[dy]).reshape(1, self.size)
         X, Y = self._along_x(positions[:, 0], dx), self._along_y(positions[:, 1], dy)
         return (X[:, :, None] * Y[:, None, :]).reshape(len(positions), self.size)
-
-    def with_slopes(self, x: float, y: float) -> Array:
-        """Every function and its slopes along x and y at one point, (3, Ni Nj)."""
-        X, Y = self._at_point(x, y)
-        found = np.empty((3, self.Ni, self.Nj))
-        for values, (dx, dy) in zip(found, ((0, 0), (1, 0), (0, 1)), strict=True):
-            np.multiply.outer(X[dx], Y[dy], out=values)
-        return found.reshape(3, self.size)
 
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> GridMap:
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.special import perm
 
-from kappaskin.bases.modes import ORDERS, Order
+from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.product import gauss
 from kappaskin.frames import Array
 

@@ -50,18 +50,24 @@ class Fit:
     @property
     def covariance(self) -> Array:
         """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients, in m^2; made on demand."""
+        U = self.estimator.undecided
+        return self.noise[..., None, None] ** 2 * self._unit_covariance() + U @ U.T
+
+    def _unit_covariance(self) -> Array:
+        """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients for unit noise."""
         missing = np.isnan(self.residual)
         units = [
             self.estimator.unit_covariance(gone)
             for gone in missing.reshape(-1, *missing.shape[-2:])
         ]
-        N, U = self.estimator.basis.size, self.estimator.undecided
-        seen = self.noise[..., None, None] ** 2 * np.reshape(units, (*self.noise.shape, N, N))
-        return seen + U @ U.T
+        N = self.estimator.basis.size
+        return units[0] if self.noise.ndim == 0 else np.reshape(units, (*self.noise.shape, N, N))
 
     def sd_of(self, rows: Array) -> Array:
         """Standard deviations (..., R) of `rows` (R, N) times the flattened coefficients."""
-        return np.sqrt(np.sum((rows @ self.covariance) * rows, axis=-1))
+        seen = np.vecdot(rows @ self._unit_covariance(), rows)
+        undecided = np.sum((rows @ self.estimator.undecided) ** 2, axis=-1)
+        return np.sqrt(self.noise[..., None] ** 2 * seen + undecided)
 
     def surface_sd(self, positions: Array) -> Array:
         """Standard deviations (..., P) of the displacement in m at `positions` (P, 2)."""

@@ -5,6 +5,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import blas
 
 from kappaskin.bases import basis_for
 from kappaskin.fit import Fit
@@ -77,7 +78,7 @@ class PointContact:
         key = used.tobytes()
         if key not in self._remembered:
             M = self._M[used]
-            G = M.T @ M
+            G: Array = np.asfortranarray(M.T @ M)
             squares = np.vecdot(self._functions @ G, self._functions).reshape(self._still.shape)
             self._remembered[key] = _Tables(G, np.where(self._still, 1.0, squares))
             if len(self._remembered) > _REMEMBERED:
@@ -132,8 +133,8 @@ class PointContact:
     def _place(self, x: float, y: float, h: Array, G: Array) -> "_Place":
         # With F the functions and their slopes along x and y, A = F G F' holds the products of T
         # and its slopes, and F h their products with K.
-        F = self.basis.with_slopes(x, y)
-        GF = np.stack([G @ f for f in F])  # faster than one thin product
+        F = self.basis.jet(x, y)[:3]
+        GF = np.stack([_times(G, f) for f in F])  # faster than one thin product
         return _Place(F[0], (GF @ F.T).tolist(), (F @ h).tolist())
 
     def _near_rim(self, x: float, y: float, h: Array, G: Array, least: float) -> bool:
@@ -147,8 +148,8 @@ class PointContact:
         for x_rim, y_rim, share in self.patch.near_rim(x, y, _DOUBTFUL):
             if share < 1 / _FUNCTIONS:
                 return True
-            t = self.basis.with_slopes(x_rim, y_rim)[0]
-            if float(h @ t) ** 2 > least * float(t @ G @ t):
+            t = self.basis.jet(x_rim, y_rim)[0]
+            if float(h @ t) ** 2 > least * float(t @ _times(G, t)):
                 return True
         return False
 
@@ -158,7 +159,7 @@ class PointContact:
         Besides the noise, by as much as the point load's own shape disagrees: what lies between is
         finer than the fit's functions.
         """
-        b = fit.estimator.basis.with_slopes(x, y)[0]
+        b = fit.estimator.basis.jet(x, y)[0]
         fitted = float(b @ fit.coefficients.ravel())
         seen = float(fit.sd_of(b[None])[0])
         t = place.functions
@@ -188,6 +189,11 @@ class _Place:
         of_force = math.sqrt(1 / tt + (u - v * Sxy / Syy) ** 2 / Cx + v**2 / Syy)
         self.unit_sd = np.array([1 / math.sqrt(Cx), 1 / math.sqrt(Cy), of_force * abs(force)])
         self.unit_sd /= abs(force)
+
+
+def _times(G: Array, f: Array) -> Array:
+    """G f, of which a symmetric G in Fortran's order is read only half."""
+    return blas.dsymv(1.0, G, f)
 
 
 def _between(low: float, value: float, high: float) -> float:
