@@ -87,6 +87,7 @@ def reconstruct(
     edge: str = "hinged",
     method: str = METHODS[0],
     contact: Annotated[bool, Parameter(negative="")] = False,
+    objects: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Turn a file of curvature readings into a file of shapes.
 
@@ -109,14 +110,17 @@ def reconstruct(
     grid
         Number of points of the surface along x and y; none when left out.
     edge
-        How the skin is held.
+        How the skin is held: hinged, sliding, clamped or elastic.
     method
         How the coefficients are found.
     contact
         Write the contact of each frame too, and the skin's geometry there.
+    objects
+        Write the contact and what it is: plane, cylinder, sphere or edge; some 50 ms a frame.
     """
     points = _pair(grid, "a grid") if grid else None
-    found = reconstructed(readings, _pair(basis, "a basis"), points, edge, method, contact)
+    functions = _pair(basis, "a basis")
+    found = reconstructed(readings, functions, points, edge, method, contact, objects)
     try:
         with out.open("wb") as file:
             np.savez(file, **found)  # pyright: ignore[reportArgumentType]

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.fit import Fit, LeastSquares
-from kappaskin.frames import Array
+from kappaskin.frames import Array, Touch
 from kappaskin.geometry import contact_geometry
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
 from kappaskin.patch import Disk, Patch, Polygon
-from kappaskin.touch import PointContact
+from kappaskin.touch import KINDS, ContactObject, ObjectFinder, PointContact
 
 _NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
 
@@ -143,12 +143,14 @@ def reconstruct(
     edge: str = "hinged",
     method: str = METHODS[0],
     contact: bool = False,
-) -> dict[str, Array]:
+    objects: bool = False,
+) -> dict[str, NDArray[Any]]:
     """What `kappaskin reconstruct` writes: `coefficients`, `sd`, `residual` and the surface.
 
     `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m; with a `grid` of nx x ny
     points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
-    `method` one of `METHODS`. With `contact` also what `_contacts` gives.
+    `method` one of `METHODS`. With `contact` also what `_contacts` gives, with `objects`
+    what `_objects` gives besides.
     """
     if method not in METHODS:
         raise Refusal(f"expected a method among {', '.join(METHODS)}; got {method!r}")
@@ -173,33 +175,38 @@ def reconstruct(
     points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
     _check_sizes(functions, int(layout.live.sum()), points)
     fit = _fit(functions, layout, curvature, sigma)
+    out: dict[str, NDArray[Any]]
     out = {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
     if grid is not None:
         x, y = patch.grid(*grid)
         out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(fit.coefficients)}
-    if contact:
-        out |= _contacts(LeastSquares(functions, layout), edge, curvature, found.get("rigidity"))
+    if contact or objects:
+        rigidity = found.get("rigidity")
+        if rigidity is not None and rigidity.size != 1:
+            raise Refusal(f"expected one rigidity in N m, got shape {rigidity.shape}")
+        plate = Plate(patch, 1.0 if rigidity is None else float(rigidity.item()))
+        fitter, touch_of = LeastSquares(functions, layout), PointContact(plate, layout, edge)
+        fits = [fitter(frame) for frame in curvature]
+        touches = [touch_of(frame, one) for frame, one in zip(curvature, fits, strict=True)]
+        out |= _contacts(fits, touches, forces=rigidity is not None)
+        if objects:
+            find = ObjectFinder(plate, layout, edge)
+            noises = [float(one.noise) for one in fits]
+            out |= _objects([find(*each) for each in zip(curvature, noises, touches, strict=True)])
     return out
 
 
-def _contacts(
-    fit: LeastSquares, edge: str, curvature: Array, rigidity: Array | None
-) -> dict[str, Array]:
+def _contacts(fits: list[Fit], touches: list[Touch], forces: bool) -> dict[str, NDArray[Any]]:
     """The contact of each frame and the skin's geometry there; NaN where there is none.
 
     `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m; `normal`
-    (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with a
-    `rigidity` in N m also `force` and `force_sd` (T,) in N. All readings weigh the same.
+    (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with
+    `forces` also `force` and `force_sd` (T,) in N. `single` and `near_rim` (T,) say whether to
+    trust them (`Touch`). All readings weigh the same.
     """
-    if rigidity is not None and rigidity.size != 1:
-        raise Refusal(f"expected one rigidity in N m, got shape {rigidity.shape}")
-    plate = Plate(fit.layout.patch, 1.0 if rigidity is None else float(rigidity.item()))
-    touch_of = PointContact(plate, fit.layout, edge)
-    fits = [fit(frame) for frame in curvature]
-    touches = [touch_of(frame, one) for frame, one in zip(curvature, fits, strict=True)]
     there = [contact_geometry(one, touch) for one, touch in zip(fits, touches, strict=True)]
-    names = ["displacement", "displacement_sd"]
-    names += [] if rigidity is None else ["force", "force_sd"]
+    names = ["displacement", "displacement_sd", "single", "near_rim"]
+    names += ["force", "force_sd"] if forces else []
     out = {
         "contact": np.stack([touch.position for touch in touches]),
         "contact_sd": np.stack([touch.position_sd for touch in touches]),
@@ -208,3 +215,22 @@ def _contacts(
     for name in ("normal", "curvature_form", "torsion_form", "principal"):
         out[name] = np.stack([getattr(geometry, name) for geometry in there])
     return out
+
+
+def _objects(found: list[ContactObject]) -> dict[str, NDArray[Any]]:
+    """What touches the skin in each frame (`ContactObject`); without a contact NaN and "".
+
+    `object` (T,) is one of `KINDS` or "", `object_probability` (T, 4) of each of them;
+    `object_radius` (T,) and `object_radius_95` (T, 2) in m; `object_axis` and `object_axis_95` (T,)
+    in rad, `object_length` and `object_length_95` (T,) in m.
+    """
+    return {
+        "object": np.array([one.kind for one in found], dtype="U8"),
+        "object_probability": np.array(
+            [[one.probability.get(kind, np.nan) for kind in KINDS] for one in found]
+        ),
+        **{
+            f"object_{name}": np.array([getattr(one, name) for one in found])
+            for name in ("radius", "radius_95", "axis", "axis_95", "length", "length_95")
+        },
+    }

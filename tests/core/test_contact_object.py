@@ -426,12 +426,15 @@ def test_one_line_describes_it():
 
     text = r"{}, radius [\d.]+ mm \([\d.]+ to [\d.]+\){}; runner-up \w+ \d+ %"
     for found, pattern in (
-        (rod, text.format("cylinder", r", axis \d+ deg")),
+        (rod, text.format("cylinder", r", \d+ mm long, axis \d+ deg")),
         (ball, text.format("sphere", "")),
-        (replace(rod, kind="edge"), r"edge, axis \d+ deg; runner-up \w+ \d+ %"),
+        (replace(rod, kind="edge"), r"edge, \d+ mm long, axis \d+ deg; runner-up \w+ \d+ %"),
         (replace(ball, radius_95=(0.05, math.inf)), r"sphere, radius above 50 mm; .*"),
         (replace(ball, radius_95=(0.0, math.inf)), r"sphere, radius unknown; .*"),
-        (replace(rod, radius_95=(math.inf, math.inf)), r"cylinder, flat or hollow, axis .*"),
+        (
+            replace(rod, radius_95=(math.inf, math.inf)),
+            r"cylinder, flat or hollow, \d+ mm .*",
+        ),
     ):
         assert re.fullmatch(pattern, found.describe())
 

@@ -1,6 +1,7 @@
 """A file of readings to a file of shapes: the right numbers, or a reason and no file."""
 
 import io
+import math
 import tracemalloc
 import zipfile
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    DiscLoad,
     Disk,
     Patch,
     Plate,
@@ -24,6 +26,7 @@ from kappaskin import (
     basis_for,
 )
 from kappaskin.reconstruct import reconstruct
+from kappaskin.touch import KINDS
 
 RNG = np.random.default_rng(7)
 A, B, P, T = 0.12, 0.09, 40, 5
@@ -496,6 +499,32 @@ def test_the_contact_of_each_frame_is_written_with_the_geometry_there(saved) -> 
     assert found["normal"][1] == pytest.approx([0, 0, 1], abs=1e-3)
     assert np.all(found["principal"] < 0)  # pressed in, it is hollow seen from outside
     assert "force" not in reconstruct(saved(), (NI, NJ), contact=True)
+    assert found["single"].tolist() == [True, True]
+    assert found["near_rim"].tolist() == [False, False]
+
+
+def test_what_touches_the_skin_is_written_for_each_frame(saved) -> None:
+    patch = Patch(0.1, 0.1)
+    layout, truth = SensorLayout.regular(patch, 10, 10), SineBasis(patch, 30, 30)
+    ends = [PointLoad(0.04, 0.04, 0.1), PointLoad(0.06, 0.04, 0.1)]  # of a rigid blade
+    curvature = np.random.default_rng(0).normal(0, 0.05, (3, 3, 100))
+    for frame, loads in zip(curvature, (ends, [DiscLoad(0.045, 0.05, 0.012, 0.2)]), strict=False):
+        deflection = Plate(patch).deflection(loads, truth)
+        frame += (layout.curvature_operator(truth) @ deflection.ravel()).reshape(3, 100)
+    path = saved(size=[0.1, 0.1], positions=layout.positions, curvature=curvature)
+
+    found = reconstruct(path, (8, 8), objects=True)
+
+    assert found["object"].tolist() == ["edge", "sphere", ""]
+    assert found["object_probability"][0, KINDS.index("edge")] > 0.5
+    assert found["object_length"][0] == pytest.approx(0.02, abs=1e-3)
+    assert math.remainder(found["object_axis"][0], math.pi) == pytest.approx(0, abs=0.05)
+    low, high = found["object_radius_95"][1]
+    assert low < found["object_radius"][1] < high
+    assert np.isnan(found["object_probability"][2]).all()
+    assert np.isnan(found["object_radius_95"][2]).all()
+    assert np.isfinite(found["contact"][:2]).all()  # it needs the contacts
+    assert np.isnan(found["contact"][2]).all()
 
 
 def test_a_disk_and_a_polygon_are_read_by_their_outline(saved) -> None:

@@ -74,7 +74,7 @@ class ContactObject:
         if self.kind in ("cylinder", "sphere"):
             parts.append(self._radius())
         if self.kind in ("cylinder", "edge"):
-            parts.append(f"axis {math.degrees(self.axis):.0f} deg")
+            parts.append(f"{1e3 * self.length:.0f} mm long, axis {math.degrees(self.axis):.0f} deg")
         return f"{', '.join(parts)}; runner-up {second} {100 * chance:.0f} %"
 
     def _radius(self) -> str:
