@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin import (
-    RADII,
     CalibrationReport,
     Estimate,
     Procedure,
@@ -34,8 +33,6 @@ _SETTLE = 0.2  # s after asking for a step that its readings begin to count
 _SILENCE = 5.0  # s without a reading after which a step is given up
 _FEWEST_FRAMES = 10  # of one step, however short: their spread tells the noise
 _MOST_FRAMES = 5000  # kept of one step, evenly: more tell no more
-_HEADROOM = 1.3  # times its curvature that a cylinder may read, by tolerances, and be on no rail
-_LADDER = 5  # cylinders for a sensor that cannot read the usual ones
 _LONGEST = 3600.0  # s on one step
 
 
@@ -46,30 +43,6 @@ class Result:
     sensor: Sensor
     sweep: Sweep
     report: CalibrationReport
-
-
-def _reads(sensor: Sensor, curvature: float) -> bool:
-    """Whether `curvature` in 1/m strains no gage too far and drives no amplifier onto a rail."""
-    electronics = sensor.transduction
-    if curvature > electronics.strain_limit_curvature:
-        return False
-    ends = np.array([1.0, -1.0]) * _HEADROOM * curvature
-    return bool(np.isfinite(electronics.curvature(electronics.counts(ends))).all())
-
-
-def suggested_radii(sensor: Sensor) -> tuple[float, ...]:
-    """Radii in m of cylinders that `sensor` can read: the usual ones, or larger ones in whole mm.
-
-    The larger ones have curvatures evenly apart.
-    """
-    if _reads(sensor, 1 / min(RADII)):
-        return RADII
-    low, high = 0.0, 1 / min(RADII)
-    for _ in range(40):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _reads(sensor, middle) else (low, middle)
-    steps = np.arange(1, _LADDER + 1) / _LADDER
-    return tuple(float(radius) for radius in np.ceil(1e3 / (low * steps)) / 1e3)
 
 
 def parsed_radii(text: str) -> tuple[float, ...]:

@@ -18,6 +18,7 @@ from kappaskin.calibration import Step as Step
 from kappaskin.calibration import Sweep as Sweep
 from kappaskin.calibration import calibrate as calibrate
 from kappaskin.calibration import load_calibration as load_calibration
+from kappaskin.calibration import radii_for as radii_for
 from kappaskin.calibration import save_calibration as save_calibration
 from kappaskin.calibration import schedule as schedule
 from kappaskin.doctor import serial_ports as serial_ports

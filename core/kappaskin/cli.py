@@ -13,8 +13,8 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import App, CycloptsError, Parameter
 
-from kappaskin.calibration import RADII, check_place, save_calibration
 from kappaskin.calibration import calibrate as calibrated
+from kappaskin.calibration import check_place, save_calibration
 from kappaskin.doctor import examine
 from kappaskin.errors import Refusal
 from kappaskin.figures import FIGURES, write_figures
@@ -152,7 +152,7 @@ def calibrate(
     source: str,
     *,
     out: Path,
-    radii: str = ",".join(f"{1e3 * radius:g}" for radius in RADII),
+    radii: str | None = None,
     seconds: float = 1.0,
     hold: float = 0.0,
     dwell: float | None = None,
@@ -172,7 +172,7 @@ def calibrate(
     out
         The file to write.
     radii
-        Radii of the cylinders in millimetres.
+        Radii of the cylinders in millimetres; those that the sensor can read when left out.
     seconds
         How long the readings on each cylinder are averaged.
     hold
@@ -186,7 +186,7 @@ def calibrate(
     try:
         sensor, sweep = take_sweep(
             source,
-            _millimetres(radii),
+            None if radii is None else _millimetres(radii),
             _asked,
             lambda line: print(line, file=sys.stderr),
             seconds=seconds,

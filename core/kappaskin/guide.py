@@ -14,6 +14,7 @@ from kappaskin.calibration import (
     Procedure,
     Step,
     Sweep,
+    radii_for,
     schedule,
 )
 from kappaskin.errors import Refusal
@@ -46,10 +47,14 @@ class _Virtual:
         self.now += seconds
 
 
-def _simulated(name: str, radii: tuple[float, ...], hold: float, dwell: float) -> Source:
+def _steps(sensor: Sensor, radii: tuple[float, ...] | None, hold: float) -> tuple[Step, ...]:
+    return schedule(radii or radii_for(sensor), hold, sensor.layout.patch.strip)
+
+
+def _simulated(name: str, radii: tuple[float, ...] | None, hold: float, dwell: float) -> Source:
     """The scene called `name`, laid on the cylinders as fast as it can be computed."""
     clock, scene = _Virtual(), load_scene(name)
-    laid = Presentation(schedule(radii, hold, scene.layout.patch.strip), dwell)
+    laid = Presentation(_steps(scene.sensor(), radii, hold), dwell)
     return SimulatedSource(replace(scene, loads=(), motion=None, laid=laid), clock, clock.sleep)
 
 
@@ -145,7 +150,7 @@ def _guide(listener: _Listener, procedure: Procedure, seconds: float, ask: Ask, 
 
 def take_sweep(
     name: str,
-    radii: tuple[float, ...],
+    radii: tuple[float, ...] | None,
     ask: Ask,
     tell: Tell,
     *,
@@ -155,9 +160,9 @@ def take_sweep(
 ) -> tuple[Sensor, Sweep]:
     """What the source called `name` says it is, and what it reads on cylinders of `radii` in m.
 
-    Asks for each cylinder and averages `seconds` of frames on it. Nobody is asked when the source
-    goes through the steps by itself, from its own time 0 on and for `dwell` s each, as a
-    simulation does.
+    Without radii they are those that it can read (`radii_for`). Asks for each cylinder and averages
+    `seconds` of frames on it. Nobody is asked when the source goes through the steps by itself,
+    from its own time 0 on and for `dwell` s each, as a simulation does.
     """
     for what, value in (("seconds", seconds), ("dwell", dwell or seconds), ("hold", hold or 1.0)):
         if not 0 < value <= _LONGEST:
@@ -170,7 +175,7 @@ def take_sweep(
         source = open_source(name)
     with closing(source):
         listener = _Listener(source)
-        steps = schedule(radii, hold, listener.sensor.layout.patch.strip)
+        steps = _steps(listener.sensor, radii, hold)
         procedure = Procedure(listener.sensor, steps)
         if dwell is None:
             _guide(listener, procedure, seconds, ask, tell)

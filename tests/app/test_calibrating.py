@@ -11,22 +11,19 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import (
     RADII,
-    Amplifier,
     Calibration,
     Estimate,
     Presentation,
     Refusal,
-    Sensor,
     Setup,
     Simulator,
     Status,
     Step,
     Tolerance,
-    Transduction,
     load_scene,
 )
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin_app.calibrating import Calibrating, parsed_radii, suggested_radii
+from kappaskin_app.calibrating import Calibrating, parsed_radii
 from kappaskin_app.history import History
 from kappaskin_app.settings import Settings
 from kappaskin_app.window import MainWindow
@@ -83,22 +80,6 @@ def done(bench: Bench, until: Callable[..., None]) -> None:
         return not bench.calibrating.computing
 
     until(told)
-
-
-def test_suggested_cylinders_are_those_that_the_sensor_reads() -> None:
-    wide, narrow = SCENE.sensor(), load_scene("circle").sensor()
-    assert suggested_radii(wide) == RADII
-    radii = suggested_radii(narrow)
-    assert len(radii) == 5
-    electronics = narrow.transduction
-    assert np.isfinite(electronics.curvature(electronics.counts(1.29 / np.array(radii)))).all()
-    assert np.isnan(electronics.curvature(electronics.counts(1.4 / np.array([min(radii)])))).all()
-
-
-def test_no_suggested_cylinder_strains_the_gages_too_far() -> None:
-    scene = replace(SCENE, transduction=Transduction(amplifier=Amplifier(gain=5.0)))
-    sensor: Sensor = scene.sensor()
-    assert 1 / min(suggested_radii(sensor)) <= sensor.transduction.strain_limit_curvature
 
 
 def test_radii_are_a_list_in_millimetres() -> None:

@@ -153,8 +153,17 @@ def test_a_place_that_cannot_be_written_to_is_refused_before_any_work(run, tmp_p
 
 
 def test_an_amplifier_that_is_too_strong_is_refused_with_the_remedy(run, tmp_path) -> None:
-    found = run("calibrate", "sim:circle", "--out", tmp_path / "s.toml", "--seconds", "0.05")
-    refused(found, "every channel is dead or on a rail.*lower the amplifier's gain", tmp_path)
+    file, radii = tmp_path / "s.toml", ("--radii", "100,50,33,25")
+    found = run("calibrate", "sim:circle", "--out", file, "--seconds", "0.05", *radii)
+    refused(found, "onto their rails; use radii of at least .* or lower the amplifier", tmp_path)
+    assert "Cylinder" not in found[2]
+
+
+def test_left_out_the_radii_are_those_that_the_sensor_reads(run, tmp_path) -> None:
+    code, printed, told = run("calibrate", "sim:", "--out", tmp_path / "s.toml", "--seconds", "0.1")
+    assert code == 0
+    assert "300 of 300 channels passed" in printed
+    assert "2/67  Cylinder of radius 35 mm" in told
 
 
 def test_dwell_is_refused_for_a_scene_without_cylinders(run, tmp_path) -> None:

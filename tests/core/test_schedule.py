@@ -8,7 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import RADII, Presentation, Procedure, Refusal, Step, load_scene, schedule
+from kappaskin import (
+    RADII,
+    Amplifier,
+    HalfBridge,
+    Presentation,
+    Procedure,
+    Refusal,
+    Step,
+    Transduction,
+    load_scene,
+    radii_for,
+    schedule,
+)
 
 SENSOR = load_scene("calibration").sensor()
 SHORT = schedule((0.05, 0.025, 0.015))
@@ -197,6 +209,33 @@ def test_redo_goes_back_by_one_step():
     assert len(procedure.taken) == 1
     procedure.take(*frames(SHORT[1], time=9.0))
     assert procedure.taken[-1].time == pytest.approx(9.02)
+
+
+def test_the_cylinders_chosen_are_those_that_the_sensor_reads():
+    wide, narrow = load_scene("calibration").sensor(), load_scene("circle").sensor()
+    assert radii_for(wide) == RADII
+    radii = radii_for(narrow)
+    assert len(radii) == 5
+    chain = narrow.transduction
+    assert np.isfinite(chain.curvature(chain.counts(1.29 / np.array(radii)))).all()
+    assert np.isnan(chain.curvature(chain.counts(1.4 / np.array([min(radii)])))).all()
+
+
+def test_no_cylinder_chosen_strains_the_gages_too_far():
+    thick = HalfBridge(substrate_thickness=300e-6)
+    scene = replace(
+        load_scene("calibration"), transduction=Transduction(thick, amplifier=Amplifier(gain=2.0))
+    )
+    sensor = scene.sensor()
+    assert 1 / min(radii_for(sensor)) <= sensor.transduction.strain_limit_curvature < 1 / RADII[-1]
+    Procedure(sensor, schedule(radii_for(sensor)))
+
+
+def test_a_cylinder_that_drives_every_amplifier_onto_a_rail_is_refused_before_the_first():
+    sensor = load_scene("circle").sensor()
+    with pytest.raises(Refusal, match=r"step 2: .* 25 mm drives .* rails; use radii of at least"):
+        Procedure(sensor, schedule((0.1, 0.05, 0.025)))
+    Procedure(sensor, schedule((0.1, 0.05, 0.03)))
 
 
 def test_a_channel_on_a_rail_in_any_frame_has_no_reading_of_that_step():

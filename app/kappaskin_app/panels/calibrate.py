@@ -19,8 +19,18 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import ADVICE, COMPONENTS, Calibration, Procedure, Refusal, Status, Step, schedule
-from kappaskin_app.calibrating import Calibrating, Result, parsed_radii, suggested_radii
+from kappaskin import (
+    ADVICE,
+    COMPONENTS,
+    Calibration,
+    Procedure,
+    Refusal,
+    Status,
+    Step,
+    radii_for,
+    schedule,
+)
+from kappaskin_app.calibrating import Calibrating, Result, parsed_radii
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.settings import Settings
@@ -451,7 +461,7 @@ class CalibratePanel(Panel):
         self.start.begin.setEnabled(status.sensor is not None and status.state == "streaming")
         if status.sensor is not None and status.meetings != self._meeting:
             self._meeting = status.meetings
-            radii = ", ".join(f"{1e3 * radius:g}" for radius in suggested_radii(status.sensor))
+            radii = ", ".join(f"{1e3 * radius:g}" for radius in radii_for(status.sensor))
             with QSignalBlocker(self.start.radii):
                 self.start.radii.setText(radii)
                 self.start.radii.setCursorPosition(0)

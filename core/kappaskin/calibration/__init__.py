@@ -16,4 +16,5 @@ from kappaskin.calibration.schedule import ADVICE as ADVICE
 from kappaskin.calibration.schedule import RADII as RADII
 from kappaskin.calibration.schedule import Presentation as Presentation
 from kappaskin.calibration.schedule import Step as Step
+from kappaskin.calibration.schedule import radii_for as radii_for
 from kappaskin.calibration.schedule import schedule as schedule

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.calibration.schedule import Step, applied, check_strain
+from kappaskin.calibration.schedule import Step, applied, check_readable, check_strain
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.sensor import Sensor
@@ -90,6 +90,7 @@ class Procedure:
 
     def __init__(self, sensor: Sensor, steps: tuple[Step, ...]) -> None:
         check_strain(steps, sensor)
+        check_readable(steps, sensor)
         self.sensor, self.steps = sensor, steps
         self.taken: list[Taken] = []
 

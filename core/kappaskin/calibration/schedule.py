@@ -16,6 +16,8 @@ RADII = (0.1, 0.05, 0.033, 0.025, 0.02, 0.017, 0.0145, 0.013)
 """Radii in m whose curvatures are about 10 1/m apart, up to the paper's fingertip's 77 1/m."""
 
 FEWEST_RADII = 3
+_LADDER = 5  # cylinders for a sensor that cannot read the usual ones
+_HEADROOM = 1.3  # times its curvature that a cylinder may read, by tolerances, and be on no rail
 _ROUNDING = 1e-6  # s by which a time may be off that was summed up, or sent on a line
 
 FACES = {1: "inner face", -1: "outer face"}
@@ -136,6 +138,48 @@ def pairs(steps: tuple[Step, ...], x: Array, face: int) -> list[tuple[int, int]]
         elif step.back and key in there:
             found.append((there[key], k))
     return found
+
+
+def _reads(sensor: Sensor, curvature: float) -> bool:
+    """Whether the sensor's electronics read `curvature` in 1/m, either way, and are on no rail."""
+    chain = sensor.transduction
+    return bool(np.isfinite(chain.curvature(chain.counts(np.array([curvature, -curvature])))).all())
+
+
+def _most_read(sensor: Sensor, most: float) -> float:
+    """The largest curvature in 1/m, up to `most`, that the sensor's electronics read."""
+    if _reads(sensor, most):
+        return most
+    low, high = 0.0, most
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _reads(sensor, middle) else (low, middle)
+    return low
+
+
+def radii_for(sensor: Sensor) -> tuple[float, ...]:
+    """Radii in m of cylinders that `sensor` can read: `RADII`, or larger ones in whole mm.
+
+    The larger ones have curvatures evenly apart. Gains may be off by a third.
+    """
+    most = min(1 / min(RADII), sensor.transduction.strain_limit_curvature)
+    most = min(most, _most_read(sensor, _HEADROOM * most) / _HEADROOM)
+    if most * min(RADII) >= 1 - 1e-9:
+        return RADII
+    steps = np.arange(1, _LADDER + 1) / _LADDER
+    return tuple(float(radius) for radius in np.ceil(1e3 / (most * steps)) / 1e3)
+
+
+def check_readable(steps: tuple[Step, ...], sensor: Sensor) -> None:
+    """Refuse steps that no channel could read, before anybody takes the first."""
+    smallest = min(steps, key=lambda step: step.radius)
+    if not smallest.flat and not _reads(sensor, 1 / smallest.radius):
+        least = 1 / _most_read(sensor, 1 / smallest.radius)
+        raise Refusal(
+            f"step {smallest.number}: a cylinder of radius {1e3 * smallest.radius:g} mm drives the "
+            f"amplifiers of {sensor.name} onto their rails; use radii of at least "
+            f"{1e3 * least:.3g} mm, or lower the amplifier's gain"
+        )
 
 
 def check_strain(steps: tuple[Step, ...], sensor: Sensor) -> None:
