@@ -11,7 +11,6 @@ from kappaskin import (
     SECOND_GENERATION_LOOPS,
     Creep,
     GaussianNoise,
-    HalfBridge,
     Hysteresis,
     Patch,
     Plate,
@@ -26,7 +25,6 @@ from kappaskin_app.pressing import REFERENCE, compliance_of, free_loads, ready
 from kappaskin_app.settings import FREE_CASES, LOAD_CASES, Settings
 from kappaskin_app.skins import SHAPES
 
-_THICKNESS = HalfBridge().thickness
 _TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid")
 
 
@@ -79,13 +77,9 @@ def patch_of(settings: Settings) -> Patch:
 
 
 def plate_of(settings: Settings) -> Plate:
-    """The skin that `settings` describe, without its elements; a bent one is an even sheet."""
-    patch = patch_of(settings)
-    plate = Plate(patch, tension=settings.tension, foundation=settings.foam, fluid=settings.fluid)
-    if not patch.base_curvature:
-        return plate
-    stretch = 12 * (1 - plate.poisson**2) * plate.rigidity / _THICKNESS**2  # E h, of D
-    return replace(plate, axial_stiffness=stretch)
+    """The skin that `settings` describe, without its elements."""
+    s = settings
+    return Plate(patch_of(s), tension=s.tension, foundation=s.foam, fluid=s.fluid)
 
 
 def is_table_1(settings: Settings) -> bool:

@@ -204,6 +204,8 @@ class Loop:
         except Refusal as refusal:
             self._status = replace(self._status, refusal=str(refusal))
             return
+        if self._pipeline is not None:
+            pipeline.go_on_from(self._pipeline)
         self._pipeline = pipeline
         self._status = replace(
             self._status, setup=pipeline.setup, generation=pipeline.generation, slot=slot

@@ -41,6 +41,14 @@ class Setup:
     rim_sd: float = RIM_SD
 
 
+@dataclass(frozen=True)
+class _Past:
+    """What a pipeline remembers of earlier frames: where the loops are, and readings it holds."""
+
+    correct: Corrector | None
+    hold: Hold
+
+
 class Pipeline:
     """Counts to curvature, coefficients, surface and contact; `pipeline(frame)` is the estimate.
 
@@ -56,7 +64,7 @@ class Pipeline:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
-        self._correct = self._corrector(setup.calibration)
+        self.past = _Past(self._corrector(setup.calibration), Hold(sensor.channels, setup.hold))
         edge = setup.edge or sensor.edge
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
@@ -68,7 +76,6 @@ class Pipeline:
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
-        self._hold = Hold(sensor.channels, setup.hold)
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
         self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
@@ -85,8 +92,8 @@ class Pipeline:
         With a calibration each frame is to be given once, in order: the loops have a memory.
         """
         flat = self.sensor.nominal(frame)
-        if self._correct is not None:
-            flat = self._correct(flat, frame.device_time)
+        if self.past.correct is not None:
+            flat = self.past.correct(flat, frame.device_time)
         return flat.reshape(3, -1)
 
     def _fitted(self, curvature: Array) -> Fit:
@@ -98,7 +105,7 @@ class Pipeline:
         return Fit(self.fit, nothing, nothing, unknown, np.array(math.nan))
 
     def __call__(self, frame: Frame) -> Estimate:
-        curvature, fresh = self._hold(frame, self.curvature(frame))
+        curvature, fresh = self.past.hold(frame, self.curvature(frame))
         fit = self._fitted(curvature)
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
@@ -120,9 +127,16 @@ class Pipeline:
             *self._compared(surface, fit.coefficients, frame.truth),
         )
 
+    def go_on_from(self, before: "Pipeline") -> None:
+        """Take over what `before` remembers, if its readings are of the same sensor and kind."""
+        asked, was = self.setup, before.setup
+        alike = (asked.calibration, asked.hold) == (was.calibration, was.hold)
+        if before.sensor is self.sensor and alike:
+            self.past = before.past
+
     def pass_over(self, frame: Frame) -> None:
         """Hold the readings of a frame of which nobody waits for the estimate."""
-        self._hold(frame, self.curvature(frame))
+        self.past.hold(frame, self.curvature(frame))
 
     def _compared(
         self, surface: Array, coefficients: Array, truth: Truth | None

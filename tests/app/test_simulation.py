@@ -54,7 +54,7 @@ def test_a_bent_skin_is_an_even_sheet_as_thick_as_its_gages() -> None:
     plate = scene_of(on("cylinder")).plate
     E = 12 * (1 - plate.poisson**2) * plate.rigidity / 250e-6**3
     sheet = Plate.of_material(plate.patch, E, plate.poisson, 250e-6)
-    assert plate.axial_stiffness == pytest.approx(sheet.axial_stiffness)
+    assert plate.stretching == pytest.approx(sheet.stretching)
 
 
 def test_the_fingertip_is_half_a_circle_of_the_papers_radius() -> None:

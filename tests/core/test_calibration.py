@@ -630,6 +630,28 @@ def test_a_new_pipeline_begins_with_a_fresh_memory(second):
     np.testing.assert_array_equal(again.curvature(flat.frame(1, lambda: 0.0)), fresh)
 
 
+def test_a_pipeline_that_goes_on_from_another_remembers_what_that_one_saw(second):
+    bent = Simulator(replace(SKIN, effects=(), laid=Presentation(schedule()[8:], 1.0)))
+    flat = Simulator(replace(SKIN, effects=(), laid=Presentation(schedule()[:1], 1.0)))
+    sensor = SKIN.sensor()
+    used, other = pipeline_of(second.calibration, sensor), pipeline_of(None, sensor)
+    used(bent.frame(0, lambda: 0.0))
+    part = flat.frame(1, lambda: 0.0)
+    part = replace(part, channels=part.channels[:100], counts=part.counts[:100])
+
+    after = Pipeline(sensor, Setup(5, 5, calibration=second.calibration))
+    after.go_on_from(used)
+    other.go_on_from(used)  # its readings are not corrected: it has nothing to take over
+    stranger = pipeline_of(second.calibration)
+    stranger.go_on_from(used)  # of another sensor
+
+    went_on, alone = after(part).curvature, stranger(part).curvature
+    assert np.isfinite(went_on).all()  # the others are held
+    assert np.isnan(other(part).curvature).sum() == np.isnan(alone).sum() == 200
+    assert np.abs(went_on - alone)[np.isfinite(alone)].max() > 1  # bent the other way before
+    np.testing.assert_array_equal(went_on, used(part).curvature)
+
+
 def test_the_calibration_of_another_device_or_skin_is_refused(second):
     sensor = SKIN.sensor()
     with pytest.raises(Refusal, match=r"is of Simulated skin SIM-0001, the sensor is .* SIM-0002"):

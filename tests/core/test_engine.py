@@ -290,6 +290,21 @@ def test_a_region_is_scanned_around_the_contact_until_it_is_off(engine, around) 
     assert wait_for(lambda: scanned_of(engine) == 300)
 
 
+def test_another_setup_goes_on_with_the_readings_that_are_held(engine) -> None:
+    engine.set_up(Setup(hold=60))
+    engine.connect("sim:off-centre")
+    before = next_estimate(engine)
+    engine.scan(Region("elements", (44,), share=0))
+    assert wait_for(lambda: scanned_of(engine) == 3)
+
+    engine.set_up(Setup(6, 6, hold=60))
+    after = next_estimate(engine, before.generation)
+
+    assert after.coefficients.shape == (6, 6)
+    assert np.isfinite(after.curvature).all()
+    engine.scan(Region())
+
+
 def test_a_region_that_is_not_on_the_skin_is_refused_and_everything_goes_on(engine) -> None:
     engine.connect("sim:")
     next_estimate(engine)

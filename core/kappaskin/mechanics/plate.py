@@ -51,6 +51,8 @@ class Compliance:
 # Tension: a skin that the pressure T H blows up has the energy T area - p volume, of which the
 # second variation is T (|grad f|^2 - H^2 f^2): nil for a rigid translation.
 
+_THICKNESS = 0.25e-3  # m of a skin whose axial stiffness nobody gave: substrate and gages
+
 
 @dataclass(frozen=True)
 class Plate:
@@ -59,9 +61,10 @@ class Plate:
     A drum head has `tension` T in N/m and may have no rigidity, a foam below it has the
     `foundation` modulus k_f in N/m^3, a fluid below it keeps its volume. `poisson` matters where
     an edge gives or the skin is bent. A cylinder skin that stretches along its axis as it bends
-    costs the `axial_stiffness` C in N/m, of an even sheet E h; at zero it stretches freely. A rim
-    that gives rests on springs, `rim_stiffness` in N/m per m of it; the default lets it give by
-    0.2 mm under a load that presses the default skin of 0.1 x 0.1 m in by 5 mm.
+    costs the `axial_stiffness` C in N/m, E h of an even sheet; left out, it is that of one 0.25 mm
+    thick, as the paper's is, and at zero it stretches freely, far too soft for a skin. A rim that
+    gives rests on springs, `rim_stiffness` in N/m per m of it; the default lets it give by 0.2 mm
+    under a load that presses the default skin of 0.1 x 0.1 m in by 5 mm.
     """
 
     patch: Patch
@@ -70,14 +73,14 @@ class Plate:
     foundation: float = 0.0
     fluid: bool = False
     poisson: float = 0.3
-    axial_stiffness: float = 0.0
+    axial_stiffness: float | None = None
     rim_stiffness: float = 2e3
 
     def __post_init__(self) -> None:
         for value, expected in (
             (self.tension, "a tension of at least zero in N/m"),
             (self.foundation, "a foundation of at least zero in N/m^3"),
-            (self.axial_stiffness, "an axial stiffness of at least zero in N/m"),
+            (self.axial_stiffness or 0.0, "an axial stiffness of at least zero in N/m"),
             (self.rim_stiffness, "a rim stiffness of at least zero in N/m^2"),
         ):
             if not 0 <= value < np.inf:
@@ -102,6 +105,13 @@ class Plate:
             )
         D = E * h**3 / (12 * (1 - nu**2))
         return cls(patch, D, poisson=nu, axial_stiffness=E * h)
+
+    @property
+    def stretching(self) -> float:
+        """C in N/m; of an even sheet it is 12 (1 - nu^2) D / h^2."""
+        if self.axial_stiffness is None:
+            return 12 * (1 - self.poisson**2) * self.rigidity / _THICKNESS**2
+        return self.axial_stiffness
 
     def check(self, load: Load) -> None:
         """Refuse a load that is not on the patch, or that moves the skin without limit."""
@@ -157,9 +167,9 @@ class Plate:
             along, per_length = basis.rim()
             rim = basis.at(along)
             whole += self.rim_stiffness * (rim.T * per_length) @ rim
-        if H and self.axial_stiffness and not self.patch.strip:
+        if H and self.stretching and not self.patch.strip:
             strain = H * basis.at(points, -2, 2)
-            whole += self.axial_stiffness * product(strain, strain)
+            whole += self.stretching * product(strain, strain)
         return whole, whole + (self.rigidity * H**4 + self.tension * H**2) * squares
 
     def _by_ritz(self, basis: Basis) -> Array:

@@ -19,7 +19,7 @@ from kappaskin.transduction import Amplifier, Converter, HalfBridge, Multiplexer
 
 def to_json(sensor: Sensor) -> str:
     """The information text of `sensor`: SI units, channels counted component by component."""
-    layout = sensor.layout
+    layout, stiffness = sensor.layout, sensor.plate.axial_stiffness
     where = {"grid": layout.shape} if layout.shape else {"positions": layout.positions.tolist()}
     return json.dumps(
         {
@@ -36,6 +36,7 @@ def to_json(sensor: Sensor) -> str:
             "edge": sensor.edge,
             "fluid": sensor.plate.fluid,
             **{name: getattr(sensor.plate, name) for name in _OF_THE_PLATE},
+            **({} if stiffness is None else {"axial_stiffness": stiffness}),
             **where,
             "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
             **asdict(sensor.transduction),
@@ -53,7 +54,7 @@ def _outline(patch: Patch) -> dict[str, Any]:
 
 _Part = TypeVar("_Part", HalfBridge, Multiplexer, Amplifier, Converter)
 
-_OF_THE_PLATE = ("tension", "foundation", "poisson", "axial_stiffness", "rim_stiffness")
+_OF_THE_PLATE = ("tension", "foundation", "poisson", "rim_stiffness")
 # What a flat plate hinged along its edges need not say.
 UNSAID: dict[str, Any] = {
     "base_curvature": 0.0,
@@ -63,14 +64,13 @@ UNSAID: dict[str, Any] = {
     "foundation": 0.0,
     "fluid": False,
     "poisson": 0.3,
-    "axial_stiffness": 0.0,
     "rim_stiffness": 2e3,
 }
 _KINDS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "a text": (str, ("name", "serial_number", "firmware", "edge")),
     "a number": (
         (int, float),
-        ("rate", "rigidity", "base_curvature", *_OF_THE_PLATE),
+        ("rate", "rigidity", "base_curvature", "axial_stiffness", *_OF_THE_PLATE),
     ),
     "a list": (list, ("size", "grid", "positions", "dead_channels")),
     "an object": (dict, ("bridge", "multiplexer", "amplifier", "converter")),
@@ -153,7 +153,8 @@ def _layout(said: dict[str, Any]) -> SensorLayout:
 
 
 def _plate(patch: Patch, said: dict[str, Any]) -> Plate:
-    numbers = {name: float(said[name]) for name in _OF_THE_PLATE}
+    names = [*_OF_THE_PLATE, *({"axial_stiffness"} & said.keys())]
+    numbers = {name: float(said[name]) for name in names}
     return Plate(patch, float(said["rigidity"]), fluid=said["fluid"], **numbers)
 
 
