@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -32,7 +32,6 @@ from kappaskin import (
     schedule,
 )
 from kappaskin.calibration.file import from_toml
-from kappaskin.cli import main
 from kappaskin.errors import SourceError
 from kappaskin.guide import summary, take_sweep
 
@@ -44,17 +43,6 @@ STEPS = schedule(RADII)
 SCENE = load_scene("calibration")
 TOLERANCE = next(effect for effect in SCENE.effects if isinstance(effect, Tolerance))
 FAST = ("--radii", "100,50,25,15", "--seconds", "0.05")
-
-
-@pytest.fixture
-def run(capsys) -> Callable[..., tuple[int, str, str]]:
-    """Runs a command in this process: its exit code, standard output and standard error."""
-
-    def run_one(*arguments: object) -> tuple[int, str, str]:
-        code = main([str(argument) for argument in arguments])
-        return code, *capsys.readouterr()
-
-    return run_one
 
 
 def refused(found: tuple[int, str, str], reason: str, folder: Path) -> None:

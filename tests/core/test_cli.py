@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
-from kappaskin.cli import REFUSED, app, main
+from kappaskin.cli import REFUSED, app
 
 SIZE, BASIS = np.array([0.1, 0.1]), SineBasis(Patch(0.1, 0.1), 8, 8)
 LAYOUT = SensorLayout.regular(BASIS.patch, 10, 10)
@@ -32,17 +32,6 @@ def npz(tmp_path) -> Callable[..., Path]:
         return tmp_path / "in.npz"
 
     return save
-
-
-@pytest.fixture
-def run(capsys) -> Callable[..., tuple[int, str, str]]:
-    """Runs a command in this process: its exit code, standard output and standard error."""
-
-    def run_one(*arguments: object) -> tuple[int, str, str]:
-        code = main([str(argument) for argument in arguments])
-        return code, *capsys.readouterr()
-
-    return run_one
 
 
 def outside(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
