@@ -71,7 +71,8 @@ class ProductBasis(FunctionBasis):
     def _place(self, x: float, y: float) -> Array:
         X = self._jet(x, self.patch.a, self.Ni)
         Y = _ALIKE if self.patch.strip else self._jet(y, self.patch.b, self.Nj)
-        return (X[_IN_X, :, None] * Y[_IN_Y, None, :]).reshape(6, self.size)
+        products = X.take(_IN_X, 0)[:, :, None] * Y.take(_IN_Y, 0)[:, None, :]
+        return products.reshape(6, self.size)
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, Ni Nj), at `positions` (P, 2)."""

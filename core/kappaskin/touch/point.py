@@ -134,7 +134,7 @@ class PointContact:
         # With F the functions and their slopes along x and y, A = F G F' holds the products of T
         # and its slopes, and F h their products with K.
         F = self.basis.jet(x, y)[:3]
-        GF = np.stack([_times(G, f) for f in F])  # faster than one thin product
+        GF = np.array([_times(G, f) for f in F])  # faster than one thin product
         return _Place(F[0], (GF @ F.T).tolist(), (F @ h).tolist())
 
     def _near_rim(self, x: float, y: float, h: Array, G: Array, least: float) -> bool:
