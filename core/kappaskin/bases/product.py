@@ -10,7 +10,7 @@ from kappaskin.bases.functions import FunctionBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
-_IN_X, _IN_Y = np.array(ORDERS).T
+_IN_X, _IN_Y = np.array(ORDERS, np.intp).T
 _ALIKE = np.array([[1.0], [0.0], [0.0]])  # along y of a strip
 
 
@@ -71,8 +71,8 @@ class ProductBasis(FunctionBasis):
     def _place(self, x: float, y: float) -> Array:
         X = self._jet(x, self.patch.a, self.Ni)
         Y = _ALIKE if self.patch.strip else self._jet(y, self.patch.b, self.Nj)
-        products = X.take(_IN_X, 0)[:, :, None] * Y.take(_IN_Y, 0)[:, None, :]
-        return products.reshape(6, self.size)
+        in_x, in_y = np.take(X, _IN_X, axis=0), np.take(Y, _IN_Y, axis=0)
+        return (in_x[:, :, None] * in_y[:, None, :]).reshape(6, self.size)
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, Ni Nj), at `positions` (P, 2)."""
