@@ -1,10 +1,76 @@
-"""What several tests of the core use."""
+"""What several tests of the core use: commands, and skins held in every way that they can be."""
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 
+import numpy as np
 import pytest
 
+from kappaskin import Basis, Disk, Patch, Polygon, basis_for, edges_of
 from kappaskin.cli import main
+
+HEXAGON = [(0, 1), (0.5, 0), (1.5, 0), (2, 1), (1.5, 2), (0.5, 2)] * np.array(
+    [0.05, 0.05 * math.sqrt(3) / 2]
+)
+
+SKINS = {
+    "flat": Patch(0.1, 0.1),
+    "long": Patch(0.12, 0.04),
+    "strip": Patch(0.1, 0.02, strip=True),
+    "bent": Patch(0.04, 0.03, 12.9e-3),
+    "arc": Patch(0.03, 0.02, 12.9e-3, strip=True),
+    "disk": Disk(0.05),
+    "square": Polygon([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0.1)]),
+    "triangle": Polygon([(0, 0), (0.1, 0), (0.05, 0.05 * math.sqrt(3))]),
+    "hexagon": Polygon(HEXAGON),
+    "L": Polygon([(0, 0), (0.1, 0), (0.1, 0.05), (0.05, 0.05), (0.05, 0.1), (0, 0.1)]),
+}
+
+
+@cache
+def _basis(patch: Patch, edge: str, Ni: int, Nj: int) -> Basis:
+    return basis_for(patch, edge, Ni, Nj)
+
+
+@dataclass(frozen=True)
+class Held:
+    """A skin and the edge that it is held by."""
+
+    name: str
+    edge: str
+
+    @property
+    def patch(self) -> Patch:
+        return SKINS[self.name]
+
+    @property
+    def whole(self) -> bool:
+        """Whether functions are modes of the whole skin, not products of one in x and one in y."""
+        return isinstance(self.patch, Disk | Polygon)
+
+    def basis(self, Ni: int = 6, Nj: int = 5) -> Basis:
+        """Ni x Nj functions, on a strip Ni alone; made once for all tests."""
+        return _basis(self.patch, self.edge, Ni, 1 if self.patch.strip else Nj)
+
+    def __str__(self) -> str:
+        return f"{self.name}-{self.edge}"
+
+
+ALL = [Held(name, edge) for name, patch in SKINS.items() for edge in edges_of(patch)]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "where(which): only the held skins that `which` is true of")
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Give a test that asks for `held` every skin in every way that it can be held."""
+    if "held" in metafunc.fixturenames:
+        which = metafunc.definition.get_closest_marker("where")
+        chosen = [held for held in ALL if which is None or which.kwargs["which"](held)]
+        metafunc.parametrize("held", chosen, ids=str)
 
 
 @pytest.fixture

@@ -17,6 +17,9 @@ from kappaskin.outline import Outline
 
 _SPACING = 1.1  # of the mean distance between the highest mode's nodes
 _FEWEST = 16  # modes that a mesh is made for
+# Of the spacing, at blunt corners: hinged, curvature has no bound there; clamped, it falls to zero
+# in no distance.
+_BLUNT_HINGED, _BLUNT_CLAMPED = 1 / 256, 1 / 16
 
 # Argyris' element: on each triangle a quintic, 21 numbers: value, slopes and second derivatives at
 # the corners and the slope across at the middle of the sides. Triangles that share them join with
@@ -42,7 +45,9 @@ def plate_modes(vertices: tuple[tuple[float, float], ...], count: int, clamped: 
     """
     corners = np.array(vertices)
     size = np.sqrt(Outline(corners).area)
-    space = _Space(meshed(Outline(corners / size), _SPACING / np.sqrt(max(count, _FEWEST))))
+    spacing = _SPACING / np.sqrt(max(count, _FEWEST))
+    blunt = _BLUNT_CLAMPED if clamped else _BLUNT_HINGED
+    space = _Space(meshed(Outline(corners / size), spacing, blunt))
     modes = _lowest(*space.energies(), space.allowed(clamped), count) / 2
     coefficients = space.shapes @ modes[space.unknowns]
     points, weights = space.quadrature()

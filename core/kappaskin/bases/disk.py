@@ -51,9 +51,11 @@ class DiskBasis(ModeBasis):
 
     def _derivative(self, positions: Array, order: Order) -> Array:
         R = self.patch.a / 2
-        z = (positions[:, 0] - R + 1j * (positions[:, 1] - R)) / R
-        z = np.where(np.abs(z) <= 1 + _ROUNDING, z, np.nan)
-        return self._modes.derivative(z, order) / R ** sum(order)
+        x, y = (positions.T - R) / R
+        on = np.hypot(x, y) <= 1 + _ROUNDING
+        values = np.full((len(positions), self.size), np.nan)
+        values[on] = self._modes.derivative(x[on] + 1j * y[on], order) / R ** sum(order)
+        return values
 
     def _place(self, x: float, y: float) -> Array:
         R = self.patch.a / 2

@@ -1,4 +1,4 @@
-"""An outline to triangles: of even size, smaller towards corners that point inward."""
+"""An outline to triangles: of even size, smaller towards corners where curvature changes fast."""
 
 from dataclasses import dataclass
 
@@ -10,9 +10,10 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.outline import Outline, turn
 
-_FINEST = 1 / 16  # of the spacing, at a corner that points inward: curvature is unbounded there
-_GROWTH = 0.6  # of the spacing per distance
+_INWARD = 1 / 256  # of the spacing, at corners that point inward: curvature is unbounded there
+_GROWTH = 1.0  # of the spacing per distance
 _STRAIGHT = 1e-6  # rad: a corner that turns by less is none
+_BLUNT = np.pi / 2 - 1e-6  # rad: one that turns by less than a right angle is blunt
 _FREE = 0.6  # of the spacing: how near to the rim no point is put
 _SMOOTHINGS = 5
 _ROUNDS = 60
@@ -29,14 +30,15 @@ class Mesh:
     rim: int
 
 
-def meshed(line: Outline, spacing: float) -> Mesh:
+def meshed(line: Outline, spacing: float, blunt: float) -> Mesh:
     """Triangles with sides of about `spacing` inside an outline that touches x = 0 and y = 0.
 
-    Points along the rim and inside it are joined by Delaunay's triangulation, where edges of the
-    outline are missing from it they are halved, and the points inside are moved to the mean of
+    Towards corners wider than a right angle they are smaller, at those that point outward `blunt`
+    of it. Points along the rim and inside it are joined by Delaunay's triangulation, where edges of
+    the outline are missing from it they are halved, and the points inside are moved to the mean of
     their neighbours.
     """
-    rim = _along_rim(line, spacing)
+    rim = _along_rim(line, spacing, blunt)
     inner = _inside(line, rim, spacing)
     smoothed = 0
     for _ in range(_ROUNDS):
@@ -56,18 +58,20 @@ def meshed(line: Outline, spacing: float) -> Mesh:
     )
 
 
-def _sizes(points: Array, around: Array, sizes: Array | float, most: float) -> Array:
+def _sizes(points: Array, around: Array, sizes: Array, most: float) -> Array:
     """The spacing (P,) wanted at `points`: what it is `around` and more with the distance."""
     distance = np.linalg.norm(points[:, None] - around, axis=-1)
     return (sizes + _GROWTH * distance).min(axis=1, initial=most)
 
 
-def _along_rim(line: Outline, spacing: float) -> Array:
+def _along_rim(line: Outline, spacing: float, blunt: float) -> Array:
     """Points along the outline, its corners among them."""
-    inward = line.corners[line.turns < -_STRAIGHT]
+    turns = line.turns
+    wide = (turns < _BLUNT) & (np.abs(turns) > _STRAIGHT)
+    corners, finest = line.corners[wide], spacing * np.where(turns < 0, _INWARD, blunt)[wide]
     share, parts = np.linspace(0, 1, 257), list[Array]()
     for start, along, length in zip(line.corners, line.along, line.lengths, strict=True):
-        sizes = _sizes(start + share[:, None] * along, inward, _FINEST * spacing, spacing)
+        sizes = _sizes(start + share[:, None] * along, corners, finest, spacing)
         wanted = length / sizes
         steps = np.append(0.0, np.cumsum((wanted[1:] + wanted[:-1]) / 2)) / 256
         count = int(np.ceil(steps[-1] - 1e-9))

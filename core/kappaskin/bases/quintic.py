@@ -1,5 +1,6 @@
 """Functions that are quintic on each triangle of a mesh: their values and derivatives at points."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -104,7 +105,8 @@ class Quintics:
 
     def jet(self, x: float, y: float) -> Array:
         """All derivatives (6, N) at one point; NaN off the mesh."""
-        t, xi, depth = self._searched(x, y)
+        finite = math.isfinite(x) and math.isfinite(y)
+        t, xi, depth = self._searched(x, y) if finite else self._searched(_FAR, _FAR)
         if not depth > -_ROUNDING:
             return np.full((len(ORDERS), self.coefficients.shape[-1]), np.nan)
         return self._chained[t] @ monomials(xi) @ self.coefficients[t]

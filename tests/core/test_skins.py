@@ -1,0 +1,88 @@
+"""A touch on every skin, held in every way: from what its elements read to shape and contact."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+from kappaskin import LeastSquares, Plate, PointContact, PointLoad, SensorLayout
+
+FUNCTIONS = 8  # along each side, of the skin that is touched; 6 of the shape fitted to it
+
+
+@pytest.fixture(autouse=True)
+def few_functions(monkeypatch):
+    """Polygons with the functions a contact is usually sought with take seconds to make."""
+    monkeypatch.setattr("kappaskin.touch.point._FUNCTIONS", FUNCTIONS)
+
+
+@cache
+def plate(held):
+    """One that stretches freely: a bent sheet that does not gives too locally for 6 functions."""
+    return Plate(held.patch, axial_stiffness=0.0)
+
+
+@cache
+def touched(held):
+    """The load, the basis of the true shape, and its coefficients and readings (3, P)."""
+    patch, basis = held.patch, held.basis(FUNCTIONS, FUNCTIONS)
+    load = PointLoad(0.42 * patch.a, 0.3 * patch.b, 0.05)
+    c = plate(held).deflection([load], basis)
+    return load, basis, c, read(held, basis, c)
+
+
+@cache
+def layout(held):
+    return SensorLayout.regular(held.patch, 12, 1 if held.patch.strip else 12)
+
+
+def read(held, basis, c):
+    return (layout(held).curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+
+
+def at_rest(fit, values, positions):
+    """The values (P,) less what no reading sees of them: how the whole skin moved."""
+    if fit.basis.unseen is None:
+        return values
+    rigid = fit.basis.at(positions) @ fit.basis.unseen
+    return values - rigid @ np.linalg.lstsq(rigid, values)[0]
+
+
+def test_a_shape_of_the_basis_comes_back_to_rounding(held):
+    basis = held.basis(6, 6)
+    fit = LeastSquares(basis, layout(held))
+    c = np.random.default_rng(0).normal(size=basis.size)
+    if basis.free is not None:
+        c = basis.free @ c[: basis.free.shape[1]]
+    c = c.reshape(basis.shape)
+
+    found = fit(read(held, basis, c))
+
+    np.testing.assert_allclose(found.coefficients, c, rtol=0, atol=1e-13 * np.abs(c).max())
+    assert (
+        np.abs(found.residual[layout(held).live]).max() < 1e-9 * np.abs(read(held, basis, c)).max()
+    )
+
+
+def test_of_a_finer_shape_little_is_missed(held):
+    _, finer, c, K = touched(held)
+    fit = LeastSquares(held.basis(6, 6), layout(held))
+    points, weights = finer.quadrature()
+    truth = at_rest(fit, finer.at(points) @ c.ravel(), points)
+
+    found = at_rest(fit, fit.basis.at(points) @ fit(K).coefficients.ravel(), points)
+
+    missed = math.sqrt(weights @ (found - truth) ** 2 / (weights @ truth**2))
+    assert missed < (0.07 if held.name == "long" else 0.03)
+
+
+def test_the_contact_is_found_where_the_load_is(held):
+    load, _, _, K = touched(held)
+    fit = LeastSquares(held.basis(6, 6), layout(held))
+
+    touch = PointContact(plate(held), layout(held), held.edge)(K, fit(K))
+
+    along = slice(0, 1) if held.patch.strip else slice(0, 2)
+    np.testing.assert_allclose(touch.position[along], load.centre()[along], atol=1e-7)
+    assert touch.force == pytest.approx(load.force, rel=1e-6)
