@@ -90,6 +90,16 @@ def test_all_that_holds_the_skin_survives() -> None:
     assert same(from_json(to_json(sensor)), sensor)
 
 
+def test_every_outline_and_edge_survives(held) -> None:
+    layout = SensorLayout.regular(held.patch, 3, 1 if held.patch.strip else 3)
+    sensor = sensor_on(layout, edge=held.edge)
+
+    found = from_json(to_json(sensor))
+
+    assert same(found, sensor)
+    assert type(found.layout.patch) is type(held.patch)
+
+
 SIDES = st.floats(1e-3, 10, allow_subnormal=False)
 
 
@@ -207,6 +217,29 @@ BAD = {
     "positions ragged": (scattered([[0.05, 0.01], [0.02]]), "shape"),
     "no positions": (scattered([]), "expected positions"),
     "positions null": (scattered([[None, 0.01]]), "outside|float"),
+    "outline unknown": (
+        said(outline="star"),
+        "the outline 'disk' or a list of corners, got 'star'",
+    ),
+    "outline null": (said(outline=None), "the outline 'disk' or a list of corners, got None"),
+    "outline of 2 corners": (said(outline=[[0, 0], [1, 1]]), r"V from 3 to 256, got \(2, 2\)"),
+    "outline of texts": (said(outline=["a", "b", "c"]), r"vertices of shape \(V, 2\)"),
+    "outline huge": (said(outline=[[0, 0], [10**400, 0], [0, 1]]), r"vertices of shape \(V, 2\)"),
+    "outline of another size": (
+        said(outline=[[0, 0], [0.1, 0], [0, 0.1]]),
+        r"size \[0.1, 0.1\], got size \[0.1, 0.08\]",
+    ),
+    "disk longer than wide": (said(outline="disk"), r"size \[0.1, 0.1\], got size \[0.1, 0.08\]"),
+    "disk bent": (
+        said(outline="disk", size=[0.1, 0.1], base_curvature=5),
+        "expected a flat disk .* curvature 5",
+    ),
+    "disk with a rim that gives": (
+        said(outline="disk", size=[0.1, 0.1], edge="elastic", grid=[3, 3]),
+        "among hinged, clamped; got 'elastic'",
+    ),
+    "edge unknown": (said(edge="glued"), "among hinged, sliding, clamped, elastic; got 'glued'"),
+    "edge a number": (said(edge=1), "expected edge to be a text, got 1"),
     "dead -1": (said(dead_channels=[-1]), r"from 0 to 17, got \[-1\]"),
     "dead beyond": (said(dead_channels=[3, 18]), r"from 0 to 17, got \[18\]"),
     "dead huge": (said(dead_channels=[10**400]), "from 0 to 17"),
