@@ -66,11 +66,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Give a test that asks for `held` every skin in every way that it can be held."""
-    if "held" in metafunc.fixturenames:
+    """Give a test that asks for a `held_skin` every skin in every way that it can be held."""
+    if "held_skin" in metafunc.fixturenames:
         which = metafunc.definition.get_closest_marker("where")
         chosen = [held for held in ALL if which is None or which.kwargs["which"](held)]
-        metafunc.parametrize("held", chosen, ids=str)
+        metafunc.parametrize("held_skin", chosen, ids=str)
 
 
 @pytest.fixture

@@ -79,9 +79,9 @@ def difference(basis, points, order, axis, step=1e-5):
     return (basis.at(points + move, *order) - basis.at(points - move, *order)) / (2 * h)
 
 
-def test_derivatives_equal_central_differences(held):
-    basis, points = held.basis(), inside(held.patch)
-    for dx, dy in [*ORDERS[1:], *([] if held.whole else MIXED)]:
+def test_derivatives_equal_central_differences(held_skin):
+    basis, points = held_skin.basis(), inside(held_skin.patch)
+    for dx, dy in [*ORDERS[1:], *([] if held_skin.whole else MIXED)]:
         lower, axis = ((dx - 1, dy), 0) if dx else ((dx, dy - 1), 1)
 
         values = basis.at(points, dx, dy)
@@ -91,13 +91,13 @@ def test_derivatives_equal_central_differences(held):
         np.testing.assert_allclose(values, by_difference, rtol=0, atol=1e-7 * largest + 1e-9)
 
 
-def may_be_bent(held):
-    return not held.whole and held.edge != "elastic"
+def may_be_bent(held_skin):
+    return not held_skin.whole and held_skin.edge != "elastic"
 
 
 @pytest.mark.where(which=may_be_bent)
-def test_integrals_along_x_have_the_next_order_as_their_derivative(held):
-    basis, points = held.basis(), inside(held.patch)
+def test_integrals_along_x_have_the_next_order_as_their_derivative(held_skin):
+    basis, points = held_skin.basis(), inside(held_skin.patch)
     for dx, dy in product((-1, -2), (0, 1, 2)):
         values = basis.at(points, dx + 1, dy)
 
@@ -108,8 +108,8 @@ def test_integrals_along_x_have_the_next_order_as_their_derivative(held):
 
 
 @pytest.mark.where(which=may_be_bent)
-def test_integrals_along_x_are_zero_on_average_at_the_ends_and_between_them(held):
-    basis, patch = held.basis(), held.patch
+def test_integrals_along_x_are_zero_on_average_at_the_ends_and_between_them(held_skin):
+    basis, patch = held_skin.basis(), held_skin.patch
     t, weights = np.polynomial.legendre.leggauss(40)
     y = np.full(40, 0.4 * patch.b)
 
@@ -120,21 +120,21 @@ def test_integrals_along_x_are_zero_on_average_at_the_ends_and_between_them(held
     np.testing.assert_allclose(weights @ twice, 0, atol=1e-15 * patch.a**2)
 
 
-def test_orders_that_a_basis_does_not_have_are_refused(held):
-    points = inside(held.patch)
+def test_orders_that_a_basis_does_not_have_are_refused(held_skin):
+    points = inside(held_skin.patch)
     beyond = [(3, 0), (0, 3), (0, -1), (-3, 0)]
-    beyond += MIXED if held.whole else []
-    beyond += [] if may_be_bent(held) else [(-1, 0), (-2, 0)]
+    beyond += MIXED if held_skin.whole else []
+    beyond += [] if may_be_bent(held_skin) else [(-1, 0), (-2, 0)]
     for order, several in product(beyond, (points, points[:1])):
         with pytest.raises(Refusal, match="order"):
-            held.basis().at(several, *order)
+            held_skin.basis().at(several, *order)
 
 
 # One point, many points, a grid
 
 
-def test_all_derivatives_at_one_point_equal_those_at_many(held):
-    basis, points = held.basis(), inside(held.patch)
+def test_all_derivatives_at_one_point_equal_those_at_many(held_skin):
+    basis, points = held_skin.basis(), inside(held_skin.patch)
     expected = np.stack([basis.at(points, *order) for order in ORDERS], axis=1)
 
     found = np.stack([basis.jet(x, y) for x, y in points.tolist()])
@@ -145,17 +145,17 @@ def test_all_derivatives_at_one_point_equal_those_at_many(held):
     )
 
 
-def test_no_points_have_no_values(held):
-    assert held.basis().at(np.empty((0, 2))).shape == (0, held.basis().size)
+def test_no_points_have_no_values(held_skin):
+    assert held_skin.basis().at(np.empty((0, 2))).shape == (0, held_skin.basis().size)
 
 
-def test_a_grid_equals_evaluation_point_by_point_and_is_nan_off_the_skin(held):
-    basis, patch = held.basis(), held.patch
+def test_a_grid_equals_evaluation_point_by_point_and_is_nan_off_the_skin(held_skin):
+    basis, patch = held_skin.basis(), held_skin.patch
     x, y = patch.grid(13, 11)
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     on = patch.contains(points)
     c = np.random.default_rng(1).normal(size=basis.shape)
-    precision = 1.2e-7 if held.whole else 1e-14
+    precision = 1.2e-7 if held_skin.whole else 1e-14
     for order in ORDERS:
         values = basis.on_grid(x, y, *order)(c)
 
@@ -166,9 +166,9 @@ def test_a_grid_equals_evaluation_point_by_point_and_is_nan_off_the_skin(held):
         np.testing.assert_allclose(values.ravel()[on], F @ c.ravel(), rtol=0, atol=bound)
 
 
-def test_a_grid_takes_batches(held):
-    basis = held.basis()
-    grid = basis.on_grid(*held.patch.grid(7, 9))
+def test_a_grid_takes_batches(held_skin):
+    basis = held_skin.basis()
+    grid = basis.on_grid(*held_skin.patch.grid(7, 9))
     c = np.random.default_rng(2).normal(size=(3, 2, *basis.shape))
 
     values = grid(c)
@@ -177,8 +177,8 @@ def test_a_grid_takes_batches(held):
     np.testing.assert_allclose(values[2, 1], grid(c[2, 1]), rtol=0, atol=1e-6)
 
 
-def test_a_map_of_curvature_equals_curvature_point_by_point(held):
-    basis, patch = held.basis(), held.patch
+def test_a_map_of_curvature_equals_curvature_point_by_point(held_skin):
+    basis, patch = held_skin.basis(), held_skin.patch
     x, y = patch.grid(7, 9)
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     on = patch.contains(points)
@@ -196,25 +196,28 @@ def test_a_component_that_curvature_does_not_have_is_refused():
         CurvatureMap(SineBasis(Patch(0.1, 0.1), 2, 2), "zz", np.zeros(2), np.zeros(2))
 
 
-def test_the_rim_and_the_corners_belong_to_the_skin(held):
-    points = rim(held.patch)[0]
-    if isinstance(held.patch, Polygon):
-        points = np.vstack([points, held.patch.vertices])
+def test_the_rim_and_the_corners_belong_to_the_skin(held_skin):
+    points = rim(held_skin.patch)[0]
+    if isinstance(held_skin.patch, Polygon):
+        points = np.vstack([points, held_skin.patch.vertices])
 
-    assert held.patch.contains(points).all()
-    assert np.isfinite(held.basis().at(points)).all()
-    assert np.isfinite([held.basis().jet(x, y) for x, y in points.tolist()]).all()
+    assert held_skin.patch.contains(points).all()
+    assert np.isfinite(held_skin.basis().at(points)).all()
+    assert np.isfinite([held_skin.basis().jet(x, y) for x, y in points.tolist()]).all()
 
 
-@pytest.mark.where(which=lambda held: held.whole)
-def test_off_a_disk_or_a_polygon_there_is_nothing(held):
-    basis, (points, inward, _) = held.basis(), rim(held.patch)
-    beyond = points - 1e-4 * inward * held.patch.a
+@pytest.mark.where(which=lambda held_skin: held_skin.whole)
+def test_off_a_disk_or_a_polygon_there_is_nothing(held_skin):
+    basis, (points, inward, _) = held_skin.basis(), rim(held_skin.patch)
+    beyond = points - 1e-4 * inward * held_skin.patch.a
     off = np.vstack(
-        [beyond[~held.patch.contains(beyond)], list(product((math.nan, math.inf, 0.05), repeat=2))]
+        [
+            beyond[~held_skin.patch.contains(beyond)],
+            list(product((math.nan, math.inf, 0.05), repeat=2)),
+        ]
     )[:-1]
 
-    mixed = basis.at(np.vstack([off, inside(held.patch, 3)]))
+    mixed = basis.at(np.vstack([off, inside(held_skin.patch, 3)]))
 
     assert np.isnan(mixed[: len(off)]).all()
     assert np.isfinite(mixed[len(off) :]).all()
@@ -224,48 +227,48 @@ def test_off_a_disk_or_a_polygon_there_is_nothing(held):
 # Edges
 
 
-@pytest.mark.where(which=lambda held: held.edge != "elastic")
-def test_what_is_held_does_not_move(held):
-    values = held.basis().at(rim(held.patch)[0])
+@pytest.mark.where(which=lambda held_skin: held_skin.edge != "elastic")
+def test_what_is_held_does_not_move(held_skin):
+    values = held_skin.basis().at(rim(held_skin.patch)[0])
 
     np.testing.assert_allclose(values, 0, atol=2e-13)
 
 
-@pytest.mark.where(which=lambda held: held.edge == "clamped")
-def test_a_clamped_edge_holds_the_slope(held):
-    basis, (points, inward, _) = held.basis(), rim(held.patch)
+@pytest.mark.where(which=lambda held_skin: held_skin.edge == "clamped")
+def test_a_clamped_edge_holds_the_slope(held_skin):
+    basis, (points, inward, _) = held_skin.basis(), rim(held_skin.patch)
 
     slopes = slope_across(basis, points, inward)
 
-    largest = np.abs(basis.at(inside(held.patch), 1, 0)).max()
+    largest = np.abs(basis.at(inside(held_skin.patch), 1, 0)).max()
     np.testing.assert_allclose(slopes, 0, atol=1e-12 * largest)
 
 
-def has_no_moment(held):
+def has_no_moment(held_skin):
     """Of the others, the hexagon's and the L's curvature has no bound next to corners."""
-    return held.edge in ("hinged", "sliding") and held.name not in ("hexagon", "L")
+    return held_skin.edge in ("hinged", "sliding") and held_skin.name not in ("hexagon", "L")
 
 
 @pytest.mark.where(which=has_no_moment)
-def test_across_a_hinged_edge_there_is_no_moment(held):
-    fem = isinstance(held.patch, Polygon)  # which meets it in the limit only
-    nu, few = (0.3 if held.name == "disk" else 0.0), (4 if fem else None)
-    basis, (points, inward, _) = held.basis(8, 8), rim(held.patch)
+def test_across_a_hinged_edge_there_is_no_moment(held_skin):
+    fem = isinstance(held_skin.patch, Polygon)  # which meets it in the limit only
+    nu, few = (0.3 if held_skin.name == "disk" else 0.0), (4 if fem else None)
+    basis, (points, inward, _) = held_skin.basis(8, 8), rim(held_skin.patch)
 
     across, along = second_derivatives(basis, points, inward)
 
-    largest = np.abs(basis.at(inside(held.patch), 2, 0)).max(axis=0)
+    largest = np.abs(basis.at(inside(held_skin.patch), 2, 0)).max(axis=0)
     moment = (np.abs(across + nu * along).max(axis=0) / largest)[:few]
     assert moment.max() < (0.01 if fem else 1e-11)
 
 
-def keeps_its_length(held):
-    return held.patch.base_curvature > 0 and held.edge != "sliding"
+def keeps_its_length(held_skin):
+    return held_skin.patch.base_curvature > 0 and held_skin.edge != "sliding"
 
 
 @pytest.mark.where(which=keeps_its_length)
-def test_an_inextensible_arc_has_no_mean_and_nothing_else_is_barred(held):
-    basis, patch = held.basis(), held.patch
+def test_an_inextensible_arc_has_no_mean_and_nothing_else_is_barred(held_skin):
+    basis, patch = held_skin.basis(), held_skin.patch
     t, weights = np.polynomial.legendre.leggauss(40)
     y = 0.3 * patch.b
     means = weights @ basis.at(np.column_stack([(t + 1) / 2 * patch.a, np.full(40, y)]))
@@ -275,38 +278,42 @@ def test_an_inextensible_arc_has_no_mean_and_nothing_else_is_barred(held):
     assert np.abs(means).max() > 0.1
 
 
-@pytest.mark.where(which=lambda held: held.edge != "elastic" and not keeps_its_length(held))
-def test_elsewhere_all_functions_are_free_and_seen(held):
-    assert held.basis().free is None
-    assert held.basis().unseen is None
+@pytest.mark.where(
+    which=lambda held_skin: held_skin.edge != "elastic" and not keeps_its_length(held_skin)
+)
+def test_elsewhere_all_functions_are_free_and_seen(held_skin):
+    assert held_skin.basis().free is None
+    assert held_skin.basis().unseen is None
 
 
-@pytest.mark.where(which=lambda held: held.edge == "elastic")
-def test_what_no_reading_sees_is_how_a_rim_that_gives_moves_as_a_whole(held):
-    basis = held.basis()
-    points, _, lengths = rim(held.patch)
+@pytest.mark.where(which=lambda held_skin: held_skin.edge == "elastic")
+def test_what_no_reading_sees_is_how_a_rim_that_gives_moves_as_a_whole(held_skin):
+    basis = held_skin.basis()
+    points, _, lengths = rim(held_skin.patch)
     R = basis.at(points)
     mean = (R.T * lengths / lengths.sum()) @ R
-    rigid = np.column_stack([np.ones(20), inside(held.patch)])[:, : 2 if held.patch.strip else 3]
+    rigid = np.column_stack([np.ones(20), inside(held_skin.patch)])[
+        :, : 2 if held_skin.patch.strip else 3
+    ]
 
     unseen, free = basis.unseen, basis.free
 
-    curvature = curvature_at(basis, inside(held.patch))
+    curvature = curvature_at(basis, inside(held_skin.patch))
     np.testing.assert_allclose(curvature @ unseen, 0, atol=1e-12 * np.abs(curvature).max())
     np.testing.assert_allclose(unseen.T @ mean @ unseen, np.eye(unseen.shape[1]), atol=1e-12)
     np.testing.assert_allclose(unseen.T @ mean @ free, 0, atol=1e-12)
     assert np.linalg.matrix_rank(np.hstack([unseen, free])) == basis.size
-    spanned = np.linalg.lstsq(basis.at(inside(held.patch)) @ unseen, rigid)
+    spanned = np.linalg.lstsq(basis.at(inside(held_skin.patch)) @ unseen, rigid)
     np.testing.assert_allclose(spanned[1], 0, atol=1e-24)
 
 
 # Integrals, scale, independence
 
 
-def test_the_quadrature_is_exact_for_what_two_quintics_make(held):
+def test_the_quadrature_is_exact_for_what_two_quintics_make(held_skin):
     """Against Green's theorem: the integral of x^i y^j from one along the rim."""
-    patch = held.patch
-    points, weights = held.basis().quadrature()
+    patch = held_skin.patch
+    points, weights = held_skin.basis().quadrature()
     x, y = (points / (patch.a, patch.b)).T
     # Of a strip, with the sides that nothing holds.
     around, inward, lengths = rim(Patch(patch.a, patch.b) if patch.strip else patch)
@@ -319,21 +326,21 @@ def test_the_quadrature_is_exact_for_what_two_quintics_make(held):
         assert found == pytest.approx(outward @ lengths, rel=1e-12)
 
 
-@pytest.mark.where(which=lambda held: held.edge != "elastic")
-def test_functions_are_orthogonal_with_the_mean_square_of_sines(held):
-    basis = held.basis()
+@pytest.mark.where(which=lambda held_skin: held_skin.edge != "elastic")
+def test_functions_are_orthogonal_with_the_mean_square_of_sines(held_skin):
+    basis = held_skin.basis()
     points, weights = basis.quadrature()
     F = basis.at(points)
 
     products = (F.T * weights) @ F / weights.sum()
 
-    mean_square = 1 / 2 if held.patch.strip else 1 / 4
+    mean_square = 1 / 2 if held_skin.patch.strip else 1 / 4
     np.testing.assert_allclose(products, mean_square * np.eye(basis.size), atol=1e-13)
 
 
-@pytest.mark.where(which=lambda held: held.edge == "elastic")
-def test_functions_of_a_rim_that_gives_are_independent(held):
-    basis = held.basis()
+@pytest.mark.where(which=lambda held_skin: held_skin.edge == "elastic")
+def test_functions_of_a_rim_that_gives_are_independent(held_skin):
+    basis = held_skin.basis()
     points, weights = basis.quadrature()
     F = basis.at(points)
 
@@ -348,9 +355,9 @@ def larger(patch, factor):
     return Patch(factor * patch.a, factor * patch.b, factor * patch.radius, patch.strip)
 
 
-def test_on_a_skin_twice_as_large_the_same_functions_bend_less(held):
-    basis, points, factor = held.basis(), inside(held.patch), 2.0
-    large = basis_for(larger(held.patch, factor), held.edge, *basis.shape)
+def test_on_a_skin_twice_as_large_the_same_functions_bend_less(held_skin):
+    basis, points, factor = held_skin.basis(), inside(held_skin.patch), 2.0
+    large = basis_for(larger(held_skin.patch, factor), held_skin.edge, *basis.shape)
     for order in ORDERS:
         values = basis.at(points, *order)
 
@@ -389,11 +396,11 @@ def distances(patch, x, y):
     return d if patch.strip else d * 4 * y * (patch.b - y) / patch.b**2
 
 
-def smooth(held, points, p):
+def smooth(held_skin, points, p):
     """Values (P,) of d^p times something without symmetry; on a pinned arc without a mean."""
-    patch, (x, y) = held.patch, points.T
+    patch, (x, y) = held_skin.patch, points.T
     u, v = x / patch.a, y / patch.b
-    if not keeps_its_length(held):
+    if not keeps_its_length(held_skin):
         return distances(patch, x, y) ** p * np.exp(u + (0 if patch.strip else 0.6 * v))
     # The slope along x of (4 u (1 - u))^(p + 1) (1 + u).
     d = 4 * u * (1 - u)
@@ -402,28 +409,28 @@ def smooth(held, points, p):
 
 
 @cache
-def functions(held, N):
+def functions(held_skin, N):
     """At the points of the finest: what is free (P, F), and the last function's wave number."""
-    basis = held.basis(N, N)
-    points, weights = held.basis(sizes(held)[-1], sizes(held)[-1]).quadrature()
+    basis = held_skin.basis(N, N)
+    points, weights = held_skin.basis(sizes(held_skin)[-1], sizes(held_skin)[-1]).quadrature()
     F, bent = basis.at(points), basis.at(points, 2, 0) + basis.at(points, 0, 2)
     k4 = weights @ bent[:, -1] ** 2 / (weights @ F[:, -1] ** 2)
     parts = [part for part in (basis.free, basis.unseen) if part is not None]
     return F @ np.hstack(parts) if parts else F, float(k4) ** 0.25
 
 
-def sizes(held):
-    return (5, 8, 11) if held.whole else (8, 12, 16)
+def sizes(held_skin):
+    return (5, 8, 11) if held_skin.whole else (8, 12, 16)
 
 
-def rate(held, p):
+def rate(held_skin, p):
     """The power of the wave number with which the error of d^p's best approximation falls."""
-    N = sizes(held)[-1]
-    points, weights = held.basis(N, N).quadrature()
+    N = sizes(held_skin)[-1]
+    points, weights = held_skin.basis(N, N).quadrature()
     root = np.sqrt(weights)
-    f, errors, ks = smooth(held, points, p), [], []
-    for count in sizes(held):
-        F, k = functions(held, count)
+    f, errors, ks = smooth(held_skin, points, p), [], []
+    for count in sizes(held_skin):
+        F, k = functions(held_skin, count)
         A = root[:, None] * F
         c = np.linalg.solve(A.T @ A, A.T @ (root * f))
         errors.append(np.linalg.norm(root * (F @ c - f)))
@@ -432,10 +439,10 @@ def rate(held, p):
 
 
 @pytest.mark.parametrize("p", [0, 1, 3])
-def test_the_error_falls_at_the_rate_that_the_edge_conditions_set(held, p):
-    order = BROKEN[held.edge][p]
+def test_the_error_falls_at_the_rate_that_the_edge_conditions_set(held_skin, p):
+    order = BROKEN[held_skin.edge][p]
 
-    found = rate(held, p)
+    found = rate(held_skin, p)
 
     assert found > 0.8 * (order + 0.5)
     assert order == 4 or found < 1.25 * (order + 0.5)
@@ -501,9 +508,9 @@ def test_each_skin_names_its_edges_and_refuses_others():
 
 
 @pytest.mark.parametrize(("Ni", "Nj"), [(0, 1), (-2, -2)])
-def test_an_empty_basis_is_refused(held, Ni, Nj):
+def test_an_empty_basis_is_refused(held_skin, Ni, Nj):
     with pytest.raises(Refusal, match=f"expected .* got {Ni} x {Nj}"):
-        basis_for(held.patch, held.edge, Ni, Nj)
+        basis_for(held_skin.patch, held_skin.edge, Ni, Nj)
 
 
 def test_more_modes_than_can_be_made_in_a_minute_are_refused():
@@ -518,10 +525,10 @@ def test_a_basis_for_another_outline_is_refused():
         PolygonBasis(Disk(0.05), 4, 4)
 
 
-@pytest.mark.where(which=lambda held: held.patch.strip)
-def test_a_strip_has_one_function_across(held):
+@pytest.mark.where(which=lambda held_skin: held_skin.patch.strip)
+def test_a_strip_has_one_function_across(held_skin):
     with pytest.raises(Refusal, match="alike along y: expected 4 x 1 functions, got 4 x 4"):
-        basis_for(held.patch, held.edge, 4, 4)
+        basis_for(held_skin.patch, held_skin.edge, 4, 4)
 
 
 @pytest.mark.parametrize("edge", ["hinged", "clamped"])

@@ -90,14 +90,14 @@ def test_all_that_holds_the_skin_survives() -> None:
     assert same(from_json(to_json(sensor)), sensor)
 
 
-def test_every_outline_and_edge_survives(held) -> None:
-    layout = SensorLayout.regular(held.patch, 3, 1 if held.patch.strip else 3)
-    sensor = sensor_on(layout, edge=held.edge)
+def test_every_outline_and_edge_survives(held_skin) -> None:
+    layout = SensorLayout.regular(held_skin.patch, 3, 1 if held_skin.patch.strip else 3)
+    sensor = sensor_on(layout, edge=held_skin.edge)
 
     found = from_json(to_json(sensor))
 
     assert same(found, sensor)
-    assert type(found.layout.patch) is type(held.patch)
+    assert type(found.layout.patch) is type(held_skin.patch)
 
 
 SIDES = st.floats(1e-3, 10, allow_subnormal=False)

@@ -18,27 +18,27 @@ def few_functions(monkeypatch):
 
 
 @cache
-def plate(held):
+def plate(held_skin):
     """One that stretches freely: a bent sheet that does not gives too locally for 6 functions."""
-    return Plate(held.patch, axial_stiffness=0.0)
+    return Plate(held_skin.patch, axial_stiffness=0.0)
 
 
 @cache
-def touched(held):
+def touched(held_skin):
     """The load, the basis of the true shape, and its coefficients and readings (3, P)."""
-    patch, basis = held.patch, held.basis(FUNCTIONS, FUNCTIONS)
+    patch, basis = held_skin.patch, held_skin.basis(FUNCTIONS, FUNCTIONS)
     load = PointLoad(0.42 * patch.a, 0.3 * patch.b, 0.05)
-    c = plate(held).deflection([load], basis)
-    return load, basis, c, read(held, basis, c)
+    c = plate(held_skin).deflection([load], basis)
+    return load, basis, c, read(held_skin, basis, c)
 
 
 @cache
-def layout(held):
-    return SensorLayout.regular(held.patch, 12, 1 if held.patch.strip else 12)
+def layout(held_skin):
+    return SensorLayout.regular(held_skin.patch, 12, 1 if held_skin.patch.strip else 12)
 
 
-def read(held, basis, c):
-    return (layout(held).curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+def read(held_skin, basis, c):
+    return (layout(held_skin).curvature_operator(basis) @ c.ravel()).reshape(3, -1)
 
 
 def at_rest(fit, values, positions):
@@ -49,40 +49,41 @@ def at_rest(fit, values, positions):
     return values - rigid @ np.linalg.lstsq(rigid, values)[0]
 
 
-def test_a_shape_of_the_basis_comes_back_to_rounding(held):
-    basis = held.basis(6, 6)
-    fit = LeastSquares(basis, layout(held))
+def test_a_shape_of_the_basis_comes_back_to_rounding(held_skin):
+    basis = held_skin.basis(6, 6)
+    fit = LeastSquares(basis, layout(held_skin))
     c = np.random.default_rng(0).normal(size=basis.size)
     if basis.free is not None:
         c = basis.free @ c[: basis.free.shape[1]]
     c = c.reshape(basis.shape)
 
-    found = fit(read(held, basis, c))
+    found = fit(read(held_skin, basis, c))
 
     np.testing.assert_allclose(found.coefficients, c, rtol=0, atol=1e-13 * np.abs(c).max())
     assert (
-        np.abs(found.residual[layout(held).live]).max() < 1e-9 * np.abs(read(held, basis, c)).max()
+        np.abs(found.residual[layout(held_skin).live]).max()
+        < 1e-9 * np.abs(read(held_skin, basis, c)).max()
     )
 
 
-def test_of_a_finer_shape_little_is_missed(held):
-    _, finer, c, K = touched(held)
-    fit = LeastSquares(held.basis(6, 6), layout(held))
+def test_of_a_finer_shape_little_is_missed(held_skin):
+    _, finer, c, K = touched(held_skin)
+    fit = LeastSquares(held_skin.basis(6, 6), layout(held_skin))
     points, weights = finer.quadrature()
     truth = at_rest(fit, finer.at(points) @ c.ravel(), points)
 
     found = at_rest(fit, fit.basis.at(points) @ fit(K).coefficients.ravel(), points)
 
     missed = math.sqrt(weights @ (found - truth) ** 2 / (weights @ truth**2))
-    assert missed < (0.07 if held.name == "long" else 0.03)
+    assert missed < (0.07 if held_skin.name == "long" else 0.03)
 
 
-def test_the_contact_is_found_where_the_load_is(held):
-    load, _, _, K = touched(held)
-    fit = LeastSquares(held.basis(6, 6), layout(held))
+def test_the_contact_is_found_where_the_load_is(held_skin):
+    load, _, _, K = touched(held_skin)
+    fit = LeastSquares(held_skin.basis(6, 6), layout(held_skin))
 
-    touch = PointContact(plate(held), layout(held), held.edge)(K, fit(K))
+    touch = PointContact(plate(held_skin), layout(held_skin), held_skin.edge)(K, fit(K))
 
-    along = slice(0, 1) if held.patch.strip else slice(0, 2)
+    along = slice(0, 1) if held_skin.patch.strip else slice(0, 2)
     np.testing.assert_allclose(touch.position[along], load.centre()[along], atol=1e-7)
     assert touch.force == pytest.approx(load.force, rel=1e-6)
