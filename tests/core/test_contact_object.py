@@ -12,7 +12,6 @@ from scipy import linalg, optimize
 from kappaskin import (
     Disk,
     LeastSquares,
-    LineLoad,
     ObjectFinder,
     Patch,
     Plate,
@@ -367,11 +366,12 @@ def test_over_foam_too_the_radius_is_found(rigid):
 class Finger:
     """A bent skin, pressed through its own compliance: the contact alone is independent."""
 
-    def __init__(self):
+    def __init__(self, axial_stiffness=None):
         self.R, self.patch = 0.03, Patch(0.04, 0.04, 0.03)
-        self.skin = Skin(self.patch)
+        plate = Plate(self.patch, axial_stiffness=axial_stiffness)
+        self.skin = Skin(self.patch, plate)
         self.basis = basis_for(self.patch, "hinged", 24, 24)
-        self.compliance = Plate(self.patch).compliance(self.basis)
+        self.compliance = plate.compliance(self.basis)
         self.M = self.skin.layout.curvature_operator(self.basis)
 
     def curvature(self, rigid):
@@ -387,6 +387,12 @@ class Finger:
 
 @pytest.fixture(scope="module")
 def finger():
+    return Finger(axial_stiffness=0.0)
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    """The same, but it cannot stretch along its axis without cost: a dent is narrower."""
     return Finger()
 
 
@@ -413,6 +419,21 @@ def test_a_rod_and_a_ball_dent_a_fingertip_further(finger, kind):
         assert one.kind == kind
         assert one.radius == pytest.approx(0.06, rel=0.15)
         assert one.radius_95[0] < 0.06 < one.radius_95[1]
+
+
+@pytest.mark.parametrize("force", [4.0, 12.0])
+@pytest.mark.parametrize("kind", ["plane", "cylinder", "sphere"])
+def test_on_a_bent_sheet_too_objects_are_told_apart(sheet, kind, force):
+    shape = {} if kind == "sphere" else ALONG
+    radius = 0.0 if kind == "plane" else 0.06
+    shape_of = "cylinder" if kind == "plane" else kind
+    rigid = Rigid(shape_of, force, 0.021, 0.019, radius, **shape)
+
+    for one in sheet.skin.finds(sheet.curvature(rigid), 5):
+        assert one.kind == kind
+        if radius:
+            assert one.radius == pytest.approx(radius, rel=0.3)
+            assert one.radius_95[0] < radius < one.radius_95[1]
 
 
 def test_a_touch_that_flattens_nothing_is_not_called_a_plane(finger):
@@ -447,16 +468,18 @@ def test_objects_on_other_outlines_are_told_apart(patch):
     skin, truth = Skin(patch), basis_for(patch, "hinged", 20, 20)
     bent = skin.layout.curvature_operator(truth)
 
-    def found(load):
-        modal = Plate(patch).compliance(truth)(load.modal(truth))
+    def found(*loads):
+        modal = Plate(patch).deflection(loads, truth)
         return skin.finds((bent @ modal.ravel()).reshape(3, -1), 3)
 
     for tip in found(PointLoad(0.04, 0.045, 0.15)):
         assert tip.kind == "sphere"
         np.testing.assert_allclose(tip.position, [0.04, 0.045], atol=1e-3)
-    for edge in found(LineLoad(0.03, 0.03, 0.05, 0.045, 0.15)):
+    ends = PointLoad(0.03, 0.03, 0.08), PointLoad(0.05, 0.045, 0.08)  # of a rigid blade
+    for edge in found(*ends):
         assert edge.probability["edge"] + edge.probability["cylinder"] > 0.9
-        assert abs(math.remainder(edge.axis - math.atan2(0.015, 0.02), math.pi)) < 0.2
+        assert abs(math.remainder(edge.axis - math.atan2(0.015, 0.02), math.pi)) < 0.1
+        assert edge.length == pytest.approx(0.025, abs=2e-3)
     for rim in found(PointLoad(0.0485, 0.002, 0.3)):  # forces beside it would lie off the skin
         assert math.hypot(*(rim.position - [0.0485, 0.002])) < 3e-3
 

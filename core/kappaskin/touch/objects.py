@@ -23,8 +23,8 @@ KINDS = ("plane", "cylinder", "sphere", "edge")
 # alike; a length of up to one side, every length alike; any angle; and `SHARE`.
 _RADII = (0.02, 5.0)
 
-_COARSE = 15  # functions along each side, at first
-_FINE, _FINE_MIXED = 40, 20  # and then: of waves that do not mix, and of any others
+_COARSE = 15  # functions along each side, at first; of a disk or a polygon to the end
+_FINE, _FINE_MIXED = 40, 30  # and then: of waves that do not mix, and of those that do
 _WELL = 1.2  # times the residual of the fitted shape that an object may leave
 _ENOUGH = 20  # readings at least
 _INEXACT = 0.02  # of a curvature: what a ring or arcs leave out of a real contact
@@ -113,9 +113,12 @@ class ObjectFinder:
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
         patch = plate.patch
-        waves = type(patch) is Patch and edge == "hinged" and not patch.base_curvature
+        if type(patch) is not Patch:
+            fine = _COARSE
+        else:
+            fine = _FINE if edge == "hinged" and not patch.base_curvature else _FINE_MIXED
         self._coarse = ElasticSkin(plate, layout, edge, _COARSE)
-        self._skin = ElasticSkin(plate, layout, edge, _FINE if waves else _FINE_MIXED)
+        self._skin = ElasticSkin(plate, layout, edge, fine)
         self._live = layout.live.ravel()
 
     def __call__(self, curvature: Array, noise: float, touch: Touch) -> ContactObject:
@@ -237,7 +240,8 @@ def _beyond_bound(best: Optimum, width: Width) -> float:
 def _unexplained(all_of: Hypotheses, width: Width) -> float:
     """What the likelihood of a cylinder gains over an edge's beyond what its width accounts for."""
     gain = all_of.edge.best.cost - all_of.cylinder.best.cost
-    return max(gain - max(width.q / width.sd, 0.0) ** 2, 0.0) / 2
+    sd = math.sqrt(all_of.cylinder.best.covariance[-1, -1])  # of the readings alone
+    return max(gain - max(width.q / sd, 0.0) ** 2, 0.0) / 2
 
 
 def _of_radius(skin: ElasticSkin, width: Width) -> float:
