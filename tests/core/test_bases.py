@@ -557,7 +557,7 @@ def test_blunt_corners_are_refused_where_they_would_clamp_a_hinged_edge():
         PolygonBasis(regular(20), 4, 4)
 
     PolygonBasis(regular(20), 4, 4, clamped=True)
-    PolygonBasis(regular(17), 4, 4)
+    PolygonBasis(regular(10), 4, 4)
 
 
 def test_a_vertex_along_a_straight_edge_is_no_corner():

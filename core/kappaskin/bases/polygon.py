@@ -13,7 +13,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.patch import Polygon
 
-_STRAIGHT, _BLUNT = 1e-6, math.radians(20)  # turns at a corner: none, and too little to be one
+_STRAIGHT, _BLUNT = 1e-6, math.radians(35)  # turns at a corner: none, and too little to be one
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ SKIN = Patch(math.pi * R0, 30e-3, R0)
 COLUMNS, ROWS = 10, 8
 ELEMENT = (6, 3)
 """Column and row of the element that is enlarged, counted from 0."""
-_LOAD, _PRESSED = (22e-3, 18e-3), 2.5e-3
+_LOAD, _PRESSED = (22e-3, 18e-3), 1.0e-3
 _NOISE = 1.0
 _SEED = 3
 _RAISED = 4  # how much higher than true the enlarged element is drawn
