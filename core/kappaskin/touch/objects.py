@@ -108,7 +108,9 @@ class ObjectFinder:
     To each kind belongs a small family of forces on the skin (`kappaskin.touch.contacts`), fitted
     to the readings by maximum likelihood. The kinds are weighed by Laplace's approximation of
     their marginal likelihoods, the noise's size unknown. The object's curvature is that of the
-    skin between the forces. A few tens of milliseconds: for display, not for every frame.
+    skin between the forces. A few tens of milliseconds: for display, not for every frame. On a
+    skin bent to a radius of a few elements its probabilities promise too much: a dent there is
+    not much wider than what the functions resolve.
     """
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
