@@ -5,34 +5,48 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kappaskin import (
     Basis,
     Compliance,
+    DiscLoad,
+    GaussianLoad,
     LineLoad,
     Load,
     Orbit,
     Patch,
     Plate,
     PointLoad,
+    RectangleLoad,
     Refusal,
     Scene,
     SensorLayout,
     basis_for,
     load_scene,
 )
-from kappaskin_app.settings import FREE_CASES, LOAD_CASES, Settings
+from kappaskin_app.settings import FREE_CASES, LOAD_CASES, SPREAD_CASES, TWO_ENDED, Settings
+
+Array = NDArray[np.float64]
 
 REFERENCE = (15, 15)
 """Functions of the true shape, by which Table 1 defines its truth."""
 _MARGIN = 0.03  # share of the patch along each edge that a dragged load keeps out of
 _MOST_BENT = 27.0  # 1/m, under the load: a moving one bends more in places, and 38 is a rail
 _LEAST = 1e-12  # m/N that a skin gives where it is free to move
+_TAIL = 4.0  # standard deviations of a Gaussian that the skin is to hold
+_HALVINGS = 16
 _REMEMBERED = 8  # skins whose compliance need not be computed again
 
 
-def free_loads(settings: Settings) -> tuple[PointLoad | LineLoad, ...]:
+def free_loads(settings: Settings) -> tuple[Load, ...]:
     s = settings
+    if s.load_case == "disc":
+        return (DiscLoad(s.x, s.y, s.size, s.force),)
+    if s.load_case == "rectangle":
+        return (RectangleLoad(s.x, s.y, s.size, s.size_y, s.force),)
+    if s.load_case == "gaussian":
+        return (GaussianLoad(s.x, s.y, s.size, s.force),)
     if s.load_case == "free-line":
         return (LineLoad(s.x, s.y, s.x_end, s.y_end, s.force),)
     if s.load_case == "two-points":
@@ -107,8 +121,8 @@ def dragged(
 ) -> dict[str, Any]:
     """The settings that change when a load of `scene` is dragged to (x, y) in m.
 
-    It becomes a free one of the same force. A line moves as a whole, of two points the one that
-    was grabbed.
+    It becomes a free one of the same force. A line moves as a whole, a spread load as far as all of
+    it stays on the skin, of two points the one that was grabbed.
     """
     if not scene.loads:
         return {}  # it lies on a cylinder
@@ -117,6 +131,8 @@ def dragged(
     if settings.load_case == "two-points":
         return {"x_end": x, "y_end": y} if grabbed_end else {"x": x, "y": y}
     kept = {} if settings.load_case in FREE_CASES else {"force": load.force}
+    if settings.load_case in SPREAD_CASES:
+        return {"x": x, "y": y} | whole_on(replace(settings, x=x, y=y), patch)
     if not isinstance(load, LineLoad):
         return {"load_case": "point", "x": x, "y": y, **kept}
     half_x, half_y = (load.x1 - load.x0) / 2, (load.y1 - load.y0) / 2
@@ -126,6 +142,57 @@ def dragged(
     if not patch.contains(np.reshape(list(ends.values()), (2, 2))).all():
         return {}
     return {"load_case": "free-line", **ends, **kept}
+
+
+def whole_on(settings: Settings, patch: Patch) -> dict[str, float]:
+    """Where a free load is to be so that all of it is on `patch`; nothing where it is already.
+
+    As near as can be to where it is asked for, and in the middle where even there it is too large.
+    """
+    s = settings
+    if s.load_case in TWO_ENDED:
+        end = whole_on(replace(s, load_case="point", x=s.x_end, y=s.y_end), patch)
+        moved = {f"{name}_end": value for name, value in end.items()}
+        return whole_on(replace(s, load_case="point"), patch) | moved
+    place, middle = np.array([s.x, s.y]), np.array([patch.a, patch.b]) / 2
+    if _lies_on(s, patch, place):
+        return {}
+    farthest = np.maximum(middle - _reach(s), 0.0)
+    away = np.clip(place - middle, -farthest, farthest)
+    if not _lies_on(s, patch, middle + away):
+        away *= _share_on(s, patch, middle, away)
+    x, y = (middle + away).tolist()
+    return {"x": x, "y": y}
+
+
+def _reach(settings: Settings) -> tuple[float, float]:
+    """How far a free load of one place presses from it along x and y, in m."""
+    s = settings
+    if s.load_case == "rectangle":
+        return s.size / 2, s.size_y / 2
+    times = {"disc": 1.0, "gaussian": _TAIL}.get(s.load_case, 0.0)
+    return times * s.size, times * s.size
+
+
+def _share_on(settings: Settings, patch: Patch, middle: Array, away: Array) -> float:
+    """The share of the way from the middle that still has all of the load on `patch`."""
+    least, most = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        share = (least + most) / 2
+        there = _lies_on(settings, patch, middle + share * away)
+        least, most = (share, most) if there else (least, share)
+    return least
+
+
+def _lies_on(settings: Settings, patch: Patch, place: Array) -> bool:
+    """Whether all of the free load is on `patch` when it is at `place` (2,) in m."""
+    x, y = place.tolist()
+    try:
+        for load in free_loads(replace(settings, x=x, y=y)):
+            load.check(patch)
+    except Refusal:
+        return False
+    return True
 
 
 def _inside(patch: Patch, x: float, y: float) -> tuple[float, float]:

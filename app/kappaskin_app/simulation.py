@@ -1,6 +1,7 @@
 """What a person chose, as a scene to simulate."""
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from kappaskin import (
     Hysteresis,
     Patch,
     Plate,
+    Refusal,
     Region,
     Scene,
     SensorLayout,
@@ -21,10 +23,12 @@ from kappaskin import (
     Transduction,
     UniformNoise,
 )
-from kappaskin_app.pressing import REFERENCE, compliance_of, free_loads, ready
+from kappaskin_app.pressing import REFERENCE, compliance_of, free_loads, ready, whole_on
 from kappaskin_app.settings import FREE_CASES, LOAD_CASES, Settings
 from kappaskin_app.skins import SHAPES
 
+_PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")
+"""What, when it changes, may leave a free load over the rim."""
 _TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid")
 
 
@@ -123,8 +127,9 @@ def settings_for(source: str) -> Settings:
 def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -> dict[str, Any]:
     """The settings that change when a person changes `name` while `scene` is played.
 
-    A shape brings its usual size, force and height. Where the skin gets longer, loads move to keep
-    their share of it. A free load presses as the one did that it follows.
+    A shape brings its usual size, force and height. Where the skin gets longer, loads move and grow
+    to keep their share of it. A free load presses as the one did that it follows, and
+    moves until all of it is on the skin.
     """
     changed: dict[str, Any] = {name: value}
     if name == "shape":
@@ -137,11 +142,15 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
         changed |= {"bits": converter.bits, "conversion_time": converter.conversion_time}
     if name in ("elements_x", "elements_y"):
         changed["region_elements"] = ()  # they were chosen among others
-    for side, places in (("side_x", ("x", "x_end")), ("side_y", ("y", "y_end"))):
+    for side, places in (("side_x", ("x", "x_end", "size")), ("side_y", ("y", "y_end", "size_y"))):
         if side in changed:
             longer = changed[side] / getattr(settings, side)
             changed |= {place: getattr(settings, place) * longer for place in places}
     freed = value in FREE_CASES and settings.load_case not in FREE_CASES
     if name == "load_case" and freed and scene.loads:
         changed["force"] = scene.loads[0].force
+    after = replace(settings, **changed)
+    if after.load_case in FREE_CASES and name in _PLACING:
+        with suppress(Refusal):  # no such skin: the scene says so
+            changed |= whole_on(after, patch_of(after))
     return changed

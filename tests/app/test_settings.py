@@ -1,7 +1,7 @@
 from dataclasses import fields, replace
 
 import pytest
-from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox
+from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLabel
 
 from kappaskin import EDGES, Status
 from kappaskin_app.panels.panels import Panels
@@ -89,6 +89,29 @@ def test_a_ready_case_asks_for_no_place(panels: Panels) -> None:
     assert load.form.isRowVisible(load.editor("y_end"))
 
 
+@pytest.mark.parametrize(
+    ("case", "rows", "called"),
+    [
+        ("disc", ["size"], "Radius"),
+        ("rectangle", ["size", "size_y"], "Width along x"),
+        ("gaussian", ["size"], "Std. deviation"),
+        ("point", [], ""),
+    ],
+)
+def test_a_spread_load_asks_for_its_size_by_its_name(
+    panels: Panels, case: str, rows: list[str], called: str
+) -> None:
+    load = panels.load
+    load.show_settings(Settings(load_case=case))
+    shown = [name for name in ("size", "size_y") if load.form.isRowVisible(load.editor(name))]
+    assert shown == rows
+    label = load.form.labelForField(load.editor("size"))
+    assert isinstance(label, QLabel)
+    assert not called or label.text() == called
+    assert load.editor("size").text().endswith(" mm")
+    assert not load.form.isRowVisible(load.editor("x_end"))
+
+
 def test_only_a_bent_skin_asks_for_a_radius_and_says_how_far_it_opens(panels: Panels) -> None:
     shape = panels.shape
     panels.show_settings(Settings())
@@ -116,7 +139,7 @@ def test_cases_are_called_table_1s_where_they_are(panels: Panels) -> None:
         return [box.itemText(index) for index in range(box.count())]
 
     panels.show_settings(Settings(elements_x=7))
-    assert [text.endswith("(Table 1)") for text in words()] == [False, *[True] * 3, *[False] * 3]
+    assert [text.endswith("(Table 1)") for text in words()] == [False, *[True] * 3, *[False] * 6]
     for changed in ({"side_x": 0.09}, {"edge": "sliding"}, {"fluid": True}):
         panels.show_settings(replace(Settings(), **changed))
         assert not any("Table 1" in text for text in words())

@@ -5,9 +5,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import EDGES, LineLoad, Plate, PointLoad, Refusal, Simulator, load_scene
+from kappaskin import (
+    EDGES,
+    DiscLoad,
+    GaussianLoad,
+    LineLoad,
+    Plate,
+    PointLoad,
+    RectangleLoad,
+    Refusal,
+    Simulator,
+    load_scene,
+)
 from kappaskin_app.pressing import dragged
-from kappaskin_app.settings import LOAD_CASES, Settings
+from kappaskin_app.settings import LOAD_CASES, SPREAD_CASES, Settings
 from kappaskin_app.simulation import is_table_1, plate_of, scene_of, with_consequences
 from kappaskin_app.skins import SHAPES
 
@@ -36,6 +47,9 @@ def test_free_cases_press_where_they_are_told() -> None:
     assert loads["point"] == (PointLoad(0.02, 0.03, 0.2),)
     assert loads["two-points"] == (PointLoad(0.02, 0.03, 0.1), PointLoad(0.08, 0.07, 0.1))
     assert loads["free-line"] == (LineLoad(0.02, 0.03, 0.08, 0.07, 0.2),)
+    assert loads["disc"] == (DiscLoad(0.02, 0.03, 0.005, 0.2),)
+    assert loads["gaussian"] == (GaussianLoad(0.02, 0.03, 0.005, 0.2),)
+    assert loads["rectangle"] == (RectangleLoad(0.02, 0.03, 0.005, 0.02, 0.2),)
 
 
 def test_no_noise_means_no_effect() -> None:
@@ -158,7 +172,8 @@ def test_choosing_a_shape_brings_its_size_and_choosing_the_first_again_all_of_it
 def test_loads_keep_their_share_of_a_skin_that_grows() -> None:
     settings = Settings(x=0.02, x_end=0.08, y=0.03)
     changed = with_consequences(settings, load_scene(), "side_x", 0.2)
-    assert changed == {"side_x": 0.2, "x": pytest.approx(0.04), "x_end": pytest.approx(0.16)}
+    places = {"x": pytest.approx(0.04), "x_end": pytest.approx(0.16), "size": pytest.approx(0.01)}
+    assert changed == {"side_x": 0.2, **places}
     alone = with_consequences(settings, load_scene(), "theme", "light")
     assert alone == {"theme": "light"}
 
@@ -181,10 +196,10 @@ def test_a_free_load_presses_every_shape_so_that_it_shows() -> None:
 
 
 @given(
-    st.sampled_from(CASES),
+    st.sampled_from([case for case in CASES if case not in SPREAD_CASES]),
     st.sampled_from(list(SHAPES)),
     st.tuples(*[st.floats(-1, 1)] * 2),
-    st.tuples(*[st.floats(0.012, 0.028)] * 4),
+    st.tuples(*[st.floats(0.016, 0.028)] * 4),
     st.booleans(),
 )
 def test_a_dragged_load_stays_on_the_skin(
@@ -215,6 +230,69 @@ def test_a_dragged_line_keeps_its_length() -> None:
     ends = np.array([load.x1 - load.x0, load.y1 - load.y0])
     old = was.loads[0]
     np.testing.assert_allclose(ends, [old.x1 - old.x0, old.y1 - old.y0])
+
+
+@pytest.mark.parametrize("case", SPREAD_CASES)
+@given(
+    st.sampled_from(list(SHAPES)),
+    st.tuples(*[st.floats(-0.1, 0.2)] * 2),
+    st.sampled_from([0.001, 0.004, 0.009]),
+)
+def test_a_spread_load_dragged_anywhere_stays_whole_on_the_skin_and_as_large_as_it_was(
+    case: str, shape: str, to: tuple[float, float], size: float
+) -> None:
+    settings = on(shape, load_case=case)
+    size *= settings.side_y / 0.1
+    settings = replace(settings, size=size, size_y=3 * size)
+    scene = scene_of(settings)
+    changed = dragged(settings, scene, *to, False)
+    (load,) = scene_of(replace(settings, **changed)).loads
+    load.check(scene.plate.patch)
+    assert changed.keys() == {"x", "y"}
+
+
+@pytest.mark.parametrize("case", SPREAD_CASES)
+def test_a_spread_load_is_where_it_was_dragged_to_inside_and_at_the_rim_outside(case: str) -> None:
+    settings = Settings(load_case=case)
+    was = scene_of(settings)
+    assert dragged(settings, was, 0.031, 0.062, False) == pytest.approx({"x": 0.031, "y": 0.062})
+    aside = dragged(settings, was, -1.0, 0.062, False)
+    half = {"disc": 0.005, "rectangle": 0.003, "gaussian": 0.02}[case]  # or the margin of a drag
+    assert aside == pytest.approx({"x": half, "y": 0.062})
+
+
+def test_a_load_that_grows_over_the_rim_moves_inwards() -> None:
+    settings = Settings(load_case="point", x=0.01, y=0.05)
+    changed = with_consequences(settings, scene_of(settings), "load_case", "gaussian")
+    assert (changed["x"], changed["y"]) == pytest.approx((0.02, 0.05))
+    settings = replace(settings, **changed)
+    wider = with_consequences(settings, scene_of(settings), "size", 0.01)
+    assert (wider["x"], wider["y"]) == pytest.approx((0.04, 0.05))
+    with pytest.raises(Refusal, match="expected a load on the patch"):
+        scene_of(replace(settings, size=0.02))
+
+
+@pytest.mark.parametrize("case", ["point", "two-points", "free-line", *SPREAD_CASES])
+def test_a_free_load_in_a_corner_stays_on_a_skin_that_has_none(case: str) -> None:
+    settings = Settings(load_case=case, x=0.004, y=0.004, x_end=0.099, y_end=0.001, size=0.001)
+    for shape in ("disk", "hexagon", "cylinder"):
+        changed = with_consequences(settings, load_scene(), "shape", shape)
+        scene = scene_of(replace(settings, **changed))
+        for load in scene.loads:
+            load.check(scene.plate.patch)
+
+
+def test_a_small_spread_load_presses_as_a_point_does() -> None:
+    settings = Settings(load_case="point", x=0.03, y=0.06)
+    point = scene_of(settings)
+    c = point.plate.deflection(point.loads, point.basis)
+    for case in SPREAD_CASES:
+        spread = scene_of(replace(settings, load_case=case, size=5e-4, size_y=5e-4))
+        d = spread.plate.deflection(spread.loads, spread.basis)
+        np.testing.assert_allclose(d, c, atol=2e-3 * np.abs(c).max())
+        wide = scene_of(replace(settings, load_case=case))
+        d = wide.plate.deflection(wide.loads, wide.basis)
+        assert np.abs(d - c).max() > 2e-3 * np.abs(c).max()
 
 
 def test_every_edge_can_be_simulated_on_the_first_skin() -> None:

@@ -1,10 +1,18 @@
 """What presses on the simulated skin, and what noise its readings have."""
 
-from PySide6.QtWidgets import QComboBox, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
 from kappaskin import Status
 from kappaskin_app.panels.form import Form
-from kappaskin_app.settings import FREE_CASES, LOAD_CASES, TABLE_1_CASES, TWO_ENDED, Settings
+from kappaskin_app.settings import (
+    FREE_CASES,
+    LOAD_CASES,
+    SIZES,
+    SPREAD_CASES,
+    TABLE_1_CASES,
+    TWO_ENDED,
+    Settings,
+)
 from kappaskin_app.simulation import is_table_1
 
 _REAL = "Only for the simulation inside the app (Ctrl+M)."
@@ -27,21 +35,30 @@ class SimulationForm(Form):
 
 
 class LoadPanel(SimulationForm):
-    """Asks for the load case; a free one has its place and its force."""
+    """Asks for the load case; a free one has its place and its force, a spread one its size."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        names = ("load_case", "force", "x", "y", "x_end", "y_end")
+        names = ("load_case", "force", "x", "y", "x_end", "y_end", "size", "size_y")
         super().__init__("Load", names, parent)
 
     def show_settings(self, settings: Settings) -> None:
         for name, side in (("x", settings.side_x), ("y", settings.side_y)):
             self.show_limit(name, side)
             self.show_limit(f"{name}_end", side)
+        self.show_limit("size", settings.side_x)
+        self.show_limit("size_y", settings.side_y)
         self._show_cases(is_table_1(settings))
         super().show_settings(settings)
-        free, two = settings.load_case in FREE_CASES, settings.load_case in TWO_ENDED
-        rows = {"load_case"} | ({"force", "x", "y"} if free else set())
-        self.show_rows(rows | ({"x_end", "y_end"} if two else set()))
+        self._show_rows_of(settings.load_case)
+
+    def _show_rows_of(self, case: str) -> None:
+        rows = {"load_case"} | ({"force", "x", "y"} if case in FREE_CASES else set())
+        rows |= {"x_end", "y_end"} if case in TWO_ENDED else set()
+        rows |= {"size"} if case in SPREAD_CASES else set()
+        self.show_rows(rows | ({"size_y"} if case == "rectangle" else set()))
+        label = self.form.labelForField(self.editor("size"))
+        if isinstance(label, QLabel) and case in SIZES:
+            label.setText(SIZES[case])
 
     def _show_cases(self, table_1: bool) -> None:
         """Call the cases Table 1's where they are."""

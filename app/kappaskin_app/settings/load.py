@@ -14,13 +14,23 @@ LOAD_CASES = (
     ("point", "Point, free"),
     ("two-points", "Two points, free"),
     ("free-line", "Line, free"),
+    ("disc", "Disc, free"),
+    ("rectangle", "Rectangle, free"),
+    ("gaussian", "Gaussian, free"),
 )
-FREE_CASES = ("point", "two-points", "free-line")
 TWO_ENDED = ("two-points", "free-line")
+SPREAD_CASES = ("disc", "rectangle", "gaussian")
+FREE_CASES = ("point", *TWO_ENDED, *SPREAD_CASES)
+SIZES = {"disc": "Radius", "rectangle": "Width along x", "gaussian": "Std. deviation"}
+"""What the size of a spread load is called."""
 
 
 def _position(default: float, label: str, tip: str) -> Any:
     return asked(default, Range(label, tip, 0.0, 1.0, 0.001, *MILLIMETRES, decimals=1))
+
+
+def _size(default: float, label: str, tip: str) -> Any:
+    return asked(default, Range(label, tip, 0.0005, 1.0, 0.0005, *MILLIMETRES, decimals=1))
 
 
 @dataclass(frozen=True)
@@ -50,10 +60,18 @@ class Load:
             3,
         ),
     )
-    x: float = _position(0.05, "x", "Where the load presses, or the line begins.")
-    y: float = _position(0.05, "y", "Where the load presses, or the line begins.")
+    x: float = _position(0.05, "x", "Where the middle of the load presses, or the line begins.")
+    y: float = _position(0.05, "y", "Where the middle of the load presses, or the line begins.")
     x_end: float = _position(0.075, "x, second", "The second point, or the end of the line.")
     y_end: float = _position(0.075, "y, second", "The second point, or the end of the line.")
+    size: float = _size(
+        0.005,
+        "Size",
+        "How far the load is spread: a disc's radius, a rectangle's width along x, or the standard "
+        "deviation of a Gaussian, which needs the skin four times as far on every side. A load "
+        "that would reach over the rim moves inwards.",
+    )
+    size_y: float = _size(0.02, "Width along y", "A rectangle's width along y.")
 
 
 @dataclass(frozen=True)

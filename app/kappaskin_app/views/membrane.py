@@ -13,11 +13,12 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
-from kappaskin import Estimate, LineLoad, Load, Sensor
+from kappaskin import Estimate, Load, Sensor
 from kappaskin_app.theme import Colours, Theme
 from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
 from kappaskin_app.views.drag import ARROW, LoadDrag
 from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
+from kappaskin_app.views.footprint import footprint
 
 Array = NDArray[np.float64]
 
@@ -268,19 +269,14 @@ class MembraneView(QWidget):
             arrow.scale = (size, size, -size if pulls else size)
             place = self.drag.handles[number] if there else np.full(2, np.nan)
             self._place(arrow, place, ARROW * size if pulls else 0.0)
-        lines = [load for load in loads if isinstance(load, LineLoad)]
+        lines = [line for line in map(footprint, loads) if line is not None]
         self._line_actor.visibility = bool(lines)
-        for load in lines[:1]:
-            self._show_line(self.skin, load)
-
-    def _show_line(self, skin: DrawnSkin, load: LineLoad) -> None:
-        s = np.linspace(0, 1, 41)[:, None]
-        along = (1 - s) * [load.x0, load.y0] + s * [load.x1, load.y1]
-        points, _ = skin.place(along, self._lift)
-        if len(points) != self._line.n_points:
-            self._line.points = points
-            self._line.lines = [41, *range(41)]
-        self._line.points[:] = points
+        for line in lines[:1]:
+            points, _ = self.skin.place(line, self._lift)
+            if len(points) != self._line.n_points:
+                self._line.points = points
+                self._line.lines = [len(points), *range(len(points))]
+            self._line.points[:] = points
 
     # How it is shown.
 
