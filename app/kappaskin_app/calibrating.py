@@ -57,7 +57,8 @@ class Calibrating(QObject):
     """A calibration as a person goes through it.
 
     It has a `procedure` while steps are taken, is `computing` after the last, and then has a
-    `result`; `message` says why a step or the whole was refused. `changed` tells of anything new,
+    `result`; `message` says why a step or the whole was refused, `file_refused` why a file was, and
+    `done` what else was done with the result. `changed` tells of anything new,
     `laid` of the step that a simulated skin is to lie on, None when it need not any more. From the
     first to the last, readings are to come without any calibration.
     """
@@ -78,7 +79,7 @@ class Calibrating(QObject):
         self.seconds = 1.0
         self.procedure: Procedure | None = None
         self.result: Result | None = None
-        self.message = ""
+        self.message = self.done = self.file_refused = ""
         self.unattended = False
         self._kept: list[Estimate] | None = None  # of the step that is being taken
         self._begun = self._heard = 0.0
@@ -182,7 +183,7 @@ class Calibrating(QObject):
         if self.result is not None:
             try:
                 save_calibration(self.result.report.calibration, path)
-                self._tell("")
+                self._tell("", f"saved as {path}")
             except Refusal as refusal:
                 self._tell(str(refusal))
 
@@ -194,7 +195,8 @@ class Calibrating(QObject):
             now = datetime.now(UTC)
             calibration = load_calibration(path, self._status.sensor, now)
         except Refusal as refusal:
-            self._tell(str(refusal))
+            self.file_refused = str(refusal)
+            self.changed.emit()
             return
         self._history.change("Load a calibration", calibration=calibration)
         self._tell("")
@@ -233,8 +235,8 @@ class Calibrating(QObject):
 
     # How.
 
-    def _tell(self, message: str) -> None:
-        self.message = message
+    def _tell(self, message: str, done: str = "") -> None:
+        self.message, self.done, self.file_refused = message, done, ""
         self.changed.emit()
 
     def _apply(self, text: str, report: CalibrationReport) -> None:
@@ -260,7 +262,7 @@ class Calibrating(QObject):
             )
         if status.state != "streaming":
             why = f": {status.message}" if status.message else ""
-            return f"The connection ended{why}. Connect again and begin anew."
+            return f"The connection ended{why}. Once it is back, begin anew."
         return ""
 
     def _give_up(self, why: str) -> None:

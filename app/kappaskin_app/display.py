@@ -14,8 +14,10 @@ from kappaskin_app.views.badge import LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.views.colour_bar import SkinScale
 from kappaskin_app.views.heatmap import Array, Heatmap, Mask
 from kappaskin_app.views.membrane import MembraneView
+from kappaskin_app.views.notice import Notice, warnings
 from kappaskin_app.views.readouts import Health, Readouts
 
+_HINT = "Drag the red arrow to move the load; F1: shortcuts"
 _HEATMAPS = 0.06  # s between two drawings of the heatmaps
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
 _TIPS = {
@@ -31,7 +33,7 @@ class Display:
     def __init__(self, session: Session) -> None:
         self._session = session
         self.membrane, self.badge, self.readouts = MembraneView(), Badge(), Readouts()
-        self.scale = SkinScale()
+        self.scale, self.notice = SkinScale(), Notice(_HINT)
         self.heatmaps = {name: Heatmap(name, _TIPS[name]) for name in COMPONENTS}
         self.ranges = Ranges()
         self._settings = Settings()
@@ -58,7 +60,13 @@ class Display:
         return largest * (1e-3 if self._settings.colour_by == "displacement" else 1.0)
 
     def show_theme(self, theme: Theme) -> None:
-        for view in (self.membrane, self.badge, self.readouts, *self.heatmaps.values()):
+        for view in (
+            self.membrane,
+            self.badge,
+            self.readouts,
+            self.notice,
+            *self.heatmaps.values(),
+        ):
             view.show_theme(theme)
 
     def show_status(self, status: Status) -> None:
@@ -100,8 +108,16 @@ class Display:
         )
         estimate = self.estimate_shown()
         self.readouts.show_estimate(estimate)
+        self._warn(estimate)
         for row, heatmap in enumerate(self.heatmaps.values()):
             heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
+
+    def _warn(self, estimate: Estimate | None) -> None:
+        if estimate is None:
+            self.notice.show_warning("")
+            return
+        crossed, _ = self.marks(estimate.curvature)
+        self.notice.show_warning(warnings(estimate.touch, int(crossed.sum())))
 
     def estimate_shown(self) -> Estimate | None:
         """The newest estimate, None while what it shows is not coming in any more."""

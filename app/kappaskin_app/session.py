@@ -28,7 +28,7 @@ from kappaskin import (
 from kappaskin_app.ahead import Ahead
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
-from kappaskin_app.settings import LOAD_CASES, Scanning, SceneSettings, Settings, part
+from kappaskin_app.settings import READY_CASES, Scanning, SceneSettings, Settings, part
 from kappaskin_app.simulation import region_of, scene_of
 from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE, WAITING
 
@@ -53,10 +53,11 @@ class Session(QObject):
     """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick.
 
     `scene` is the one that is simulated; `refused` says why it is not the one the settings describe
-    now, with nothing to say when it is.
+    now, with nothing to say when it is; `preparing` whether that takes a while to be computed.
     """
 
     refused = Signal(str)
+    preparing = Signal(bool)
     estimated = Signal(Estimate)
     reported = Signal(Status)
 
@@ -84,8 +85,9 @@ class Session(QObject):
 
     @property
     def simulating(self) -> bool:
-        """Whether the loads and the noise are ours to choose."""
-        return self.source.startswith("sim:")
+        """Whether the loads and the noise are ours to choose: not in a scene that has its own."""
+        kind, _, scene = self.source.partition(":")
+        return kind == "sim" and (not scene or scene in READY_CASES)
 
     def connect_to(self, source: str, already: bool = False) -> None:
         """Take frames from `source`, unless the engine does `already`.
@@ -96,7 +98,7 @@ class Session(QObject):
         if not already:
             self.engine.connect(self.source)
         scene = self.source.removeprefix("sim:")
-        if self.simulating and scene in dict(LOAD_CASES):
+        if self.simulating and scene:
             self._history.change("Load case", load_case=scene)
         if self.simulating:
             self._play()
@@ -145,7 +147,8 @@ class Session(QObject):
     def _play(self) -> None:
         """Simulate what the settings describe, or go on as before and say why."""
         if not self._ahead.ready(self._history.settings):
-            self.refused.emit("computing what this one needs")
+            self.refused.emit("")
+            self.preparing.emit(True)
             return
         why = ""
         try:
@@ -156,6 +159,7 @@ class Session(QObject):
             why = str(refusal)
         self.engine.play(self.scene)
         self.refused.emit(why)
+        self.preparing.emit(False)
 
     def bargain(self) -> Bargain | None:
         """What scanning the region in use buys and costs, while a contact tells where it is."""

@@ -13,6 +13,7 @@ from kappaskin import (
     Creep,
     GaussianNoise,
     Hysteresis,
+    Load,
     Patch,
     Plate,
     Refusal,
@@ -22,9 +23,10 @@ from kappaskin import (
     Tolerance,
     Transduction,
     UniformNoise,
+    edges_of,
 )
 from kappaskin_app.pressing import REFERENCE, compliance_of, free_loads, ready, whole_on
-from kappaskin_app.settings import FREE_CASES, LOAD_CASES, Settings
+from kappaskin_app.settings import FREE_CASES, READY_CASES, Settings
 from kappaskin_app.skins import SHAPES
 
 _PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")
@@ -99,6 +101,7 @@ def scene_of(settings: Settings) -> Scene:
     if settings.load_case in FREE_CASES:
         compliance_of(plate, settings.edge)  # for its refusal
         loads, motion = free_loads(settings), None
+        _check_on(loads, plate)
     else:
         loads, motion = ready(settings.load_case, plate, settings.edge)
     scene = Scene(
@@ -117,19 +120,31 @@ def scene_of(settings: Settings) -> Scene:
     return replace(scene, rate=min(SHAPES[settings.shape].rate, fastest))
 
 
+def _check_on(loads: tuple[Load, ...], plate: Plate) -> None:
+    """Refuse `loads` that are not wholly on the skin, in the words of who placed them."""
+    try:
+        for load in loads:
+            load.check(plate.patch)
+    except Refusal as refusal:
+        raise Refusal(
+            "expected a load that lies wholly on the skin, got one that reaches over the rim; move "
+            "it inwards or make it smaller"
+        ) from refusal
+
+
 def settings_for(source: str) -> Settings:
     """The settings to begin with on `source`: a simulated scene's load case, else as they are."""
     case = source.removeprefix("sim:")
-    ready = source.startswith("sim:") and case in dict(LOAD_CASES)
+    ready = source.startswith("sim:") and case in READY_CASES
     return Settings(load_case=case) if ready else Settings()
 
 
 def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -> dict[str, Any]:
     """The settings that change when a person changes `name` while `scene` is played.
 
-    A shape brings its usual size, force and height. Where the skin gets longer, loads move and grow
-    to keep their share of it. A free load presses as the one did that it follows, and
-    moves until all of it is on the skin.
+    A shape brings its usual size, force and height, and its usual edge if it cannot be held as the
+    last one was. Where the skin gets longer, loads move and grow to keep their share of it. A free
+    load presses as the one did that it follows, and moves until all of it is on the skin.
     """
     changed: dict[str, Any] = {name: value}
     if name == "shape":
@@ -137,6 +152,10 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
     if name in ("shape", "rim_radius") and "side_x" not in changed:
         patch = patch_of(replace(settings, **changed))
         changed |= {"side_x": patch.a, "side_y": patch.b}  # of the rectangle around it
+    if name == "shape":
+        offered = edges_of(patch_of(replace(settings, **changed)))
+        changed |= {"edge": offered[0]} if settings.edge not in offered else {}
+        changed |= {"fit_edge": ""} if settings.fit_edge not in offered else {}
     if name == "electronics":
         converter = _CHAINS[value].converter
         changed |= {"bits": converter.bits, "conversion_time": converter.conversion_time}

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
     QHBoxLayout,
-    QLabel,
     QMainWindow,
     QMessageBox,
     QToolBar,
@@ -39,7 +38,6 @@ from kappaskin_app.wishes import Wishes
 
 _WORDS = 0.2  # s between two looks at what touches the skin
 _BARGAIN = 1.0  # s between two looks at what a region buys
-_HINT = "Drag the red arrow to move the load; F1: shortcuts"
 
 
 class MainWindow(QMainWindow):
@@ -59,7 +57,7 @@ class MainWindow(QMainWindow):
         self._shortcuts: QMessageBox | None = None
         self._next_bargain = self._next_words = 0.0
         # There from the start, or its first message would push the rest up.
-        self.statusBar().addWidget(QLabel(_HINT))
+        self.statusBar().addWidget(self.display.notice)
         self.object = Line()
         self.object.setToolTip(
             "What the readings say touches the skin, with 95 % interval and the runner-up's "
@@ -167,6 +165,8 @@ class MainWindow(QMainWindow):
         panels.calibrate.attend(self.calibrating)
         panels.in_use.attend(self.calibrating)
         session.refused.connect(guarded(panels.shape.show_refusal))
+        session.refused.connect(guarded(panels.load.show_refusal))
+        session.preparing.connect(guarded(panels.shape.show_preparing))
         # Queued: the next look comes after the picture is out, and need not wait for the timer.
         self.membrane.drawn.connect(session.tick, Qt.ConnectionType.QueuedConnection)
         drag.grabbed.connect(guarded(wishes.grab))

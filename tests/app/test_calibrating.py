@@ -259,8 +259,10 @@ def test_unattended_steps_make_a_calibration_that_can_be_used_undone_saved_and_l
     assert history.settings.calibration is None
     calibrating.save(tmp_path / "it.toml")
     assert calibrating.message == ""
+    assert calibrating.done == f"saved as {tmp_path / 'it.toml'}"
     calibrating.load(tmp_path / "it.toml")
     assert history.settings.calibration == used
+    assert not calibrating.done
     calibrating.stop_using()
     assert history.settings.calibration is None
     history.stack.undo()
@@ -273,11 +275,21 @@ def test_a_file_that_is_no_calibration_of_this_sensor_is_refused(
     path = tmp_path / "it.toml"
     path.write_text("damaged")
     bench.calibrating.load(path)
-    assert "it.toml" in bench.calibrating.message
+    assert "it.toml" in bench.calibrating.file_refused
     assert bench.history.settings.calibration is None
     bench.tell(sensor=None)
     bench.calibrating.load(path)
-    assert "no sensor is connected" in bench.calibrating.message
+    assert "no sensor is connected" in bench.calibrating.file_refused
+    bench.tell(sensor=SCENE.sensor())
+    bench.calibrating.begin(THREE, 0.2)
+    assert not bench.calibrating.file_refused
+
+
+def test_a_refused_file_is_told_where_files_are_loaded(window, tmp_path: Path) -> None:
+    panels = window.panels
+    window.calibrating.load(tmp_path / "none.toml")
+    assert "none.toml" in panels.in_use.message.text()
+    assert not panels.calibrate.message.text()
 
 
 def test_cancelling_forgets_what_was_taken(bench: Bench) -> None:

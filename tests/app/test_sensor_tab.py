@@ -7,10 +7,14 @@ from kappaskin import (
     SECOND_GENERATION,
     SECOND_GENERATION_LOOPS,
     Creep,
+    PointLoad,
     Region,
+    Status,
     Tolerance,
     UniformNoise,
+    bargain,
 )
+from kappaskin_app.panels.sensor import RegionPanel
 from kappaskin_app.settings import Settings
 from kappaskin_app.simulation import region_of, scene_of, with_consequences
 
@@ -72,9 +76,33 @@ def test_a_region_says_what_it_buys_and_costs(window, until):
     window.wishes.wish("electronics", "second")
     window.wishes.wish("region", "skin")
 
-    until(lambda: "instead of 167 frames/s" in window.panels.region.message.text())
-    assert "One frame tells the contact to" in window.panels.region.message.text()
+    until(lambda: "instead of 166 frames/s" in window.panels.region.message.text())
+    assert "one frame tells where the contact is to" in window.panels.region.message.text()
     until(lambda: window.session.estimate is not None and not window.session.estimate.fresh.all())
+
+
+@pytest.mark.parametrize(
+    ("electronics", "buys"),
+    [
+        ("modern", "It buys no rate: all channels come at 500 frames/s as well (it could be"),
+        ("second", "It buys 500 instead of 166 frames/s, 3.0 times (it could be"),
+        ("first", "It buys 500 instead of 166 frames/s, 3.0 times (it could be"),
+    ],
+)
+def test_a_bargain_is_of_the_frames_that_really_come(qapp, electronics, buys):
+    settings = Settings(
+        region="skin",
+        **with_consequences(Settings(), scene_of(Settings()), "electronics", electronics),
+    )
+    sensor, region = scene_of(settings).sensor(), region_of(settings)
+    panel = RegionPanel()
+    panel.show_settings(settings)
+    panel.show_status(Status(sensor=sensor, region=region), simulating=True)
+    panel.show_bargain(bargain(sensor, region, PointLoad(0.05, 0.05, 0.15), 0.231))
+    panel.show_status(Status(sensor=sensor, region=region), simulating=True)
+
+    assert buys in panel.message.text()
+    assert "It costs accuracy: one frame tells" in panel.message.text()
 
 
 @pytest.mark.parametrize("name", ["creep", "tolerance", "region_share"])

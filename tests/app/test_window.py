@@ -8,9 +8,10 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QImage, QWheelEvent
 from PySide6.QtWidgets import QApplication, QCheckBox, QDockWidget, QPushButton
 
-from kappaskin import Disk
+from kappaskin import EDGES, SCENES, Disk
 from kappaskin_app.panels.form import Form
 from kappaskin_app.settings import Settings
+from kappaskin_app.views.line import Line
 from kappaskin_app.window import MainWindow
 
 
@@ -190,6 +191,79 @@ def test_an_absent_port_says_why_and_the_simulation_comes_back(window: MainWindo
     assert not window.panels.connection.message.isVisible()
 
 
+def test_a_scene_of_its_own_is_shown_as_it_is_and_leaves_the_load_to_itself(opened, until) -> None:
+    window = opened("sim:calibration")
+    until(lambda: window.session.estimate is not None)
+    assert window.session.status.sensor.transduction.amplifier.gain == 35  # no load case has it
+    until(lambda: window.badge.state == "SIM")
+    assert not window.session.simulating
+    assert "Only for the simulation" in window.panels.load.message.text()
+    window.actions_by_name["simulate"].trigger()
+    until(lambda: window.session.estimate is not None and window.session.simulating)
+    assert not window.panels.load.message.text()
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "calibration"])
+def test_a_ready_scene_becomes_the_load_case(opened, until, name: str) -> None:
+    window = opened(f"sim:{name}")
+    until(lambda: window.session.estimate is not None)
+    assert window.history.settings.load_case == name
+
+
+@pytest.mark.parametrize("name", ["nonsense", "disc"])
+def test_an_unknown_scene_is_refused_with_those_there_are(opened, until, name: str) -> None:
+    window = opened(f"sim:{name}")
+    until(lambda: window.badge.state == "LOST")
+    assert f"got '{name}'" in window.panels.connection.message.text()
+    for known in SCENES:
+        assert known in window.panels.connection.message.text()
+    assert window.history.settings.load_case == "circle"
+
+
+def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
+    window: MainWindow, until
+) -> None:
+    notice = window.display.notice
+    window.history.change("Load", -1, load_case="point", x=0.003, y=0.05)
+    until(lambda: "too near the rim to trust" in notice.text())
+    assert "near rim" in window.readouts.text("contact")
+    assert notice.toolTip()
+    window.history.change("Load", -1, x=0.05)
+    until(lambda: not notice.warning)
+    assert "Drag the red arrow" in notice.text()
+
+
+def test_a_load_over_the_rim_is_explained_where_it_is_placed(window: MainWindow, until) -> None:
+    window.history.change("Load", -1, load_case="disc", x=0.001)
+    until(lambda: "reaches over the rim" in window.panels.load.message.text())
+    window.history.stack.undo()
+    until(lambda: not window.panels.load.message.text())
+
+
+def test_only_edges_that_the_skin_can_have_are_offered(window: MainWindow, until) -> None:
+    def offered(panel, name: str) -> list[str]:
+        box = panel.editor(name)
+        return [box.itemData(i) for i in range(box.count()) if box.model().item(i).isEnabled()]
+
+    shape, basis = window.panels.shape, window.panels.basis
+    assert offered(shape, "edge") == list(EDGES)
+    window.history.change("Edges", -1, edge="elastic", fit_edge="elastic")
+    window.wishes.wish("shape", "cylinder")
+    assert (window.history.settings.edge, window.history.settings.fit_edge) == ("hinged", "")
+    _met(window, until)
+    assert offered(shape, "edge") == ["hinged", "sliding", "clamped"]
+    until(lambda: offered(basis, "fit_edge") == ["", "hinged", "sliding", "clamped"])
+
+
+def test_a_line_too_long_for_its_place_begins_its_tooltip(qapp) -> None:
+    line = Line("as short as can be")
+    line.setToolTip("What it is.")
+    line.resize(400, 20)
+    assert line.tip() == "What it is."
+    line.resize(20, 20)
+    assert line.tip() == "as short as can be\n\nWhat it is."
+
+
 def test_disconnecting_is_said(window: MainWindow, until) -> None:
     window.actions_by_name["disconnect"].trigger()
     until(lambda: window.badge.state == "OFF")
@@ -322,7 +396,7 @@ def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
 ) -> None:
     window.history.change("Disk", -1, shape="disk", rim_radius=0.043)  # no other test made it
     message = window.panels.shape.message
-    until(lambda: "computing" in message.text())
+    until(lambda: "Computing this skin" in message.text())
     until(lambda: isinstance(window.membrane.skin.patch, Disk))
     until(lambda: window.session.estimate is not None and not message.text())
     until(lambda: colours_in(window, window.membrane) > 300)

@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QWidget
 
-from kappaskin import Status
+from kappaskin import Status, edges_of
 from kappaskin_app.panels.form import Form
 
 
@@ -19,5 +19,7 @@ class BasisPanel(Form):
         super().__init__("Basis", ("functions_x", "functions_y", "fit_edge"), parent)
 
     def show_status(self, status: Status, simulating: bool) -> None:
+        if status.sensor is not None:
+            self.offer("fit_edge", ("", *edges_of(status.sensor.layout.patch)))
         computing = "Computing\N{HORIZONTAL ELLIPSIS}"
         self.show_message(computing if status.computing else in_use(status))

@@ -287,7 +287,8 @@ def _median(values: np.ndarray) -> float:
 def _number(value: float, how: str) -> str:
     if not np.isfinite(value):
         return "\N{EN DASH}"
-    return f"{value + 0.0:{how}}".replace("-", "\N{MINUS SIGN}")
+    rounded = round(value, int(how[-2])) + 0.0  # no minus before a zero
+    return f"{rounded:{how}}".replace("-", "\N{MINUS SIGN}")
 
 
 class _Outcome(QWidget):
@@ -510,7 +511,7 @@ class CalibratePanel(Panel):
             self.steps.show_step(now, now.procedure, now.step)
         elif now.result:
             self.outcome.show_result(now.result)
-        self.show_message(_sentence(now.message))
+        self.show_message(_sentence(now.message or now.done), hint=not now.message)
         if phase is not self._phase:
             self._phase = phase
             self._show_page()
@@ -547,7 +548,7 @@ class InUsePanel(Panel):
         self.body.addWidget(self.what)
         self.body.addLayout(_row(self.load, self.stop))
         self._calibration: Calibration | None = None
-        self._status, self._calibrating = Status(), False
+        self._status, self._calibrating, self._file_refused = Status(), False, ""
 
     def attend(self, calibrating: Calibrating) -> None:
         def load() -> None:
@@ -561,6 +562,7 @@ class InUsePanel(Panel):
 
     def _note(self, calibrating: Calibrating) -> None:
         self._calibrating = calibrating.procedure is not None
+        self._file_refused = calibrating.file_refused
         self._tell()
 
     def show_settings(self, settings: Settings) -> None:
@@ -586,7 +588,10 @@ class InUsePanel(Panel):
         if text != self.what.text():
             self.what.setText(text)
             self.what.setToolTip(_EQUATION_8 if found is None else "")
-        self.show_message(alarm, hint=self._calibrating)
+        if self._file_refused:
+            self.show_message(_sentence(self._file_refused))
+        else:
+            self.show_message(alarm, hint=self._calibrating)
 
 
 def _unfit(calibration: Calibration, status: Status) -> str:

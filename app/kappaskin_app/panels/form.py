@@ -1,11 +1,11 @@
 """Editors for settings, made from what `settings` says of each."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt
-from PySide6.QtGui import QKeyEvent, QKeySequence, QValidator
+from PySide6.QtGui import QKeyEvent, QKeySequence, QStandardItemModel, QValidator
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -183,6 +183,14 @@ class Form(Panel):
         """Show only the rows of these settings."""
         for name, editor in self._editors.items():
             self.form.setRowVisible(editor.widget, name in names)
+
+    def offer(self, name: str, values: Collection[str]) -> None:
+        """Let only these be chosen of the choice called `name`."""
+        box = self.editor(name)
+        model = box.model() if isinstance(box, QComboBox) else None
+        if isinstance(box, QComboBox) and isinstance(model, QStandardItemModel):
+            for index in range(box.count()):
+                model.item(index).setEnabled(box.itemData(index) in values)
 
     def show_limit(self, name: str, most: float) -> None:
         """Let the number asked for as `name` be at most `most`, in SI units."""

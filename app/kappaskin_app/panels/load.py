@@ -40,6 +40,7 @@ class LoadPanel(SimulationForm):
     def __init__(self, parent: QWidget | None = None) -> None:
         names = ("load_case", "force", "x", "y", "x_end", "y_end", "size", "size_y")
         super().__init__("Load", names, parent)
+        self._refusal = ""
 
     def show_settings(self, settings: Settings) -> None:
         for name, side in (("x", settings.side_x), ("y", settings.side_y)):
@@ -59,6 +60,13 @@ class LoadPanel(SimulationForm):
         label = self.form.labelForField(self.editor("size"))
         if isinstance(label, QLabel) and case in SIZES:
             label.setText(SIZES[case])
+
+    def show_refusal(self, text: str) -> None:
+        """Say why the load or the skin asked for cannot be, or nothing when it can."""
+        self._refusal = text
+
+    def alarm(self, status: Status) -> str:
+        return f"The last load stays: {self._refusal}." if self._refusal else ""
 
     def _show_cases(self, table_1: bool) -> None:
         """Call the cases Table 1's where they are."""

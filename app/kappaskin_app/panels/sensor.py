@@ -1,5 +1,7 @@
 """The simulated electronics and what spoils them; which elements are scanned, and at what cost."""
 
+import math
+
 from PySide6.QtWidgets import QLabel, QWidget
 
 from kappaskin import Bargain, Sensor, Status
@@ -60,7 +62,7 @@ class RegionPanel(Form):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Region of interest", ("region", "region_radius", "region_share"), parent)
         self._region, self._chosen = "off", 0
-        self._told = ""
+        self._told, self._rates = "", (math.inf, math.inf)
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
@@ -71,9 +73,11 @@ class RegionPanel(Form):
 
     def show_bargain(self, bargain: Bargain | None) -> None:
         """What the region in use buys and costs; None while that is not known."""
-        self._told = "" if bargain is None else _words(bargain)
+        self._told = "" if bargain is None else _words(bargain, *self._rates)
 
     def show_status(self, status: Status, simulating: bool) -> None:
+        if status.sensor is not None:
+            self._rates = status.region.rate, status.sensor.rate
         if status.region_refusal:
             self.show_message(f"{status.region_refusal}.")
         elif self._region == "elements" and not self._chosen:
@@ -82,12 +86,20 @@ class RegionPanel(Form):
             self.show_message(self._told if self._region != "off" else "", hint=True)
 
 
-def _words(bargain: Bargain) -> str:
-    mm = 1e3 * max(bargain.bound[:2])
-    full = 1e3 * max(bargain.full_bound[:2])
-    return (
-        f"{bargain.channels} channels a frame: {bargain.rate:.0f} instead of "
-        f"{bargain.full_rate:.0f} frames/s, {bargain.gain:.1f} times. One frame tells the contact "
-        f"to \N{PLUS-MINUS SIGN}{mm:.2f} mm at best, all channels to "
-        f"\N{PLUS-MINUS SIGN}{full:.2f} mm."
+def _words(bargain: Bargain, asked: float, without: float) -> str:
+    """What a region of which `asked` frames/s are wanted buys and costs; so many come `without`."""
+    rate, full_rate = min(asked, bargain.rate), min(without, bargain.full_rate)
+    buys = (
+        f"buys {rate:.0f} instead of {full_rate:.0f} frames/s, {rate / full_rate:.1f} times"
+        if rate > 1.005 * full_rate
+        else f"buys no rate: all channels come at {full_rate:.0f} frames/s as well"
     )
+    more = f" (it could be {bargain.rate:.0f})" if bargain.rate > 1.005 * rate else ""
+    mm, full = (1e3 * max(bound[:2]) for bound in (bargain.bound, bargain.full_bound))
+    costs = (
+        f"costs accuracy: one frame tells where the contact is to \N{PLUS-MINUS SIGN}{mm:.2f} mm "
+        f"at best, all channels to \N{PLUS-MINUS SIGN}{full:.2f} mm"
+        if mm > 1.005 * full
+        else f"costs no accuracy: \N{PLUS-MINUS SIGN}{full:.2f} mm at best, as all channels"
+    )
+    return f"Scans {bargain.channels} channels a frame. It {buys}{more}. It {costs}."

@@ -10,6 +10,7 @@ from kappaskin_app.settings.asks import Range as Range
 from kappaskin_app.settings.asks import Switch as Switch
 from kappaskin_app.settings.load import FREE_CASES as FREE_CASES
 from kappaskin_app.settings.load import LOAD_CASES as LOAD_CASES
+from kappaskin_app.settings.load import READY_CASES as READY_CASES
 from kappaskin_app.settings.load import SIZES as SIZES
 from kappaskin_app.settings.load import SPREAD_CASES as SPREAD_CASES
 from kappaskin_app.settings.load import TABLE_1_CASES as TABLE_1_CASES

@@ -21,6 +21,7 @@ LOAD_CASES = (
 TWO_ENDED = ("two-points", "free-line")
 SPREAD_CASES = ("disc", "rectangle", "gaussian")
 FREE_CASES = ("point", *TWO_ENDED, *SPREAD_CASES)
+READY_CASES = tuple(case for case, _ in LOAD_CASES if case not in FREE_CASES)
 SIZES = {"disc": "Radius", "rectangle": "Width along x", "gaussian": "Std. deviation"}
 """What the size of a spread load is called."""
 

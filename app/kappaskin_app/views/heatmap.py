@@ -18,6 +18,13 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 
+_LEGEND = (
+    "One cell for each element. Grey: no reading, dead or at the end of the converter's range. "
+    "Crossed: bent beyond 1 % strain, where the gage is not elastic any more. Dotted: chosen to be "
+    "in every frame."
+)
+
+
 def coloured(values: Array, limits: tuple[float, float], colours: Colours, missing: str) -> Colours:
     """RGB (..., 3) of `values` (...) between `limits`; NaN in the colour `missing`."""
     low, high = limits
@@ -203,6 +210,7 @@ class Heatmap(QWidget):
         self.lock = LockButton()
         self.lock.wanted.connect(lambda locked: self.lock_wanted.emit(self._limit * locked))
         self.cells, self.bar = _Cells(), ColourBar()
+        self.cells.setToolTip(_LEGEND)
         self.cells.pointed.connect(self.pointed)
         self.cells.chosen.connect(self.chosen)
         self._limit, self._layout, self._element = 1.0, None, -1

@@ -1,12 +1,15 @@
 """One line of text that changes many times a second."""
 
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtGui import QFontMetrics, QHelpEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 
 class Line(QWidget):
-    """Draws its text where it stands; a QLabel would have the whole window laid out anew."""
+    """Draws its text where it stands; a QLabel would have the whole window laid out anew.
+
+    Where there is no room for all of it, the tooltip begins with it.
+    """
 
     def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -26,6 +29,21 @@ class Line(QWidget):
         if text != self._text:
             self._text = text
             self.update()
+
+    @property
+    def whole(self) -> bool:
+        """Whether there is room for all of the text."""
+        return self.fontMetrics().horizontalAdvance(self._text) <= self.width()
+
+    def tip(self) -> str:
+        """What the tooltip says."""
+        return self.toolTip() if self.whole else f"{self._text}\n\n{self.toolTip()}".strip()
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
+            QToolTip.showText(event.globalPos(), self.tip(), self)
+            return True
+        return super().event(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)

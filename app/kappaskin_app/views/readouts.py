@@ -11,6 +11,7 @@ from kappaskin import Estimate, Touch
 from kappaskin_app.theme import Theme
 from kappaskin_app.views.line import Line
 
+_FINE = 0.02  # mm of error bar, below which a hundredth is too coarse
 NONE = "\N{EN DASH}"
 
 
@@ -30,12 +31,13 @@ FIELDS = {
     "rate": ("Frames", "Frames computed per second, and pictures drawn of them."),
     "age": ("Latency", "Age of the frame when it was drawn, since its bytes were read."),
     "lost": (
-        "Lost",
-        "Frames that never came, bytes that made no sense, frames too many to compute.",
+        "Lost frames",
+        "Frames that never came; skipped: too many to compute; B: bytes that made no sense.",
     ),
     "contact": (
         "Contact",
-        "Where one point load explains the readings best; spread: they are not of one.",
+        "Where one point load explains the readings best; spread: they are not of one; near rim: "
+        "too near a held edge for place and force to be trusted.",
     ),
     "force": ("Force", "How hard that load presses, with its error bar."),
     "depth": (
@@ -77,6 +79,8 @@ def _contact(touch: Touch) -> str:
     if not touch.present:
         return "none"
     x, y = touch.position * 1e3
+    if touch.near_rim:
+        return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, near rim"
     if not touch.single:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, spread"
     sd = float(np.max(touch.position_sd)) * 1e3
@@ -114,8 +118,8 @@ class Readouts(QWidget):
         age = f"{health.age * 1e3:.0f} ms" if math.isfinite(health.age) else NONE
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
         self._write("age", age)
-        also = ((health.discarded, "B"), (health.skipped, "skipped"))
-        lost = [f"{health.lost} frames", *(f"{count} {what}" for count, what in also if count)]
+        also = ((health.skipped, "skipped"), (health.discarded, "B"))
+        lost = [str(health.lost), *(f"{count} {what}" for count, what in also if count)]
         self._write("lost", ", ".join(lost))
 
     def show_estimate(self, estimate: Estimate | None) -> None:
@@ -126,8 +130,9 @@ class Readouts(QWidget):
         touch = estimate.touch
         self._write("contact", _contact(touch))
         self._write("force", _with_error(touch.force * 1e3, touch.force_sd * 1e3, 1, "mN"))
-        depth = touch.displacement * 1e3, touch.displacement_sd * 1e3
-        self._write("depth", _with_error(*depth, 2, "mm"))
+        depth, sd = touch.displacement * 1e3, touch.displacement_sd * 1e3
+        digits = 3 if sd < _FINE else 2
+        self._write("depth", _with_error(depth, sd, digits, "mm"))
         error, rms = estimate.error_at_load * 1e3, estimate.error_rms * 1e3
         self._write("error", f"{_number(error, 3, '+')} mm" if math.isfinite(error) else NONE)
         self._write("rms", f"{_number(rms, 3)} mm" if math.isfinite(rms) else NONE)

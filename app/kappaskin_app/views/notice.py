@@ -1,0 +1,50 @@
+"""A hint at the foot of the window, until there is something to warn of."""
+
+from PySide6.QtWidgets import QLabel, QWidget
+
+from kappaskin import Touch
+from kappaskin_app.theme import LIGHT, Theme
+
+_TIP = (
+    "Near the rim: no force moves the skin where it is held, so that a light touch further inside "
+    "and a hard one at the rim read alike; an edge that gives may be assumed instead (Basis). "
+    "Strain: beyond 1 % a metal gage is not elastic any more; these elements are crossed out in "
+    "the heatmaps."
+)
+
+
+def warnings(touch: Touch | None, strained: int) -> str:
+    """What is doubtful in words: a contact near the rim, so many elements `strained` too far."""
+    told: list[str] = []
+    if strained:
+        told.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
+    if touch is not None and touch.near_rim:
+        told.append("contact too near the rim to trust")
+    words = "; ".join(told)
+    return words[:1].upper() + words[1:]
+
+
+class Notice(QLabel):
+    """Shows a hint, or in the colour of alarms what there is to warn of."""
+
+    def __init__(self, hint: str, parent: QWidget | None = None) -> None:
+        super().__init__(hint, parent)
+        self._hint, self._theme, self.warning = hint, LIGHT, ""
+        self.setContentsMargins(4, 0, 12, 0)
+        self.setMinimumWidth(self.sizeHint().width())  # or what stands beside it would jump
+
+    def show_warning(self, text: str) -> None:
+        """Warn of `text`, or of nothing."""
+        if text != self.warning:
+            self.warning = text
+            self.setText(text or self._hint)
+            self.setToolTip(_TIP if text else "")
+            self._paint()
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self._paint()
+
+    def _paint(self) -> None:
+        colour = self._theme.alert if self.warning else self._theme.text
+        self.setStyleSheet(f"color: {colour};")

@@ -1,0 +1,41 @@
+"""What is doubtful, at the foot of the window."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kappaskin import Touch
+from kappaskin_app.theme import DARK, LIGHT
+from kappaskin_app.views.notice import Notice, warnings
+
+INSIDE = Touch(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
+NEAR = replace(INSIDE, near_rim=True)
+
+
+@pytest.mark.parametrize(
+    ("touch", "strained", "words"),
+    [
+        (None, 0, ""),
+        (INSIDE, 0, ""),
+        (NEAR, 0, "Contact too near the rim to trust"),
+        (INSIDE, 1, "1 element over 1 % strain"),
+        (NEAR, 12, "12 elements over 1 % strain; contact too near the rim to trust"),
+    ],
+)
+def test_what_is_doubtful_is_told_in_words(touch: Touch | None, strained: int, words: str) -> None:
+    assert warnings(touch, strained) == words
+
+
+def test_a_warning_takes_the_hints_place_in_the_colour_of_alarms_and_gives_it_back(qapp) -> None:
+    notice = Notice("Drag the arrow")
+    width = notice.minimumWidth()
+    for theme in (LIGHT, DARK):
+        notice.show_theme(theme)
+        notice.show_warning("Too near")
+        assert (notice.text(), notice.minimumWidth()) == ("Too near", width)
+        assert theme.alert in notice.styleSheet()
+        assert "near" in notice.toolTip().lower()
+        notice.show_warning("")
+        assert (notice.text(), notice.toolTip()) == ("Drag the arrow", "")
+        assert theme.alert not in notice.styleSheet()
