@@ -25,6 +25,7 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
     whole.setLayout(stack)
     area = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # a stop on the way of Tab that nobody sees
     area.setFrameShape(QScrollArea.Shape.NoFrame)
     area.setWidget(whole)
     bar = area.verticalScrollBar().sizeHint().width()

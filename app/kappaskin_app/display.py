@@ -17,7 +17,7 @@ from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.notice import Notice, warnings
 from kappaskin_app.views.readouts import Health, Readouts
 
-_HINT = "Drag the red arrow to move the load; F1: shortcuts"
+_HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
 _HEATMAPS = 0.06  # s between two drawings of the heatmaps
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
 _TIPS = {
@@ -113,6 +113,8 @@ class Display:
             heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
 
     def _warn(self, estimate: Estimate | None) -> None:
+        there = self._session.simulating and estimate is not None and self._session.scene.loads
+        self.notice.show_hint(_HINT if there else _NO_LOAD_HINT)
         if estimate is None:
             self.notice.show_warning("")
             return

@@ -6,6 +6,8 @@ from PySide6.QtCore import QObject, Signal
 
 from kappaskin import Estimate, ObjectFinder, Refusal, Status
 
+_LEARNING = "computing what objects read like on this skin\N{HORIZONTAL ELLIPSIS}"
+
 
 def curved(estimate: Estimate) -> str:
     """How the skin curves at the contact, in words; empty without one."""
@@ -34,11 +36,14 @@ class Naming(QObject):
         self._busy: Future[str] | None = None
         self._key: tuple[int, str] | None = None
         self._finder: ObjectFinder | str = ""
+        self._learning = False
 
     def look(self, status: Status, estimate: Estimate | None) -> None:
         """Take up what was named, and the next estimate to be named."""
         if self._busy is not None:
             if not self._busy.done():
+                if self._learning:
+                    self.named.emit(_LEARNING)
                 return
             self.named.emit(self._busy.result())
             self._busy = None
@@ -61,11 +66,13 @@ class Naming(QObject):
             return
         key = status.meetings, status.setup.edge or sensor.edge
         if key != self._key:
-            self._key = key
+            self._key, self._learning = key, True
             try:
                 self._finder = ObjectFinder(sensor.plate, sensor.layout, key[1])
             except Refusal as refusal:
                 self._finder = str(refusal)
+            finally:
+                self._learning = False
 
     def close(self) -> None:
         self._thread.shutdown(wait=True, cancel_futures=True)

@@ -34,6 +34,13 @@ def test_the_window_says_what_touches_the_skin(window, until):
     until(lambda: not window.object.text())
 
 
+def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until):
+    until(lambda: "curves" in window.object.text())
+    window.wishes.wish("shape", "cylinder")
+    until(lambda: "computing what objects read like" in window.object.text())
+    until(lambda: "curves" in window.object.text())
+
+
 def test_a_skin_that_objects_cannot_be_told_on_says_so(window, until):
     window.history.change("Elements", -1, elements_x=50, elements_y=50)
 

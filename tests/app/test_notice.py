@@ -39,3 +39,12 @@ def test_a_warning_takes_the_hints_place_in_the_colour_of_alarms_and_gives_it_ba
         notice.show_warning("")
         assert (notice.text(), notice.toolTip()) == ("Drag the arrow", "")
         assert theme.alert not in notice.styleSheet()
+
+
+def test_another_hint_waits_for_the_warning_to_go(qapp) -> None:
+    notice = Notice("Drag the arrow")
+    notice.show_warning("Too near")
+    notice.show_hint("F1: shortcuts")
+    assert notice.text() == "Too near"
+    notice.show_warning("")
+    assert notice.text() == "F1: shortcuts"

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QImage, QWheelEvent
-from PySide6.QtWidgets import QApplication, QCheckBox, QDockWidget, QPushButton
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QDockWidget,
+    QPushButton,
+)
 
 from kappaskin import EDGES, SCENES, Disk
 from kappaskin_app.panels.form import Form
@@ -198,9 +206,10 @@ def test_a_scene_of_its_own_is_shown_as_it_is_and_leaves_the_load_to_itself(open
     until(lambda: window.badge.state == "SIM")
     assert not window.session.simulating
     assert "Only for the simulation" in window.panels.load.message.text()
+    until(lambda: "red arrow" not in window.display.notice.text())  # there is none
     window.actions_by_name["simulate"].trigger()
-    until(lambda: window.session.estimate is not None and window.session.simulating)
-    assert not window.panels.load.message.text()
+    until(lambda: not window.panels.load.message.text())
+    assert window.session.simulating
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "calibration"])
@@ -506,6 +515,17 @@ def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> No
             seen.append(renderer.GetViewPoint()[:2])
         assert np.abs(seen).max() < 1, name
         assert np.ptp(seen, axis=0).max() > 1, name  # and large
+        written = [bool(label.GetVisibility()) for label in window.membrane.labels]
+        end_on = {"look-along-x": 1, "look-along-y": 2}.get(name)
+        assert written == [number != end_on for number in range(3)], name
+
+
+def test_every_button_and_editor_explains_itself(window: MainWindow) -> None:
+    kinds = (QAbstractSpinBox, QComboBox, QAbstractButton)
+    for panel in window.panels.all():
+        for kind in kinds:
+            for widget in panel.findChildren(kind):
+                assert widget.toolTip(), (panel.title(), widget.objectName())
 
 
 @pytest.mark.parametrize("shape", ["flat", "cylinder"])

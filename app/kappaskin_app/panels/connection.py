@@ -37,8 +37,10 @@ class ConnectionPanel(Panel):
         self.look_button.setToolTip("Look for serial ports again.")
         self.connect_button = QPushButton("Connect")
         self.connect_button.setObjectName("connect")
+        self.connect_button.setToolTip("Take readings from the source above (Ctrl+Return).")
         self.disconnect_button = QPushButton("Disconnect")
         self.disconnect_button.setObjectName("disconnect")
+        self.disconnect_button.setToolTip("Take no more readings (Ctrl+D).")
         self.device = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
         self.connect_button.clicked.connect(lambda: self.connect_wanted.emit(self.source()))
         line = QLineEdit()

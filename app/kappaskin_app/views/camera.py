@@ -22,6 +22,10 @@ class Direction:
     towards: tuple[float, float, float]
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
+    def sees(self, axis: int) -> bool:
+        """Whether what runs along `axis` is not seen end-on."""
+        return any(share for other, share in enumerate(self.towards) if other != axis)
+
 
 FROM_THE_LEFT = Direction("from the front, a little from the left", (-0.45, -1.1, 1.1))
 ABOVE = Direction("from above", (0.0, 0.0, 1.6), (0.0, 1.0, 0.0))

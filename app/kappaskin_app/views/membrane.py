@@ -83,8 +83,8 @@ class MembraneView(QWidget):
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
-        self._labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
-        for label in self._labels:
+        self.labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
+        for label in self.labels:
             plotter.add_actor(label, reset_camera=False, render=False)
 
     def _make_lights(self) -> None:
@@ -103,6 +103,12 @@ class MembraneView(QWidget):
 
     def _note_turning(self, *_: object) -> None:
         self._fitted = False  # the person chose this view: a new size must not undo it
+        self._show_labels(True, True)
+
+    def _show_labels(self, x: bool, y: bool) -> None:
+        """Whether the sides' lengths are written: seen end-on, a text lies on the skin's rim."""
+        for label, shown in zip(self.labels[1:], (x, y), strict=True):
+            label.SetVisibility(shown)
 
     # What a skin looks like: rebuilt only when another one appears.
 
@@ -184,18 +190,19 @@ class MembraneView(QWidget):
         corners, _ = skin.at_rest(np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]))
         beside = MM * np.array([(-0.04 * a, -0.04 * b, 0), (0, -0.06 * b, 0), (0, 0.05 * b, 0)])
         texts = ("0", f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm")
-        for label, text, at in zip(self._labels, texts, corners + beside, strict=True):
+        for label, text, at in zip(self.labels, texts, corners + beside, strict=True):
             label.input = text
             label.position = tuple(at)
         # Where the skin rises steeply beside it, a text in the middle would lie below it.
         y_at = "right" if skin.patch.base_curvature else "center"
-        self._labels[2].prop.justification_horizontal = y_at
+        self.labels[2].prop.justification_horizontal = y_at
 
     def look_from(self, direction: Direction) -> None:
         """Look at the whole skin, as large as it fits, and again whenever the size changes."""
         self._from = direction
         fit_camera(self.plotter.renderer, self.skin, direction)
         self._fitted = True
+        self._show_labels(direction.sees(0), direction.sees(1))
         self.plotter.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -313,7 +320,7 @@ class MembraneView(QWidget):
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
         self.plotter.set_background(theme.scene, top=theme.scene_top)
-        for label in self._labels:
+        for label in self.labels:
             label.prop.color = theme.text
         if self._surface_actor:
             self._surface_actor.prop.color = theme.missing

@@ -33,6 +33,12 @@ class Notice(QLabel):
         self.setContentsMargins(4, 0, 12, 0)
         self.setMinimumWidth(self.sizeHint().width())  # or what stands beside it would jump
 
+    def show_hint(self, hint: str) -> None:
+        """Hint at this while there is nothing to warn of."""
+        if hint != self._hint:
+            self._hint = hint
+            self.setText(self.warning or hint)
+
     def show_warning(self, text: str) -> None:
         """Warn of `text`, or of nothing."""
         if text != self.warning:

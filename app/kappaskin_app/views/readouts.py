@@ -87,6 +87,12 @@ def _contact(touch: Touch) -> str:
     return f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.2f} mm"
 
 
+def _force(touch: Touch) -> str:
+    if abs(touch.force) >= 1:
+        return _with_error(touch.force, touch.force_sd, 3, "N")
+    return _with_error(touch.force * 1e3, touch.force_sd * 1e3, 1, "mN")
+
+
 class Readouts(QWidget):
     """Names above numbers, each of a fixed width so that nothing jitters."""
 
@@ -129,7 +135,7 @@ class Readouts(QWidget):
             return
         touch = estimate.touch
         self._write("contact", _contact(touch))
-        self._write("force", _with_error(touch.force * 1e3, touch.force_sd * 1e3, 1, "mN"))
+        self._write("force", _force(touch))
         depth, sd = touch.displacement * 1e3, touch.displacement_sd * 1e3
         digits = 3 if sd < _FINE else 2
         self._write("depth", _with_error(depth, sd, digits, "mm"))
