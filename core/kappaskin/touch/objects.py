@@ -120,7 +120,9 @@ class ObjectFinder:
         else:
             fine = _FINE if edge == "hinged" and not patch.base_curvature else _FINE_MIXED
         self._coarse = ElasticSkin(plate, layout, edge, _COARSE)
-        self._skin = ElasticSkin(plate, layout, edge, fine)
+        self._skin = self._coarse
+        if fine != _COARSE:
+            self._skin = ElasticSkin(plate, layout, edge, fine)
         self._live = layout.live.ravel()
 
     def __call__(self, curvature: Array, noise: float, touch: Touch) -> ContactObject:
