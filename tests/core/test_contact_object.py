@@ -451,6 +451,7 @@ def test_one_line_describes_it():
         (ball, text.format("sphere", "")),
         (replace(rod, kind="edge"), r"edge, \d+ mm long, axis \d+ deg; runner-up \w+ \d+ %"),
         (replace(ball, radius_95=(0.05, math.inf)), r"sphere, radius above 50 mm; .*"),
+        (replace(ball, radius_95=(0.0, 2.756)), r"sphere, radius below 2756 mm; .*"),
         (replace(ball, radius_95=(0.0, math.inf)), r"sphere, radius unknown; .*"),
         (
             replace(rod, radius_95=(math.inf, math.inf)),

@@ -82,10 +82,15 @@ class ContactObject:
         if low == math.inf:
             return "flat or hollow"
         if high == math.inf:
-            return f"radius above {low:.3g} mm" if low else "radius unknown"
+            return f"radius above {_digits(low)} mm" if low else "radius unknown"
         if not low:
-            return f"radius below {high:.3g} mm"
-        return f"radius {1e3 * self.radius:.3g} mm ({low:.3g} to {high:.3g})"
+            return f"radius below {_digits(high)} mm"
+        return f"radius {_digits(1e3 * self.radius)} mm ({_digits(low)} to {_digits(high)})"
+
+
+def _digits(value: float) -> str:
+    """Three digits, and whatever more a number from 1000 on has before the point."""
+    return f"{value:.3g}" if value < 999.5 else f"{value:.0f}"
 
 
 NO_OBJECT = ContactObject(
