@@ -1,6 +1,7 @@
 """What every test shares: none may leave a thread, a process or a block of memory behind."""
 
 import os
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -22,6 +23,9 @@ settings.load_profile("steady")
 # As in the engine, and before NumPy is loaded: two threads that spin for two busy cores took 15 to
 # 80 s for what one does in 10. Processes that tests start inherit it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# A background job begins with Ctrl+C ignored, and so would every process that a test starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 resource_tracker.ensure_running()  # a process that stays, and is nobody's leak
 

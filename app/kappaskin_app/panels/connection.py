@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import Calibration, Sensor, Status
-from kappaskin_app.panels.calibrate import said
+from kappaskin_app.panels.calibration.parts import said
 from kappaskin_app.panels.panel import Panel
 
 _SIMULATED = ("sim:", "Simulated skin")

@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 from kappaskin import Status
 from kappaskin_app.columns import scrolled
 from kappaskin_app.panels.basis import BasisPanel
-from kappaskin_app.panels.calibrate import CalibratePanel, InUsePanel
+from kappaskin_app.panels.calibrate import CalibratePanel
+from kappaskin_app.panels.calibration.in_use import InUsePanel
 from kappaskin_app.panels.connection import ConnectionPanel
 from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.panel import Panel

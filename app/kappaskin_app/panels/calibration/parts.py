@@ -1,0 +1,79 @@
+"""What the pages of a calibration have in common: words, numbers and small widgets."""
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QLabel, QPushButton, QWidget
+
+from kappaskin import COMPONENTS, Calibration
+
+FILES = "Calibration (*.toml)"
+ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
+EQUATION_8 = (
+    "Nominal curvature, as Eq. 8 reads it from the voltage: kappa = 4 V / (V_in GF (t_s + t_g) G). "
+)
+
+
+def said(calibration: Calibration) -> str:
+    """A calibration in a few words."""
+    passed, all_ = int(np.isfinite(calibration.gain).sum()), len(calibration.gain)
+    day = calibration.date.astimezone()
+    return f"calibrated {day:%Y-%m-%d}, {passed} of {all_} channels"
+
+
+def named(channel: int, elements: int) -> str:
+    return f"{COMPONENTS[channel // elements]} of element {channel % elements}"
+
+
+def number(value: float, how: str) -> str:
+    if not np.isfinite(value):
+        return "\N{EN DASH}"
+    rounded = round(value, int(how[-2])) + 0.0  # no minus before a zero
+    return f"{rounded:{how}}".replace("-", "\N{MINUS SIGN}")
+
+
+def sentence(text: str) -> str:
+    text = text[:1].upper() + text[1:]
+    return text if not text or text.endswith((".", "?", "!")) else f"{text}."
+
+
+def text_label(text: str = "", tip: str = "") -> QLabel:
+    label = QLabel(text, wordWrap=True)  # pyright: ignore[reportCallIssue]
+    label.setToolTip(tip)
+    return label
+
+
+class _PushedByEnter(QPushButton):
+    """A button that Enter pushes too, as Space does."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.click()
+        else:
+            super().keyPressEvent(event)
+
+
+def button(text: str, name: str, tip: str) -> QPushButton:
+    button = _PushedByEnter(text)
+    button.setObjectName(name)
+    button.setToolTip(tip)
+    return button
+
+
+def in_a_row(*widgets: QWidget) -> QHBoxLayout:
+    row = QHBoxLayout()
+    for widget in widgets:
+        row.addWidget(widget)
+    return row
+
+
+def seconds_box(name: str, least: float, value: float, tip: str) -> QDoubleSpinBox:
+    box = QDoubleSpinBox()
+    box.setObjectName(name)
+    box.setDecimals(1)
+    box.setRange(least, 3600.0)
+    box.setValue(value)
+    box.setSuffix(" s")
+    box.setToolTip(tip)
+    box.setAlignment(Qt.AlignmentFlag.AlignRight)
+    return box
