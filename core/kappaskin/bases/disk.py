@@ -7,7 +7,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import ive, jn_zeros, jv
 
 from kappaskin.bases.basis import ORDERS, Order
@@ -157,6 +156,7 @@ def _lowest(count: int, clamped: bool) -> tuple[Array, Array, NDArray[np.intp]]:
 
 def _frequencies(m: int, most: float, clamped: bool) -> list[float]:
     """The roots k up to `most` of the edge's equation, one between two zeros of J_m."""
+    from scipy.optimize import brentq  # slow to import, and seldom needed
 
     def edge(k: float) -> float:
         turning = 0.0 if clamped else 2 * k / (1 - _POISSON)

@@ -3,15 +3,18 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kappaskin.bases.argyris import PlateModes, plate_modes
 from kappaskin.bases.basis import Order
 from kappaskin.bases.modes import ModeBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.patch import Polygon
+
+if TYPE_CHECKING:
+    from kappaskin.bases.argyris import PlateModes
 
 _STRAIGHT, _BLUNT = 1e-6, math.radians(35)  # turns at a corner: none, and too little to be one
 
@@ -45,7 +48,10 @@ class PolygonBasis(ModeBasis):
         return self.patch
 
     @cached_property
-    def _modes(self) -> PlateModes:
+    def _modes(self) -> "PlateModes":
+        # scipy.sparse and scipy.spatial are slow to import, and seldom needed.
+        from kappaskin.bases.argyris import plate_modes
+
         return plate_modes(self._polygon.vertices, self.size, self.clamped)
 
     def _derivative(self, positions: Array, order: Order) -> Array:

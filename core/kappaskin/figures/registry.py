@@ -1,19 +1,28 @@
 """Names to figures, and figures to files."""
 
 from collections.abc import Callable, Iterable
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kappaskin.errors import Refusal
-from kappaskin.figures import fig1, fig2, fig6, fig8, fig9, initial_curvature, style
+from kappaskin.figures import style
 
-FIGURES: dict[str, Callable[[style.Figure], None]] = {
-    "fig1": fig1.draw,
-    "fig2": fig2.draw,
-    "fig6": fig6.draw,
-    "fig8": fig8.draw,
-    "fig9": fig9.draw,
-    "initial-curvature": initial_curvature.draw,
+Draw = Callable[[style.Figure], None]
+
+
+def _of(module: str) -> Draw:
+    """What draws the figure of that module, which is imported when it is first drawn."""
+    return lambda figure: import_module(f"kappaskin.figures.{module}").draw(figure)
+
+
+FIGURES: dict[str, Draw] = {
+    "fig1": _of("fig1"),
+    "fig2": _of("fig2"),
+    "fig6": _of("fig6"),
+    "fig8": _of("fig8"),
+    "fig9": _of("fig9"),
+    "initial-curvature": _of("initial_curvature"),
 }
 """What draws each figure on an empty matplotlib.figure.Figure; fig1 to fig9 are the paper's."""
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, optimize
+from scipy import linalg
 
 from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
@@ -70,6 +70,8 @@ class ElasticSkin:
 
         Its surface lies `gap` (k,) in m behind its tip at `points` (k, 2).
         """
+        from scipy.optimize import nnls  # slow to import, and seldom needed
+
         felt = self._felt(points)
         G = self._compliance.after(felt) @ felt.T
         G[np.diag_indices_from(G)] *= 1 + _SOFT
@@ -78,7 +80,7 @@ class ElasticSkin:
         heavy = _HEAVY * math.sqrt(G.max())
         A = np.vstack([L.T, np.full(len(gap), heavy)])
         b = np.append(linalg.solve_triangular(L, -gap, lower=True), heavy * force)
-        return optimize.nnls(A, b)[0]
+        return nnls(A, b)[0]
 
     def unresolved(self, forces: PointForces) -> Array:
         """Variance (R,) in 1/m^2 of what finer functions would add to the readings.
