@@ -36,7 +36,7 @@ from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direct
 from kappaskin_app.views.line import Line
 from kappaskin_app.wishes import Wishes
 
-_WORDS = 0.2  # s between two looks at what touches the skin
+_WORDS = 0.5  # s between two looks at what touches the skin: as fast as one can read
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
