@@ -466,7 +466,7 @@ HEXAGON = [(0.025, 0), (0.075, 0), (0.1, 0.0433), (0.075, 0.0866), (0.025, 0.086
 
 @pytest.mark.parametrize("patch", [Disk(0.05), Polygon(HEXAGON)], ids=["disk", "hexagon"])
 def test_objects_on_other_outlines_are_told_apart(patch):
-    skin, truth = Skin(patch), basis_for(patch, "hinged", 17, 17)
+    skin, truth = Skin(patch), basis_for(patch, "hinged", 15, 15)
     bent = skin.layout.curvature_operator(truth)
 
     def found(*loads):
