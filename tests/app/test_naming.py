@@ -3,7 +3,7 @@
 import time
 from dataclasses import replace
 
-from kappaskin import LineLoad, Pipeline, PointLoad, Setup, Simulator, load_scene
+from kappaskin import Pipeline, PointLoad, Setup, Simulator, load_scene
 from kappaskin_app.naming import curved
 
 
@@ -25,10 +25,12 @@ def test_nothing_is_told_of_a_skin_that_nothing_touches():
 
 
 def test_the_window_says_what_touches_the_skin(window, until):
-    window.history.change("Line", -1, load_case="line", noise_kind="none")
-    assert isinstance(window.session.scene.loads[0], LineLoad)
+    ends = {"x": 0.04, "y": 0.05, "x_end": 0.06, "y_end": 0.05}  # of a rigid blade
+    window.history.change("Blade", -1, load_case="two-points", force=0.2, **ends)
+    assert len(window.session.scene.loads) == 2
 
-    until(lambda: "edge" in window.object.text() and "skin there curves" in window.object.text())
+    until(lambda: window.object.text().startswith("edge, 20 mm long, axis "))
+    assert "skin there curves" in window.object.text()
 
     window.session.disconnect_from()
     until(lambda: not window.object.text())

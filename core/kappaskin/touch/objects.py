@@ -66,10 +66,11 @@ class ContactObject:
         """One line in millimetres and degrees, with the runner-up."""
         if not self.probability:
             return "nothing touches"
-        (_, first), (second, chance) = self.ranked[:2]
+        (likeliest, first), (second, chance) = self.ranked[:2]
+        if not self.kind and first >= _SURE:
+            return f"cannot tell: fits none of these objects, {likeliest} the least badly"
         if not self.kind:
-            names = " or ".join(name for name, _ in self.ranked[:2])
-            return f"{names}: cannot tell ({first:.0%} to {chance:.0%})"
+            return f"{likeliest} or {second}: cannot tell ({first:.0%} to {chance:.0%})"
         parts = [self.kind]
         if self.kind in ("cylinder", "sphere"):
             parts.append(self._radius())
