@@ -18,8 +18,8 @@ from kappaskin.calibration import check_place, save_calibration
 from kappaskin.doctor import examine
 from kappaskin.errors import Refusal
 from kappaskin.figures import FIGURES, write_figures
+from kappaskin.fit import METHODS
 from kappaskin.guide import summary, take_sweep
-from kappaskin.reconstruct import METHODS
 from kappaskin.reconstruct import reconstruct as reconstructed
 from kappaskin.scene import load_scene
 from kappaskin.studies.as_printed import misprints
@@ -85,7 +85,7 @@ def reconstruct(
     basis: _Pair = "8x8",
     grid: _Pair | None = None,
     edge: str = "hinged",
-    method: str = METHODS[0],
+    method: str = next(iter(METHODS)),
     contact: Annotated[bool, Parameter(negative="")] = False,
     objects: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
@@ -112,7 +112,8 @@ def reconstruct(
     edge
         How the skin is held: hinged, sliding, clamped or elastic.
     method
-        How the coefficients are found.
+        How the coefficients are found: least-squares, as-printed, direct, fast, bayes,
+        finite-slope, tracking or robust.
     contact
         Write the contact of each frame too, and the skin's geometry there.
     objects

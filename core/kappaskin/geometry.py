@@ -1,5 +1,6 @@
 """From the shape fitted to the readings to the skin's local geometry, anywhere on it."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,11 +31,7 @@ def local_geometry(fit: Fit, positions: Array) -> LocalGeometry:
         raise Refusal(
             f"expected the fit of one frame, got coefficients of shape {fit.coefficients.shape}"
         )
-    missing = np.isnan(fit.residual)
-    unit = fit.estimator.unit_covariance(missing if missing.any() else None)
-    return surface_geometry(
-        fit.estimator.basis, fit.coefficients, positions, float(fit.noise) ** 2 * unit
-    )
+    return surface_geometry(fit.estimator.basis, fit.coefficients, positions, fit.covariance_of)
 
 
 def contact_geometry(fit: Fit, touch: Touch) -> LocalGeometry:
@@ -43,11 +40,14 @@ def contact_geometry(fit: Fit, touch: Touch) -> LocalGeometry:
 
 
 def surface_geometry(
-    basis: Basis, coefficients: Array, positions: Array, covariance: Array
+    basis: Basis,
+    coefficients: Array,
+    positions: Array,
+    covariance_of: Callable[[Array], Array],
 ) -> LocalGeometry:
     """The geometry at `positions` (P, 2) or (2,) in m of the shape with `coefficients` (Ni, Nj).
 
-    `covariance` (N, N) in m^2 is that of the flattened coefficients.
+    `covariance_of` rows (..., 3, N) is that of their products with the flattened coefficients.
     """
     if coefficients.shape != basis.shape or positions.ndim > 2 or positions.shape[-1:] != (2,):
         raise Refusal(
@@ -67,7 +67,7 @@ def surface_geometry(
         *_frame(basis.patch, positions, jet),
         _matrix(xx, xy, xy, yy),
         np.array(_torsion_form(jet, H)).T,
-        to_form @ covariance @ to_form.swapaxes(-1, -2),
+        covariance_of(to_form),
     )
 
 

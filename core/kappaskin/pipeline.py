@@ -11,7 +11,7 @@ import numpy as np
 from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector
 from kappaskin.errors import RankDeficient
-from kappaskin.fit import RIM_SD, Fit, LeastSquares
+from kappaskin.fit import METHODS, RIM_SD, Fit, estimator_for
 from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.geometry import contact_geometry
 from kappaskin.hold import Hold
@@ -25,7 +25,8 @@ _LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is 
 class Setup:
     """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points.
 
-    `edge` says which functions; empty, those for the edge that the sensor says it has. A channel
+    `edge` says which functions; empty, those for the edge that the sensor says it has. `method` is
+    one of `METHODS`. A channel
     that a frame leaves out keeps its last reading until that is `hold` s old. Readings are
     corrected by the `calibration`, which must be the sensor's own. A rim that gives is expected to
     move by `rim_sd` in m.
@@ -36,6 +37,7 @@ class Setup:
     nx: int = 65
     ny: int = 65
     edge: str = ""
+    method: str = next(iter(METHODS))
     hold: float = 0.1
     calibration: Calibration | None = None
     rim_sd: float = RIM_SD
@@ -68,8 +70,10 @@ class Pipeline:
         edge = setup.edge or sensor.edge
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
-        self.fit = LeastSquares(self.basis, sensor.layout, rim_sd=setup.rim_sd)
-        self._loosest = _LOOSE * math.sqrt(np.trace(self.fit.unit_covariance()))
+        layout, rim_sd = sensor.layout, setup.rim_sd
+        self.fit = estimator_for(setup.method, self.basis, layout, rim_sd=rim_sd)
+        self._whole = self.fit(np.zeros((3, len(layout))))  # a frame with every reading
+        self._loosest = _LOOSE * np.linalg.norm(self._whole.unit_sd)
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         points = np.stack(np.meshgrid(self._x, self._y), axis=-1).reshape(-1, 2)
         on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
@@ -101,15 +105,15 @@ class Pipeline:
             fit = self.fit(curvature)
             if np.linalg.norm(fit.unit_sd) <= self._loosest:
                 return fit
-        nothing, unknown = self._no_shape, np.full_like(curvature, np.nan)
-        return Fit(self.fit, nothing, nothing, unknown, np.array(math.nan))
+        unknown = np.full_like(curvature, np.nan)
+        return Fit(self.fit, unknown, self._no_shape, self._whole.spreads, 0, np.array(math.nan))
 
     def __call__(self, frame: Frame) -> Estimate:
         curvature, fresh = self.past.hold(frame, self.curvature(frame))
         fit = self._fitted(curvature)
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
-        touch = self._touch(curvature, fit) if math.isfinite(noise) else NO_TOUCH
+        touch = self._touch(fit.curvature, fit) if math.isfinite(noise) else NO_TOUCH
         return Estimate(
             self.generation,
             frame.sequence,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.fit import Fit, LeastSquares
+from kappaskin.fit import METHODS, Fit, estimator_for
 from kappaskin.frames import Array, Touch
 from kappaskin.geometry import contact_geometry
 from kappaskin.layout import SensorLayout
@@ -19,9 +19,6 @@ from kappaskin.patch import Disk, Patch, Polygon
 from kappaskin.touch import KINDS, ContactObject, ObjectFinder, PointContact
 
 _NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
-
-METHODS = ("least-squares",)
-"""Ways from readings to coefficients, the default first."""
 
 _MOST = 2**27  # numbers in one array: 1 GiB
 
@@ -106,18 +103,23 @@ def _layout(path: Path, patch: Patch, positions: Array) -> SensorLayout:
     return SensorLayout.scattered(patch, positions)
 
 
-def _fit(basis: Basis, layout: SensorLayout, curvature: Array, sigma: Array | None) -> Fit:
-    """All T frames, each with its own sigma when there is one for each."""
+def _shapes(
+    method: str, basis: Basis, layout: SensorLayout, curvature: Array, sigma: Array | None
+) -> dict[str, NDArray[Any]]:
+    """`coefficients`, `sd` and `residual` of all T frames; `sigma` may be of each of them."""
+
+    def told(fit: Fit) -> dict[str, NDArray[Any]]:
+        return {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
+
     if sigma is None or sigma.ndim < 3:
-        return LeastSquares(basis, layout, sigma)(curvature)
-    fits: list[Fit] = []
-    for frame, own in enumerate(sigma):
+        return told(estimator_for(method, basis, layout, sigma)(curvature))
+    frames: list[dict[str, NDArray[Any]]] = []
+    for number, own in enumerate(sigma):
         try:
-            fits.append(LeastSquares(basis, layout, own)(curvature[frame]))
+            frames.append(told(estimator_for(method, basis, layout, own)(curvature[number])))
         except Refusal as error:
-            raise type(error)(f"frame {frame}: {error}") from error
-    stacked = [np.stack([getattr(fit, name) for fit in fits]) for name in Fit.arrays]
-    return Fit(fits[0].estimator, *stacked)
+            raise type(error)(f"frame {number}: {error}") from error
+    return {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
 
 
 def _check_sizes(basis: Basis, readings: int, surface: int) -> None:
@@ -141,7 +143,7 @@ def reconstruct(
     basis: tuple[int, int],
     grid: tuple[int, int] | None = None,
     edge: str = "hinged",
-    method: str = METHODS[0],
+    method: str = next(iter(METHODS)),
     contact: bool = False,
     objects: bool = False,
 ) -> dict[str, NDArray[Any]]:
@@ -152,8 +154,6 @@ def reconstruct(
     `method` one of `METHODS`. With `contact` also what `_contacts` gives, with `objects`
     what `_objects` gives besides.
     """
-    if method not in METHODS:
-        raise Refusal(f"expected a method among {', '.join(METHODS)}; got {method!r}")
     found = _read(readings)
     curvature, sigma = found["curvature"], found.get("sigma")
     radius = found.get("radius", np.array(np.inf))
@@ -174,20 +174,19 @@ def reconstruct(
     functions = basis_for(patch, edge, *basis)
     points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
     _check_sizes(functions, int(layout.live.sum()), points)
-    fit = _fit(functions, layout, curvature, sigma)
-    out: dict[str, NDArray[Any]]
-    out = {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
+    out = _shapes(method, functions, layout, curvature, sigma)
     if grid is not None:
         x, y = patch.grid(*grid)
-        out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(fit.coefficients)}
+        out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(out["coefficients"])}
     if contact or objects:
         rigidity = found.get("rigidity")
         if rigidity is not None and rigidity.size != 1:
             raise Refusal(f"expected one rigidity in N m, got shape {rigidity.shape}")
         plate = Plate(patch, 1.0 if rigidity is None else float(rigidity.item()))
-        fitter, touch_of = LeastSquares(functions, layout), PointContact(plate, layout, edge)
+        fitter = estimator_for(method, functions, layout)
+        touch_of = PointContact(plate, layout, edge)
         fits = [fitter(frame) for frame in curvature]
-        touches = [touch_of(frame, one) for frame, one in zip(curvature, fits, strict=True)]
+        touches = [touch_of(one.curvature, one) for one in fits]
         out |= _contacts(fits, touches, forces=rigidity is not None)
         if objects:
             find = ObjectFinder(plate, layout, edge)

@@ -1,5 +1,37 @@
-"""From curvature to coefficients."""
+"""From curvature to coefficients: several estimators that answer alike."""
 
-from kappaskin.fit.least_squares import RIM_SD as RIM_SD
-from kappaskin.fit.least_squares import Fit as Fit
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
+
+from kappaskin.bases import Basis
+from kappaskin.errors import Refusal
+from kappaskin.fit.baselines import AsPrinted as AsPrinted
+from kappaskin.fit.baselines import Direct as Direct
+from kappaskin.fit.estimator import RIM_SD as RIM_SD
+from kappaskin.fit.estimator import Estimator as Estimator
+from kappaskin.fit.estimator import Fit as Fit
+from kappaskin.fit.finite_slope import FiniteSlope as FiniteSlope
 from kappaskin.fit.least_squares import LeastSquares as LeastSquares
+from kappaskin.layout import SensorLayout
+
+METHODS: dict[str, type[Estimator]] = {
+    "least-squares": LeastSquares,
+    "as-printed": AsPrinted,
+    "direct": Direct,
+    "finite-slope": FiniteSlope,
+}
+"""Ways from readings to coefficients, the default first."""
+
+
+def estimator_for(
+    method: str,
+    basis: Basis,
+    layout: SensorLayout,
+    sigma: ArrayLike | None = None,
+    rim_sd: float = RIM_SD,
+    dtype: DTypeLike = np.float64,
+) -> Estimator:
+    """The estimator of this name; raises a `Refusal` when there is none or it cannot be made."""
+    if method not in METHODS:
+        raise Refusal(f"expected a method among {', '.join(METHODS)}; got {method!r}")
+    return METHODS[method](basis, layout, sigma, rim_sd, dtype)

@@ -93,7 +93,7 @@ class PointContact:
         explained = self._map(readings.h.reshape(self.basis.shape)) ** 2 / tables.norm
         explained[self._still] = 0.0
         row, column = divmod(int(explained.argmax()), len(self._x))
-        least = _threshold(readings.count - fit.estimator.unknowns) * float(fit.noise) ** 2
+        least = _threshold(float(np.asarray(fit.spare))) * float(fit.noise) ** 2
         if not explained[row, column] > least:
             return NO_TOUCH
         x = _highest(self._x, explained[row], column)
@@ -209,7 +209,7 @@ def _highest(x: Array, values: Array, i: int) -> float:
     return float(x[i] + (x[1] - x[0]) * (before - after) / (2 * bend)) if bend else float(x[i])
 
 
-def _threshold(spare: int) -> float:
+def _threshold(spare: float) -> float:
     """What a contact must explain, in units of the noise's variance known from `spare` readings.
 
     The likelihood ratio spare ln(1 + F / spare) must exceed `_SIGNIFICANT`.
