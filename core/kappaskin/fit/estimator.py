@@ -282,7 +282,7 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
     spreads: list[Spread] = []
     for fit in fits:
         own = fit.spreads
-        spreads += own if isinstance(own, Sequence) else [own] * len(fit.curvature)
+        spreads.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
     told = [fit.told_noise for fit in fits if fit.told_noise is not None]
     return Fit(
         fits[0].estimator,
