@@ -7,18 +7,23 @@ from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.fit.baselines import AsPrinted as AsPrinted
 from kappaskin.fit.baselines import Direct as Direct
+from kappaskin.fit.bayes import Bayes as Bayes
 from kappaskin.fit.estimator import RIM_SD as RIM_SD
 from kappaskin.fit.estimator import Estimator as Estimator
 from kappaskin.fit.estimator import Fit as Fit
 from kappaskin.fit.finite_slope import FiniteSlope as FiniteSlope
 from kappaskin.fit.least_squares import LeastSquares as LeastSquares
+from kappaskin.fit.robust import WHY as WHY
+from kappaskin.fit.robust import Robust as Robust
 from kappaskin.layout import SensorLayout
 
 METHODS: dict[str, type[Estimator]] = {
     "least-squares": LeastSquares,
     "as-printed": AsPrinted,
     "direct": Direct,
+    "bayes": Bayes,
     "finite-slope": FiniteSlope,
+    "robust": Robust,
 }
 """Ways from readings to coefficients, the default first."""
 

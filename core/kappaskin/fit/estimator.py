@@ -70,7 +70,8 @@ class Fit:
     noise, of each frame when there are several; `spare` (...) how many readings there are beyond
     those that the shape took. `told_noise` (...) is the noise in 1/m where the estimator knows it.
     An iteration took `steps` (...); where it has not `converged` (...), the answer is that of
-    least squares.
+    least squares. `suspect` (..., P) says which elements were left out and why, by their number in
+    `WHY`; None where none is ever suspected.
     """
 
     estimator: "Estimator"
@@ -81,6 +82,7 @@ class Fit:
     told_noise: Array | None = None
     steps: ArrayLike = 0
     converged: ArrayLike = True
+    suspect: "NDArray[np.uint8] | None" = None
 
     @cached_property
     def residual(self) -> Array:
@@ -284,6 +286,7 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
         own = fit.spreads
         spreads.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
     told = [fit.told_noise for fit in fits if fit.told_noise is not None]
+    suspect = [fit.suspect for fit in fits if fit.suspect is not None]
     return Fit(
         fits[0].estimator,
         joined([fit.curvature for fit in fits]),
@@ -293,4 +296,5 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
         joined(told) if told else None,
         of_each("steps"),
         of_each("converged"),
+        np.concatenate(suspect)[order] if suspect else None,
     )
