@@ -119,7 +119,7 @@ class Display:
             self.notice.show_warning("")
             return
         crossed, _ = self.marks(estimate.curvature)
-        self.notice.show_warning(warnings(estimate.touch, int(crossed.sum())))
+        self.notice.show_warning(warnings(estimate, int(crossed.sum())))
 
     def estimate_shown(self) -> Estimate | None:
         """The newest estimate, None while what it shows is not coming in any more."""
@@ -152,7 +152,7 @@ class Display:
             crossed, dotted = self.marks(estimate.curvature)
             for row, (name, heatmap) in enumerate(self.heatmaps.items()):
                 readings = estimate.curvature[row]
-                heatmap.show_marks(crossed, dotted)
+                heatmap.show_marks(crossed, dotted, estimate.suspect > 0)
                 heatmap.show_values(readings, self.ranges.limit(name, readings, settings, now))
 
     def marks(self, curvature: Array) -> tuple[Mask, Mask]:

@@ -41,7 +41,8 @@ _STATUS = 0.05  # s between two looks at the status
 
 def _setup_of(settings: Settings, sensor: Sensor | None = None) -> Setup:
     """The setup asked for, with the calibration if it is one of `sensor`."""
-    setup = Setup(settings.functions_x, settings.functions_y, edge=settings.fit_edge)
+    s = settings
+    setup = Setup(s.functions_x, s.functions_y, edge=s.fit_edge, method=s.method)
     if settings.calibration is not None and sensor is not None:
         with suppress(Refusal):
             settings.calibration.check(sensor)

@@ -36,12 +36,15 @@ from kappaskin.errors import SourceError as SourceError
 from kappaskin.figures import FIGURES as FIGURES
 from kappaskin.figures import write_figures as write_figures
 from kappaskin.fit import METHODS as METHODS
+from kappaskin.fit import WHY as WHY
 from kappaskin.fit import AsPrinted as AsPrinted
+from kappaskin.fit import Bayes as Bayes
 from kappaskin.fit import Direct as Direct
 from kappaskin.fit import Estimator as Estimator
 from kappaskin.fit import FiniteSlope as FiniteSlope
 from kappaskin.fit import Fit as Fit
 from kappaskin.fit import LeastSquares as LeastSquares
+from kappaskin.fit import Robust as Robust
 from kappaskin.fit import estimator_for as estimator_for
 from kappaskin.frames import COMPONENTS as COMPONENTS
 from kappaskin.frames import Estimate as Estimate

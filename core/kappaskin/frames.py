@@ -189,7 +189,9 @@ class Estimate:
     `curvature` and `residual` (3, P) in 1/m, NaN where a reading is missing; `fresh` (3, P) which
     readings this frame brought: the others are held from earlier ones; `coefficients`
     (Ni, Nj) in m; `surface` (ny, nx) in m, NaN off the skin; `noise` is the standard deviation of
-    a reading in 1/m as the residual tells it; `geometry` is that of the skin at the contact.
+    a reading in 1/m as the residual tells it; `suspect` (P,) numbers in `WHY` why an element was
+    left out, 0 if it was not; `converged` is False where an iteration gave up for least squares;
+    `fit_time` in s is what the fit took. `geometry` is that of the skin at the contact.
     `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a
     simulation made the frame. `ready_time` is when the estimate was done, on the clock of
     `host_time`.
@@ -206,6 +208,9 @@ class Estimate:
     coefficients: Array
     surface: Array
     noise: float
+    suspect: NDArray[np.uint8]
+    converged: bool
+    fit_time: float
     touch: Touch
     geometry: LocalGeometry
     true_surface: Array

@@ -73,7 +73,8 @@ class Pipeline:
         layout, rim_sd = sensor.layout, setup.rim_sd
         self.fit = estimator_for(setup.method, self.basis, layout, rim_sd=rim_sd)
         self._whole = self.fit(np.zeros((3, len(layout))))  # a frame with every reading
-        self._loosest = _LOOSE * np.linalg.norm(self._whole.unit_sd)
+        loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
+        self._loosest = math.inf if self.fit.has_prior else loosest
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         points = np.stack(np.meshgrid(self._x, self._y), axis=-1).reshape(-1, 2)
         on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
@@ -110,7 +111,9 @@ class Pipeline:
 
     def __call__(self, frame: Frame) -> Estimate:
         curvature, fresh = self.past.hold(frame, self.curvature(frame))
+        began = time.perf_counter()
         fit = self._fitted(curvature)
+        fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
         touch = self._touch(fit.curvature, fit) if math.isfinite(noise) else NO_TOUCH
@@ -126,6 +129,9 @@ class Pipeline:
             fit.coefficients,
             surface,
             noise,
+            np.zeros(curvature.shape[1], np.uint8) if fit.suspect is None else fit.suspect,
+            bool(fit.converged),
+            fit_time,
             touch,
             contact_geometry(fit, touch),
             *self._compared(surface, fit.coefficients, frame.truth),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.fit import METHODS, Fit, estimator_for
+from kappaskin.fit import METHODS, Fit, check_method, estimator_for
 from kappaskin.frames import Array, Touch
 from kappaskin.geometry import contact_geometry
 from kappaskin.layout import SensorLayout
@@ -122,13 +122,14 @@ def _shapes(
     return {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
 
 
-def _check_sizes(basis: Basis, readings: int, surface: int) -> None:
+def _check_sizes(basis: Basis, readings: int, surface: int, has_prior: bool) -> None:
     """Refuse what would exhaust the memory before anything is computed."""
     (Ni, Nj), N = basis.shape, basis.size
-    if readings < N:
+    if readings < N and not has_prior:
         raise RankDeficient(
             f"expected at most {readings} functions for {readings} readings per frame, got "
-            f"{Ni} x {Nj} = {N}; use a smaller basis, or more elements"
+            f"{Ni} x {Nj} = {N}; use a smaller basis, more elements, or a "
+            "prior (bayes)"
         )
     if max(readings * N, surface) > _MOST:
         raise Refusal(
@@ -172,8 +173,9 @@ def reconstruct(
             f"(3, {len(layout)}), or one number; got {sigma.shape}"
         )
     functions = basis_for(patch, edge, *basis)
+    check_method(method)
     points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
-    _check_sizes(functions, int(layout.live.sum()), points)
+    _check_sizes(functions, int(layout.live.sum()), points, METHODS[method].has_prior)
     out = _shapes(method, functions, layout, curvature, sigma)
     if grid is not None:
         x, y = patch.grid(*grid)

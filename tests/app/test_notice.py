@@ -5,26 +5,50 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import Touch
+from kappaskin import WHY, Pipeline, Setup, Simulator, Touch, load_scene
 from kappaskin_app.theme import DARK, LIGHT
 from kappaskin_app.views.notice import Notice, warnings
 
 INSIDE = Touch(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
 NEAR = replace(INSIDE, near_rim=True)
+SCENE = load_scene("centre")
+ESTIMATE = Pipeline(SCENE.sensor(), Setup())(Simulator(SCENE).frame(0, lambda: 0.0))
+
+
+def suspecting(**why: int) -> np.ndarray:
+    """Codes (100,) that call so many elements, from the first on, by what they are left out for."""
+    codes = [WHY.index(kind) for kind, count in why.items() for _ in range(count)]
+    return np.array(codes + [0] * (100 - len(codes)), np.uint8)
 
 
 @pytest.mark.parametrize(
     ("touch", "strained", "words"),
     [
-        (None, 0, ""),
         (INSIDE, 0, ""),
         (NEAR, 0, "Contact too near the rim to trust"),
         (INSIDE, 1, "1 element over 1 % strain"),
         (NEAR, 12, "12 elements over 1 % strain; contact too near the rim to trust"),
     ],
 )
-def test_what_is_doubtful_is_told_in_words(touch: Touch | None, strained: int, words: str) -> None:
-    assert warnings(touch, strained) == words
+def test_what_is_doubtful_is_told_in_words(touch: Touch, strained: int, words: str) -> None:
+    assert warnings(replace(ESTIMATE, touch=touch), strained) == words
+
+
+@pytest.mark.parametrize(
+    ("suspect", "words"),
+    [
+        (suspecting(stuck=1), "Element 0 (stuck) left out"),
+        (suspecting(spike=1, swapped=2), "Elements 0 (spike), 1 (swapped), 2 (swapped) left out"),
+        (suspecting(noisy=3, stuck=2), "5 elements left out (stuck, noisy)"),
+    ],
+)
+def test_elements_that_are_left_out_are_named(suspect: np.ndarray, words: str) -> None:
+    assert warnings(replace(ESTIMATE, suspect=suspect), 0) == words
+
+
+def test_an_iteration_that_gave_up_is_told() -> None:
+    words = "The iteration gave up, least squares shown"
+    assert warnings(replace(ESTIMATE, converged=False), 0) == words
 
 
 def test_a_warning_takes_the_hints_place_in_the_colour_of_alarms_and_gives_it_back(qapp) -> None:

@@ -16,7 +16,7 @@ class BasisPanel(Form):
     """Asks for Ni x Nj and the edge, and says why a choice was not taken."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Basis", ("functions_x", "functions_y", "fit_edge"), parent)
+        super().__init__("Basis", ("functions_x", "functions_y", "method", "fit_edge"), parent)
 
     def show_status(self, status: Status, simulating: bool) -> None:
         if status.sensor is not None:

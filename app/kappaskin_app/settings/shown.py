@@ -11,11 +11,19 @@ COLOURS = (
     ("yy", "Curvature yy"),
     ("xy", "Twist xy"),
 )
+METHOD_NAMES = (
+    ("least-squares", "Least squares"),
+    ("as-printed", "As printed (Eq. 6)"),
+    ("direct", "Direct, each frame anew"),
+    ("bayes", "Bayes, a plate's prior"),
+    ("finite-slope", "Finite slope"),
+    ("robust", "Robust, leaves out bad elements"),
+)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """The functions that the shape is made of."""
+    """The functions that the shape is made of, and how they are fitted."""
 
     functions_x: int = asked(
         8,
@@ -30,6 +38,15 @@ class Fit:
     )
     functions_y: int = asked(
         8, Range("Functions along y", "Nj, the same along y (Eq. 1).", 1, 64, 1)
+    )
+    method: str = asked(
+        "least-squares",
+        Choice(
+            "Estimator",
+            "How the shape is found from the readings. Every way tells its error bars; the page "
+            "Cost shows what each takes and gives.",
+            METHOD_NAMES,
+        ),
     )
     fit_edge: str = asked(
         "",

@@ -21,7 +21,7 @@ Indices = NDArray[np.intp]
 _LEGEND = (
     "One cell for each element. Grey: no reading, dead or at the end of the converter's range. "
     "Crossed: bent beyond 1 % strain, where the gage is not elastic any more. Dotted: chosen to be "
-    "in every frame."
+    "in every frame. Ringed: left out, because the others contradict it."
 )
 
 
@@ -50,7 +50,7 @@ class _Cells(QWidget):
         self._colours: Colours = np.empty((0, 3), np.uint8)
         self._line = QColor("#888888")
         self._under, self._faded = -1, False
-        self._marks: tuple[list[int], list[int]] = ([], [])
+        self._marks: tuple[list[int], ...] = ([], [], [])
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(90, 90)
@@ -60,7 +60,7 @@ class _Cells(QWidget):
 
     def show_layout(self, layout: SensorLayout) -> None:
         self._layout = layout
-        self._under, self._marks = -1, ([], [])
+        self._under, self._marks = -1, ([], [], [])
 
     def _spacing(self) -> float:
         """What separates the two nearest elements, in m: squares of that side hide none."""
@@ -75,9 +75,9 @@ class _Cells(QWidget):
         self._colours = rgb
         self.update()
 
-    def show_marks(self, crossed: Indices, dotted: Indices) -> None:
-        """Cross out and dot elements by number."""
-        marks = (crossed.tolist(), dotted.tolist())
+    def show_marks(self, crossed: Indices, dotted: Indices, ringed: Indices) -> None:
+        """Cross out, dot and ring elements by number."""
+        marks = (crossed.tolist(), dotted.tolist(), ringed.tolist())
         if marks != self._marks:
             self._marks = marks
             self.update()
@@ -144,17 +144,21 @@ class _Cells(QWidget):
                 painter.drawRect(cell)
 
     def _paint_marks(self, painter: QPainter, area: QRectF) -> None:
-        crossed, dotted = self._marks
+        crossed, dotted, ringed = self._marks
         for colour, width in (("#16191d", 3), ("#ffffff", 1)):  # seen on every colour
             painter.setPen(QPen(QColor(colour), width))
             for element in crossed:
                 cell = self._cell(area, element)
                 painter.drawLine(cell.topLeft(), cell.bottomRight())
                 painter.drawLine(cell.bottomLeft(), cell.topRight())
+            for element in ringed:
+                cell = self._cell(area, element)
+                reach = 0.36 * min(cell.width(), cell.height())
+                painter.drawEllipse(cell.center(), reach, reach)
             painter.setBrush(QColor(colour))
             for element in dotted:
                 painter.drawEllipse(self._cell(area, element).center(), 1.5, 1.5)
-        painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setBrush(Qt.BrushStyle.NoBrush)
 
     def _cell(self, area: QRectF, element: int) -> QRectF:
         if self._layout is None or not self._layout.shape:
@@ -248,9 +252,9 @@ class Heatmap(QWidget):
         self.cells.show_cells(coloured(values, limits, DIVERGING, self._missing))
         self.bar.show_scale(DIVERGING, limits, "1/m")
 
-    def show_marks(self, crossed: Mask, dotted: Mask) -> None:
-        """Cross out elements (P,) bent beyond their strain limit, dot those chosen to scan."""
-        self.cells.show_marks(np.flatnonzero(crossed), np.flatnonzero(dotted))
+    def show_marks(self, crossed: Mask, dotted: Mask, ringed: Mask) -> None:
+        """Cross out elements (P,) bent too far, dot those chosen to scan, ring those left out."""
+        self.cells.show_marks(*(np.flatnonzero(mask) for mask in (crossed, dotted, ringed)))
 
     def show_lost(self, lost: bool) -> None:
         """Fade the cells while what they show is not coming in any more."""

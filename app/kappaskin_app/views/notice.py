@@ -1,24 +1,42 @@
 """A hint at the foot of the window, until there is something to warn of."""
 
+import numpy as np
 from PySide6.QtWidgets import QLabel, QWidget
 
-from kappaskin import Touch
+from kappaskin import WHY, Estimate
 from kappaskin_app.theme import LIGHT, Theme
 
 _TIP = (
     "Near the rim: no force moves the skin where it is held, so that a light touch further inside "
     "and a hard one at the rim read alike; an edge that gives may be assumed instead (Basis). "
     "Strain: beyond 1 % a metal gage is not elastic any more; these elements are crossed out in "
-    "the heatmaps."
+    "the heatmaps. Left out: elements, counted from 0, that the others contradict; ringed there."
 )
 
 
-def warnings(touch: Touch | None, strained: int) -> str:
-    """What is doubtful in words: a contact near the rim, so many elements `strained` too far."""
-    told: list[str] = []
+_NAMED = 4  # elements that are named one by one
+
+
+def _left_out(estimate: Estimate) -> str:
+    """Which elements are left out and why."""
+    out = np.flatnonzero(estimate.suspect)
+    if not len(out):
+        return ""
+    if len(out) > _NAMED:
+        kinds = [WHY[kind] for kind in np.unique(estimate.suspect[out])]
+        return f"{len(out)} elements left out ({', '.join(kinds)})"
+    named = ", ".join(f"{element} ({WHY[estimate.suspect[element]]})" for element in out)
+    return f"element{'s' if len(out) > 1 else ''} {named} left out"
+
+
+def warnings(estimate: Estimate, strained: int) -> str:
+    """What is doubtful of an estimate in words; so many elements are `strained` too far."""
+    told = [_left_out(estimate)] if estimate.suspect.any() else []
+    if not estimate.converged:
+        told.append("the iteration gave up, least squares shown")
     if strained:
         told.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
-    if touch is not None and touch.near_rim:
+    if estimate.touch.near_rim:
         told.append("contact too near the rim to trust")
     words = "; ".join(told)
     return words[:1].upper() + words[1:]

@@ -28,6 +28,12 @@ METHODS: dict[str, type[Estimator]] = {
 """Ways from readings to coefficients, the default first."""
 
 
+def check_method(method: str) -> None:
+    """Refuse a method that there is not."""
+    if method not in METHODS:
+        raise Refusal(f"expected a method among {', '.join(METHODS)}; got {method!r}")
+
+
 def estimator_for(
     method: str,
     basis: Basis,
@@ -37,6 +43,5 @@ def estimator_for(
     dtype: DTypeLike = np.float64,
 ) -> Estimator:
     """The estimator of this name; raises a `Refusal` when there is none or it cannot be made."""
-    if method not in METHODS:
-        raise Refusal(f"expected a method among {', '.join(METHODS)}; got {method!r}")
+    check_method(method)
     return METHODS[method](basis, layout, sigma, rim_sd, dtype)

@@ -98,4 +98,4 @@ class Direct(_PerFrame):
             root = back @ np.linalg.pinv(A.astype(float))
             return root @ root.T
 
-        return self._fitted(flat, used, (back @ g).T, DenseSpread(covariance))
+        return self._fitted(flat, used, (back @ g).T.astype(self.dtype), DenseSpread(covariance))

@@ -3,7 +3,6 @@
 import math
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -50,7 +49,7 @@ class Evidence:
     """The prior's scale and the noise that make readings K = A z most likely, A (R, F)."""
 
     def __init__(self, A: Array, told: bool, floor: float) -> None:
-        U, s, Vt = cast("tuple[Array, Array, Array]", linalg.svd(A, full_matrices=len(A) < A.shape[1]))
+        U, s, Vt = linalg.svd(A, full_matrices=len(A) < A.shape[1])
         k = len(s)
         self.U, self.V = U[:, :k], Vt.T
         self.s2 = np.zeros(len(Vt))
@@ -58,7 +57,7 @@ class Evidence:
         self._k, self._told, self._readings = k, told, len(A)
         self._top = math.log(self.s2[0]) if s[0] > 0 else 0.0
         self._floor = floor  # of the readings' own power: what their rounding leaves
-        d = 1 + np.exp(np.minimum.outer(_GRID, np.inf) - self._top)[:, None] * self.s2[:k]
+        d = 1 + np.exp(_GRID - self._top)[:, None] * self.s2[:k]
         self._share, self._volume = 1 / d, np.log(d).sum(axis=1)
 
     def __call__(self, K: Array) -> tuple[Array, Array, Array]:
@@ -126,6 +125,8 @@ class Bayes(Estimator):
     likelihood, doi:10.1162/neco.1992.4.3.415), of each frame by itself. What the readings do not
     decide is left to the prior, with error bars that say so: no basis is too large.
     """
+
+    has_prior = True
 
     def __init__(
         self,

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, cast
+from typing import ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -98,7 +98,7 @@ class Fit:
         """
         if self.told_noise is not None:
             return self.told_noise
-        left = self.residual.reshape(*self.residual.shape[:-2], -1)
+        left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
         squares = np.vecdot(left, left)
         if np.isnan(squares).any():
             left = np.where(np.isnan(left), 0.0, left)
@@ -161,6 +161,9 @@ class Estimator(ABC):
     shape that no reading sees, by RMS along the rim. A frame is computed in `dtype`, which is
     float64 or float32; the factorisation always in float64.
     """
+
+    has_prior: ClassVar = False
+    """Whether what the readings do not decide is left to a prior, so that no basis is too large."""
 
     def __init__(
         self,
@@ -286,7 +289,7 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
         own = fit.spreads
         spreads.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
     told = [fit.told_noise for fit in fits if fit.told_noise is not None]
-    suspect = [fit.suspect for fit in fits if fit.suspect is not None]
+    suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
     return Fit(
         fits[0].estimator,
         joined([fit.curvature for fit in fits]),

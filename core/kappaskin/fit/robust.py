@@ -90,9 +90,7 @@ class Robust(Estimator):
         self._linear = LeastSquares(basis, layout, sigma, rim_sd, dtype)
         across = 1 if basis.patch.strip else max(basis.shape[1], _FUNCTIONS)
         rich = replace(cast("Any", basis), Ni=max(basis.shape[0], _FUNCTIONS), Nj=across)
-        self._A: Array = self.weight[:, None] * (
-            layout.curvature_operator(rich) @ prior_root(rich)
-        )
+        self._A: Array = self.weight[:, None] * (layout.curvature_operator(rich) @ prior_root(rich))
         self._take_presses(rich)
         self._judges: OrderedDict[bytes, _Judge] = OrderedDict()
         P = len(layout)
@@ -138,48 +136,55 @@ class Robust(Estimator):
         K = flat.reshape(*frames, 3, P)
         verdicts = [self._told(frame, used) for frame in np.atleast_2d(flat)]
         why = [
-            self._history(readings, told.suspects, told.off / self.weight.reshape(3, P))
+            self._history(readings, told.suspects, told.off)
             for readings, told in zip(K.reshape(-1, 3, P), verdicts, strict=True)
         ]
         out = np.reshape([told.suspects for told in verdicts], (*frames, 1, P))
         return replace(
             self._linear(np.where(out, np.nan, K)),
             estimator=self,
-            steps=np.reshape([told.rounds for told in verdicts], frames),
-            converged=np.reshape([not told.hopeless for told in verdicts], frames),
-            suspect=np.reshape(why, (*frames, P)),
+            steps=np.array([told.rounds for told in verdicts], int).reshape(frames),
+            converged=np.array([not told.hopeless for told in verdicts], bool).reshape(frames),
+            suspect=np.array(why, np.uint8).reshape(*frames, P),
         )
 
     def _told(self, flat: Array, used: Mask) -> _Verdict:
         judge, P = self._judge(used), len(self.layout)
         K = np.where(used, flat, 0.0) * self.weight
-        suspects, loads = self._outrageous(K), list[int]()
+        suspects, loads, rounds = self._outrageous(K), list[int](), 0
         (gamma,) = judge.evidence(K[None, used])[1]
-        for rounds in range(_ROUNDS):
+        while suspects.sum() <= _MOST * P:
             free = np.hstack([_columns(suspects), *(self._presses[:, g] for g in loads)])
             view = _View(judge, K, free, float(gamma))
             _, (gamma,), (sigma,) = judge.evidence((K - view.explained)[None, used])
-            if not sigma:
-                break  # nothing but zeros
             left = judge.count - free.shape[1]
-            variance = 1.0 if self.told_sigma else sigma**2 * judge.count / left
-            t = view.contradiction(suspects) / variance
-            press = self._press(view, judge) / variance
-            others = t[~suspects].max(initial=0.0)
-            place = int(press.argmax())
-            if press[place] > max(others, self._press_limit) and len(loads) < _LOADS:
+            variance = 1.0 if self.told_sigma else float(sigma) ** 2 * judge.count / left
+            found, place = self._found(view, judge, suspects, variance)
+            if place is not None and len(loads) < _LOADS:
                 loads.append(place)
-                continue
-            least = np.maximum(self._limit, others / _AT_ONCE)
-            found = t > np.where(suspects, _BACK * self._limit, least)
-            if (found == suspects).all():
-                break
-            suspects = found
-            if suspects.sum() > _MOST * P:
-                return _Verdict(np.zeros(P, bool), np.zeros((3, P)), rounds, hopeless=True)
-        off = np.zeros(3 * P)
-        off[np.tile(suspects, 3)] = view.amounts[: 3 * suspects.sum()]
-        return _Verdict(suspects, off.reshape(3, P), rounds, hopeless=False)
+            elif (found == suspects).all() or rounds == _ROUNDS:
+                off = np.zeros(3 * P)
+                out = np.tile(suspects, 3)
+                off[out] = view.amounts[: 3 * suspects.sum()]
+                out &= judge.used
+                off[out] /= self.weight[out]
+                return _Verdict(suspects, off.reshape(3, P), rounds, hopeless=False)
+            else:
+                suspects = found
+            rounds += 1
+        return _Verdict(np.zeros(P, bool), np.zeros((3, P)), rounds, hopeless=True)
+
+    def _found(
+        self, view: "_View", judge: _Judge, suspects: Mask, variance: float
+    ) -> tuple[Mask, int | None]:
+        """Which elements (P,) the rest contradicts; a place where a load would explain more."""
+        if not variance:  # nothing but zeros
+            return suspects, None
+        t, press = view.contradiction(suspects) / variance, self._press(view, judge) / variance
+        most, place = t[~suspects].max(initial=0.0), int(press.argmax())
+        least = np.maximum(self._limit, most / _AT_ONCE)
+        found = t > np.where(suspects, _BACK * self._limit, least)
+        return found, place if press[place] > max(most, self._press_limit) else None
 
     def _outrageous(self, K: Array) -> Mask:
         """The elements (P,) that read so much more than most that they are suspected at once."""
@@ -209,7 +214,8 @@ class _View:
         self._Uw = U * self.w
         self._U, self._free = U, free
         self._QF = free - self._Uw @ (U.T @ free)
-        self._inverse: Array = np.linalg.inv(free.T @ self._QF)
+        inverse: Array = np.linalg.inv(free.T @ self._QF)
+        self._inverse = inverse
         r = K - self._Uw @ (K @ U)
         self.amounts = self._inverse @ (free.T @ r)
         self.explained = free @ self.amounts
@@ -220,8 +226,8 @@ class _View:
     def contradiction(self, out: Mask) -> Array:
         """How far each element is from the rest (P,), chi-squared; those `out` come first."""
         P = len(out)
-        D = np.eye(3) - _crossed(self._Uw, self._U, P)
-        D -= _crossed(self._QF @ self._inverse, self._QF, P)
+        taken = _crossed(self._QF @ self._inverse, self._QF, P)
+        D: Array = np.eye(3) - _crossed(self._Uw, self._U, P) - taken
         r = self.r.reshape(3, P).T.copy()
         own = np.flatnonzero(out)
         block = np.arange(len(own))[:, None] + len(own) * np.arange(3)
