@@ -1,5 +1,7 @@
 """What shapes to expect before any reading: a basis to the covariance of its coefficients."""
 
+from typing import cast
+
 import numpy as np
 
 from kappaskin.bases import Basis, SineBasis
@@ -25,7 +27,7 @@ def prior_root(basis: Basis) -> Array:
     points, weights = basis.quadrature()
     f = np.sqrt(weights / weights.sum())[:, None] * basis.at(points)
     # With f = Q R, G = R'R and C R' is a root of C G C; R C R' is one of the displacement's.
-    R: Array = np.linalg.qr(f, mode="r")
+    R = _triangle(f)
     root = _on_free(basis, Plate(basis.patch).compliance(basis).after(R).T)
     return root / np.linalg.norm(R @ root)
 
@@ -34,5 +36,10 @@ def _on_free(basis: Basis, root: Array) -> Array:
     """The part of a covariance's `root` (N, N) on the free combinations, as a root (N, F)."""
     W = np.eye(basis.size) if basis.free is None else basis.free
     V = W if basis.unseen is None else np.hstack([W, basis.unseen])
-    share: Array = np.linalg.lstsq(V, root)[0][: W.shape[1]]
-    return W @ np.linalg.qr(share.T, mode="r").T
+    share = cast("Array", np.linalg.lstsq(V, root)[0])[: W.shape[1]]
+    return W @ _triangle(share.T).T
+
+
+def _triangle(A: Array) -> Array:
+    """The triangular R of A = Q R: a root, R'R = A'A."""
+    return cast("Array", np.linalg.qr(A, mode="r"))
