@@ -81,6 +81,7 @@ class Pipeline:
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
+        self._none_suspect = np.zeros(len(layout), np.uint8)
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
         self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
@@ -129,7 +130,7 @@ class Pipeline:
             fit.coefficients,
             surface,
             noise,
-            np.zeros(curvature.shape[1], np.uint8) if fit.suspect is None else fit.suspect,
+            self._none_suspect if fit.suspect is None else fit.suspect,
             bool(fit.converged),
             fit_time,
             touch,

@@ -214,8 +214,7 @@ class _View:
         self._Uw = U * self.w
         self._U, self._free = U, free
         self._QF = free - self._Uw @ (U.T @ free)
-        inverse: Array = np.linalg.inv(free.T @ self._QF)
-        self._inverse = inverse
+        self._inverse = cast("Array", np.linalg.inv(free.T @ self._QF))
         r = K - self._Uw @ (K @ U)
         self.amounts = self._inverse @ (free.T @ r)
         self.explained = free @ self.amounts
