@@ -10,6 +10,7 @@ from kappaskin.fit.baselines import Direct as Direct
 from kappaskin.fit.estimator import RIM_SD as RIM_SD
 from kappaskin.fit.estimator import Estimator as Estimator
 from kappaskin.fit.estimator import Fit as Fit
+from kappaskin.fit.fast import Fast as Fast
 from kappaskin.fit.finite_slope import FiniteSlope as FiniteSlope
 from kappaskin.fit.least_squares import LeastSquares as LeastSquares
 from kappaskin.layout import SensorLayout
@@ -18,6 +19,7 @@ METHODS: dict[str, type[Estimator]] = {
     "least-squares": LeastSquares,
     "as-printed": AsPrinted,
     "direct": Direct,
+    "fast": Fast,
     "finite-slope": FiniteSlope,
 }
 """Ways from readings to coefficients, the default first."""

@@ -101,8 +101,7 @@ class Fit:
         if np.isnan(squares).any():
             left = np.where(np.isnan(left), 0.0, left)
             squares = np.vecdot(left, left)
-        spare = np.asarray(self.spare, float)
-        return np.sqrt(np.divide(squares, spare, where=spare > 0, out=np.full(spare.shape, np.nan)))
+        return np.sqrt(squares / np.where(np.greater(self.spare, 0), self.spare, np.nan))
 
     def _each(self, told: Callable[[Spread], Array], shape: tuple[int, ...]) -> Array:
         """What is `told` of the spread, of this `shape`, for each frame when there are several."""
@@ -240,10 +239,10 @@ class Estimator(ABC):
     def _fit(self, flat: Array, used: Mask) -> Fit:
         """Fit readings (3 P,) or (T, 3 P) of which those `used` (3 P,) are there, the rest NaN."""
 
-    def refusal(self, readings: int, rank: int) -> RankDeficient:
+    def refusal(self, readings: int, rank: int, at_most: bool = False) -> RankDeficient:
         """Why `readings` of them, which determine `rank` coefficients, do not decide a shape."""
         (Ni, Nj), N, layout = self.basis.shape, self.unknowns, self.layout
-        bound = "at most " if readings < N else ""
+        bound = "at most " if at_most or readings < N else ""
         what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
         what += f"of a {Ni} x {Nj} basis"
         if readings == 0:
