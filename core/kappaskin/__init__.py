@@ -41,6 +41,7 @@ from kappaskin.fit import AsPrinted as AsPrinted
 from kappaskin.fit import Bayes as Bayes
 from kappaskin.fit import Direct as Direct
 from kappaskin.fit import Estimator as Estimator
+from kappaskin.fit import Fast as Fast
 from kappaskin.fit import FiniteSlope as FiniteSlope
 from kappaskin.fit import Fit as Fit
 from kappaskin.fit import LeastSquares as LeastSquares

@@ -11,6 +11,7 @@ from kappaskin.fit.bayes import Bayes as Bayes
 from kappaskin.fit.estimator import RIM_SD as RIM_SD
 from kappaskin.fit.estimator import Estimator as Estimator
 from kappaskin.fit.estimator import Fit as Fit
+from kappaskin.fit.fast import Fast as Fast
 from kappaskin.fit.finite_slope import FiniteSlope as FiniteSlope
 from kappaskin.fit.least_squares import LeastSquares as LeastSquares
 from kappaskin.fit.robust import WHY as WHY
@@ -21,6 +22,7 @@ METHODS: dict[str, type[Estimator]] = {
     "least-squares": LeastSquares,
     "as-printed": AsPrinted,
     "direct": Direct,
+    "fast": Fast,
     "bayes": Bayes,
     "finite-slope": FiniteSlope,
     "robust": Robust,

@@ -1,5 +1,6 @@
 """What every estimator takes and answers: curvature to coefficients, error bars, what is left."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -100,11 +101,12 @@ class Fit:
             return self.told_noise
         left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
         squares = np.vecdot(left, left)
-        if np.isnan(squares).any():
+        if np.count_nonzero(squares != squares):  # NaN, told in a tenth of the time of any()
             left = np.where(np.isnan(left), 0.0, left)
             squares = np.vecdot(left, left)
-        spare = np.asarray(self.spare, float)
-        return np.sqrt(np.divide(squares, spare, where=spare > 0, out=np.full(spare.shape, np.nan)))
+        spare = np.array(self.spare, float)
+        spare[spare <= 0] = np.nan
+        return np.sqrt(squares / spare)
 
     def _each(self, told: Callable[[Spread], Array], shape: tuple[int, ...]) -> Array:
         """What is `told` of the spread, of this `shape`, for each frame when there are several."""
@@ -188,6 +190,7 @@ class Estimator(ABC):
         """What each reading (3 P,) is worth, 1 / sigma in m; 1 for all without a sigma."""
         self.readable: Mask = layout.live.ravel() & (self.weight > 0)
         """Which readings (3 P,) are used when they are there."""
+        self._all_readable = bool(self.readable.all())
         self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
         """How many numbers there are to tell: the coefficients less what the edges decide."""
 
@@ -212,8 +215,9 @@ class Estimator(ABC):
 
     def predicted(self, coefficients: Array) -> Array:
         """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
-        flat = coefficients.reshape(*coefficients.shape[:-2], self.basis.size)
-        return np.dot(flat, self._M_T).reshape(*flat.shape[:-1], 3, len(self.layout))
+        frames = coefficients.shape[:-2]
+        flat = coefficients.reshape(*frames, self.basis.size)
+        return np.dot(flat, self._M_T).reshape(*frames, 3, len(self.layout))
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading."""
@@ -224,10 +228,14 @@ class Estimator(ABC):
                 f"{len(self.layout)}), got {K.shape}"
             )
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
-        used = np.isfinite(flat) & self.readable
-        if used.all():
+        every = K.reshape(-1)
+        # One that is not finite makes the sum of squares so, and that is told fastest.
+        if self._all_readable and math.isfinite(every.dot(every)):
             return self._fit(flat, self.readable)
+        used = np.isfinite(flat) & self.readable
         flat[~used] = np.nan
+        if np.all(used == self.readable):
+            return self._fit(flat, self.readable)
         if K.ndim == 2:
             return self._fit(flat, used)
         patterns, which = np.unique(used, axis=0, return_inverse=True)
@@ -245,10 +253,10 @@ class Estimator(ABC):
     def _fit(self, flat: Array, used: Mask) -> Fit:
         """Fit readings (3 P,) or (T, 3 P) of which those `used` (3 P,) are there, the rest NaN."""
 
-    def refusal(self, readings: int, rank: int) -> RankDeficient:
+    def refusal(self, readings: int, rank: int, at_most: bool = False) -> RankDeficient:
         """Why `readings` of them, which determine `rank` coefficients, do not decide a shape."""
         (Ni, Nj), N, layout = self.basis.shape, self.unknowns, self.layout
-        bound = "at most " if readings < N else ""
+        bound = "at most " if at_most or readings < N else ""
         what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
         what += f"of a {Ni} x {Nj} basis"
         if readings == 0:

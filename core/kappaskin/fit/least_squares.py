@@ -122,6 +122,6 @@ class LeastSquares(Estimator):
             flat.reshape(*frames, 3, len(self.layout)),
             c.reshape(*frames, *shape),
             [solver.spread] * frames[0] if frames else solver.spread,
-            np.broadcast_to(solver.count - self.unknowns, frames),
+            solver.count - self.unknowns,
             np.ones(frames) if self.told_sigma else None,
         )
