@@ -24,7 +24,7 @@ from kappaskin.reconstruct import reconstruct as reconstructed
 from kappaskin.scene import load_scene
 from kappaskin.studies.as_printed import misprints
 from kappaskin.studies.regions import regions as measured_regions
-from kappaskin.studies.tables import table_1, table_2
+from kappaskin.studies.tables import tables as computed_tables
 from kappaskin.studies.text import misprints_text, regions_text, tables_text
 
 FAILED = 1
@@ -49,32 +49,38 @@ def _pair(text: str, what: str) -> tuple[int, int]:
     return first, second
 
 
+# A hyphen is let through so that -1x8 is refused as a basis, not as an option.
+_Pair = Annotated[str, Parameter(allow_leading_hyphen=True)]
+
+
 @app.command
 def tables(
     *,
+    method: str = next(iter(METHODS)),
+    basis: _Pair = "8x8",
     json: Annotated[bool, Parameter(negative="")] = False,
     as_printed: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Compute the paper's Tables 1 and 2 and print them beside the printed numbers.
 
-    Example: `kappaskin tables --json`
+    Example: `kappaskin tables --method bayes --basis 15x15`
 
     Parameters
     ----------
+    method
+        How the coefficients are found, as in `kappaskin reconstruct`.
+    basis
+        Number of functions along x and y; on the fingertip of Table 2 those along the arc.
     json
         Print one JSON list of rows instead of tables.
     as_printed
         Instead, tell what the paper misprints, what that would give and why it is not meant.
     """
-    rows = misprints() if as_printed else table_1() + table_2()
+    rows = misprints() if as_printed else computed_tables(method, _pair(basis, "a basis"))
     if json:
         _print_json(rows)
     else:
         print(misprints_text(rows) if as_printed else tables_text(rows))
-
-
-# A hyphen is let through so that -1x8 is refused as a basis, not as an option.
-_Pair = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 
 @app.command

@@ -189,8 +189,8 @@ def test_tables_prints_the_papers_numbers_beside_ours(run) -> None:
     assert (code, told) == (0, "")
     lines = printed.splitlines()
     assert sum(line.startswith(("centre", "off-centre", "line")) for line in lines) == 6
-    assert "(4.59)" in lines[2]
-    assert "(-0.11)" in lines[2]
+    assert "(4.59)" in lines[3]
+    assert "(-0.11)" in lines[3]
     assert "(0.69)" in printed
 
 

@@ -6,8 +6,9 @@ import math
 import numpy as np
 import pytest
 
+from kappaskin.errors import Refusal
 from kappaskin.studies.as_printed import misprints
-from kappaskin.studies.tables import DRAWS, fingertip_scene, table_1, table_2
+from kappaskin.studies.tables import DRAWS, fingertip_scene, table_1, table_2, tables
 from kappaskin.studies.text import misprints_text, tables_text
 
 CASES = ("centre", "off-centre", "line")
@@ -27,7 +28,8 @@ PRINTED = {
     ("line", True): (4.62, -0.06, 0.191),
 }
 KEYS = ["table", "case", "noise", "method", "w_applied_mm", "w_max_mm", "e_max_mm", "rms_mm",
-        "paper"]  # fmt: skip
+        "paper", "functions"]  # fmt: skip
+BESIDES = {True: ["e_max_sd_mm", "covered_95"], False: ["slopes_e_max_mm", "slopes_rms_mm"]}
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +85,7 @@ def test_the_rows_come_in_the_papers_order():
 
 def test_every_row_has_exactly_the_promised_keys(rows):
     for (_, noise), row in rows.items():
-        assert list(row) == KEYS + ["e_max_sd_mm"] * noise
+        assert list(row) == KEYS + BESIDES[noise]
         assert (row["table"], row["method"]) == (1, "least-squares")
 
 
@@ -185,7 +187,7 @@ def test_table_2_has_six_rows_in_the_papers_order_with_table_1s_keys(rows_2):
         (case, noise) for case in PRINTED_2 for noise in (False, True)
     ]
     for (case, noise), row in rows_2.items():
-        assert list(row) == KEYS + ["e_max_sd_mm"] * noise
+        assert list(row) == KEYS + (BESIDES[True] if noise else [])
         assert (row["table"], row["method"]) == (2, "least-squares")
         assert row["w_applied_mm"] == pytest.approx(float(case), rel=1e-12)
         assert row["w_max_mm"] == pytest.approx(row["w_applied_mm"] + row["e_max_mm"], rel=1e-12)
@@ -325,3 +327,46 @@ def test_misprints_are_told_to_people_and_to_programs(misprint):
     assert all(where in text for where in misprint)
     assert max(map(len, text.splitlines())) <= 96
     assert json.loads(json.dumps(list(misprint.values()))) == list(misprint.values())
+
+
+# Other methods, and gages that sense the bent surface's own curvature.
+
+ON_SLOPES = {
+    # E_max and RMS in mm, of a linear fit and of one that knows the slopes.
+    "centre": ((-0.076, 0.0143), (-0.0482, 0.0042)),
+    "off-centre": ((-0.257, 0.0499), (-0.1186, 0.0102)),
+    "line": ((-0.031, 0.0180), (-0.0000, 0.0008)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_finite_slopes_explain_most_of_the_papers_error_and_can_be_undone(rows, case):
+    linear, known = ON_SLOPES[case]
+    row = rows[case, False]
+    finite = {r["case"]: r for r in table_1("finite-slope") if not r["noise"]}[case]
+
+    assert (row["slopes_e_max_mm"], row["slopes_rms_mm"]) == pytest.approx(linear, abs=6e-4)
+    given = finite["slopes_e_max_mm"], finite["slopes_rms_mm"]
+    assert given == pytest.approx(known, abs=6e-5)
+    assert 0.6 < abs(linear[0] / PRINTED[case, False][1]) < 0.85
+
+
+def test_a_priors_rows_are_within_what_is_asked_and_tell_what_their_bands_cover():
+    most = {"centre": 0.001, "off-centre": 0.0015, "line": 0.0006}
+
+    for row in table_1("bayes", (15, 15)):
+        assert row["method"] == "bayes"
+        assert row["functions"] == [15, 15]
+        assert row["rms_mm"] <= (0.021 if row["noise"] else most[row["case"]])
+        if row["noise"]:
+            assert 0.9 < row["covered_95"] < 1
+
+
+def test_a_table_that_a_method_refuses_says_why_and_both_are_an_error():
+    rows = tables("fast")
+
+    assert [row["table"] for row in rows] == [1] * 6 + [2]
+    assert "expected a flat skin" in rows[-1]["refused"]
+    assert "refused: expected a flat skin" in tables_text(rows)
+    with pytest.raises(Refusal, match="140 of the 144"):
+        tables("least-squares", (12, 12))

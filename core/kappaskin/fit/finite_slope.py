@@ -1,7 +1,5 @@
 """Least squares that knows the skin's slopes: gages sense the curvature of the bent surface."""
 
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
@@ -18,14 +16,40 @@ _CLOSE = 1e-2  # of the readings' RMS: so small must the fourth step be
 _CONTRACTS = 0.7  # a step longer than this share of the one before: it will not get there
 
 
+class NormalCurvature:
+    """Coefficients to the true normal curvature of the deflected surface along the gages.
+
+    With W^2 = 1 + f_x^2 + f_y^2 it is xx: f_xx / (W (1 + f_x^2)), yy: f_yy / (W (1 + f_y^2)),
+    xy: f_xy / (W sqrt((1 + f_x^2) (1 + f_y^2))), of which Eqs. 3-5 are the first order.
+    """
+
+    def __init__(self, basis: Basis, layout: SensorLayout, dtype: DTypeLike = np.float64) -> None:
+        if basis.patch.base_curvature:
+            raise Refusal(
+                f"expected a flat skin for finite slopes, got a {basis.patch.name}: on a bent one "
+                "the tangential displacement matters as much as the slope; use least-squares"
+            )
+        places = layout.positions
+        self._size = basis.size
+        self._second = layout.curvature_operator(basis).T.astype(dtype)
+        self._first = [basis.at(places, *order).T.astype(dtype) for order in ((1, 0), (0, 1))]
+
+    def __call__(self, coefficients: Array) -> Array:
+        """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
+        flat = coefficients.reshape(*coefficients.shape[:-2], self._size)
+        along_x, along_y = (1 + np.dot(flat, slope) ** 2 for slope in self._first)
+        W2 = along_x + along_y - 1
+        inclined = np.stack([along_x**2, along_y**2, along_x * along_y], axis=-2)
+        linear = np.dot(flat, self._second).reshape(inclined.shape)
+        return linear / np.sqrt(W2[..., None, :] * inclined)
+
+
 class FiniteSlope(Estimator):
     """c <- c + M^+ (K - h(c)), from the least-squares shape on, at most four times.
 
-    h(c) is the true normal curvature of the deflected surface along the gages; with
-    W^2 = 1 + f_x^2 + f_y^2 it is xx: f_xx / (W (1 + f_x^2)), yy: f_yy / (W (1 + f_y^2)),
-    xy: f_xy / (W sqrt((1 + f_x^2) (1 + f_y^2))), of which Eqs. 3-5 are the first order. M^+ is
-    that of `LeastSquares`, factored once. Where the steps do not shrink, as when slopes are near
-    one and noise is large, the answer is that of least squares and `Fit.converged` says no.
+    h(c) is `NormalCurvature`; M^+ is that of `LeastSquares`, factored once. Where the steps do not
+    shrink, as when slopes are near one and noise is large, the answer is that of least squares and
+    `Fit.converged` says no.
     """
 
     def __init__(
@@ -36,29 +60,13 @@ class FiniteSlope(Estimator):
         rim_sd: float = RIM_SD,
         dtype: DTypeLike = np.float64,
     ) -> None:
-        if basis.patch.base_curvature:
-            raise Refusal(
-                f"expected a flat skin for finite slopes, got a {basis.patch.name}: on a bent one "
-                "the tangential displacement matters as much as the slope; use least-squares"
-            )
         super().__init__(basis, layout, sigma, rim_sd, dtype)
+        self._sensed = NormalCurvature(basis, layout, dtype)
         self._linear = LeastSquares(basis, layout, sigma, rim_sd, dtype)
-        self.complete = self._linear.complete
-        """The spread of a frame that has every reading."""
-
-    @cached_property
-    def _slopes(self) -> tuple[Array, Array]:
-        """Slopes along x and y (N, P) of each function at the elements."""
-        at, P = self.basis.at, self.layout.positions
-        return at(P, 1, 0).T.astype(self.dtype), at(P, 0, 1).T.astype(self.dtype)
 
     def predicted(self, coefficients: Array) -> Array:
         """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
-        flat = coefficients.reshape(*coefficients.shape[:-2], self.basis.size)
-        along_x, along_y = (1 + np.dot(flat, S) ** 2 for S in self._slopes)
-        W2 = along_x + along_y - 1
-        inclined = np.stack([along_x**2, along_y**2, along_x * along_y], axis=-2)
-        return self._linear.predicted(coefficients) / np.sqrt(W2[..., None, :] * inclined)
+        return self._sensed(coefficients)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         K = flat.reshape(*flat.shape[:-1], 3, len(self.layout))

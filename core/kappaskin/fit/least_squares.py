@@ -55,11 +55,6 @@ class LeastSquares(Estimator):
         self._solver = self._made(self.readable, self._root, self._U)
         self._reduced: OrderedDict[bytes, _Solver] = OrderedDict()
 
-    @property
-    def complete(self) -> DenseSpread:
-        """The spread of a frame that has every reading."""
-        return self._solver.spread
-
     def _factor(self, used: Mask) -> None:
         """U (R, F) orthonormal and root (N, F) with operator = root U^T, for the readings used."""
         W = self.basis.free

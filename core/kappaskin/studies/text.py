@@ -4,10 +4,12 @@ import textwrap
 from typing import Any
 
 _TITLES = {
-    1: "Table 1: 10 x 10 elements, 8 x 8 functions, truth of 15 x 15; mm; paper in brackets",
-    2: "Table 2: 10 elements on half a circle, 8 functions, truth of Eq. 10 as it must read; mm;\n"
+    1: "Table 1: 10 x 10 elements, {} x {} functions, truth of 15 x 15; mm; paper in brackets;\n"
+    "on slopes: with gages that sense the curvature of the bent surface",
+    2: "Table 2: 10 elements on half a circle, {} functions, truth of Eq. 10 as it must read; mm;\n"
     "paper's simulation in brackets, its experiment under measured",
 }
+_LAST = {1: f"{'on slopes: error':>18}{'RMS':>9}", 2: "  measured"}
 
 
 def _row(row: dict[str, Any]) -> str:
@@ -18,14 +20,17 @@ def _row(row: dict[str, Any]) -> str:
     def bracketed(name: str, form: str) -> str:
         return f"({paper(name, form)})"
 
-    sd = row.get("e_max_sd_mm")
+    if "refused" in row:
+        return f"refused: {row['refused']}"
+    sd, e, rms = (row.get(name) for name in ("e_max_sd_mm", "slopes_e_max_mm", "slopes_rms_mm"))
+    on_slopes = "" if e is None else f"{e:>+9.3f} {rms:>8.4f}"
     spread = "" if sd is None else f" +-{sd:.3f}"
     return (
         f"{row['case']:<12}{'yes' if row['noise'] else 'no':<7}{row['w_applied_mm']:>8.2f}"
         f"{row['w_max_mm']:>8.3f} {bracketed('w_max_mm', '.2f'):<7}"
         f"{row['e_max_mm']:>+10.3f}{spread:<8} {bracketed('e_max_mm', '+.2f'):<8}"
         f"{row['rms_mm']:>8.4f} {bracketed('rms_mm', '.3f'):<8}"
-        + (f"{paper('experiment_w_max_mm', '.2f'):>8}" if row["table"] == 2 else "")
+        + (f"{paper('experiment_w_max_mm', '.2f'):>8}" if row["table"] == 2 else on_slopes)
     ).rstrip()
 
 
@@ -36,9 +41,18 @@ def tables_text(rows: list[dict[str, Any]]) -> str:
         head = (
             f"{'case':<12}{'noise':<7}{'applied':>8}{'w max':>17}{'error at load':>25}{'RMS':>18}"
         )
-        lines += [title, head + ("  measured" if table == 2 else "")]
-        lines += [_row(row) for row in rows if row["table"] == table] + [""]
-    return "\n".join([*lines, "With noise: means over 200 draws, error +- one standard deviation."])
+        its = [row for row in rows if row["table"] == table]
+        lines += [title.format(*its[0]["functions"]), head + _LAST[table]]
+        lines += [_row(row) for row in its] + [""]
+    covered = {row["case"]: row["covered_95"] for row in rows if "covered_95" in row}
+    held = ", ".join(f"{case} {share:.0%}" for case, share in covered.items())
+    return "\n".join(
+        [
+            *lines,
+            f"Method: {rows[0]['method']}. With noise: means over 200 draws, error +- one standard",
+            f"deviation; the 95 % bands hold of the skin: {held}.",
+        ]
+    )
 
 
 def misprints_text(rows: list[dict[str, Any]]) -> str:
