@@ -24,6 +24,8 @@ from kappaskin.reconstruct import reconstruct as reconstructed
 from kappaskin.scene import load_scene
 from kappaskin.studies.as_printed import misprints
 from kappaskin.studies.regions import regions as measured_regions
+from kappaskin.studies.stability import stability as measured_stability
+from kappaskin.studies.stability import stability_text
 from kappaskin.studies.tables import tables as computed_tables
 from kappaskin.studies.text import misprints_text, regions_text, tables_text
 
@@ -228,6 +230,31 @@ def regions(*, json: Annotated[bool, Parameter(negative="")] = False) -> None:
         _print_json(rows)
     else:
         print(regions_text(rows))
+
+
+@app.command
+def stability(
+    *,
+    json: Annotated[bool, Parameter(negative="")] = False,
+    long: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Run hard cases through every method that claims them, and judge each answer.
+
+    Example: `kappaskin stability --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    long
+        Run the longest cases too: a million frames, up to 512 functions a side.
+    """
+    told = sys.stderr.isatty()
+    rows = measured_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
+    if json:
+        _print_json(rows)
+    else:
+        print(stability_text(rows))
 
 
 @app.command

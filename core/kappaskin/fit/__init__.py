@@ -17,6 +17,7 @@ from kappaskin.fit.finite_slope import NormalCurvature as NormalCurvature
 from kappaskin.fit.least_squares import LeastSquares as LeastSquares
 from kappaskin.fit.robust import WHY as WHY
 from kappaskin.fit.robust import Robust as Robust
+from kappaskin.fit.unseen import singular_values as singular_values
 from kappaskin.layout import SensorLayout
 
 METHODS: dict[str, type[Estimator]] = {

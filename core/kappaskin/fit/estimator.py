@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kappaskin.bases import Basis
+from kappaskin.bases.basis import curvature_at
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
@@ -154,6 +155,16 @@ class Fit:
         return self.sd_of(self.estimator.basis.at(positions))
 
 
+_UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
+
+
+def column_lengths(A: Array) -> Array:
+    """Lengths (F,) of the columns of A (R, F); infinite where nothing but rounding is left."""
+    length = np.linalg.norm(A, axis=0)
+    length[length <= _UNSEEN * length.max(initial=0.0)] = np.inf
+    return length
+
+
 class Estimator(ABC):
     """`fit = LeastSquares(basis, layout)`, factored once; `fit(curvature)` is a `Fit`.
 
@@ -246,12 +257,24 @@ class Estimator(ABC):
                 fits.append(self._fit(flat[which == number], pattern))
             except RankDeficient as error:
                 first = int(np.argmax(which == number))
-                raise RankDeficient(f"frame {first}: {error}") from error
+                # An estimator inside this one counts the frames that it was given.
+                inner = error.__cause__
+                why = inner if isinstance(inner, RankDeficient) else error
+                raise RankDeficient(f"frame {first}: {why}") from why
         return gathered(fits, np.argsort(np.argsort(which, kind="stable")))
 
     @abstractmethod
     def _fit(self, flat: Array, used: Mask) -> Fit:
         """Fit readings (3 P,) or (T, 3 P) of which those `used` (3 P,) are there, the rest NaN."""
+
+    def _moves_as_a_whole(self) -> bool:
+        """Whether the basis has a function that changes no curvature anywhere; only arcs may."""
+        patch, W = self.basis.patch, self.basis.free
+        if not (patch.strip and patch.base_curvature):
+            return False
+        x, y = patch.cell_centres(2 * self.basis.size + 1, 1)
+        bends = curvature_at(self.basis, np.column_stack([x, np.repeat(y, len(x))]))[0]
+        return bool(np.isinf(column_lengths(bends if W is None else bends @ W)).any())
 
     def refusal(self, readings: int, rank: int, at_most: bool = False) -> RankDeficient:
         """Why `readings` of them, which determine `rank` coefficients, do not decide a shape."""
@@ -263,7 +286,13 @@ class Estimator(ABC):
             return RankDeficient(
                 f"{what}: no readings are left; check the connection and the dead elements"
             )
-        missing = 3 * len(layout) - readings
+        channels = len(layout) if layout.patch.strip else 3 * len(layout)
+        missing = channels - readings
+        if self._moves_as_a_whole():
+            return RankDeficient(
+                f"{what}: a function moves the skin as a whole and bends it nowhere; hold the "
+                "edges so that it cannot (pin the ends of the arc)"
+            )
         if layout.shape and not missing:
             m, n = layout.shape
             # Along each direction, mode m + q looks like m - q at the cell centres.
@@ -273,7 +302,7 @@ class Estimator(ABC):
                 "(bayes)"
             )
         why = (
-            f"{missing} of {3 * len(layout)} readings are missing"
+            f"{missing} of {channels} readings are missing"
             if missing
             else ("the elements do not tell these functions apart")
         )

@@ -12,6 +12,7 @@ from kappaskin.layout import SensorLayout
 
 _STEPS = 4  # at most; 2 or 3 do
 _EXACT = 1e-6  # of the readings' RMS: a step that changes them by less is the last one
+_ROUNDINGS = 100  # relative errors that a step may amount to by rounding alone, as in float32
 _CLOSE = 1e-2  # of the readings' RMS: so small must the fourth step be
 _CONTRACTS = 0.7  # a step longer than this share of the one before: it will not get there
 
@@ -64,14 +65,19 @@ class FiniteSlope(Estimator):
         self._sensed = NormalCurvature(basis, layout, dtype)
         self._linear = LeastSquares(basis, layout, sigma, rim_sd, dtype)
 
+    # Steps that run away may overflow: what is infinitely steep reads nothing, and what is no
+    # number does not converge.
+    @np.errstate(over="ignore", invalid="ignore")
     def predicted(self, coefficients: Array) -> Array:
         """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
         return self._sensed(coefficients)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def _fit(self, flat: Array, used: Mask) -> Fit:
         K = flat.reshape(*flat.shape[:-1], 3, len(self.layout))
         first = self._linear(K)
         c, size = first.coefficients, _rms(np.where(used.reshape(3, -1), K, 0.0))
+        exact = max(_EXACT, _ROUNDINGS * float(np.finfo(self.dtype).eps))
         last, steps = size, np.zeros(size.shape, int)
         going, diverged = size > 0, np.zeros(size.shape, bool)
         while going.any() and steps.max() < _STEPS:
@@ -81,7 +87,7 @@ class FiniteSlope(Estimator):
             going &= ~diverged
             c = np.where(going[..., None, None], c + step, c)
             steps, last = steps + going, change
-            going &= change > _EXACT * size
+            going &= change > exact * size
         diverged |= going & (last > _CLOSE * size)
         return Fit(
             self,

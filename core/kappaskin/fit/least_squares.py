@@ -9,12 +9,11 @@ from numpy.typing import ArrayLike, DTypeLike
 from scipy import linalg
 
 from kappaskin.bases import Basis
-from kappaskin.fit.estimator import RIM_SD, DenseSpread, Estimator, Fit
+from kappaskin.fit.estimator import RIM_SD, DenseSpread, Estimator, Fit, column_lengths
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
 _REMEMBERED = 8  # sets of missing readings whose operators are kept
-_UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits: factor anew
 
 
@@ -59,8 +58,7 @@ class LeastSquares(Estimator):
         """U (R, F) orthonormal and root (N, F) with operator = root U^T, for the readings used."""
         W = self.basis.free
         A = self.weight[used, None] * (self.M[used] if W is None else self.M[used] @ W)
-        length = np.linalg.norm(A, axis=0)
-        length[length <= _UNSEEN * length.max(initial=0.0)] = np.inf  # what is left is rounding
+        length = column_lengths(A)
         Q, R = cast("tuple[Array, Array]", linalg.qr(A / length, mode="economic"))
         U, s, Vt = linalg.svd(R)
         rank = int(np.sum(s > s[0] * max(A.shape) * np.finfo(float).eps))

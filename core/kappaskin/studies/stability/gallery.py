@@ -1,0 +1,359 @@
+"""Hard cases for a reconstruction, as frozen values: what is hard, what is read, what is true.
+
+Where a case does not say otherwise, 40 frames are read of a shape whose every function bends the
+skin alike, by about 0.3 1/m, with Gaussian noise of the paper's 0.231 1/m; all seeded.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from kappaskin.bases import Basis, CurvatureMap, SineBasis
+from kappaskin.fit import FiniteSlope
+from kappaskin.frames import COMPONENTS, Array
+from kappaskin.layout import SensorLayout
+from kappaskin.mechanics import Plate, PointLoad
+from kappaskin.patch import Patch
+from kappaskin.scene import TABLE_1_NOISE
+from kappaskin.studies.tables import RADIUS
+from kappaskin.transduction import Transduction
+
+FRAMES = 40
+"""Frames of a case, each with its own noise: an error bar is judged by all of them."""
+
+_BENDS = 0.3  # 1/m by each function: slopes are then too slight to matter
+_SEED = 8
+_SQUARE = Patch(0.1, 0.1)
+_TENS = SensorLayout.regular(_SQUARE, 10, 10)
+
+
+class Kind(Enum):
+    """What a case asks of a method; which methods claim it follows."""
+
+    ANY = "any method that takes the skin"
+    LINEAR = "readings as a skin of slight slope gives them, to more digits than slopes allow"
+    SLOPES = "readings of a skin with slopes near one"
+    SEQUENCE = "more frames than a method that solves each anew is asked for"
+    LARGE = "more functions than a dense matrix is made for"
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """`curvature` (T, 3, P) in 1/m, read of the shape with coefficients `truth` in m.
+
+    `truth` is (Ri, Rj), or (T, Ri, Rj) of a shape that moves, of the functions of `true_basis`.
+    `hard` says in one sentence what is hard; `announced` why an answer may be less than exact, or
+    none; empty where nothing excuses it.
+    """
+
+    name: str
+    hard: str
+    basis: Basis
+    layout: SensorLayout
+    true_basis: Basis
+    truth: Array
+    curvature: Array
+    announced: str = ""
+    kind: Kind = Kind.ANY
+
+    @property
+    def in_reach(self) -> bool:
+        """Whether the functions that are fitted can be the truth."""
+        return self.true_basis == self.basis
+
+
+def _case(
+    name: str,
+    hard: str,
+    layout: SensorLayout,
+    functions: tuple[int, int],
+    *,
+    announced: str = "",
+    noise: float = TABLE_1_NOISE,
+    kind: Kind = Kind.ANY,
+    basis: Basis | None = None,
+    true_basis: Basis | None = None,
+    truth: Array | None = None,
+    spoilt: Callable[[Array], Array] = lambda K: K,
+) -> Case:
+    """A case of `functions` on a `layout`; `spoilt` makes of clean, noisy readings what comes."""
+    rng = np.random.default_rng(_SEED)
+    basis = SineBasis(layout.patch, *functions) if basis is None else basis
+    true_basis = basis if true_basis is None else true_basis
+    M = layout.curvature_operator(true_basis)
+    c = _even(true_basis, M, rng) if truth is None else truth
+    clean = np.dot(c.reshape(-1, true_basis.size), M.T).reshape(-1, 3, len(layout))
+    frames = (FRAMES if len(clean) == 1 else len(clean)) if noise else 1
+    K = clean + rng.normal(0.0, noise, (frames, 3, len(layout)))
+    return Case(name, hard, basis, layout, true_basis, c, spoilt(K), announced, kind)
+
+
+def _even(basis: Basis, M: Array, rng: np.random.Generator) -> Array:
+    """Coefficients (Ni, Nj) of which each function that is free bends the skin alike."""
+    W = np.eye(basis.size) if basis.free is None else basis.free
+    A = M @ W
+    length = np.linalg.norm(A, axis=0) / math.sqrt(len(A))
+    length[length <= 1e-9 * length.max(initial=1.0)] = np.inf  # it would move without bending
+    return (W @ (_BENDS * rng.normal(size=len(length)) / length)).reshape(basis.shape)
+
+
+def _sizes() -> Iterator[Case]:
+    yield _case("paper", "nothing: the paper's grid and basis, to compare with", _TENS, (8, 8))
+    yield _case(
+        "paper, exact",
+        "nothing, and readings without noise: only rounding is left",
+        _TENS,
+        (8, 8),
+        noise=0,
+        kind=Kind.LINEAR,
+    )
+    yield _case(
+        "Ni = m",
+        "the last function has another norm: its cosine vanishes at every element",
+        _TENS,
+        (10, 10),
+    )
+    yield _case(
+        "Ni > m",
+        "functions 11 and 12 look like 9 and 8 in each channel; three channels tell them apart",
+        _TENS,
+        (12, 10),
+    )
+    yield _case(
+        "Ni > m, Nj > n",
+        "four mixtures of functions beyond the elements change no reading",
+        _TENS,
+        (12, 12),
+        announced="140 of 144 coefficients are determined",
+    )
+    yield _case(
+        "Ni = 2m",
+        "a function that is zero at every element is seen by its twist alone",
+        _TENS,
+        (20, 8),
+    )
+    yield _case(
+        "Ni = 2m, Nj = 2n",
+        "400 coefficients of 300 readings",
+        _TENS,
+        (20, 20),
+        announced="there are fewer readings than coefficients",
+    )
+    yield _case(
+        "Ni = 64",
+        "unscaled, the lengths of the columns differ by a factor of thousands",
+        SensorLayout.regular(Patch(0.5, 0.02), 65, 5),
+        (64, 4),
+    )
+    yield _case(
+        "24 x 24",
+        "576 unknowns of 1875 readings, by dense algebra",
+        SensorLayout.regular(_SQUARE, 25, 25),
+        (24, 24),
+    )
+
+
+def _arcs() -> Iterator[Case]:
+    patch = Patch(math.pi * RADIUS, 0.02, RADIUS, strip=True)
+    layout = SensorLayout.regular(patch, 10, 1)
+    hard = "sin(theta) moves half a circle as a whole and bends nothing: its column is zero"
+    pinned = SineBasis(patch, 8, 1)
+    a0 = 0.63e-3 / 4
+    dent = np.zeros((8, 1))
+    dent[0], dent[2] = a0, -3 * a0
+    yield _case("fingertip, exact", f"{hard}; pinned ends decide it", layout, (8, 1), truth=dent,
+                noise=0, kind=Kind.LINEAR)  # fmt: skip
+    yield _case("fingertip", f"{hard}; pinned ends decide it, noise of 4.5 1/m", layout, (8, 1),
+                truth=dent, noise=4.5, basis=pinned)  # fmt: skip
+    yield _case(
+        "fingertip, free ends",
+        f"{hard}; nothing decides it",
+        layout,
+        (8, 1),
+        basis=SineBasis(patch, 8, 1, sliding=True),
+        announced="no reading tells where the skin as a whole is",
+    )
+
+
+def _loads() -> Iterator[Case]:
+    places = {
+        "load near an edge": (5e-4, 0.04, "0.5 mm from an edge, between it and the first element"),
+        "load near a corner": (5e-4, 5e-4, "0.5 mm from both edges of a corner"),
+        "load on an element": (0.045, 0.055, "right on an element, where the peak is read"),
+        "load between elements": (0.05, 0.05, "between four elements, none of which reads it"),
+    }
+    fine = SineBasis(_SQUARE, 15, 15)
+    for name, (x, y, where) in places.items():
+        w = Plate(_SQUARE).deflection([PointLoad(x, y)], fine)
+        peak = np.abs(fine.on_grid(*_SQUARE.grid(101, 101))(w)).max()
+        yield _case(
+            name,
+            f"{where}; curvature peaks there, and 8 x 8 functions cannot follow 15 x 15",
+            _TENS,
+            (8, 8),
+            true_basis=fine,
+            truth=1e-3 * w / peak,
+            kind=Kind.LINEAR,
+        )
+    yield _case(
+        "load on the edge",
+        "the edge holds: a load moves nothing, whatever its force",
+        _TENS,
+        (8, 8),
+        truth=Plate(_SQUARE).deflection([PointLoad(0.0, 0.04, 100.0)], SineBasis(_SQUARE, 8, 8)),
+    )
+    yield _case("no load", "nothing but noise", _TENS, (8, 8), truth=np.zeros((8, 8)))
+    yield _case("no load, exact", "every reading is zero: there is no scale to compare with", _TENS,
+                (8, 8), truth=np.zeros((8, 8)), noise=0)  # fmt: skip
+
+
+def _only(channel: int) -> SensorLayout:
+    live = np.zeros_like(_TENS.live)
+    live[channel] = True
+    return replace(_TENS, live=live)
+
+
+def _elements() -> Iterator[Case]:
+    for channel, name in enumerate(COMPONENTS):
+        yield _case(f"only {name}", "one channel kind of three", _only(channel), (8, 8))
+    yield _case("dead elements", "five elements of a hundred read nothing",
+                _TENS.without([0, 11, 12, 57, 99]), (8, 8))  # fmt: skip
+    yield _case("dead row", "a row of ten elements reads nothing",
+                _TENS.without(range(40, 50)), (8, 8))  # fmt: skip
+    quarter = _TENS.without(p + 10 * q for p in range(5) for q in range(5))
+    yield _case("dead quarter", "a quarter of the skin is not read", quarter, (5, 5))
+    yield _case("dead quarter, 8 x 8", "a quarter is not read, and functions are fine enough to "
+                "hide in it", quarter, (8, 8))  # fmt: skip
+    yield _case("all dead", "no element reads anything", _TENS.without(range(100)), (8, 8),
+                truth=np.zeros((8, 8)), announced="there is nothing to go by")  # fmt: skip
+    rng = np.random.default_rng(_SEED)
+    points = rng.uniform(0.0, 0.1, (60, 2))
+    yield _case("scattered", "60 elements anywhere", _scattered(points), (6, 5))
+    clusters = np.repeat(rng.uniform(0.01, 0.09, (6, 2)), 12, axis=0)
+    clusters += rng.normal(0.0, 1e-3, clusters.shape)
+    yield _case("clustered", "72 elements in six heaps of 2 mm", _scattered(clusters), (5, 5),
+                announced="between the heaps little is seen")  # fmt: skip
+    yield _case("nearly coincident", "40 elements, each with another 1 nm beside it",
+                _scattered(np.vstack([points[:40], points[:40] * (1 - 1e-8)])),
+                (6, 5))  # fmt: skip
+    for gap in (1e-5, 1e-9, 1e-16):
+        yield _pair(gap)
+
+
+def _scattered(points: Array) -> SensorLayout:
+    return SensorLayout.scattered(_SQUARE, points)
+
+
+def _pair(gap: float) -> Case:
+    """Two places, each with two elements, that tell two functions apart by the `gap` in m."""
+    x = np.repeat([0.03 - gap / 2, 0.03 + gap / 2], 2)
+    points = np.column_stack([x, np.full(4, 0.01)])
+    return _case(
+        f"pairs {gap:.0e} m apart",
+        "two functions, seen from nearly the same place: all that is not noise is what they share",
+        SensorLayout.scattered(Patch(0.1, 0.02, strip=True), points),
+        (2, 1),
+        announced="what tells the functions apart is the distance of the elements",
+    )
+
+
+def _scales() -> Iterator[Case]:
+    for name, side in (("1 mm", 1e-3), ("1 m", 1.0)):
+        yield _case(f"{name} patch", f"the lengths of M's columns go with 1/{name}^2",
+                    SensorLayout.regular(Patch(side, side), 10, 10), (8, 8),
+                    kind=Kind.LINEAR)  # fmt: skip
+    yield _case("1:100", "functions across bend ten thousand times as much as those along",
+                SensorLayout.regular(Patch(0.01, 1.0), 4, 40), (3, 30))  # fmt: skip
+
+
+def _readings() -> Iterator[Case]:
+    holes = np.random.default_rng(_SEED).random((FRAMES, 3, 100))
+
+    def spiked(K: Array) -> Array:
+        K.reshape(FRAMES, -1)[range(FRAMES), (37 * np.arange(FRAMES)) % 300] += 1e6
+        return K
+
+    def lost(share: float, what: float) -> Callable[[Array], Array]:
+        return lambda K: np.where(holes < share, what, K)
+
+    yield _case("NaN", "one reading in ten is missing, others in each frame", _TENS, (8, 8),
+                spoilt=lost(0.1, np.nan))  # fmt: skip
+    yield _case("infinity", "one reading in ten is infinite", _TENS, (8, 8),
+                spoilt=lost(0.1, np.inf))  # fmt: skip
+    yield _case("all NaN", "every reading is missing", _TENS, (8, 8), spoilt=lost(2.0, np.nan),
+                announced="there is nothing to go by")  # fmt: skip
+    chain = Transduction()
+    yield _case("rails", "bent so far that the electronics stand on a rail where it matters most",
+                _TENS, (8, 8), truth=_strong(chain), noise=0.1, kind=Kind.LINEAR,
+                spoilt=lambda K: chain.curvature(chain.counts(K)))  # fmt: skip
+    yield _case("spikes", "one reading of each frame is off by 1e6 1/m", _TENS, (8, 8),
+                spoilt=spiked, announced="a spike is no noise: bars widen by as much")  # fmt: skip
+    yield _case("noise 10 times the signal", "readings tell more of the noise than of the shape",
+                _TENS, (8, 8), noise=10 * _BENDS * 8)  # fmt: skip
+
+
+def _strong(chain: Transduction) -> Array:
+    """A dent whose peak curvature is half as much again as the electronics can tell."""
+    basis = SineBasis(_SQUARE, 8, 8)
+    c = Plate(_SQUARE).deflection([PointLoad(0.045, 0.045)], basis)
+    peak = np.abs(_TENS.curvature_operator(basis) @ c.ravel()).max()
+    low, high = chain.limits
+    return c * 1.5 * 0.5 * (high - low) * chain.resolution / peak
+
+
+def _slopes() -> Iterator[Case]:
+    basis = SineBasis(_SQUARE, 8, 8)
+    c = Plate(_SQUARE).deflection([PointLoad(0.04, 0.06)], basis)
+    slope = np.abs(basis.on_grid(*_SQUARE.grid(101, 101), dx=1)(c)).max()
+    for steepest in (0.5, 0.9):
+        truth = c * steepest / slope
+        skin = FiniteSlope(basis, _TENS)
+        rng = np.random.default_rng(_SEED)
+        K = skin.predicted(truth) + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, 3, 100))
+        yield Case(f"slopes of {steepest}", "gages sense the curvature of the bent surface, which "
+                   "is not that of Eqs. 3-5", basis, _TENS, basis, truth, K,
+                   "linear methods do not know slopes", Kind.SLOPES)  # fmt: skip
+
+
+def _sequence(frames: int, elements: int, functions: int) -> Case:
+    """A dent that goes round a hundred times."""
+    layout = SensorLayout.regular(_SQUARE, elements, elements)
+    basis = SineBasis(_SQUARE, functions, functions)
+    turn = 2 * np.pi * np.arange(400) / 400
+    places = 0.05 + 0.02 * np.column_stack([np.cos(turn), np.sin(turn)])
+    way = Plate(_SQUARE).compliance(basis).values * basis.at(places)
+    way *= 1e-3 / np.abs(way).max()
+    truth = way[np.arange(frames) % len(way)].reshape(frames, *basis.shape)
+    return _case(f"{frames} frames", "errors of many steps could add up, and a covariance lose its "
+                 "definiteness", layout, basis.shape, truth=truth, kind=Kind.SEQUENCE)  # fmt: skip
+
+
+def _large(count: int) -> Case:
+    """`count` functions a side on one more element a side."""
+    patch = Patch(0.1, 0.1)
+    basis, layout = (
+        SineBasis(patch, count, count),
+        SensorLayout.regular(patch, count + 1, count + 1),
+    )
+    rng = np.random.default_rng(_SEED)
+    c = _BENDS * rng.normal(size=basis.shape) / basis.laplacian / count
+    x, y = patch.cell_centres(count + 1, count + 1)
+    clean = np.stack([CurvatureMap(basis, name, x, y)(c).ravel() for name in COMPONENTS])
+    K = clean + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, *clean.shape))
+    return Case(f"{count} x {count}", f"{count**2} unknowns of {clean.size} readings", basis,
+                layout, basis, c, K, kind=Kind.LARGE)  # fmt: skip
+
+
+def gallery(long: bool = False) -> Iterator[Case]:
+    """Every case, made when it is asked for; the largest only when `long`."""
+    for room in (_sizes, _arcs, _loads, _elements, _scales, _readings, _slopes):
+        yield from room()
+    yield _sequence(4000, 6, 4)
+    yield _large(64)
+    if long:
+        yield _sequence(1_000_000, 4, 3)
+        for count in (128, 256, 512):
+            yield _large(count)

@@ -1,0 +1,121 @@
+"""A case and a method to a row of numbers and a verdict.
+
+The verdicts, in the order in which they are found:
+
+- `refused`: the method raised a `Refusal`, whose text names the cause.
+- `wrong`: it answered, and the truth is not covered: of all places on the skin and all frames less
+  than 85 % lie within the 95 % error bar. An answer without an error bar covers nothing. Frames
+  that the method itself flags as not converged are not counted. Where there is no noise the answer
+  may instead be the truth to rounding.
+- `exact`: covered, every coefficient is determined, no frame is flagged, and the coefficients are
+  as near to the reference as rounding allows; see `Reference.allowed`. A bound that leaves less
+  than two digits allows nothing, or it could not fail.
+- `degraded`: covered, or flagged by the method itself, but not exact.
+
+Eq. 6 as printed `breaks` where another method would be wrong. Methods that do not seek the
+least-squares answer have no digits to lose: the truth and the error bar judge them, and in float32
+their own answer in float64 is the reference.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from kappaskin.errors import Refusal
+from kappaskin.fit import Estimator, Fit
+from kappaskin.frames import Array
+from kappaskin.studies.stability.gallery import Case
+from kappaskin.studies.stability.reference import Reference
+
+Precision = np.dtype[np.floating[Any]]
+
+COVERED = 0.85
+"""How much of the truth must lie in bars of 95 %: three standard errors less, over 40 frames."""
+
+_PLACES = 9  # along each side, at the middles of so many cells
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a method made of a case: the first frame's coefficients, and its shapes at places.
+
+    `error` and `bar` (T, P) in m, the bar being the half width of 95 %; `flagged` (T,) frames that
+    the method does not vouch for.
+    """
+
+    coefficients: Array
+    error: Array
+    bar: Array
+    flagged: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, case: Case, fit: Fit) -> "Answer":
+        """What `fit` says at the middles of 9 x 9 cells."""
+        x, y = case.layout.patch.cell_centres(_PLACES, 1 if case.layout.patch.strip else _PLACES)
+        places = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+        frames = len(case.curvature)
+        c = fit.coefficients.reshape(frames, -1).astype(float)
+        truth = case.truth.reshape(-1, case.true_basis.size)
+        error = c @ case.basis.at(places).T - truth @ case.true_basis.at(places).T
+        finite = bool(np.isfinite(c).all())
+        bar = (
+            _reach(fit)[:, None] * fit.surface_sd(places) if finite else np.full_like(error, np.nan)
+        )
+        flagged = ~np.broadcast_to(np.asarray(fit.converged, bool), (frames,))
+        return cls(c[0], error, bar, flagged)
+
+    @property
+    def covered(self) -> float | None:
+        """The share of places and frames at which the truth lies within the bar, if any count."""
+        counted = ~self.flagged
+        within = np.abs(self.error[counted]) <= self.bar[counted]
+        return float(np.mean(within)) if within.size else None
+
+
+def _reach(fit: Fit) -> Array:
+    """Half widths of 95 % in standard deviations, (T,): Student's t where noise is estimated."""
+    frames = len(fit.curvature)
+    if fit.told_noise is not None:
+        return np.full(frames, special.ndtri(0.975))
+    spare = np.broadcast_to(np.asarray(fit.spare, float), (frames,))
+    return np.asarray(special.stdtrit(np.where(spare > 0, spare, np.nan), 0.975), float)
+
+
+def answered(case: Case, make: Callable[[], Estimator]) -> Answer | Refusal:
+    """What an estimator answers, or why it does not."""
+    try:
+        return Answer.of(case, make()(case.curvature))
+    except Refusal as refusal:
+        return refusal
+
+
+def verdict(
+    case: Case, reference: Reference, answer: Answer, eps: float, peer: Array | None
+) -> tuple[str, str]:
+    """The verdict on an answer in a precision of `eps`, and why.
+
+    `peer` is what the first frame's coefficients should be to rounding: None when nothing is known.
+    """
+    if not np.isfinite(answer.coefficients).all():
+        return "wrong", "the coefficients are no numbers"
+    at_truth, covered = _at_truth(case, reference, answer, eps), answer.covered
+    if covered is not None and not (at_truth or covered >= COVERED):
+        return "wrong", f"the 95 % bar covers {covered:.0%} of the truth"
+    if flagged := int(answer.flagged.sum()):
+        return "degraded", f"{flagged} of {len(answer.flagged)} frames are flagged: not converged"
+    if not np.isfinite(reference.condition):
+        return "degraded", "not all is determined; the bar covers the truth"
+    if peer is not None and not reference.near(answer.coefficients, peer, eps):
+        return "degraded", "rounding costs digits; the bar covers the truth"
+    return "exact", "to rounding" if at_truth else f"the bar covers {covered:.0%}"
+
+
+def _at_truth(case: Case, reference: Reference, answer: Answer, eps: float) -> bool:
+    """Whether a single frame's answer is the truth to rounding."""
+    if len(case.curvature) > 1 or not case.in_reach or not np.isfinite(reference.condition):
+        return False
+    return reference.near(answer.coefficients, case.truth.ravel(), eps)
