@@ -132,6 +132,8 @@ class Robust(Estimator):
         return self._judges[key]
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
+        if not used.any():
+            raise self.refusal(0, 0)
         frames, P = flat.shape[:-1], len(self.layout)
         K = flat.reshape(*frames, 3, P)
         verdicts = [self._told(frame, used) for frame in np.atleast_2d(flat)]

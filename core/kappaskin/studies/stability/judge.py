@@ -79,7 +79,7 @@ class Answer:
 def _reach(fit: Fit) -> Array:
     """Half widths of 95 % in standard deviations, (T,): Student's t where noise is estimated."""
     frames = len(fit.curvature)
-    if fit.told_noise is not None:
+    if fit.estimator.told_sigma:
         return np.full(frames, special.ndtri(0.975))
     spare = np.broadcast_to(np.asarray(fit.spare, float), (frames,))
     return np.asarray(special.stdtrit(np.where(spare > 0, spare, np.nan), 0.975), float)
