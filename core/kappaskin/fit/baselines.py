@@ -5,7 +5,14 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient
-from kappaskin.fit.estimator import RIM_SD, DenseSpread, Estimator, Fit, Spread
+from kappaskin.fit.estimator import (
+    RIM_SD,
+    DenseSpread,
+    Estimator,
+    Fit,
+    Spread,
+    column_lengths,
+)
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
@@ -80,8 +87,7 @@ class Direct(_PerFrame):
     def _columns(self) -> Array:
         W = self.basis.free
         A = self.M if W is None else self.M @ W
-        length = np.linalg.norm(A, axis=0)
-        length[length <= np.finfo(float).eps * length.max(initial=0.0)] = np.inf
+        length = column_lengths((self.weight[:, None] * A)[self.readable])
         self._back = (np.eye(self.unknowns) if W is None else W) / length
         return A / length
 

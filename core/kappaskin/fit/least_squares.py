@@ -14,15 +14,20 @@ from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
 _REMEMBERED = 8  # sets of missing readings whose operators are kept
+_MILD = 100.0  # a condition up to which a product of factors rounds no worse than they do
 _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits: factor anew
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solver:
-    """The transposed operator (R, N) for the R readings `used` (3 P,), and what it is worth."""
+    """The transposed operator (R, N) for the R readings `used` (3 P,), and what it is worth.
+
+    It is the product of the `factors`: of one, or where rounding it would show in the residual of
+    two, (R, F) and (F, N).
+    """
 
     used: Mask
-    operator: Array
+    factors: tuple[Array, ...]
     spread: DenseSpread
     count: int
 
@@ -73,11 +78,10 @@ class LeastSquares(Estimator):
     def _made(self, used: Mask, root: Array, U: Array, inverse: Array | None = None) -> _Solver:
         """The solver root X U^T, whose covariance is root X root^T; X = 1 without an `inverse`."""
         left = root if inverse is None else root @ inverse
-        operator = (left @ U.T).T
-        if self.told_sigma:
-            operator = self.weight[used, None] * operator
+        seen = self.weight[used, None] * U if self.told_sigma else U
+        factors = ((left @ seen.T).T,) if self.condition <= _MILD else (seen, left.T)
         spread = DenseSpread(lambda: left @ root.T)
-        return _Solver(used, operator.astype(self.dtype), spread, len(U))
+        return _Solver(used, tuple(f.astype(self.dtype) for f in factors), spread, len(U))
 
     def _without(self, used: Mask) -> _Solver:
         """The solver for the readings `used` (3 P,), remembered for the next frames."""
@@ -109,7 +113,9 @@ class LeastSquares(Estimator):
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         solver, shape, frames = self._without(used), self.basis.shape, flat.shape[:-1]
-        c = np.dot(flat if solver.count == flat.shape[-1] else flat[..., used], solver.operator)
+        c = flat if solver.count == flat.shape[-1] else flat[..., used]
+        for factor in solver.factors:
+            c = np.dot(c, factor)
         return Fit(
             self,
             flat.reshape(*frames, 3, len(self.layout)),

@@ -313,8 +313,9 @@ def _readings() -> Iterator[Case]:
                 spoilt=spiked, announced="a spike is no noise: bars widen by as much")  # fmt: skip
     dent = _dent(8)
     signal = _TENS.curvature_operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
+    noise = 10 * float(np.sqrt(np.mean(signal**2)))
     yield _case("noise 10 times the signal", "readings tell more of the noise than of the shape",
-                _TENS, (8, 8), truth=dent, noise=10 * float(np.sqrt(np.mean(signal**2))))  # fmt: skip
+                _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
 
 
 def _strong(chain: Transduction) -> Array:
