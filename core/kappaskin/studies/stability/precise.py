@@ -94,7 +94,7 @@ def least_squares(A: Array, free: Array | None, b: Array) -> Solution | None:
     gets any nearer; its columns should be of about equal length.
     """
     factors = [A] if free is None else [A, free]
-    product = A if free is None else A @ free
+    product: Array = A if free is None else A @ free
     if product.shape[0] < product.shape[1]:
         return None
     Q, R = cast("tuple[Array, Array]", linalg.qr(product, mode="economic"))
