@@ -1,0 +1,11 @@
+"""What accuracy costs: settings to their error, time and memory, and which of them to choose."""
+
+from kappaskin.studies.cost.background import Measuring as Measuring
+from kappaskin.studies.cost.bench import Bench as Bench
+from kappaskin.studies.cost.bench import costs as costs
+from kappaskin.studies.cost.choice import cheapest as cheapest
+from kappaskin.studies.cost.choice import frontier as frontier
+from kappaskin.studies.cost.setting import Cost as Cost
+from kappaskin.studies.cost.setting import Refused as Refused
+from kappaskin.studies.cost.setting import Setting as Setting
+from kappaskin.studies.cost.setting import settings_to_try as settings_to_try
