@@ -5,6 +5,7 @@ import signal
 from collections.abc import Generator, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from typing import cast
 
 from kappaskin.engine import one_thread_per_process
 from kappaskin.errors import Refusal
@@ -37,7 +38,7 @@ class Measuring:
         self.done = False
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
-        self._pipe: Connection[None, _Told] = ours
+        self._pipe = cast("Connection[None, _Told]", ours)
         with one_thread_per_process():
             self._process = context.Process(
                 target=_measure, args=(theirs, scene, settings), name="kappaskin-cost", daemon=True

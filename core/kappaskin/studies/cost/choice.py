@@ -2,33 +2,31 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from kappaskin.errors import Refusal
-from kappaskin.scene import Scene
-from kappaskin.studies.cost.setting import Cost, Refused, own_elements
+from kappaskin.studies.cost.setting import Cost, Refused
 
-_ALIKE = 1e-3
-"""Errors that differ by a smaller share count as equal: rounding tells no better from worse."""
+ALIKE = 0.01
+"""Errors that differ by a smaller share count as equal: who would wait for that?"""
 
 
 def frontier(costs: Iterable[Cost | Refused], total: bool = False) -> tuple[Cost, ...]:
     """The costs that no other beats in both RMS error, with noise, and time; fastest first.
 
-    The time is that of the arithmetic in a frame; with `total`, conversion counts too.
+    The time is that of the arithmetic in a frame; with `total`, conversion counts too. A slower one
+    must be better by more than `ALIKE`.
     """
     known = [cost for cost in costs if isinstance(cost, Cost)]
     kept: list[Cost] = []
     least = math.inf
-    for cost in sorted(known, key=lambda cost: (time_of(cost, total), cost.rms)):
-        if cost.rms < (1 - _ALIKE) * least:
+    for cost in sorted(known, key=lambda cost: (_time(cost, total), cost.rms)):
+        if cost.rms < (1 - ALIKE) * least:
             kept.append(cost)
         least = min(least, cost.rms)
     return tuple(kept)
 
 
-def time_of(cost: Cost, total: bool) -> float:
-    """Seconds per frame of arithmetic; with `total`, until the answer is there."""
+def _time(cost: Cost, total: bool) -> float:
     return cost.total_time if total else cost.time_per_frame
 
 

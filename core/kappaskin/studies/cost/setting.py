@@ -1,5 +1,4 @@
-"""A scene to the settings worth trying on it; what one of them is, and what it turned out to cost.
-"""
+"""A scene to the settings worth trying on it; what a setting is, and what it turned out to cost."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -7,7 +6,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
 from kappaskin.fit import METHODS
@@ -15,12 +13,13 @@ from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 from kappaskin.scene import Scene
 
-FUNCTIONS = (4, 6, 8, 10, 12)
+FUNCTIONS = (4, 6, 8, 12)
 """Functions along each side that are tried."""
 ELEMENTS = (6, 10, 16)
 """Elements along each side that are tried, besides the scene's own."""
 PRECISIONS = ("float64", "float32")
 
+ALL = "all"
 _REGION = 1 / 3  # of the elements
 
 
@@ -28,21 +27,11 @@ def _every(layout: SensorLayout, contact: Array) -> Mask:
     return np.ones(len(layout), bool)
 
 
-def _place(layout: SensorLayout) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Column and row (P,) of each element, counted where elements are."""
+def _half(layout: SensorLayout, contact: Array) -> Mask:
+    # Column and row of each element, counted where elements are.
     rounded = np.round(layout.positions / (layout.patch.a, layout.patch.b), 9)
     column, row = (np.unique(along, return_inverse=True)[1].ravel() for along in rounded.T)
-    return column, row
-
-
-def _half(layout: SensorLayout, contact: Array) -> Mask:
-    column, row = _place(layout)
     return (column + row) % 2 == 0
-
-
-def _quarter(layout: SensorLayout, contact: Array) -> Mask:
-    column, row = _place(layout)
-    return column % 4 == 0 if layout.patch.strip else (column % 2 == 0) & (row % 2 == 0)
 
 
 def _region(layout: SensorLayout, contact: Array) -> Mask:
@@ -52,15 +41,13 @@ def _region(layout: SensorLayout, contact: Array) -> Mask:
 
 
 SCANS: dict[str, Callable[[SensorLayout, Array], Mask]] = {
-    "all": _every,
+    ALL: _every,
     "half": _half,
-    "quarter": _quarter,
     "region": _region,
 }
 """Which elements (P,) a frame scans, by name, of a layout with a contact (2,) in m.
 
-All, every second one as on a chessboard, those in every second column and row, or the third of
-them that is nearest to the contact.
+All, every second one as on a chessboard, or the third of them that is nearest to the contact.
 """
 
 
@@ -77,7 +64,7 @@ class Setting:
     functions: tuple[int, int]
     elements: tuple[int, int] | None = None
     precision: str = PRECISIONS[0]
-    scanned: str = next(iter(SCANS))
+    scanned: str = ALL
 
     def __post_init__(self) -> None:
         for what, got, known in (
