@@ -2,6 +2,7 @@
 
 import json
 import math
+import multiprocessing
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
@@ -11,6 +12,7 @@ import pytest
 
 import kappaskin.cli
 from kappaskin import (
+    Amplifier,
     Cost,
     GaussianNoise,
     Measuring,
@@ -22,6 +24,7 @@ from kappaskin import (
     Scene,
     SensorLayout,
     Setting,
+    Transduction,
     cheapest,
     costs,
     frontier,
@@ -37,7 +40,8 @@ from kappaskin.studies.tables import fingertip_scene, table_1
 
 EIGHT = Setting("least-squares", (8, 8), (10, 10))
 CENTRE = load_scene("centre")
-STRIP = fingertip_scene(1.27)
+# A third of the gain: at Table 2's loads the default electronics stand on the rails.
+STRIP = replace(fingertip_scene(1.27), transduction=Transduction(amplifier=Amplifier(gain=35.0)))
 RNG = np.random.default_rng(5)
 
 
@@ -129,7 +133,7 @@ def test_more_noise_means_more_error() -> None:
     ]
     for less, more in pairwise(found):
         assert more.e_sd == pytest.approx(2 * less.e_sd, rel=1e-2)
-        assert more.rms > 1.8 * less.rms
+        assert more.rms > 1.7 * less.rms
 
 
 def test_a_moving_load_is_judged_where_it_is() -> None:
@@ -375,7 +379,7 @@ def test_where_noise_is_the_limit_readings_are_missing() -> None:
     assert "Missing are readings" in said
     assert "25 times as many" in said
     assert "50 x 50 elements, at 500 frames/s with a conversion 19 times as fast" in said
-    assert "about 25 frames averaged, 25.3 ms for an answer" in said
+    assert "about 25 frames averaged, 25.2 ms for an answer" in said
 
 
 def test_more_readings_do_bring_the_accuracy_that_was_told() -> None:
@@ -423,16 +427,23 @@ def test_rows_are_json_with_the_frontier_marked(small) -> None:
 
 
 def test_the_table_fits_and_marks_what_no_other_beats(small) -> None:
-    text = costs_text(CENTRE, small)
-    lines = text.splitlines()
+    lines = costs_text(CENTRE, small).splitlines()
     assert max(map(len, lines)) <= 120
-    assert sum(line[:2].strip() in ("*", "+", "*+") for line in lines if line[:1] in "*+ ") >= len(
-        frontier(small)
-    )
-    assert "10 x 10 elements with 300 readings" not in text
-    assert "refused, 6 x 6 elements with 108 readings determine 60 of the 64" not in lines[0]
+    start = lines.index("No other setting beats these in both error and time")
+    section = lines[start + 3 : lines.index("", start)]
+    by_frame, by_total = frontier(small), frontier(small, total=True)
+    assert len(section) == len({*by_frame, *by_total})
+    assert sum(line[0] == "*" for line in section) == len(by_frame)
+    assert sum(line[1] == "+" for line in section) == len(by_total)
     assert f"{len(SMALL)} settings tried" in lines[-1]
     assert "Refused: least-squares" in lines[-1]
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_table_of_nothing_known_still_says_what_was_tried(count) -> None:
+    text = costs_text(CENTRE, [Refused(EIGHT, "no functions " * 20)] * count)
+    assert f"{count} settings tried" in text
+    assert max(map(len, text.splitlines())) <= 120
 
 
 def test_the_plot_is_drawn_with_the_frontier_named(small, tmp_path) -> None:
@@ -474,12 +485,18 @@ def test_measuring_ends_when_it_is_told_to() -> None:
     assert measuring.poll() == []
 
 
-def test_what_cannot_be_measured_is_refused_where_it_was_asked() -> None:
-    with (
-        Measuring(replace(CENTRE, loads=()), [EIGHT]) as measuring,
-        pytest.raises(Refusal, match="is not pressed"),
-    ):
-        list(measuring.wait())
+def test_what_cannot_be_measured_is_refused_before_a_process_is_started() -> None:
+    with pytest.raises(Refusal, match="is not pressed"):
+        Measuring(replace(CENTRE, loads=()), [EIGHT])
+
+
+def test_a_process_that_dies_is_told_of() -> None:
+    with Measuring(CENTRE, settings_to_try(CENTRE)) as measuring:
+        (child,) = [p for p in multiprocessing.active_children() if p.name == "kappaskin-cost"]
+        child.kill()
+        with pytest.raises(Refusal, match="ended unexpectedly; measure again"):
+            list(measuring.wait())
+        assert measuring.done
 
 
 @pytest.fixture

@@ -10,31 +10,30 @@ from typing import cast
 from kappaskin.engine import one_thread_per_process
 from kappaskin.errors import Refusal
 from kappaskin.scene import Scene
-from kappaskin.studies.cost.bench import costs
+from kappaskin.studies.cost.bench import Bench, costs
 from kappaskin.studies.cost.setting import Cost, Refused, Setting
 
-_Told = Cost | Refused | str | None  # a cost, why none can be had, or the end
+_Told = Cost | Refused | None  # None at the end
 
 
 def _measure(pipe: "Connection[_Told, None]", scene: Scene, settings: Sequence[Setting]) -> None:
     """What the child process does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
     with suppress(OSError):  # who asked has gone
-        try:
-            for cost in costs(scene, settings):
-                pipe.send(cost)
-            pipe.send(None)
-        except Refusal as refusal:
-            pipe.send(str(refusal))
+        for cost in costs(scene, settings):
+            pipe.send(cost)
+        pipe.send(None)
 
 
 class Measuring:
     """Measures `settings` on a `scene` in a process of one thread; no call here but `wait` waits.
 
-    It ends when it is done, when `close` is called, or when the process that started it is gone.
+    Refuses a scene that `Bench` refuses. It ends when it is done, when `close` is called, or when
+    the process that started it is gone.
     """
 
     def __init__(self, scene: Scene, settings: Sequence[Setting]) -> None:
+        Bench(scene)  # or refused here
         self.done = False
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
@@ -47,7 +46,7 @@ class Measuring:
         theirs.close()
 
     def poll(self) -> list[Cost | Refused]:
-        """What has been measured since the last call; a `Refusal` when nothing can be."""
+        """What has been measured since the last call; a `Refusal` when the process has died."""
         found: list[Cost | Refused] = []
         while not self.done and self._pipe.poll():
             found += self._next()
@@ -63,13 +62,10 @@ class Measuring:
         try:
             told = self._pipe.recv()
         except EOFError:
-            told = "the process that measures ended unexpectedly; measure again"
-        if isinstance(told, Cost | Refused):
-            return [told]
-        self.done = True
-        if told is not None:
-            raise Refusal(told)
-        return []
+            self.done = True
+            raise Refusal("the process that measures ended unexpectedly; measure again") from None
+        self.done = told is None
+        return [] if told is None else [told]
 
     def close(self) -> None:
         """Stop measuring and end the process."""

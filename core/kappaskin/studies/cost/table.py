@@ -144,6 +144,8 @@ def _methods(scene: Scene, costs: Sequence[Cost | Refused]) -> list[Cost | Refus
 
 def _others(costs: Sequence[Cost | Refused]) -> list[Cost | Refused]:
     """The first method with the most functions that are seldom refused, on all there is."""
+    if not costs:
+        return []
     method = costs[0].setting.method
     its = [cost for cost in costs if cost.setting.method == method]
     refused = Counter(c.setting.functions for c in its if isinstance(c, Refused))
