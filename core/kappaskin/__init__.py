@@ -86,6 +86,14 @@ from kappaskin.scene import Scene as Scene
 from kappaskin.scene import load_scene as load_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
+from kappaskin.studies.cost import Cost as Cost
+from kappaskin.studies.cost import Measuring as Measuring
+from kappaskin.studies.cost import Refused as Refused
+from kappaskin.studies.cost import Setting as Setting
+from kappaskin.studies.cost import cheapest as cheapest
+from kappaskin.studies.cost import costs as costs
+from kappaskin.studies.cost import frontier as frontier
+from kappaskin.studies.cost import settings_to_try as settings_to_try
 from kappaskin.touch import NO_OBJECT as NO_OBJECT
 from kappaskin.touch import ContactObject as ContactObject
 from kappaskin.touch import ObjectFinder as ObjectFinder

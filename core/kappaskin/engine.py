@@ -35,7 +35,7 @@ def _serve(requests: "Connection[Request, Request]", name: str) -> None:
 
 
 @contextmanager
-def _one_thread_per_process() -> Generator[None]:
+def one_thread_per_process() -> Generator[None]:
     # Small products lose by threading, and the threads would take the cores from whoever draws.
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
     was = {name: os.environ.get(name) for name in names}
@@ -73,7 +73,7 @@ class Engine:
         context = multiprocessing.get_context("spawn")
         theirs, ours = context.Pipe(duplex=False)
         self._requests = cast("Connection[Request, Request]", ours)
-        with _one_thread_per_process():
+        with one_thread_per_process():
             self._process = context.Process(
                 target=_serve, args=(theirs, self._ring.name), name="kappaskin-engine", daemon=True
             )

@@ -27,7 +27,7 @@ FIGURES: dict[str, Draw] = {
 """What draws each figure on an empty matplotlib.figure.Figure; fig1 to fig9 are the paper's."""
 
 # Neither a date nor a version: the same run gives the same bytes.
-_KINDS = {"svg": {"Date": None, "Creator": "kappaskin"}, "png": {"Software": "kappaskin"}}
+KINDS = {"svg": {"Date": None, "Creator": "kappaskin"}, "png": {"Software": "kappaskin"}}
 
 
 def _known(names: Iterable[str]) -> list[str]:
@@ -58,9 +58,9 @@ def write_figures(out: Path, names: Iterable[str]) -> list[Path]:
 
 
 def _draw_into(room: Path, name: str) -> list[Path]:
-    paths = [room / f"{name}.{kind}" for kind in _KINDS]
+    paths = [room / f"{name}.{kind}" for kind in KINDS]
     with style.sheet() as figure:
         FIGURES[name](figure)
-        for path, metadata in zip(paths, _KINDS.values(), strict=True):
+        for path, metadata in zip(paths, KINDS.values(), strict=True):
             figure.savefig(path, metadata=metadata)
     return paths

@@ -1,0 +1,82 @@
+"""Costs measured in a process of their own, so that nobody waits and nothing else is timed."""
+
+import multiprocessing
+import signal
+from collections.abc import Generator, Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import cast
+
+from kappaskin.engine import one_thread_per_process
+from kappaskin.errors import Refusal
+from kappaskin.scene import Scene
+from kappaskin.studies.cost.bench import Bench, costs
+from kappaskin.studies.cost.setting import Cost, Refused, Setting
+
+_Told = Cost | Refused | None  # None at the end
+
+
+def _measure(pipe: "Connection[_Told, None]", scene: Scene, settings: Sequence[Setting]) -> None:
+    """What the child process does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
+    with suppress(OSError):  # who asked has gone
+        for cost in costs(scene, settings):
+            pipe.send(cost)
+        pipe.send(None)
+
+
+class Measuring:
+    """Measures `settings` on a `scene` in a process of one thread; no call here but `wait` waits.
+
+    Refuses a scene that `Bench` refuses. It ends when it is done, when `close` is called, or when
+    the process that started it is gone.
+    """
+
+    def __init__(self, scene: Scene, settings: Sequence[Setting]) -> None:
+        Bench(scene)  # or refused here
+        self.done = False
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe(duplex=False)
+        self._pipe = cast("Connection[None, _Told]", ours)
+        with one_thread_per_process():
+            self._process = context.Process(
+                target=_measure, args=(theirs, scene, settings), name="kappaskin-cost", daemon=True
+            )
+            self._process.start()
+        theirs.close()
+
+    def poll(self) -> list[Cost | Refused]:
+        """What has been measured since the last call; a `Refusal` when the process has died."""
+        found: list[Cost | Refused] = []
+        while not self.done and self._pipe.poll():
+            found += self._next()
+        return found
+
+    def wait(self) -> Generator[Cost | Refused]:
+        """Each cost as soon as it is measured, to the end."""
+        while not self.done:
+            yield from self._next()
+
+    def _next(self) -> list[Cost | Refused]:
+        """The next cost, none at the end."""
+        try:
+            told = self._pipe.recv()
+        except EOFError:
+            self.done = True
+            raise Refusal("the process that measures ended unexpectedly; measure again") from None
+        self.done = told is None
+        return [] if told is None else [told]
+
+    def close(self) -> None:
+        """Stop measuring and end the process."""
+        self.done = True
+        self._pipe.close()
+        self._process.kill()
+        self._process.join()
+        self._process.close()
+
+    def __enter__(self) -> "Measuring":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,265 @@
+"""A scene and settings to what each of them costs: error, time, memory."""
+
+import statistics
+import time
+import tracemalloc
+from collections.abc import Callable, Generator, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import cycle
+
+import numpy as np
+
+from kappaskin.bases import Basis, basis_for
+from kappaskin.errors import Refusal
+from kappaskin.fit import Estimator, estimator_for
+from kappaskin.frames import Array
+from kappaskin.layout import SensorLayout
+from kappaskin.scan import Scan
+from kappaskin.scene import Scene, contact_of
+from kappaskin.sensor import Sensor
+from kappaskin.simulate import Simulator
+from kappaskin.studies.cost.setting import SCANS, Cost, Refused, Setting
+
+SETTLING, DRAWS = 8, 64
+"""Frames that methods with a memory are given to settle, and those that are judged after them."""
+_POINTS = 101  # of the surface along each side, edges included, as in Table 1
+_TURNS, _BUDGET = (7, 41), 10e-3  # least and most of them that are timed, and about how long in s
+_CALLS, _SLOW = 5, 1e-3  # in a turn; one of a method whose frame takes longer, in s
+
+
+@dataclass(frozen=True, eq=False)
+class _Skin:
+    """Elements, and what they read of the scene: (T, 3, P) in 1/m, `exact` and as it is `read`."""
+
+    sensor: Sensor
+    exact: Array
+    read: Array
+
+    @property
+    def layout(self) -> SensorLayout:
+        return self.sensor.layout
+
+
+@dataclass(frozen=True, eq=False)
+class _Judge:
+    """Coefficients to errors, for one basis.
+
+    The surface of c is S c on G points; with S = Q R its distance from the true w is the hypotenuse
+    of R c - Q'w and of what no c can reach, w - Q Q'w.
+    """
+
+    basis: Basis
+    at_load: Array
+    true_at_load: Array
+    R: Array
+    reached: Array
+    left: Array
+    points: int
+
+    @classmethod
+    def of(cls, basis: Basis, points: Array, truth: "_Truth") -> "_Judge":
+        Q, R = np.linalg.qr(basis.at(points))
+        reached = truth.surface @ Q
+        left = np.linalg.norm(truth.surface - reached @ Q.T, axis=1)
+        at_load = basis.at(truth.contact)
+        return cls(basis, at_load, truth.at_load, R, reached, left, len(points))
+
+    def __call__(self, coefficients: Array) -> tuple[Array, Array]:
+        """Signed error at the load and RMS over the skin, (T,) each in m."""
+        c = coefficients.reshape(len(coefficients), -1).astype(float)
+        off = np.hypot(np.linalg.norm(c @ self.R.T - self.reached, axis=1), self.left)
+        return np.vecdot(self.at_load, c) - self.true_at_load, off / np.sqrt(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class _Truth:
+    """What the skin does: coefficients (T, Ri, Rj), surface (T, G), contact (T, 2), all in m."""
+
+    coefficients: Array
+    surface: Array
+    contact: Array
+    at_load: Array
+
+
+def _points_on(scene: Scene) -> Array:
+    """The points (G, 2) of the skin over which errors are averaged."""
+    patch = scene.plate.patch
+    x, y = patch.grid(_POINTS, 2 if patch.strip else _POINTS)
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return points[patch.contains(points)]
+
+
+class Bench:
+    """Measures settings on a `scene`; what they share is computed once.
+
+    All are judged on the same frames, begun at the scene's rate. Each shows the skin standing still
+    where it is when the frame begins; noise, loops, creep, tolerances and the converter spoil it as
+    the scene says. Other elements than the scene's own have the same skin, loads and electronics.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        if not scene.loads or not np.isfinite(contact_of(scene.loads)).all():
+            why = "lies on cylinders" if scene.laid else "is not pressed"
+            raise Refusal(
+                f"expected a scene with a load to tell errors by, but the skin of {scene.name} "
+                f"{why}; choose one such as centre"
+            )
+        self.scene = scene
+        self._times = np.arange(SETTLING + DRAWS) / scene.rate
+        self._skins: dict[tuple[int, int] | None, _Skin] = {}
+        self._judges: dict[tuple[int, int], _Judge] = {}
+
+    def _still(self, time: float) -> Scene:
+        """The scene as it is at `time`, without its motion."""
+        return replace(self.scene, motion=None, loads=self.scene.loads_at(time))
+
+    @cached_property
+    def _points(self) -> Array:
+        return _points_on(self.scene)
+
+    @cached_property
+    def _truth(self) -> _Truth:
+        scene, basis = self.scene, self.scene.basis
+        compliance = scene.plate.compliance(basis)
+        loads = [scene.loads_at(t) for t in self._times.tolist()]
+        contact = np.array([contact_of(each) for each in loads])
+        forces = [np.sum([load.modal(basis) for load in each], axis=0) for each in loads]
+        shapes = np.array([compliance(force) for force in forces])
+        c = shapes.reshape(len(shapes), -1)
+        at_load = np.vecdot(basis.at(contact), c)
+        return _Truth(shapes, c @ basis.at(self._points).T, contact, at_load)
+
+    def _skin(self, elements: tuple[int, int] | None) -> _Skin:
+        if elements not in self._skins:
+            self._skins[elements] = self._read_by(elements)
+        return self._skins[elements]
+
+    def _read_by(self, elements: tuple[int, int] | None) -> _Skin:
+        scene = self.scene
+        if elements not in (None, scene.layout.shape):
+            layout = SensorLayout.regular(scene.plate.patch, *elements)
+            slowest = 1 / scene.transduction.scan_time(3 * len(layout))
+            scene = replace(scene, layout=layout, rate=min(scene.rate, slowest))
+        sensor, simulator = scene.sensor(), Simulator(scene)
+        read: list[Array] = []
+        for n, t in enumerate(self._times.tolist()):
+            still = replace(self._still(t), layout=scene.layout, rate=scene.rate)
+            simulator.change(still)
+            read.append(sensor.nominal(simulator.scanned(sensor.scan(), n, t, lambda: 0.0)))
+        operator = scene.layout.curvature_operator(scene.basis)
+        exact = self._truth.coefficients.reshape(len(read), -1) @ operator.T
+        shape = (len(read), 3, len(scene.layout))
+        return _Skin(sensor, exact.reshape(shape), np.reshape(read, shape))
+
+    def _judge(self, functions: tuple[int, int]) -> _Judge:
+        if functions not in self._judges:
+            basis = basis_for(self.scene.plate.patch, self.scene.edge, *functions)
+            self._judges[functions] = _Judge.of(basis, self._points, self._truth)
+        return self._judges[functions]
+
+    def __call__(self, setting: Setting) -> Cost | Refused:
+        """What `setting` costs, or why it gives no answer."""
+        try:
+            with np.errstate(all="ignore"):  # what is not finite is refused
+                return self._cost(setting)
+        except (Refusal, np.linalg.LinAlgError) as error:
+            return Refused(setting, str(error))
+
+    def _scanned(self, setting: Setting, skin: _Skin) -> tuple[SensorLayout, Scan]:
+        """The skin's layout with the channels outside the scan dead, and the scan."""
+        contact = self._truth.contact[len(self._times) // 2]
+        elements = SCANS[setting.scanned](skin.layout, contact)
+        layout = replace(skin.layout, live=skin.layout.live & elements)
+        return layout, skin.sensor.scan(np.flatnonzero(np.tile(elements, 3)))
+
+    def _cost(self, setting: Setting) -> Cost:
+        skin, judge = self._skin(setting.elements), self._judge(setting.functions)
+        layout, scan = self._scanned(setting, skin)
+        exact, read = (
+            np.where(layout.live, curvature, np.nan) for curvature in (skin.exact, skin.read)
+        )
+
+        def started(curvature: Array) -> Estimator:
+            fit = estimator_for(setting.method, judge.basis, layout, dtype=setting.precision)
+            fit(curvature[0])
+            return fit
+
+        exactly, memory = _traced(lambda: started(exact))
+        begun = time.perf_counter()
+        fit = started(read)
+        setup_time = time.perf_counter() - begun
+        time_per_frame, lstsq_time = _medians(fit, layout, exact, read)
+        e_exact, rms_exact = _judged(judge, exactly, exact)
+        e, rms = _judged(judge, fit, read)
+        return Cost(
+            setting,
+            len(layout),
+            len(scan.channels),
+            scan.duration,
+            setup_time,
+            time_per_frame,
+            lstsq_time,
+            memory,
+            float(e_exact.mean()),
+            float(rms_exact.mean()),
+            float(e.mean()),
+            float(e.std(ddof=1)),
+            float(rms.mean()),
+            float(np.sqrt(np.mean(self._truth.surface[SETTLING:] ** 2))),
+        )
+
+
+def _judged(judge: _Judge, fit: Estimator, curvature: Array) -> tuple[Array, Array]:
+    """Errors (DRAWS,) at the load and over the skin in m, of the frames after the settling."""
+    e, rms = (error[SETTLING:] for error in judge(fit(curvature).coefficients))
+    if not (np.isfinite(e).all() and np.isfinite(rms).all()):
+        raise Refusal("the coefficients are not finite: the arithmetic overflowed")
+    return e, rms
+
+
+def _traced(made: Callable[[], Estimator]) -> tuple[Estimator, int]:
+    """What is made, and the bytes that were held besides at the highest point of making it."""
+    mine = not tracemalloc.is_tracing()
+    if mine:
+        tracemalloc.start()
+    try:
+        tracemalloc.reset_peak()
+        before = tracemalloc.get_traced_memory()[0]
+        fit = made()
+        return fit, tracemalloc.get_traced_memory()[1] - before
+    finally:
+        if mine:
+            tracemalloc.stop()
+
+
+def _medians(
+    fit: Estimator, layout: SensorLayout, exact: Array, read: Array
+) -> tuple[float, float]:
+    """Median seconds per frame of `fit` and of numpy.linalg.lstsq, turn by turn."""
+    used = layout.live.ravel()
+    M = fit.M[used].astype(fit.dtype)
+    K = exact[0].ravel()[used].astype(fit.dtype)
+    frames = cycle(read)
+    ours: list[float] = []
+    theirs: list[float] = []
+    calls, least, most = 1, *_TURNS
+    end = time.perf_counter() + _BUDGET
+    while len(theirs) < least or (len(theirs) < most and time.perf_counter() < end):
+        ours += [_seconds(fit, next(frames)) for _ in range(calls)]
+        theirs.append(_seconds(np.linalg.lstsq, M, K))
+        calls = _CALLS if ours[0] < _SLOW else 1
+    return statistics.median(ours), statistics.median(theirs)
+
+
+def _seconds(call: Callable[..., object], *arguments: Array) -> float:
+    begun = time.perf_counter()
+    call(*arguments)
+    return time.perf_counter() - begun
+
+
+def costs(scene: Scene, settings: Iterable[Setting]) -> Generator[Cost | Refused]:
+    """What each of `settings` costs on `scene`, one by one as it is measured."""
+    bench = Bench(scene)
+    for setting in settings:
+        yield bench(setting)
