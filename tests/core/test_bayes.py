@@ -116,7 +116,8 @@ def test_the_posterior_is_that_of_textbook_regression():
     # The scale is the one that makes the readings most likely.
     def surprise(tau):
         S = 0.25 * np.eye(36) + tau**2 * M @ L @ L.T @ M.T
-        return K.ravel() @ np.linalg.solve(S, K.ravel()) + np.linalg.slogdet(S)[1]
+        likelihood = K.ravel() @ np.linalg.solve(S, K.ravel()) + np.linalg.slogdet(S)[1]
+        return likelihood - 2 * np.log(tau)  # which keeps the scale from zero
 
     taus = np.geomspace(1e-6, 1e-1, 4001)
     tau = taus[np.argmin([surprise(t) for t in taus])]
@@ -152,6 +153,19 @@ def test_half_of_the_readings_gone_leave_a_shape_whose_bars_hold():
 
     off = (answer.coefficients - truth).reshape(300, -1) @ FIFTEEN.at(points).T
     assert 0.93 <= np.mean(np.abs(off) < 1.96 * answer.surface_sd(points)) <= 0.97
+
+
+@pytest.mark.parametrize("name", ["centre", "off-centre", "line"])
+def test_bands_hold_where_noise_hides_the_signal(name):
+    case = Case(name)
+    sd = 10 * np.sqrt(np.mean(case.K**2))
+    K = case.K + np.random.default_rng(0).normal(0, sd, (300, *case.K.shape))
+    points = np.random.default_rng(1).uniform(0.01, 0.09, (60, 2))
+
+    answer = Bayes(FIFTEEN, TENS)(K)
+
+    off = (answer.coefficients - case.truth).reshape(300, -1) @ FIFTEEN.at(points).T
+    assert 0.92 <= np.mean(np.abs(off) < 1.96 * answer.surface_sd(points)) <= 0.98
 
 
 def test_noise_alone_is_told_as_noise():

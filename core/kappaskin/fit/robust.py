@@ -64,7 +64,7 @@ class _Verdict:
 # Under the prior the readings have the covariance sigma^2 S, S^-1 = Q = 1 - U diag(w) U^T with
 # w = gamma s^2 / (1 + gamma s^2). What the others tell of the readings E of some elements, and how
 # well, needs blocks of Q alone: K_E is off by Q_EE^-1 (Q K)_E, with covariance sigma^2 Q_EE^-1
-# (leaving one out, as in kriging: doi:10.1007/978-1-4612-1494-6, section 5). Leaving E out changes
+# (leaving one out, as in kriging: doi:10.1007/BF01033232). Leaving E out changes
 # Q to Q - Q_.E Q_EE^-1 Q_E. for the rest.
 class Robust(Estimator):
     """Least squares from the elements that agree with each other.
