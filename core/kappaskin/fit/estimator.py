@@ -19,6 +19,8 @@ from kappaskin.layout import SensorLayout
 RIM_SD = 0.2e-3
 """How far in m a rim that gives is expected to move, unless said otherwise."""
 
+_MOST = 10_000  # coefficients: their covariance takes 800 MB
+
 
 class Spread(Protocol):
     """How far the N coefficients of a frame may be off, for unit noise."""
@@ -133,7 +135,12 @@ class Fit:
     @property
     def covariance(self) -> Array:
         """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients in m^2; made on demand."""
-        return self.covariance_of(np.eye(self.estimator.basis.size))
+        if (N := self.estimator.basis.size) > _MOST:
+            raise Refusal(
+                f"expected at most {_MOST} coefficients whose covariance is made, got {N} x {N} "
+                "numbers; ask for the covariance_of what is wanted"
+            )
+        return self.covariance_of(np.eye(N))
 
     def covariance_of(self, rows: Array) -> Array:
         """Covariance (..., R, R) of `rows` (..., R, N) times the flattened coefficients.
@@ -213,7 +220,7 @@ class Estimator(ABC):
             )
         if not np.all(sigma > 0):
             raise Refusal("expected every sigma above zero in 1/m, got zero, less or NaN")
-        return np.broadcast_to(1 / sigma, (3, len(self.layout))).ravel()
+        return np.broadcast_to(1 / sigma, (3, len(self.layout))).reshape(-1)
 
     @cached_property
     def M(self) -> Array:
@@ -239,9 +246,7 @@ class Estimator(ABC):
                 f"{len(self.layout)}), got {K.shape}"
             )
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
-        every = K.reshape(-1)
-        # One that is not finite makes the sum of squares so, and that is told fastest.
-        if self._all_readable and math.isfinite(every.dot(every)):
+        if self._all_readable and _surely_finite(K.reshape(-1)):
             return self._fit(flat, self.readable)
         used = np.isfinite(flat) & self.readable
         flat[~used] = np.nan
@@ -276,10 +281,10 @@ class Estimator(ABC):
         bends = curvature_at(self.basis, np.column_stack([x, np.repeat(y, len(x))]))[0]
         return bool(np.isinf(column_lengths(bends if W is None else bends @ W)).any())
 
-    def refusal(self, readings: int, rank: int, at_most: bool = False) -> RankDeficient:
+    def refusal(self, readings: int, rank: int) -> RankDeficient:
         """Why `readings` of them, which determine `rank` coefficients, do not decide a shape."""
         (Ni, Nj), N, layout = self.basis.shape, self.unknowns, self.layout
-        bound = "at most " if at_most or readings < N else ""
+        bound = "at most " if readings < N else ""
         what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
         what += f"of a {Ni} x {Nj} basis"
         if readings == 0:
@@ -312,6 +317,12 @@ class Estimator(ABC):
         )
 
 
+def _surely_finite(a: Array) -> bool:
+    """Whether the sum of squares of `a` is finite: told fastest, and false for huge numbers too."""
+    with np.errstate(over="ignore"):
+        return math.isfinite(a.dot(a))
+
+
 def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
     """One fit of T frames from the fits of groups of them."""
 
@@ -331,7 +342,7 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
         fits[0].estimator,
         joined([fit.curvature for fit in fits]),
         joined([fit.coefficients for fit in fits]),
-        [spreads[place] for place in order],
+        [spreads[int(place)] for place in order],
         of_each("spare"),
         joined(told) if told else None,
         of_each("steps"),

@@ -1,31 +1,41 @@
 """Least squares on a regular grid in as much time as a few fast transforms, without a matrix."""
 
+import math
 from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
+from scipy.linalg import eigvalsh_tridiagonal
 
 from kappaskin.bases import Basis, SineBasis
-from kappaskin.errors import Refusal
+from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.fit.estimator import RIM_SD, Estimator, Fit
 from kappaskin.fit.transforms import Scaled, Transforms, cells_of
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
 _REMEMBERED = 8  # sets of missing readings that are known to decide a shape
-_STEPS = 500  # at most; sound sets of missing readings take 10 to 60
+_STEPS = 1000  # at most; most sets of missing readings that decide a shape take 10 to 100
+_LOOK = 20  # steps after which to look whether a shape is hardly seen
 _SURE = 1e-6  # of its part in a random shape: what is left of one that was seen
 _ROUNDING = 10  # times the rounding of the readings is where transforms cannot tell what is left
 _AT_ONCE = 2**18  # readings transformed together: about what a cache holds
+_Number = TypeVar("_Number", bound=np.generic)
 _MISSING = 4096  # readings that may be missing when error bars are asked for
 
 
 def _parts(count: int, readings: int) -> list[slice]:
-    """`count` frames of so many `readings` in parts that are computed together."""
+    """`count` frames of so many `readings` in parts that are computed together; at least one."""
     length = max(1, _AT_ONCE // readings)
-    return [slice(start, start + length) for start in range(0, count, length)]
+    return [slice(start, start + length) for start in range(0, max(count, 1), length)]
+
+
+def _joined(parts: list[NDArray[_Number]]) -> NDArray[_Number]:
+    """All frames of the parts; those of a single one are not copied."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _squares(a: Array, axes: int) -> Array:
@@ -34,50 +44,56 @@ def _squares(a: Array, axes: int) -> Array:
     return np.vecdot(flat, flat)
 
 
-def _least_seen(A: Scaled) -> float:
-    """About the least eigenvalue of A^T A: the share of a shape that the readings see.
+def _least_seen(A: Scaled, least: float) -> float:
+    """The least eigenvalue of A^T A: the share of some shape that is all the readings see of it.
 
     Conjugate gradients on A^T A y = z for a random z, in which every shape has its part. They end
-    when no part of z is left, so that every eigenvalue has been met; the least one of their
-    tridiagonal matrix is the share. It is 0 when they do not end.
+    when no part of z is left, so that every eigenvalue has been met; those of their tridiagonal
+    matrix (Lanczos) tell the least one, from above. They end too when that is below `least`.
     """
-    from scipy.linalg import eigvalsh_tridiagonal
-
     left = np.random.default_rng(0).normal(size=A.root.shape)
     step, size = left, float(_squares(left, 2))
-    enough = _SURE**2  # each of the parts is about 1
     diagonal, beside, carried = list[float](), list[float](), 0.0
-    for _ in range(_STEPS):
+    for number in range(1, _STEPS + 1):
         seen = A.forward(step)
         bend = float(_squares(seen, 3))
-        if bend <= np.finfo(float).eps * float(_squares(step, 2)):
-            return 0.0
+        if bend <= least * float(_squares(step, 2)):
+            break
         length = size / bend
         left = left - length * A.back(seen)
         before, size = size, float(_squares(left, 2))
-        ratio = size / before
         diagonal.append(1 / length + carried)
-        if size <= enough:
-            return float(eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=(0, 0))[0])
-        beside.append(np.sqrt(ratio) / length)
+        ended = size <= _SURE**2  # each of the parts was about 1
+        if ended or number % _LOOK == 0:
+            share = _least_of(diagonal, beside)
+            if ended or share < least:
+                return share
+        ratio = size / before
+        beside.append(math.sqrt(ratio) / length)
         carried = ratio / length
         step = left + ratio * step
     return 0.0
 
 
+def _least_of(diagonal: list[float], beside: list[float]) -> float:
+    """The least eigenvalue of a symmetric tridiagonal matrix."""
+    return float(eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=(0, 0))[0])
+
+
 def _conjugate_gradients(A: Scaled, K: Array) -> tuple[Array, NDArray[np.intp]] | None:
     """The least-squares g (T, Nj, Ni) of A g = K (T, 3, n, m) and steps (T,); None without an end.
 
-    The residual is carried along (CGLS), as accurate as A allows and not A^T A. It ends where
-    A^T (K - A g) is what rounding leaves of it.
+    The residual is carried along in the place of `K` (CGLS), as accurate as A allows and not A^T A.
+    It ends where A^T (K - A g) is what rounding leaves of it.
     """
 
     def of_each(a: Array, like: Array) -> Array:
         return np.expand_dims(a, tuple(range(1, like.ndim)))
 
-    left, g = K.copy(), np.zeros((len(K), *A.root.shape), K.dtype)
-    gradient = A.back(left)
-    step, slope = gradient, _squares(gradient, 2)
+    left = K
+    g = np.zeros((len(K), *A.root.shape), K.dtype)
+    step = A.back(left)
+    slope = _squares(step, 2)
     end = (_ROUNDING * np.finfo(K.dtype).eps) ** 2 * _squares(K, 3)
     steps = np.zeros(len(K), np.intp)
     while (going := slope > end).any():
@@ -86,7 +102,8 @@ def _conjugate_gradients(A: Scaled, K: Array) -> tuple[Array, NDArray[np.intp]] 
         seen = A.forward(step)
         length = np.divide(slope, _squares(seen, 3), where=going, out=np.zeros_like(slope))
         g += of_each(length, g) * step
-        left -= of_each(length, left) * seen
+        seen *= of_each(length, seen)
+        left -= seen
         gradient = A.back(left)
         before, slope = slope, np.where(going, _squares(gradient, 2), slope)
         ratio = np.divide(slope, before, where=going, out=np.zeros_like(slope))
@@ -116,7 +133,7 @@ class _GridSpread:
 
     def _read(self, g: Array) -> Array:
         """B g (R, k) for g (R, Nj, Ni)."""
-        return self._A.forward(g).reshape(len(g), -1)[:, self._other]
+        return self._A.forward(g).reshape(len(g), self._readings)[:, self._other]
 
     def _shape(self, K: Array) -> Array:
         """B^T K (R, Nj, Ni) for K (R, k)."""
@@ -136,10 +153,14 @@ class _GridSpread:
         G, unit = np.empty((k, k)), np.eye(k)
         for part in _parts(k, self._readings):
             G[part] = self._read(self._shape(unit[part]))
-        return np.linalg.solve(np.eye(k) - self._E[:, None] * G, np.diag(self._E))
+        return np.linalg.solve(np.eye(k) - self._E[:, None] * G, np.diag(self._E)).astype(float)
 
     @property
     def sd(self) -> Array:
+        return self._sd
+
+    @cached_property
+    def _sd(self) -> Array:
         X, variance = self._X, np.ones(self._A.root.shape)
         for part in _parts(len(X), self._readings):
             unit = np.eye(len(X))[part]
@@ -150,20 +171,23 @@ class _GridSpread:
         """`rows` (R, N) for the scaled unknowns, (R, N), and what B reads of them, (R, k)."""
         Nj, Ni = self._A.root.shape
         g = self._A.root * rows.reshape(-1, Ni, Nj).swapaxes(-1, -2)
-        read = [
-            self._read(g[part]) for part in _parts(len(g) if len(self._E) else 0, self._readings)
-        ]
-        return g.reshape(len(g), -1), np.vstack([np.empty((0, len(self._E))), *read])
+        read = np.empty((len(g), len(self._E)))
+        if len(self._E):
+            for part in _parts(len(g), self._readings):
+                read[part] = self._read(g[part])
+        return g.reshape(len(g), -1), read
 
     def of(self, rows: Array) -> Array:
         if rows.ndim > 2:
             return np.stack([self.of(one) for one in rows])
         g, read = self._seen(rows)
-        return g @ g.T + (read @ self._X @ read.T if len(self._E) else 0.0)
+        return g @ g.T + read @ self._X @ read.T
 
     def sd_of(self, rows: Array) -> Array:
         g, read = self._seen(rows)
-        return np.sqrt(np.vecdot(g, g) + (np.vecdot(read @ self._X, read) if len(self._E) else 0.0))
+        variance: Array = np.vecdot(read @ self._X, read)
+        variance += np.vecdot(g, g)
+        return np.sqrt(variance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -208,6 +232,7 @@ class Fast(Estimator):
         self._exact = Transforms(sines, m, n)
         exactly = self.dtype == np.float64
         self._transforms = self._exact if exactly else Transforms(sines, m, n, self.dtype)
+        self._least = math.sqrt(np.finfo(self.dtype).eps)  # half of the digits are left
         self._solvers: OrderedDict[bytes, _Solver] = OrderedDict()
         self._whole = self._made(self.readable)
 
@@ -235,8 +260,8 @@ class Fast(Estimator):
         if even:
             return _Solver(count, scale, inverse, spread, None)
         root = 1 / np.sqrt(D)
-        if _least_seen(Scaled(self._exact, w, root)) < np.sqrt(np.finfo(self.dtype).eps):
-            raise self.refusal(count, self.unknowns - 1, at_most=True)
+        if _least_seen(Scaled(self._exact, w, root), self._least) < self._least:
+            raise self._hardly(count)
         A = Scaled(self._transforms, w.astype(self.dtype), root.astype(self.dtype))
         return _Solver(count, scale, inverse, spread, A)
 
@@ -253,36 +278,45 @@ class Fast(Estimator):
 
     def predicted(self, coefficients: Array) -> Array:
         """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
-        frames, P = coefficients.shape[:-2], len(self.layout)
+        (n, m), P, frames = self._exact.cells, len(self.layout), coefficients.shape[:-2]
         c = coefficients.reshape(-1, *self.basis.shape).swapaxes(-1, -2)
-        K = np.empty((len(c), 3, P), self.dtype)
-        for part in _parts(len(c), 3 * P):
-            read = self._transforms.readings(c[part]).reshape(
-                -1, 3, self._exact.cells[0] * self._exact.cells[1]
-            )
-            K[part] = read if self._cells is None else read[..., self._cells]
-        return K.reshape(*frames, 3, P)
+        K = _joined([self._transforms.readings(c[part]) for part in _parts(len(c), 3 * P)])
+        on_cells = K.reshape(*frames, 3, n * m)
+        return on_cells if self._cells is None else on_cells[..., self._cells]
 
-    def _solved(self, solver: _Solver, K: Array) -> tuple[Array, NDArray[np.intp] | int]:
+    def _solved(self, solver: _Solver, K: Array) -> tuple[Array, NDArray[np.intp]]:
         """Coefficients (T, Nj, Ni) and steps (T,) for readings K (T, 3, n, m)."""
         A = solver.A
         if A is None:
-            return solver.inverse * self._transforms.analysed(K, solver.scale), 0
-        K = np.where(A.weights > 0, A.weights * K, 0)
-        size = np.abs(K).max(axis=(1, 2, 3), keepdims=True)
+            c = self._transforms.analysed(K, solver.scale)
+            c *= solver.inverse
+            return c, np.zeros(len(K), np.intp)
+        weighted = np.where(A.weights > 0, K, 0)
+        weighted *= A.weights
+        size = np.abs(weighted).max(axis=(1, 2, 3), keepdims=True)
         size[size == 0] = 1  # squares of tiny or huge readings would leave the range of numbers
-        found = _conjugate_gradients(A, K / size)
+        weighted /= size
+        found = _conjugate_gradients(A, weighted)
         if found is None:
-            raise self.refusal(solver.count, self.unknowns - 1, at_most=True)
+            raise self._hardly(solver.count)
         return A.root * found[0] * size[:, 0], found[1]
+
+    def _hardly(self, readings: int) -> RankDeficient:
+        (Ni, Nj), total = self.basis.shape, 3 * len(self.layout)
+        return RankDeficient(
+            f"{self.layout} with {readings} readings hardly determine some of the {self.unknowns} "
+            f"coefficients of a {Ni} x {Nj} basis: of some shape they see less than a share of "
+            f"{self._least:.1g}, as {total - readings} of {total} readings are missing; use a "
+            "smaller basis, more elements, least-squares, or a prior (bayes)"
+        )
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         solver, frames = self._solver(used), flat.shape[:-1]
         every = flat.reshape(-1, flat.shape[-1])
-        c = np.empty((len(every), *solver.inverse.shape), self.dtype)
-        steps = np.zeros(len(every), np.intp)
-        for part in _parts(len(every), flat.shape[-1]):
-            c[part], steps[part] = self._solved(solver, self._on_grid(every[part]))
+        parts = _parts(len(every), flat.shape[-1])
+        solved = [self._solved(solver, self._on_grid(every[part])) for part in parts]
+        c = _joined([c for c, _ in solved])
+        steps = _joined([steps for _, steps in solved])
         return Fit(
             self,
             flat.reshape(*frames, 3, len(self.layout)),

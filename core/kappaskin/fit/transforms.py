@@ -36,13 +36,16 @@ class _Side:
         sines = np.sqrt(self.cells / np.where(last, 1.0, 2.0))
         return sines, np.where(last, 0.0, sines)
 
-    def analysed(self, K: Array, axis: int, cosines: bool) -> Array:
-        """Components of `K` along the unit sines or cosines; a last cosine of none is left out."""
+    def analysed(self, K: Array, axis: int, cosines: bool, spend: bool = False) -> Array:
+        """Components of `K` along the unit sines or cosines; a last cosine of none is left out.
+
+        They take the place of `K` when it may be spent.
+        """
         # Slow to import, and only needed here.
         from scipy.fft import dct, dst
 
         transform = dct if cosines or self.constant else dst
-        parts: Array = transform(K, 2, axis=axis, norm="ortho")
+        parts: Array = transform(K, 2, axis=axis, norm="ortho", overwrite_x=spend)
         kept = slice(int(cosines), int(cosines) + self.count)
         return parts[..., kept] if axis == -1 else parts[..., kept, :]
 
@@ -76,13 +79,14 @@ class Transforms:
     def analysed(self, K: Array, scale: Array) -> Array:
         """M^T K (..., Nj, Ni), each channel times its `scale` (3,); one with none is not read."""
         total = np.zeros((*K.shape[:-3], *self.gain.shape[1:]), self.gain.dtype)
-        scale = scale.astype(self.gain.dtype)
         for channel in np.flatnonzero(scale):
             cosines = bool(channel == 2)
             along_y = self._y.analysed(K[..., channel, :, :], -2, cosines)
-            parts = self._x.analysed(along_y, -1, cosines)
+            parts = self._x.analysed(along_y, -1, cosines, spend=True)
             Nj, Ni = parts.shape[-2:]  # at i = m and j = n the cosines have no part
-            parts *= scale[channel] * self.gain[channel, :Nj, :Ni]
+            parts *= self.gain[channel, :Nj, :Ni]
+            if scale[channel] != 1:
+                parts *= float(scale[channel])
             total[..., :Nj, :Ni] += parts
         return total
 
@@ -114,7 +118,9 @@ class Scaled:
 
     def forward(self, g: Array) -> Array:
         """A g (..., 3, n, m) for g (..., Nj, Ni)."""
-        return self.weights * self.transforms.readings(self.root * g)
+        read = self.transforms.readings(self.root * g)
+        read *= self.weights
+        return read
 
     def back(self, K: Array) -> Array:
         """A^T K (..., Nj, Ni) for K (..., 3, n, m)."""
@@ -129,15 +135,16 @@ def cells_of(layout: SensorLayout) -> tuple[int, int, NDArray[np.intp] | None]:
     """
     P, sides = layout.positions, np.array([layout.patch.a, layout.patch.b])
     least = np.maximum(P.min(axis=0), _FEW * sides / (2 * len(P)))
-    m, n = counts = np.rint(sides / (2 * least)).astype(int)
+    counts = np.rint(sides / (2 * least)).astype(np.intp)
+    m, n = int(counts[0]), int(counts[1])
     at = P * counts / sides - 0.5
-    nearest = np.rint(at).astype(int)
-    cells = nearest @ [1, m]
-    on = np.abs(at - nearest).max() <= _OFF and len(np.unique(cells)) == len(P)
-    if not on or _FEW * m * n > len(P):
+    nearest = np.rint(at).astype(np.intp)
+    cells = nearest[:, 0] + m * nearest[:, 1]
+    there = np.abs(at - nearest).max() <= _OFF and len(np.unique(cells)) == len(P)
+    if not there or _FEW * m * n > len(P):
         raise Refusal(
             f"expected elements at the cell centres of a regular grid, {_OFF:g} of a cell off at "
             f"most, got {layout} that stand otherwise; use least-squares"
         )
     in_order = len(P) == m * n and bool(np.all(cells == np.arange(m * n)))
-    return int(m), int(n), None if in_order else cells
+    return m, n, None if in_order else cells

@@ -1,0 +1,125 @@
+"""Estimators, each against the bare arithmetic that it cannot do without.
+
+What takes milliseconds is measured in processor time: others on the machine interrupt it.
+"""
+
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+from scipy.fft import dct, dst
+
+from kappaskin import Fast, LeastSquares, Patch, SensorLayout, SineBasis
+
+PATCH = Patch(0.1, 0.1)
+LARGE = SensorLayout.regular(PATCH, 256, 256)
+READINGS = np.random.default_rng(0).normal(size=(3, 256**2))
+
+
+def fast(layout=LARGE):
+    return Fast(SineBasis(PATCH, 255, 255), layout)
+
+
+def bare_transforms():
+    """Sines of xx and yy and cosines of xy, along y and then along x."""
+    channels = zip(READINGS.reshape(3, 256, 256), (dst, dst, dct), strict=True)
+    return [f(f(K, 2, axis=0), 2, axis=1, overwrite_x=True) for K, f in channels]
+
+
+def test_256_by_256_elements_take_less_than_two_times_three_bare_transforms(
+    medians, figure
+) -> None:
+    fit = fast()
+
+    ours, bare = medians(
+        lambda: fit(READINGS).coefficients,
+        bare_transforms,
+        turns=100,
+        calls=1,
+        clock=time.thread_time,
+    )
+
+    figure(
+        f"256 x 256 elements to 255 x 255 functions: {ours * 1e3:.2f} ms, {ours / bare:.2f} times "
+        f"three bare transforms ({bare * 1e3:.2f} ms)"
+    )
+    assert ours < 2 * bare
+
+
+def test_256_by_256_elements_take_less_memory_than_six_times_their_readings(figure) -> None:
+    fast()(READINGS)
+    tracemalloc.start()
+    fit = fast()
+    answer = fit(READINGS)
+    to_coefficients = tracemalloc.get_traced_memory()[1] / READINGS.nbytes
+    held = answer.residual, answer.sd
+    peak = tracemalloc.get_traced_memory()[1] / READINGS.nbytes
+    tracemalloc.stop()
+
+    figure(
+        f"256 x 256 elements to 255 x 255 functions: {to_coefficients:.1f} times the memory of "
+        f"the readings, with the estimator; {peak:.1f} with residual and error bars"
+    )
+    assert len(held) == 2
+    assert peak < 6
+
+
+@pytest.mark.parametrize("percent", [1, 5])
+def test_dead_elements_take_a_few_steps_of_two_fits_each(percent, medians, figure) -> None:
+    dead = np.flatnonzero(np.random.default_rng(1).random(256**2) < percent / 100)
+    whole, lacking = fast(), fast(LARGE.without(dead))
+
+    complete, without = medians(
+        lambda: whole(READINGS),
+        lambda: lacking(READINGS),
+        turns=15,
+        calls=1,
+        clock=time.thread_time,
+    )
+
+    steps = int(lacking(READINGS).steps)
+    figure(
+        f"{percent} % of 256 x 256 elements dead: {steps} steps, {without * 1e3:.0f} ms, "
+        f"{without / complete:.0f} times the complete fit ({complete * 1e3:.2f} ms), "
+        f"{without / complete / steps:.1f} times a step"
+    )
+    assert steps <= 40
+    assert without < 8 * steps * complete
+
+
+def test_100_000_frames_take_less_than_two_times_a_bare_matrix_product(medians, figure) -> None:
+    fit = LeastSquares(SineBasis(PATCH, 8, 8), SensorLayout.regular(PATCH, 10, 10))
+    rng = np.random.default_rng(0)
+    K, A = rng.normal(size=(100_000, 3, 100)), rng.normal(size=(300, 64))
+
+    ours, bare = medians(
+        lambda: fit(K).coefficients,
+        lambda: K.reshape(-1, 300) @ A,
+        turns=9,
+        calls=1,
+        clock=time.thread_time,
+    )
+
+    figure(
+        f"100,000 frames of 10 x 10 elements to 8 x 8 functions: {ours * 1e3:.0f} ms "
+        f"({0.1 / ours:.2f} million per second), {ours / bare:.2f} times a bare matrix product "
+        f"({bare * 1e3:.0f} ms)"
+    )
+    assert ours < 2 * bare
+
+
+def test_one_frame_takes_a_few_times_a_bare_matrix_product(medians, figure) -> None:
+    fit = LeastSquares(SineBasis(PATCH, 8, 8), SensorLayout.regular(PATCH, 10, 10))
+    rng = np.random.default_rng(0)
+    K, A = rng.normal(size=(3, 100)), rng.normal(size=(300, 64))
+    flat = K.ravel()
+
+    called, with_noise, bare = medians(lambda: fit(K), lambda: fit(K).noise, lambda: flat.dot(A))
+
+    figure(
+        f"one frame of 10 x 10 elements to 8 x 8 functions: {called * 1e6:.1f} us, "
+        f"{with_noise * 1e6:.1f} us with its noise; {called / bare:.1f} and "
+        f"{with_noise / bare:.1f} times a bare matrix product ({bare * 1e6:.1f} us)"
+    )
+    assert with_noise < 20 * bare
