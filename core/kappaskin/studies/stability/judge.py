@@ -27,6 +27,7 @@ from scipy import special
 
 from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, Fit
+from kappaskin.fit.estimator import gathered
 from kappaskin.frames import Array
 from kappaskin.studies.stability.gallery import Case
 from kappaskin.studies.stability.reference import Reference
@@ -37,6 +38,7 @@ COVERED = 0.85
 """How much of the truth must lie in bars of 95 %: three standard errors less, over 40 frames."""
 
 _PLACES = 9  # along each side, at the middles of so many cells
+_BLOCK = 4000  # frames that are fitted together, and about as many of all are judged
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,7 @@ class Answer:
     """What a method made of a case: the first frame's coefficients, and its shapes at places.
 
     `error` and `bar` (T, P) in m, the bar being the half width of 95 %; `flagged` (T,) frames that
-    the method does not vouch for.
+    the method does not vouch for. Of a long sequence they are those of some frames, evenly spread.
     """
 
     coefficients: Array
@@ -53,19 +55,19 @@ class Answer:
     flagged: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, case: Case, fit: Fit) -> "Answer":
-        """What `fit` says at the middles of 9 x 9 cells."""
+    def of(cls, case: Case, fit: Fit, frames: NDArray[np.intp]) -> "Answer":
+        """What `fit` says of these `frames` of a case at the middles of 9 x 9 cells."""
         x, y = case.layout.patch.cell_centres(_PLACES, 1 if case.layout.patch.strip else _PLACES)
         places = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
-        frames = len(case.curvature)
-        c = fit.coefficients.reshape(frames, -1).astype(float)
+        c = fit.coefficients.reshape(len(frames), -1).astype(float)
         truth = case.truth.reshape(-1, case.true_basis.size)
+        truth = truth if len(truth) == 1 else truth[frames]
         error = c @ case.basis.at(places).T - truth @ case.true_basis.at(places).T
-        finite = bool(np.isfinite(c).all())
+        known = bool(np.isfinite(c).all())
         bar = (
-            _reach(fit)[:, None] * fit.surface_sd(places) if finite else np.full_like(error, np.nan)
+            _reach(fit)[:, None] * fit.surface_sd(places) if known else np.full_like(error, np.nan)
         )
-        flagged = ~np.broadcast_to(np.asarray(fit.converged, bool), (frames,))
+        flagged = ~np.broadcast_to(np.asarray(fit.converged, bool), (len(frames),))
         return cls(c[0], error, bar, flagged)
 
     @property
@@ -86,11 +88,24 @@ def _reach(fit: Fit) -> Array:
 
 
 def answered(case: Case, make: Callable[[], Estimator]) -> Answer | Refusal:
-    """What an estimator answers, or why it does not."""
+    """What an estimator answers, one block of frames after the other, or why it does not."""
+    every = max(1, len(case.curvature) // _BLOCK)
+    parts: list[Answer] = []
     try:
-        return Answer.of(case, make()(case.curvature))
+        estimator = make()
+        for start in range(0, len(case.curvature), _BLOCK):
+            fit = estimator(case.curvature[start : start + _BLOCK])
+            chosen = np.arange(0, len(fit.curvature), every)
+            kept = fit if every == 1 else gathered([fit], chosen)
+            parts.append(Answer.of(case, kept, start + chosen))
     except Refusal as refusal:
         return refusal
+    return Answer(
+        parts[0].coefficients,
+        np.concatenate([part.error for part in parts]),
+        np.concatenate([part.bar for part in parts]),
+        np.concatenate([part.flagged for part in parts]),
+    )
 
 
 def verdict(

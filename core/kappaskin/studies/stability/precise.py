@@ -100,7 +100,8 @@ def least_squares(A: Array, free: Array | None, b: Array) -> Solution | None:
     Q, R = cast("tuple[Array, Array]", linalg.qr(product, mode="economic"))
     if not np.abs(np.diag(R)).min() > 0:
         return None
-    g, r, K = Pair.of(np.zeros(product.shape[1])), Pair.of(b), Pair.of(b)
+    g = Pair.of(np.zeros_like(product[0]))
+    r, K = Pair.of(b), Pair.of(b)
     last = np.inf
     for _ in range(_STEPS):
         f = K - r - _applied(factors, g)
