@@ -506,10 +506,14 @@ def few(monkeypatch) -> None:
 
 
 @pytest.mark.usefixtures("few")
-def test_the_command_prints_rows_and_draws(run, tmp_path) -> None:
+def test_the_command_prints_rows_and_draws_and_tells_how_far_it_is(
+    run, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.setattr(kappaskin.cli.sys.stderr, "isatty", lambda: True)
     plot = tmp_path / "cost.svg"
     code, printed, told = run("cost", "--scene", "centre", "--json", "--plot", plot)
-    assert (code, told) == (0, "")
+    assert (code, told.count("\n")) == (0, 1)
+    assert told.endswith(f"[{'#' * 40}] 3 of 3\n")
     assert [row["functions"] for row in json.loads(printed)] == [[8, 8], [4, 4], [4, 4]]
     assert plot.read_text().startswith("<?xml")
 
