@@ -61,7 +61,7 @@ class Measuring:
         """The next cost, none at the end."""
         try:
             told = self._pipe.recv()
-        except EOFError:
+        except (EOFError, OSError):
             self.done = True
             raise Refusal("the process that measures ended unexpectedly; measure again") from None
         self.done = told is None

@@ -21,7 +21,7 @@ from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
 from kappaskin.studies.cost.setting import SCANS, Cost, Refused, Setting
 
-SETTLING, DRAWS = 8, 64
+SETTLING, DRAWS = 8, 40
 """Frames that methods with a memory are given to settle, and those that are judged after them."""
 _POINTS = 101  # of the surface along each side, edges included, as in Table 1
 _TURNS, _BUDGET = (7, 41), 10e-3  # least and most of them that are timed, and about how long in s

@@ -54,8 +54,9 @@ _FIGURES: dict[str, Callable[[Cost], float]] = {
 def rows(scene: Scene, costs: Sequence[Cost | Refused]) -> list[dict[str, Any]]:
     """`costs` as JSON values; the figures of a refused setting are None, `refused` says why.
 
-    `frontier` says whether no other row has both a smaller `rms_mm` and a smaller `frame_s`,
-    `frontier_total` the same of `total_s`; `exact` stands for readings without noise.
+    `frontier` says whether no other row beats it in both `rms_mm` and `frame_s`, where errors that
+    are `ALIKE` count as equal, `frontier_total` the same of `total_s`; `exact` stands for readings
+    without noise.
     """
     by_frame, by_total = frontier(costs), frontier(costs, total=True)
     return [
