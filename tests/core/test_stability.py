@@ -33,10 +33,6 @@ from kappaskin.studies.stability.run import rows_of
 
 CASES = {case.name: case for case in gallery()}
 
-# What a prior's scale by evidence makes of shapes that its functions cannot follow, and of noise
-# that hides them: some frames are taken for no shape at all, with an error bar to match.
-WRONG_YET = {("bayes", "load near a corner"), ("bayes", "noise 10 times the signal")}
-
 SEEK_LEAST_SQUARES = ("least-squares", "direct")
 
 
@@ -62,7 +58,7 @@ def test_there_is_a_row_for_every_case_method_and_precision(rows):
 
 
 def test_no_method_of_ours_is_wrong(rows):
-    assert {(r["method"], r["case"]) for r in rows if r["verdict"] == "wrong"} == WRONG_YET
+    assert not [(r["method"], r["case"]) for r in rows if r["verdict"] == "wrong"]
 
 
 def test_least_squares_is_exact_wherever_nothing_is_announced(rows):

@@ -23,6 +23,8 @@ _ALARM = 1e-3  # chance that a frame of good readings has any of them suspected
 _PLACES = 25  # along each side, where a load is thought of
 _LOADS = 3  # that are thought of at most
 _OUTRAGEOUS = 50.0  # times what three quarters of the elements read at most
+_UNSEEN = 1e-12  # of a load's readings: so much is left of one that the elements do not tell
+_CLEAREST = 1e10  # signal over noise in power: beyond it rounding tells elements apart
 _BACK = 0.5  # of what makes a suspect: below it, one is trusted again
 _ROUNDS = 12  # of suspecting and trusting again
 _AT_ONCE = 4.0  # a suspect is left out together with those at least a fourth as far off
@@ -41,12 +43,13 @@ class _Judge:
     """What depends on which readings are `used` (3 P,), `count` of them.
 
     U (3 P, k) of the evidence, zero where there is none; `by_press` (G, k) the squares of what each
-    direction has of a load at each place.
+    direction has of a load at each place, `beyond` (G,) those of what none has.
     """
 
     evidence: Evidence
     U: Array
     by_press: Array
+    beyond: Array
     used: Mask
     count: int
 
@@ -117,7 +120,9 @@ class Robust(Estimator):
 
     def _press(self, view: "_View", judge: _Judge) -> Array:
         """How much better the readings are explained (G,) with a load at each place."""
-        return (view.r @ self._forces) ** 2 / (1 - judge.by_press @ view.w)
+        seen = judge.beyond + judge.by_press @ (1 - view.w)
+        known = seen > _UNSEEN
+        return np.divide((view.r @ self._forces) ** 2, seen, where=known, out=np.zeros_like(seen))
 
     def _judge(self, used: Mask) -> _Judge:
         key = used.tobytes()
@@ -126,7 +131,9 @@ class Robust(Estimator):
             U = np.zeros((len(used), evidence.U.shape[1]))
             U[used] = evidence.U
             by_press = (self._forces.T @ U) ** 2
-            self._judges[key] = _Judge(evidence, U, by_press, used, int(used.sum()))
+            beyond = np.sum(self._forces[used] ** 2, axis=0) - by_press.sum(axis=1)
+            count = int(used.sum())
+            self._judges[key] = _Judge(evidence, U, by_press, np.maximum(beyond, 0.0), used, count)
             if len(self._judges) > 8:
                 self._judges.popitem(last=False)
         return self._judges[key]
@@ -211,7 +218,8 @@ class _View:
 
     def __init__(self, judge: _Judge, K: Array, free: Array, gamma: float) -> None:
         U = judge.U
-        s2 = gamma * judge.evidence.s2[: U.shape[1]]
+        s2 = judge.evidence.s2[: U.shape[1]]
+        s2 = min(gamma, _CLEAREST / s2[0]) * s2
         self.w = s2 / (1 + s2)
         self._Uw = U * self.w
         self._U, self._free = U, free
