@@ -1,4 +1,4 @@
-"""Costs to the settings that are worth their time, and to what an accuracy still lacks."""
+"""Costs to the settings that are worth their time, and to the cheapest that is accurate enough."""
 
 import math
 from collections.abc import Iterable
