@@ -297,6 +297,12 @@ def test_what_is_better_by_too_little_to_wait_for_is_no_frontier() -> None:
     assert frontier([slowest, fast]) == (fast, slowest)
 
 
+def test_who_is_further_off_than_the_shape_is_large_is_beaten_by_silence() -> None:
+    wild, known = cost_of(2.1e-3, 1e-6), cost_of(1e-5, 1e-5)
+    assert frontier([wild, known]) == (known,)
+    assert frontier([wild]) == ()
+
+
 def test_the_cheapest_is_first_among_those_that_are_accurate_enough() -> None:
     found = some(100)
     known = [cost for cost in found if isinstance(cost, Cost)]

@@ -17,7 +17,7 @@ _COLOURS = (style.BLUE, style.GREY, style.FAINT, "#63a878", style.ORANGE, "#7a4b
             "#c9a227", "#c2487a")  # fmt: skip
 _SIZES = (2.2, 3.4, 4.8, 6.0)  # of marks in points, by the number of elements
 _PANEL = 70.0, 66.0  # mm
-_LABEL, _APART = 21.0, 2.6  # mm: room for a label, and from one to the next
+_LABEL, _APART = 22.5, 2.6  # mm: room for a label, and from one to the next
 
 
 def check_plot(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Costs to the settings that are worth their time, and to what an accuracy still lacks."""
+"""Costs to the settings that are worth their time, and to the cheapest that is accurate enough."""
 
 import math
 from collections.abc import Iterable
@@ -14,9 +14,9 @@ def frontier(costs: Iterable[Cost | Refused], total: bool = False) -> tuple[Cost
     """The costs that no other beats in both RMS error, with noise, and time; fastest first.
 
     The time is that of the arithmetic in a frame; with `total`, conversion counts too. A slower one
-    must be better by more than `ALIKE`.
+    must be better by more than `ALIKE`. To say nothing beats what is further off than the shape.
     """
-    known = [cost for cost in costs if isinstance(cost, Cost)]
+    known = [cost for cost in costs if isinstance(cost, Cost) and cost.rms < cost.shape_rms]
     kept: list[Cost] = []
     least = math.inf
     for cost in sorted(known, key=lambda cost: (_time(cost, total), cost.rms)):
