@@ -17,9 +17,9 @@ least-squares answer have no digits to lose: the truth and the error bar judge t
 their own answer in float64 is the reference.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, Fit
 from kappaskin.fit.estimator import gathered
 from kappaskin.frames import Array
-from kappaskin.studies.stability.gallery import Case
+from kappaskin.studies.stability.gallery import Case, Kind
 from kappaskin.studies.stability.reference import Reference
 
 Precision = np.dtype[np.floating[Any]]
@@ -87,25 +87,53 @@ def _reach(fit: Fit) -> Array:
     return np.asarray(special.stdtrit(np.where(spare > 0, spare, np.nan), 0.975), float)
 
 
+@runtime_checkable
+class Remembers(Protocol):
+    """An estimator whose answers depend on earlier frames, until it is restarted."""
+
+    def restart(self) -> None:
+        """Forget every frame."""
+        ...
+
+
 def answered(case: Case, make: Callable[[], Estimator]) -> Answer | Refusal:
-    """What an estimator answers, one block of frames after the other, or why it does not."""
-    every = max(1, len(case.curvature) // _BLOCK)
-    parts: list[Answer] = []
+    """What an estimator answers, or why it does not.
+
+    One that remembers answers each frame after the one before it, and knows no others: of forty
+    frames of a skin at rest its errors would be one error. Sequences it follows whole.
+    """
     try:
         estimator = make()
-        for start in range(0, len(case.curvature), _BLOCK):
-            fit = estimator(case.curvature[start : start + _BLOCK])
-            chosen = np.arange(0, len(fit.curvature), every)
-            kept = fit if every == 1 else gathered([fit], chosen)
-            parts.append(Answer.of(case, kept, start + chosen))
+        if isinstance(estimator, Remembers) and case.kind is not Kind.SEQUENCE:
+            return _joined(list(_after_another(case, estimator, estimator.restart)))
+        return _joined(list(_in_blocks(case, estimator)))
     except Refusal as refusal:
         return refusal
-    return Answer(
-        parts[0].coefficients,
-        np.concatenate([part.error for part in parts]),
-        np.concatenate([part.bar for part in parts]),
-        np.concatenate([part.flagged for part in parts]),
-    )
+
+
+def _in_blocks(case: Case, estimator: Estimator) -> Iterator[Answer]:
+    """One block of frames after the other."""
+    every = max(1, len(case.curvature) // _BLOCK)
+    for start in range(0, len(case.curvature), _BLOCK):
+        fit = estimator(case.curvature[start : start + _BLOCK])
+        chosen = np.arange(0, len(fit.curvature), every)
+        kept = fit if every == 1 else gathered([fit], chosen)
+        yield Answer.of(case, kept, start + chosen)
+
+
+def _after_another(
+    case: Case, estimator: Estimator, restart: Callable[[], None]
+) -> Iterator[Answer]:
+    for t in range(len(case.curvature)):
+        restart()
+        fit = estimator(case.curvature[[t - 1, t]])
+        yield Answer.of(case, gathered([fit], np.array([1])), np.array([t]))
+
+
+def _joined(parts: list[Answer]) -> Answer:
+    error, bar, flagged = zip(*((p.error, p.bar, p.flagged) for p in parts), strict=True)
+    whole = np.concatenate(error), np.concatenate(bar), np.concatenate(flagged)
+    return Answer(parts[0].coefficients, *whole)
 
 
 def verdict(

@@ -14,14 +14,15 @@ from kappaskin.studies.stability.gallery import Case, Kind, gallery
 from kappaskin.studies.stability.judge import Answer, answered, verdict
 from kappaskin.studies.stability.reference import Reference, reference_of
 
-_DENSE = frozenset({Kind.ANY, Kind.LINEAR})
+_USUAL = frozenset({Kind.ANY, Kind.LINEAR, Kind.DENSE})
 _CLAIMS: Mapping[str, frozenset[Kind]] = {
-    "least-squares": _DENSE | {Kind.SEQUENCE},
+    "least-squares": _USUAL | {Kind.SEQUENCE},
+    "fast": _USUAL | {Kind.SEQUENCE, Kind.LARGE},
     "finite-slope": frozenset({Kind.ANY, Kind.SLOPES}),
-    "fast": _DENSE | {Kind.SEQUENCE, Kind.LARGE},
-    "tracking": _DENSE | {Kind.SEQUENCE},
+    "robust": _USUAL - {Kind.DENSE},
+    "tracking": _USUAL - {Kind.DENSE} | {Kind.SEQUENCE},
 }
-"""Which cases a method claims; any other claims those of `_DENSE`."""
+"""Which cases a method claims; any other claims the usual ones."""
 
 _SEEK_LEAST_SQUARES = frozenset({"least-squares", "as-printed", "direct", "fast"})
 _PRINTED = "as-printed"
@@ -48,7 +49,7 @@ def stability(
 
 def rows_of(case: Case, methods: Mapping[str, type[Estimator]] = METHODS) -> list[dict[str, Any]]:
     """The rows of one case, for those of `methods` that claim it."""
-    claiming = [name for name in methods if case.kind in _CLAIMS.get(name, _DENSE)]
+    claiming = [name for name in methods if case.kind in _CLAIMS.get(name, _USUAL)]
     if not claiming:
         return []
     reference, rows = reference_of(case), list[dict[str, Any]]()
