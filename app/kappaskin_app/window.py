@@ -21,12 +21,14 @@ from kappaskin import FIGURES, Engine, Status, serial_ports
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
-from kappaskin_app.columns import column, widen
+from kappaskin_app.columns import column, heighten, widen
+from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.naming import Naming
+from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
@@ -37,6 +39,7 @@ from kappaskin_app.views.line import Line
 from kappaskin_app.wishes import Wishes
 
 _WORDS = 0.5  # s between two looks at what touches the skin: as fast as one can read
+_DOCK_KEYS = {"cost": "F9"}
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -51,7 +54,9 @@ class MainWindow(QMainWindow):
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
         self.calibrating = Calibrating(self.history, self)
+        self.costing = Costing(self.history, self.session, self.wishes, self)
         self.panels, self.display = Panels(), Display(self.session)
+        self.cost = CostPanel()
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
@@ -66,12 +71,20 @@ class MainWindow(QMainWindow):
         self.statusBar().addPermanentWidget(self.object, 1)
         self.setCentralWidget(self._centre())
         self._make_header()
-        left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+        area = Qt.DockWidgetArea
+        left, right, below = (
+            area.LeftDockWidgetArea,
+            area.RightDockWidgetArea,
+            area.BottomDockWidgetArea,
+        )
         maps = column(*self.heatmaps.values())
         self._docks = [
             self._dock("settings", "Settings", self.panels, left),
             self._dock("curvature", "Curvature, by element", maps, right),
+            self._dock("cost", "Cost of accuracy", self.cost, below),
         ]
+        for dock in self._docks[2:]:
+            dock.hide()  # so that a small window is left to the skin until they are asked for
         self.actions_by_name = Actions(self)
         self._make_actions()
         self._wire()
@@ -144,11 +157,20 @@ class MainWindow(QMainWindow):
         add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
         for dock in self._docks:
-            name = f"dock-{dock.objectName()}"
-            self.actions_by_name.register(name, view, dock.toggleViewAction())
+            name, action = f"dock-{dock.objectName()}", dock.toggleViewAction()
+            action.setShortcut(_DOCK_KEYS.get(dock.objectName(), ""))
+            action.triggered.connect(guarded(lambda *_, dock=dock: self._raise(dock)))
+            self.actions_by_name.register(name, view, action)
         for name in FIGURES:
             add(name, figures, TITLES.get(name, name), partial(self._draw, name))
         add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
+
+    def _raise(self, dock: QDockWidget) -> None:
+        """Let a dock that was just asked for be seen before the others in its place."""
+        below = self.dockWidgetArea(dock) == Qt.DockWidgetArea.BottomDockWidgetArea
+        if below and not dock.isFloating() and dock.isVisible():
+            heighten(self, dock)
+        dock.raise_()
 
     def _wire(self) -> None:
         panels, wishes, session, drag = self.panels, self.wishes, self.session, self.membrane.drag
@@ -164,6 +186,10 @@ class MainWindow(QMainWindow):
         session.estimated.connect(guarded(self.calibrating.receive))
         panels.calibrate.attend(self.calibrating)
         panels.in_use.attend(self.calibrating)
+        self._docks[2].visibilityChanged.connect(guarded(self.costing.watch))
+        session.reported.connect(guarded(self.costing.follow))
+        session.estimated.connect(guarded(self.costing.receive))
+        self.cost.attend(self.costing)
         session.refused.connect(guarded(panels.shape.show_refusal))
         session.refused.connect(guarded(panels.load.show_refusal))
         session.preparing.connect(guarded(panels.shape.show_preparing))
@@ -211,6 +237,7 @@ class MainWindow(QMainWindow):
         if isinstance(application, QApplication):
             application.setPalette(palette(theme))
         self.panels.show_theme(theme)
+        self.cost.show_theme(theme)
         self.display.show_theme(theme)
 
     def _show_status(self, status: Status) -> None:
@@ -259,6 +286,7 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.session.closed:
             guard.forget(self._tell)
+            self.costing.close()
             self.session.close()
             self.naming.close()
             self.membrane.close_plotter()
