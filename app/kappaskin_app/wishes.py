@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from kappaskin import Setting
+from kappaskin_app.demonstrations import Demonstration
 from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
 from kappaskin_app.session import Session
@@ -40,6 +41,10 @@ class Wishes:
         if elements is not None and another and self._session.simulating:
             changed |= {"elements_x": elements[0], "elements_y": elements[1], **NO_ELEMENTS}
         self._history.change("Choice by its cost", -1, **changed)
+
+    def demonstrate(self, demonstration: Demonstration) -> None:
+        """Bring a hard case about."""
+        self._history.change(demonstration.title, -1, **demonstration.changes())
 
     def toggle(self, name: str) -> None:
         self.wish(name, not getattr(self._history.settings, name))
