@@ -41,7 +41,6 @@ from kappaskin_app.views.line import Line
 from kappaskin_app.wishes import Wishes
 
 _WORDS = 0.5  # s between two looks at what touches the skin: as fast as one can read
-_DOCK_KEYS = {"cost": "F9", "stability": "F10"}
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -161,19 +160,25 @@ class MainWindow(QMainWindow):
         add("theme", view, "Light or &dark", wishes.switch_theme, "Ctrl+T")
         add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
-        for dock in self._docks:
-            name, action = f"dock-{dock.objectName()}", dock.toggleViewAction()
-            action.setShortcut(_DOCK_KEYS.get(dock.objectName(), ""))
-            action.triggered.connect(guarded(lambda *_, dock=dock: self._raise(dock)))
-            self.actions_by_name.register(name, view, action)
+        for dock in self._docks[:2]:
+            name = f"dock-{dock.objectName()}"
+            self.actions_by_name.register(name, view, dock.toggleViewAction())
+        for dock, key in zip(self._docks[2:], ("F9", "F10"), strict=True):
+            name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
+            action = add(name, view, dock.windowTitle(), turn, key)
+            action.setCheckable(True)
+            dock.visibilityChanged.connect(action.setChecked)
         for name in FIGURES:
             add(name, figures, TITLES.get(name, name), partial(self._draw, name))
         add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
 
-    def _raise(self, dock: QDockWidget) -> None:
-        """Let a dock that was just asked for be seen before the others in its place."""
-        below = self.dockWidgetArea(dock) == Qt.DockWidgetArea.BottomDockWidgetArea
-        if below and not dock.isFloating() and dock.isVisible():
+    def _turn(self, dock: QDockWidget) -> None:
+        """Show a dock below the skin, before the other in its place; hide one that is seen."""
+        if not dock.visibleRegion().isEmpty():
+            dock.hide()
+            return
+        dock.show()
+        if not dock.isFloating():
             heighten(self, dock)
         dock.raise_()
 

@@ -202,15 +202,25 @@ def test_a_real_sensor_leaves_the_demonstrations_to_the_simulation(
 def test_both_panels_below_the_skin_share_a_place_and_fit_a_small_window(
     window: MainWindow, until
 ) -> None:
-    for name in ("dock-cost", "dock-stability"):
-        window.actions_by_name[name].trigger()
-    until(lambda: window.stability.isVisible())
-    assert not window.cost.isVisible()
+    cost, stability = (window.actions_by_name[name] for name in ("dock-cost", "dock-stability"))
+
+    def seen() -> tuple[bool, bool]:
+        return tuple(not p.visibleRegion().isEmpty() for p in (window.cost, window.stability))
+
+    cost.trigger()
+    until(lambda: window.costing.running)
+    stability.trigger()
+    until(lambda: seen() == (False, True))
     assert not window.costing.running
+    assert (cost.isChecked(), stability.isChecked()) == (False, True)
     assert (window.width(), window.height()) == (1280, 800)
     assert window.minimumSizeHint().height() <= 800
     for button in window.stability.buttons:
         assert button.width() >= button.sizeHint().width()
+    cost.trigger()
+    until(lambda: seen() == (True, False))  # brought to the front, not hidden
+    cost.trigger()
+    until(lambda: seen() == (False, True))
 
 
 def test_everything_below_the_skin_explains_itself(window: MainWindow) -> None:
