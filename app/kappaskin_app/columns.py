@@ -4,6 +4,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QVBoxLayout, QWidget
 
+_LOWEST, _SHARE = 240, 0.28  # px, and of the window's height, of what is below the skin
+
 
 def column(*widgets: QWidget) -> QWidget:
     """The widgets sharing the height evenly."""
@@ -31,6 +33,12 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
     bar = area.verticalScrollBar().sizeHint().width()
     area.setMinimumWidth(whole.minimumSizeHint().width() + bar)
     return area
+
+
+def heighten(window: QMainWindow, dock: QDockWidget) -> None:
+    """Give a `dock` below the skin its share of the height of the `window`."""
+    height = max(_LOWEST, round(_SHARE * window.height()))
+    window.resizeDocks([dock], [height], Qt.Orientation.Vertical)
 
 
 def widen(window: QMainWindow, dock: QDockWidget, event: QResizeEvent) -> None:

@@ -54,10 +54,15 @@ def free_loads(settings: Settings) -> tuple[Load, ...]:
     return (PointLoad(s.x, s.y, s.force),)
 
 
+def reference_on(patch: Patch) -> tuple[int, int]:
+    """Functions of the true shape of `patch`; a strip is alike along y."""
+    return (REFERENCE[0], 1) if patch.strip else REFERENCE
+
+
 @lru_cache(_REMEMBERED)
 def _tried(plate: Plate, edge: str) -> Compliance | Refusal:
     try:
-        return plate.compliance(basis_for(plate.patch, edge, *REFERENCE))
+        return plate.compliance(basis_for(plate.patch, edge, *reference_on(plate.patch)))
     except Refusal as refusal:
         return refusal
 
@@ -102,7 +107,8 @@ def ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit |
     was = paper.plate.patch
     size = min(patch.a / was.a, patch.b / was.b)
     moved = _moved(paper.loads[0], paper.basis, compliance_of(paper.plate, paper.edge))
-    load, basis = _placed(paper.loads[0], was, patch), basis_for(patch, edge, *REFERENCE)
+    load = _placed(paper.loads[0], was, patch)
+    basis = basis_for(patch, edge, *reference_on(patch))
     gives = abs(_moved(load, basis, compliance))
     if not gives > _LEAST:
         raise Refusal(

@@ -19,20 +19,22 @@ from kappaskin import (
     Refusal,
     Region,
     Scene,
+    Sensor,
     SensorLayout,
     Tolerance,
     Transduction,
     UniformNoise,
     edges_of,
 )
-from kappaskin_app.pressing import REFERENCE, compliance_of, free_loads, ready, whole_on
+from kappaskin_app.pressing import compliance_of, free_loads, ready, reference_on, whole_on
 from kappaskin_app.settings import FREE_CASES, READY_CASES, Settings
 from kappaskin_app.skins import SHAPES
 
 _PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")
 """What, when it changes, may leave a free load over the rim."""
 _TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid")
-
+NO_ELEMENTS: dict[str, Any] = {"region_elements": (), "dead_elements": ()}
+"""What follows from other elements: those chosen by number were chosen among the last ones."""
 
 _CHAINS = {
     "modern": Transduction(),
@@ -88,6 +90,11 @@ def plate_of(settings: Settings) -> Plate:
     return Plate(patch_of(s), tension=s.tension, foundation=s.foam, fluid=s.fluid)
 
 
+def elements_of(settings: Settings) -> tuple[int, int]:
+    """The m x n elements asked for."""
+    return settings.elements_x, settings.elements_y
+
+
 def is_table_1(settings: Settings) -> bool:
     """Whether the skin is that of Table 1, where its cases are what they are called."""
     paper = Settings()
@@ -97,7 +104,8 @@ def is_table_1(settings: Settings) -> bool:
 def scene_of(settings: Settings) -> Scene:
     """The scene that `settings` describe; raises `Refusal` for a skin that cannot be."""
     plate = plate_of(settings)
-    layout = SensorLayout.regular(plate.patch, settings.elements_x, settings.elements_y)
+    layout = SensorLayout.regular(plate.patch, *elements_of(settings))
+    layout = layout.without(settings.dead_elements)
     if settings.load_case in FREE_CASES:
         compliance_of(plate, settings.edge)  # for its refusal
         loads, motion = free_loads(settings), None
@@ -113,11 +121,28 @@ def scene_of(settings: Settings) -> Scene:
         _effects(settings),
         _transduction(settings),
         seed=settings.noise_seed,
-        reference=REFERENCE,
+        reference=reference_on(plate.patch),
         edge=settings.edge,
     )
     fastest = math.floor(1 / scene.transduction.scan_time(3 * len(layout)))
     return replace(scene, rate=min(SHAPES[settings.shape].rate, fastest))
+
+
+def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
+    """A scene on a real `sensor`: a point load in its middle, and `noise` in 1/m as it has."""
+    plate, edge = sensor.plate, sensor.edge
+    loads, _ = ready("centre", plate, edge)
+    return Scene(
+        sensor.name,
+        plate,
+        sensor.layout,
+        loads,
+        effects=(GaussianNoise(noise),),
+        transduction=sensor.transduction,
+        rate=sensor.rate,
+        reference=reference_on(plate.patch),
+        edge=edge,
+    )
 
 
 def _check_on(loads: tuple[Load, ...], plate: Plate) -> None:
@@ -159,8 +184,8 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
     if name == "electronics":
         converter = _CHAINS[value].converter
         changed |= {"bits": converter.bits, "conversion_time": converter.conversion_time}
-    if name in ("elements_x", "elements_y"):
-        changed["region_elements"] = ()  # they were chosen among others
+    if name in ("shape", "elements_x", "elements_y"):
+        changed |= NO_ELEMENTS
     for side, places in (("side_x", ("x", "x_end", "size")), ("side_y", ("y", "y_end", "size_y"))):
         if side in changed:
             longer = changed[side] / getattr(settings, side)

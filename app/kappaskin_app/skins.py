@@ -23,6 +23,11 @@ class Shape:
     rate: float = 500.0
 
 
+def _strip(side_x: float, side_y: float, base_radius: float) -> Patch:
+    """The paper's planar finger: an arc that is alike all along its width."""
+    return Patch(side_x, side_y, base_radius, strip=True)
+
+
 def _hexagon(rim_radius: float) -> Patch:
     """Its corners `rim_radius` from its middle, two of them on the left and right."""
     height = math.sqrt(3) / 2
@@ -37,6 +42,12 @@ SHAPES = {
         "Cylinder (fingertip)",
         Patch,
         {"side_x": math.pi * _FINGERTIP, "side_y": 0.04, "base_radius": _FINGERTIP},
+        {"force": 1.2, "exaggeration": 30.0},
+    ),
+    "strip": Shape(
+        "Strip (fingertip)",
+        _strip,
+        {"side_x": math.pi * _FINGERTIP, "side_y": 0.01, "base_radius": _FINGERTIP},
         {"force": 1.2, "exaggeration": 30.0},
     ),
     "disk": Shape("Disk", Disk, {"rim_radius": 0.05}, _AS_TABLE_1, rate=200.0),

@@ -97,6 +97,19 @@ def palette(theme: Theme) -> QPalette:
     return made
 
 
+def slider_style(theme: Theme) -> str:
+    """A slider whose groove is seen on a dark ground too, where Fusion's is lost."""
+    off, on = theme.off, theme.accent
+    handle = "QSlider::handle:horizontal"
+    return (
+        f"QSlider::groove:horizontal {{ height: 4px; background: {theme.line}; }}"
+        f"{handle} {{ width: 14px; margin: -5px 0; border-radius: 7px; background: {on};"
+        f" border: 1px solid {on}; }}"
+        f"{handle}:focus {{ border-color: {theme.text}; }}"
+        f"{handle}:disabled {{ background: {off}; border-color: {off}; }}"
+    )
+
+
 def _colour_map(*anchors: str) -> Colours:
     """256 colours (256, 3) that pass evenly through `anchors`."""
     rgb = np.array([[int(a[i : i + 2], 16) for i in (1, 3, 5)] for a in anchors], float)
@@ -125,3 +138,15 @@ PULLED = SEQUENTIAL[::-1]  # the same for what lies below zero
 
 # What is drawn over each: seen against every one of its colours.
 LIGHT_INK, DARK_INK = "#f4f6f8", "#16191d"
+
+# Told apart in the common colour blindnesses (after Okabe and Ito), on a light and a dark ground.
+SERIES = (
+    ("#0072b2", "#5ab4e8"),
+    ("#8a6d00", "#f0e060"),
+    ("#5b6470", "#a0a9b4"),
+    ("#00805c", "#1fc796"),
+    ("#a8527f", "#e08fbd"),
+    ("#c24e00", "#f08a3c"),
+    ("#1a7a8a", "#7fe0e8"),
+    ("#6a3fb5", "#b79bf0"),
+)

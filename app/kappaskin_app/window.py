@@ -21,13 +21,17 @@ from kappaskin import FIGURES, Engine, Status, serial_ports
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
-from kappaskin_app.columns import column, widen
+from kappaskin_app.columns import column, heighten, widen
+from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.naming import Naming
+from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.panels import Panels
+from kappaskin_app.panels.stability import StabilityPanel
+from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
 from kappaskin_app.simulation import settings_for
@@ -51,7 +55,10 @@ class MainWindow(QMainWindow):
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
         self.calibrating = Calibrating(self.history, self)
+        self.seeing = Seeing(self.history, self)
+        self.costing = Costing(self.history, self.session, self.wishes, self)
         self.panels, self.display = Panels(), Display(self.session)
+        self.cost, self.stability = CostPanel(), StabilityPanel()
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
@@ -66,12 +73,22 @@ class MainWindow(QMainWindow):
         self.statusBar().addPermanentWidget(self.object, 1)
         self.setCentralWidget(self._centre())
         self._make_header()
-        left, right = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+        area = Qt.DockWidgetArea
+        left, right, below = (
+            area.LeftDockWidgetArea,
+            area.RightDockWidgetArea,
+            area.BottomDockWidgetArea,
+        )
         maps = column(*self.heatmaps.values())
         self._docks = [
             self._dock("settings", "Settings", self.panels, left),
             self._dock("curvature", "Curvature, by element", maps, right),
+            self._dock("cost", "Cost of accuracy", self.cost, below),
+            self._dock("stability", "Stability", self.stability, below),
         ]
+        self.tabifyDockWidget(*self._docks[2:])
+        for dock in self._docks[2:]:
+            dock.hide()  # so that a small window is left to the skin until they are asked for
         self.actions_by_name = Actions(self)
         self._make_actions()
         self._wire()
@@ -143,12 +160,27 @@ class MainWindow(QMainWindow):
         add("theme", view, "Light or &dark", wishes.switch_theme, "Ctrl+T")
         add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
-        for dock in self._docks:
+        for dock in self._docks[:2]:
             name = f"dock-{dock.objectName()}"
             self.actions_by_name.register(name, view, dock.toggleViewAction())
+        for dock, key in zip(self._docks[2:], ("F9", "F10"), strict=True):
+            name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
+            action = add(name, view, dock.windowTitle(), turn, key)
+            action.setCheckable(True)
+            dock.visibilityChanged.connect(action.setChecked)
         for name in FIGURES:
             add(name, figures, TITLES.get(name, name), partial(self._draw, name))
         add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
+
+    def _turn(self, dock: QDockWidget) -> None:
+        """Show a dock below the skin, before the other in its place; hide one that is seen."""
+        if not dock.visibleRegion().isEmpty():
+            dock.hide()
+            return
+        dock.show()
+        if not dock.isFloating():
+            heighten(self, dock)
+        dock.raise_()
 
     def _wire(self) -> None:
         panels, wishes, session, drag = self.panels, self.wishes, self.session, self.membrane.drag
@@ -164,6 +196,18 @@ class MainWindow(QMainWindow):
         session.estimated.connect(guarded(self.calibrating.receive))
         panels.calibrate.attend(self.calibrating)
         panels.in_use.attend(self.calibrating)
+        self._docks[2].visibilityChanged.connect(guarded(self.costing.watch))
+        session.reported.connect(guarded(self.costing.follow))
+        session.estimated.connect(guarded(self.costing.receive))
+        self.cost.attend(self.costing)
+        self._docks[3].visibilityChanged.connect(guarded(self.seeing.watch))
+        session.reported.connect(guarded(self.seeing.follow))
+        self.stability.attend(self.seeing)
+        self.stability.demonstrated.connect(guarded(wishes.demonstrate))
+        self.stability.back.connect(guarded(self.history.stack.undo))
+        self.stability.shown.connect(guarded(self._show_shape))
+        self.history.stack.canUndoChanged.connect(guarded(self.stability.show_undo))
+        self.stability.show_undo(self.history.stack.canUndo())
         session.refused.connect(guarded(panels.shape.show_refusal))
         session.refused.connect(guarded(panels.load.show_refusal))
         session.preparing.connect(guarded(panels.shape.show_preparing))
@@ -211,7 +255,22 @@ class MainWindow(QMainWindow):
         if isinstance(application, QApplication):
             application.setPalette(palette(theme))
         self.panels.show_theme(theme)
+        self.cost.show_theme(theme)
+        self.stability.show_settings(settings)
+        self.stability.show_theme(theme)
         self.display.show_theme(theme)
+
+    def _show_shape(self) -> None:
+        """Draw the shape that is looked at on the skin, while somebody looks and wants it."""
+        if self.session.closed:
+            return  # the last panel hides while the window closes
+        seen, setup = self.seeing.telling(), self.session.status.setup
+        if seen is None or not self.stability.on_skin.isChecked():
+            self.display.show_mode(None)
+            return
+        number, count = self.seeing.chosen, len(seen.values)
+        words = f"Colours: shape {number} of {count}, no measurement"
+        self.display.show_mode(seen.surface(number, setup.nx, setup.ny), words)
 
     def _show_status(self, status: Status) -> None:
         self.display.show_status(status)
@@ -224,6 +283,7 @@ class MainWindow(QMainWindow):
             self._next_bargain = now + _BARGAIN
             self.panels.region.show_bargain(self.session.bargain())
         self.panels.show_status(status, simulating)
+        self.stability.show_status(status, self.session.simulating)
 
     # Small things.
 
@@ -259,6 +319,8 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.session.closed:
             guard.forget(self._tell)
+            self.costing.close()
+            self.seeing.close()
             self.session.close()
             self.naming.close()
             self.membrane.close_plotter()

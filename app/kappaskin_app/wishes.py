@@ -3,11 +3,13 @@
 import math
 from typing import Any
 
+from kappaskin import Setting
+from kappaskin_app.demonstrations import Demonstration
 from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
 from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings, ask_of
-from kappaskin_app.simulation import with_consequences
+from kappaskin_app.simulation import NO_ELEMENTS, elements_of, with_consequences
 
 
 class Wishes:
@@ -29,6 +31,20 @@ class Wishes:
         if settings.region == "elements":
             chosen = set(settings.region_elements) ^ {element}
             self._history.change("Choose elements", region_elements=tuple(sorted(chosen)))
+
+    def take(self, setting: Setting) -> None:
+        """Fit as `setting` says, on as many elements."""
+        along_x, along_y = setting.functions
+        changed = {"method": setting.method, "functions_x": along_x, "functions_y": along_y}
+        elements = setting.elements
+        another = elements != elements_of(self._history.settings)
+        if elements is not None and another and self._session.simulating:
+            changed |= {"elements_x": elements[0], "elements_y": elements[1], **NO_ELEMENTS}
+        self._history.change("Choice by its cost", -1, **changed)
+
+    def demonstrate(self, demonstration: Demonstration) -> None:
+        """Bring a hard case about."""
+        self._history.change(demonstration.title, -1, **demonstration.changes())
 
     def toggle(self, name: str) -> None:
         self.wish(name, not getattr(self._history.settings, name))

@@ -13,12 +13,15 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QLabel,
     QLineEdit,
+    QSizePolicy,
     QSpinBox,
     QWidget,
 )
 
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.settings import Choice, Range, Settings, Switch, ask_of
+
+_LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
 
 
 class _WholeBox(QSpinBox):
@@ -125,6 +128,12 @@ def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:
     box = QComboBox()
     for value, words in how.options:
         box.addItem(words, value)
+    if max(len(words) for _, words in how.options) > _LONG:
+        # Or one long answer would take its width from the skin beside the form.
+        box.view().setMinimumWidth(box.sizeHint().width())
+        box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        box.setMinimumContentsLength(_SEEN)
+        box.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
     box.activated.connect(lambda index: said(box.itemData(index)))
     return _Editor(box, lambda value: box.setCurrentIndex(box.findData(value)))
 

@@ -15,6 +15,7 @@ METHOD_NAMES = (
     ("least-squares", "Least squares"),
     ("as-printed", "As printed (Eq. 6)"),
     ("direct", "Direct, each frame anew"),
+    ("fast", "Fast, a regular grid"),
     ("bayes", "Bayes, a plate's prior"),
     ("finite-slope", "Finite slope"),
     ("robust", "Robust, leaves out bad elements"),

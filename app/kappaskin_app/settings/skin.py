@@ -71,6 +71,7 @@ class Skin:
     )
     elements_x: int = asked(10, _elements("x", "m"))
     elements_y: int = asked(10, _elements("y", "n"))
+    dead_elements: tuple[int, ...] = ()  # by a demonstration
     tension: float = asked(
         0.0,
         Range(

@@ -1,0 +1,234 @@
+import math
+import multiprocessing
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from kappaskin import Cost, Refused, Setting
+from kappaskin_app import costing
+from kappaskin_app.amounts import duration, length
+from kappaskin_app.costing import Frontier, in_words
+from kappaskin_app.settings import METHOD_NAMES, Settings
+from kappaskin_app.simulation import scene_of, scene_of_sensor
+from kappaskin_app.views.log_axis import LogAxis
+from kappaskin_app.window import MainWindow
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So few settings that measuring them takes no time."""
+    monkeypatch.setattr(costing, "METHODS", ("least-squares", "bayes"))
+    monkeypatch.setattr(costing, "FUNCTIONS", (4, 8, 12))
+    monkeypatch.setattr(costing, "ELEMENTS", (6,))
+
+
+@pytest.fixture
+def measured(window: MainWindow, until) -> MainWindow:
+    """The window once everything is measured."""
+    window.actions_by_name["dock-cost"].trigger()
+    until(lambda: _all_measured(window), 60.0)
+    until(lambda: window.cost.plot.frontier == window.costing.frontier())
+    return window
+
+
+def _all_measured(window: MainWindow) -> bool:
+    done, asked = window.costing.progress
+    return asked > 0 and done == asked and not window.costing.running
+
+
+def _processes() -> list[str]:
+    names = [child.name for child in multiprocessing.active_children()]
+    return [name for name in names if name == "kappaskin-cost"]
+
+
+def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
+    window: MainWindow, until, qtbot
+) -> None:
+    assert not window.cost.isVisible()
+    until(lambda: window.session.status.sensor is not None)
+    assert not _processes()
+    qtbot.keyClick(window, Qt.Key.Key_F9)
+    assert window.cost.isVisible()
+    until(lambda: _processes() == ["kappaskin-cost"])
+    until(lambda: window.cost.bar.isVisible())
+    until(lambda: window.costing.progress[0] > 0, 60.0)
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 2)
+
+
+def test_nobody_looking_ends_the_measuring_and_a_look_takes_it_up_again(
+    window: MainWindow, until
+) -> None:
+    dock = window.actions_by_name["dock-cost"]
+    dock.trigger()
+    until(lambda: window.costing.progress[0] > 0, 60.0)
+    dock.trigger()
+    assert not window.costing.running
+    assert not _processes()
+    kept = dict(window.costing.costs)
+    dock.trigger()
+    until(lambda: _all_measured(window), 60.0)
+    assert all(window.costing.costs[setting] is cost for setting, cost in kept.items())
+
+
+def test_every_method_and_basis_is_measured_and_what_is_refused_is_not_drawn(
+    measured: MainWindow, colours_in
+) -> None:
+    costs = measured.costing.costs
+    assert len(costs) == 2 * 3 * 2
+    assert isinstance(costs[Setting("least-squares", (12, 12), (10, 10))], Refused)
+    drawn = measured.cost.plot.frontier.costs
+    assert drawn
+    assert all(cost in drawn for cost in costs.values() if isinstance(cost, Cost))
+    assert colours_in(measured, measured.cost.plot) > 20
+    assert measured.cost.count.text() == "12 of 12"
+
+
+def test_a_click_on_a_point_switches_to_it_and_is_one_step_to_undo(
+    measured: MainWindow, until, qtbot
+) -> None:
+    plot, was = measured.cost.plot, measured.history.settings
+    cost = measured.costing.costs[Setting("bayes", (12, 12), (6, 6))]
+    # The range follows what is measured live: where the point is now.
+    place = plot.place_of(cost).toPoint()
+    qtbot.mouseMove(plot, place + QPoint(40, -40))
+    qtbot.mouseClick(plot, Qt.MouseButton.LeftButton, pos=place)
+    s = measured.history.settings
+    asked = (s.method, s.functions_x, s.functions_y, s.elements_x, s.elements_y)
+    assert asked[0] == "bayes"
+    until(lambda: measured.costing.predicted() in plot.frontier.costs)
+    assert measured.costing.present == Setting(asked[0], asked[1:3], asked[3:])
+    measured.history.stack.undo()
+    assert measured.history.settings == was
+
+
+def test_what_is_predicted_and_what_is_measured_stand_beside_each_other(
+    measured: MainWindow, until
+) -> None:
+    figures = measured.cost.figures
+    for row in ("Predicted", "Measured"):
+        until(lambda row=row: figures[row, "RMS error"].text().endswith(" mm"))
+        until(lambda row=row: figures[row, "time"].text().endswith("s"))
+    assert measured.cost.setting.text().startswith("Least squares, 8")
+    error, time = measured.costing.measured()
+    predicted = measured.costing.predicted()
+    assert isinstance(predicted, Cost)
+    assert error == pytest.approx(predicted.rms, rel=0.7)
+    assert 0 < time < 1
+
+
+def test_the_slider_takes_the_cheapest_setting_that_is_accurate_enough(
+    measured: MainWindow, qtbot
+) -> None:
+    slider, best = measured.cost.wanted, measured.costing.frontier().best
+    assert slider.isEnabled()
+    slider.setFocus()
+    qtbot.keyClick(slider, Qt.Key.Key_End)
+    assert measured.costing.present is not None
+    s = measured.history.settings
+    chosen = Setting(s.method, (s.functions_x, s.functions_y), (s.elements_x, s.elements_y))
+    assert chosen == best[0].setting
+    assert in_words(chosen) in measured.cost.cheapest.text()
+    qtbot.keyClick(slider, Qt.Key.Key_Home)
+    s = measured.history.settings
+    chosen = Setting(s.method, (s.functions_x, s.functions_y), (s.elements_x, s.elements_y))
+    assert chosen == measured.costing.frontier().best[-1].setting
+
+
+def test_a_slider_held_by_the_mouse_switches_when_it_is_let_go(measured: MainWindow) -> None:
+    slider, was = measured.cost.wanted, measured.history.settings
+    slider.setSliderDown(True)
+    slider.setValue(slider.maximum())
+    assert measured.history.settings == was
+    assert measured.cost.cheapest.text().startswith("Cheapest")
+    slider.setSliderDown(False)
+    assert measured.history.settings != was
+
+
+def test_another_basis_is_measured_too_and_another_skin_only_when_asked(
+    measured: MainWindow, until
+) -> None:
+    message = measured.cost.message
+    measured.history.change("Odd", -1, functions_x=7, functions_y=5)
+    odd = Setting("least-squares", (7, 5), (10, 10))
+    until(lambda: odd in measured.costing.costs, 60.0)
+    measured.history.change("Noise", -1, noise_rms=1.0)
+    until(lambda: message.text() == "Measured with other noise: measure again.")
+    was = measured.costing.costs[odd]
+    measured.history.change("Edge", -1, edge="clamped")
+    until(lambda: "on another skin" in message.text())
+    measured.cost.again.click()
+    until(lambda: odd in measured.costing.costs, 60.0)
+    assert measured.costing.costs[odd] is not was
+    until(lambda: not message.isVisible())
+    measured.history.change("Load", -1, load_case="centre")
+    until(lambda: "under another load" in message.text())
+
+
+def test_a_skin_without_a_load_is_refused_in_words(window: MainWindow, until) -> None:
+    window.session.scene = scene_of(Settings(load_case="point", force=0.0))
+    window.actions_by_name["dock-cost"].trigger()
+    until(lambda: window.costing.refusal != "", 60.0)
+    until(lambda: window.cost.message.isVisible())
+    assert "load" in window.cost.message.text()
+    assert not window.costing.running
+
+
+def test_a_real_sensor_is_reckoned_with_its_own_skin_and_noise() -> None:
+    sensor = scene_of(Settings(elements_x=7, dead_elements=(3,), edge="clamped")).sensor()
+    scene = scene_of_sensor(sensor, 0.3)
+    assert (scene.plate, scene.layout, scene.edge) == (sensor.plate, sensor.layout, "clamped")
+    assert [effect.rms for effect in scene.effects] == [0.3]
+    (load,) = scene.loads
+    assert load.centre().tolist() == pytest.approx([0.05, 0.05])
+
+
+def test_every_method_has_a_name_that_people_read() -> None:
+    from kappaskin import METHODS
+
+    assert [name for name, _ in METHOD_NAMES] == list(METHODS)
+
+
+def test_nothing_is_cheapest_where_nothing_was_measured() -> None:
+    assert Frontier().cheapest(1.0) is None
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (1.64e-5, "0.016 mm"),
+        (2.5e-3, "2.5 mm"),
+        (0.12, "120 mm"),
+        (9.96e-7, "0.0010 mm"),
+        (4e-7, "0.40 \N{MICRO SIGN}m"),
+        (math.nan, "\N{EN DASH}"),
+        (math.inf, "\N{EN DASH}"),
+    ],
+)
+def test_a_length_is_said_with_two_digits(value: float, words: str) -> None:
+    assert length(value) == words
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(2.51e-5, "25 \N{MICRO SIGN}s"), (9.99e-4, "1.0 ms"), (0.0456, "46 ms"), (2.0, "2.0 s")],
+)
+def test_a_time_is_said_with_two_digits(value: float, words: str) -> None:
+    assert duration(value) == words
+
+
+def test_a_logarithmic_axis_has_round_ends_around_all_and_equal_ratios_apart() -> None:
+    axis = LogAxis.around([3e-5, 7e-3, math.nan, 0.0, math.inf])
+    assert (axis.least, axis.most) == pytest.approx((2e-5, 1e-2))
+    steps = [axis.share(value) for value in (1e-4, 1e-3, 1e-2)]
+    assert steps[1] - steps[0] == pytest.approx(steps[2] - steps[1])
+    assert axis.at(axis.share(1e-3)) == pytest.approx(1e-3)
+    assert (axis.share(1e-9), axis.share(1.0), axis.share(math.nan)) == (0.0, 1.0, 0.0)
+    values = [value for value, _ in axis.ticks()]
+    assert values == pytest.approx([2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2])
+
+
+def test_an_axis_of_one_value_or_none_can_still_be_drawn() -> None:
+    for axis in (LogAxis.around([]), LogAxis.around([1e-3]), LogAxis.around([math.nan])):
+        assert 0 < axis.least < axis.most
+        assert len(axis.ticks()) >= 2
