@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.fit import METHODS, Fit, check_method, estimator_for
+from kappaskin.fit import METHODS, Estimator, Fit, check_method, estimator_for
 from kappaskin.frames import Array, Touch
 from kappaskin.geometry import contact_geometry
 from kappaskin.layout import SensorLayout
@@ -122,18 +122,19 @@ def _shapes(
     return {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
 
 
-def _check_sizes(basis: Basis, readings: int, surface: int, has_prior: bool) -> None:
+def _check_sizes(basis: Basis, readings: int, surface: int, method: type[Estimator]) -> None:
     """Refuse what would exhaust the memory before anything is computed."""
     (Ni, Nj), N = basis.shape, basis.size
-    if readings < N and not has_prior:
+    if readings < N and not method.has_prior:
         raise RankDeficient(
             f"expected at most {readings} functions for {readings} readings per frame, got "
             f"{Ni} x {Nj} = {N}; use a smaller basis, more elements, or a "
             "prior (bayes)"
         )
-    if max(readings * N, surface) > _MOST:
+    operator = readings * N if method.has_matrix else N
+    if max(operator, surface) > _MOST:
         raise Refusal(
-            f"expected at most {_MOST} numbers in one array, got {readings * N} in the operator "
+            f"expected at most {_MOST} numbers in one array, got {operator} in the operator "
             f"of the {Ni} x {Nj} basis and {surface} in the surfaces; use a smaller basis, a "
             "coarser grid or fewer frames"
         )
@@ -175,7 +176,7 @@ def reconstruct(
     functions = basis_for(patch, edge, *basis)
     check_method(method)
     points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
-    _check_sizes(functions, int(layout.live.sum()), points, METHODS[method].has_prior)
+    _check_sizes(functions, int(layout.live.sum()), points, METHODS[method])
     out = _shapes(method, functions, layout, curvature, sigma)
     if grid is not None:
         x, y = patch.grid(*grid)

@@ -14,16 +14,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    METHODS,
     DiscLoad,
     Disk,
+    Fast,
     Patch,
     Plate,
     PointLoad,
     RankDeficient,
     Refusal,
     SensorLayout,
+    Simulator,
     SineBasis,
     basis_for,
+    load_scene,
 )
 from kappaskin.reconstruct import reconstruct
 from kappaskin.touch import KINDS
@@ -544,3 +548,33 @@ def test_a_disk_and_a_polygon_are_read_by_their_outline(saved) -> None:
         reconstruct(saved(outline=0.07), (4, 4))
     with pytest.raises(Refusal, match="cross"):
         reconstruct(saved(outline=[[0, 0], [0.1, 0.1], [0.1, 0], [0, 0.1]]), (4, 4))
+
+
+def test_a_large_grid_is_read_by_fast_transforms_though_no_matrix_would_fit(tmp_path) -> None:
+    patch = Patch(0.1, 0.1)
+    layout, basis = SensorLayout.regular(patch, 128, 128), SineBasis(patch, 120, 120)
+    truth = np.random.default_rng(0).normal(0, 1e-9, (120, 120))
+    order = np.random.default_rng(1).permutation(len(layout))
+    K = Fast(basis, layout).predicted(truth)[:, order]
+    path = tmp_path / "grid.npz"
+    np.savez(path, size=[0.1, 0.1], positions=layout.positions[order], curvature=K)
+
+    out = reconstruct(path, (120, 120), method="fast")
+
+    np.testing.assert_allclose(out["coefficients"][0], truth, rtol=0, atol=1e-18)
+    with pytest.raises(Refusal, match="in the operator"):
+        reconstruct(path, (120, 120))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_reads_a_file(tmp_path, method: str) -> None:
+    scene = load_scene("centre")
+    simulator, sensor = Simulator(scene), scene.sensor()
+    K = [sensor.nominal(simulator.frame(n, lambda: 0.0)).reshape(3, -1) for n in range(3)]
+    path = tmp_path / "frames.npz"
+    np.savez(path, size=[0.1, 0.1], positions=scene.layout.positions, curvature=K)
+
+    out = reconstruct(path, (8, 8), (33, 33), method=method, contact=True)
+
+    assert out["w"].max(axis=(1, 2)) * 1e3 == pytest.approx(4.70, abs=0.15)
+    np.testing.assert_allclose(out["contact"], 0.05, atol=1e-3)

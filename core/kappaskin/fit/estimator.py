@@ -182,6 +182,8 @@ class Estimator(ABC):
     float64 or float32; the factorisation always in float64.
     """
 
+    has_matrix: ClassVar = True
+    """Whether M is made, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
     """Whether what the readings do not decide is left to a prior, so that no basis is too large."""
 

@@ -213,6 +213,8 @@ class Fast(Estimator):
     Raises `RankDeficient` when the readings do not decide the coefficients, or hardly.
     """
 
+    has_matrix = False
+
     def __init__(
         self,
         basis: Basis,
