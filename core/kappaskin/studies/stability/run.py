@@ -1,12 +1,17 @@
 """The gallery to rows: every case through every method that claims it, in both precisions."""
 
 import math
+import multiprocessing
+import os
 from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 
+from kappaskin.engine import one_thread_per_process
 from kappaskin.errors import Refusal
 from kappaskin.fit import METHODS, Estimator
 from kappaskin.frames import Array
@@ -38,13 +43,22 @@ def stability(
     has it, None where a coefficient is not determined. `digits_lost` of the first frame, None where
     the least-squares answer is not sought or does not exist. `error_mm` and `bar_mm` (95 %) are
     root mean squares over the skin and all frames; `covered` is the share of the truth that lies
-    within the bar. `progress` is told each case before it is run.
+    within the bar. `progress` is told each case when it is done. Cases are shared among processes
+    of one thread each: on matrices of this size more threads only wait for each other.
     """
-    rows: list[dict[str, Any]] = []
-    for case in gallery(long):
-        progress(case.name)
-        rows += rows_of(case)
+    names, rows = [case.name for case in gallery(long)], list[dict[str, Any]]()
+    context = multiprocessing.get_context("spawn")
+    with one_thread_per_process(), ProcessPoolExecutor(os.cpu_count(), context) as pool:
+        found = pool.map(_rows_of_the, names, repeat(long))
+        for name, its_own in zip(names, found, strict=True):
+            progress(name)
+            rows += its_own
     return rows
+
+
+def _rows_of_the(name: str, long: bool) -> list[dict[str, Any]]:
+    """The rows of the case of this name."""
+    return rows_of(next(case for case in gallery(long) if case.name == name))
 
 
 def rows_of(case: Case, methods: Mapping[str, type[Estimator]] = METHODS) -> list[dict[str, Any]]:
