@@ -106,7 +106,7 @@ def test_eq_6_as_printed_loses_twice_the_digits_of_the_condition(rows):
         ("all NaN", "frame 0: .* no readings are left"),
     ],
 )
-@pytest.mark.parametrize("method", ["least-squares", "direct", "robust"])
+@pytest.mark.parametrize("method", SEEK_LEAST_SQUARES)
 def test_a_refusal_names_its_cause(rows, method, case, cause):
     found = [r for r in rows if (r["case"], r["method"]) == (case, method)]
 

@@ -167,7 +167,7 @@ def _sizes() -> Iterator[Case]:
     yield _case(
         "Ni = 64",
         "unscaled, the lengths of the columns differ by a factor of thousands",
-        SensorLayout.regular(Patch(0.5, 0.02), 65, 3),
+        SensorLayout.regular(Patch(0.5, 0.5), 65, 3),
         (64, 2),
         kind=Kind.DENSE,
     )
