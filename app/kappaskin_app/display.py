@@ -37,6 +37,7 @@ class Display:
         self.heatmaps = {name: Heatmap(name, _TIPS[name]) for name in COMPONENTS}
         self.ranges = Ranges()
         self._settings = Settings()
+        self._mode: Array | None = None
         self._met = 0
         self._colours: object = None
         self._next_heatmaps = self._next_numbers = 0.0
@@ -58,6 +59,12 @@ class Display:
         """Up to where the colours of the skin go, in SI units."""
         largest = max(abs(limit) for limit in self.scale.bar.limits)
         return largest * (1e-3 if self._settings.colour_by == "displacement" else 1.0)
+
+    def show_mode(self, mode: Array | None, words: str = "") -> None:
+        """Colour the skin by a shape (ny, nx) from -1 to 1 instead, which `words` say, or not."""
+        self._mode = mode
+        self.membrane.show_caption(words if mode is not None else "")
+        self.scale.lock.setEnabled(mode is None)  # these colours have no range to keep
 
     def show_theme(self, theme: Theme) -> None:
         for view in (
@@ -133,7 +140,10 @@ class Display:
         colour = settings.colour_by
         values = self._session.surface_values(estimate, colour)
         depth = self.ranges.limit("displacement", 1e3 * estimate.surface, settings, now)
-        if colour == "displacement":
+        mode = self._mode
+        if mode is not None and mode.shape == estimate.surface.shape:
+            values, limits, colours, unit = mode, (-1.0, 1.0), DIVERGING, "shape"
+        elif colour == "displacement":
             pulled = self.ranges.pulled(values)
             limits = (-depth, 0.0) if pulled else (0.0, depth)
             colours, unit = PULLED if pulled else SEQUENTIAL, "mm"

@@ -30,6 +30,8 @@ from kappaskin_app.history import History
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.panels import Panels
+from kappaskin_app.panels.stability import StabilityPanel
+from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
 from kappaskin_app.simulation import settings_for
@@ -39,7 +41,6 @@ from kappaskin_app.views.line import Line
 from kappaskin_app.wishes import Wishes
 
 _WORDS = 0.5  # s between two looks at what touches the skin: as fast as one can read
-_DOCK_KEYS = {"cost": "F9"}
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -54,9 +55,10 @@ class MainWindow(QMainWindow):
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
         self.calibrating = Calibrating(self.history, self)
+        self.seeing = Seeing(self.history, self)
         self.costing = Costing(self.history, self.session, self.wishes, self)
         self.panels, self.display = Panels(), Display(self.session)
-        self.cost = CostPanel()
+        self.cost, self.stability = CostPanel(), StabilityPanel()
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
@@ -82,7 +84,9 @@ class MainWindow(QMainWindow):
             self._dock("settings", "Settings", self.panels, left),
             self._dock("curvature", "Curvature, by element", maps, right),
             self._dock("cost", "Cost of accuracy", self.cost, below),
+            self._dock("stability", "Stability", self.stability, below),
         ]
+        self.tabifyDockWidget(*self._docks[2:])
         for dock in self._docks[2:]:
             dock.hide()  # so that a small window is left to the skin until they are asked for
         self.actions_by_name = Actions(self)
@@ -156,19 +160,25 @@ class MainWindow(QMainWindow):
         add("theme", view, "Light or &dark", wishes.switch_theme, "Ctrl+T")
         add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
-        for dock in self._docks:
-            name, action = f"dock-{dock.objectName()}", dock.toggleViewAction()
-            action.setShortcut(_DOCK_KEYS.get(dock.objectName(), ""))
-            action.triggered.connect(guarded(lambda *_, dock=dock: self._raise(dock)))
-            self.actions_by_name.register(name, view, action)
+        for dock in self._docks[:2]:
+            name = f"dock-{dock.objectName()}"
+            self.actions_by_name.register(name, view, dock.toggleViewAction())
+        for dock, key in zip(self._docks[2:], ("F9", "F10"), strict=True):
+            name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
+            action = add(name, view, dock.windowTitle(), turn, key)
+            action.setCheckable(True)
+            dock.visibilityChanged.connect(action.setChecked)
         for name in FIGURES:
             add(name, figures, TITLES.get(name, name), partial(self._draw, name))
         add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
 
-    def _raise(self, dock: QDockWidget) -> None:
-        """Let a dock that was just asked for be seen before the others in its place."""
-        below = self.dockWidgetArea(dock) == Qt.DockWidgetArea.BottomDockWidgetArea
-        if below and not dock.isFloating() and dock.isVisible():
+    def _turn(self, dock: QDockWidget) -> None:
+        """Show a dock below the skin, before the other in its place; hide one that is seen."""
+        if not dock.visibleRegion().isEmpty():
+            dock.hide()
+            return
+        dock.show()
+        if not dock.isFloating():
             heighten(self, dock)
         dock.raise_()
 
@@ -190,6 +200,15 @@ class MainWindow(QMainWindow):
         session.reported.connect(guarded(self.costing.follow))
         session.estimated.connect(guarded(self.costing.receive))
         self.cost.attend(self.costing)
+        self._docks[3].visibilityChanged.connect(guarded(self.seeing.watch))
+        session.reported.connect(guarded(self.seeing.follow))
+        self.stability.attend(self.seeing)
+        self.stability.demonstrated.connect(guarded(wishes.demonstrate))
+        session.reported.connect(guarded(wishes.follow))
+        self.stability.back.connect(guarded(self.history.stack.undo))
+        self.stability.shown.connect(guarded(self._show_shape))
+        self.history.stack.canUndoChanged.connect(guarded(self.stability.show_undo))
+        self.stability.show_undo(self.history.stack.canUndo())
         session.refused.connect(guarded(panels.shape.show_refusal))
         session.refused.connect(guarded(panels.load.show_refusal))
         session.preparing.connect(guarded(panels.shape.show_preparing))
@@ -238,7 +257,21 @@ class MainWindow(QMainWindow):
             application.setPalette(palette(theme))
         self.panels.show_theme(theme)
         self.cost.show_theme(theme)
+        self.stability.show_settings(settings)
+        self.stability.show_theme(theme)
         self.display.show_theme(theme)
+
+    def _show_shape(self) -> None:
+        """Draw the shape that is looked at on the skin, while somebody looks and wants it."""
+        if self.session.closed:
+            return  # the last panel hides while the window closes
+        seen, setup = self.seeing.telling(), self.session.status.setup
+        if seen is None or not self.stability.on_skin.isChecked():
+            self.display.show_mode(None)
+            return
+        number, count = self.seeing.chosen, len(seen.values)
+        words = f"Colours: shape {number} of {count}, no measurement"
+        self.display.show_mode(seen.surface(number, setup.nx, setup.ny), words)
 
     def _show_status(self, status: Status) -> None:
         self.display.show_status(status)
@@ -251,6 +284,7 @@ class MainWindow(QMainWindow):
             self._next_bargain = now + _BARGAIN
             self.panels.region.show_bargain(self.session.bargain())
         self.panels.show_status(status, simulating)
+        self.stability.show_status(status, self.session.simulating)
 
     # Small things.
 
@@ -287,6 +321,7 @@ class MainWindow(QMainWindow):
         if not self.session.closed:
             guard.forget(self._tell)
             self.costing.close()
+            self.seeing.close()
             self.session.close()
             self.naming.close()
             self.membrane.close_plotter()

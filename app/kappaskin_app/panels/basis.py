@@ -8,8 +8,13 @@ from kappaskin_app.panels.form import Form
 
 def in_use(status: Status) -> str:
     """Why the functions are not those asked for, and which they are; nothing when they are."""
-    setup = status.setup
-    return f"In use: {setup.Ni} x {setup.Nj}. {status.refusal}." if status.refusal else ""
+    if not status.refusal:
+        return ""
+    if status.slot is None:
+        return f"Nothing is in use. {status.refusal}."
+    setup, sensor = status.setup, status.sensor
+    across = 1 if sensor is not None and sensor.layout.patch.strip else setup.Nj
+    return f"In use: {setup.Ni} x {across}. {status.refusal}."
 
 
 class BasisPanel(Form):

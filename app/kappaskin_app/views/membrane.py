@@ -86,6 +86,11 @@ class MembraneView(QWidget):
         self.labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
         for label in self.labels:
             plotter.add_actor(label, reset_camera=False, render=False)
+        self.caption: Any = pv.Text("")
+        self.caption.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+        self.caption.position = 0.015, 0.94  # of the picture, from its lower left corner
+        self.caption.prop.font_size = 14
+        plotter.add_actor(self.caption, reset_camera=False, render=False)
 
     def _make_lights(self) -> None:
         """One low lamp from the left for relief, and a weak one at the camera."""
@@ -292,6 +297,12 @@ class MembraneView(QWidget):
         self._elements_actor.visibility = elements and self._surface_actor is not None
         self.plotter.update()
 
+    def show_caption(self, text: str) -> None:
+        """Say in the picture what else than what is measured colours the skin, or nothing."""
+        if text != self.caption.input:
+            self.caption.input = text
+            self.plotter.update()
+
     def show_colours(self, colours: Colours, ink: str) -> None:
         """Colour by a map of 256 colours (256, 3), with points and lines in `ink`."""
         opaque = np.full((len(colours), 1), 255, np.uint8)
@@ -320,8 +331,8 @@ class MembraneView(QWidget):
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
         self.plotter.set_background(theme.scene, top=theme.scene_top)
-        for label in self.labels:
-            label.prop.color = theme.text
+        for text in (*self.labels, self.caption):
+            text.prop.color = theme.text
         if self._surface_actor:
             self._surface_actor.prop.color = theme.missing
         self.plotter.update()
