@@ -1,7 +1,7 @@
 """Hard cases, each as the settings that bring it about and what there is to see then."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from kappaskin_app.settings import Fit, SceneSettings, Settings
@@ -13,11 +13,16 @@ _PLAIN = {f.name: f.default for kind in (SceneSettings, Fit) for f in fields(kin
 
 @dataclass(frozen=True)
 class Demonstration:
-    """Table 1's patch and fit, but for what `differs`; `told` says what is seen and why."""
+    """Table 1's patch and fit, but for what `differs`; `told` says what is seen and why.
+
+    What is refused of a skin that nothing is known of yet would leave nothing to see: `then` is
+    changed once the skin is there.
+    """
 
     title: str
     told: str
     differs: Mapping[str, Any]
+    then: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def changes(self) -> dict[str, Any]:
         """The settings that bring it about; how things are shown stays as it is."""
@@ -25,7 +30,8 @@ class Demonstration:
 
     def holds(self, settings: Settings) -> bool:
         """Whether it is what the settings describe."""
-        return all(getattr(settings, name) == value for name, value in self.changes().items())
+        whole = self.changes() | dict(self.then)
+        return all(getattr(settings, name) == value for name, value in whole.items())
 
 
 _FINGERTIP = {
@@ -81,7 +87,8 @@ DEMONSTRATIONS = (
         "Its ends free to slide",
         "The same readings, but the fit believes that the ends slide: then nothing decides "
         "sin \N{GREEK SMALL LETTER THETA}, in red, and the fit is refused.",
-        {**_FINGERTIP, "fit_edge": "sliding"},
+        _FINGERTIP,
+        {"fit_edge": "sliding"},
     ),
     Demonstration(
         "Noise ten times the signal",

@@ -204,6 +204,7 @@ class MainWindow(QMainWindow):
         session.reported.connect(guarded(self.seeing.follow))
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
+        session.reported.connect(guarded(wishes.follow))
         self.stability.back.connect(guarded(self.history.stack.undo))
         self.stability.shown.connect(guarded(self._show_shape))
         self.history.stack.canUndoChanged.connect(guarded(self.stability.show_undo))

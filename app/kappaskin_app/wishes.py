@@ -3,13 +3,13 @@
 import math
 from typing import Any
 
-from kappaskin import Setting
+from kappaskin import Setting, Status
 from kappaskin_app.demonstrations import Demonstration
 from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
 from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings, ask_of
-from kappaskin_app.simulation import NO_ELEMENTS, elements_of, with_consequences
+from kappaskin_app.simulation import NO_ELEMENTS, elements_of, patch_of, with_consequences
 
 
 class Wishes:
@@ -18,6 +18,7 @@ class Wishes:
     def __init__(self, history: History, session: Session) -> None:
         self._history, self._session = history, session
         self._gesture, self._grabbed_end = -1, False
+        self._begun: tuple[Demonstration, int, Settings] | None = None
 
     def wish(self, name: str, value: Any) -> None:
         """Make the setting `name` what is wished, and what follows from it."""
@@ -43,8 +44,24 @@ class Wishes:
         self._history.change("Choice by its cost", -1, **changed)
 
     def demonstrate(self, demonstration: Demonstration) -> None:
-        """Bring a hard case about."""
-        self._history.change(demonstration.title, -1, **demonstration.changes())
+        """Bring a hard case about, as one step."""
+        gesture = self._history.new_gesture()
+        self._history.change(demonstration.title, gesture, **demonstration.changes())
+        if demonstration.then:
+            self._begun = demonstration, gesture, self._history.settings
+
+    def follow(self, status: Status) -> None:
+        """Go on with the hard case that was begun, once its skin is there."""
+        if self._begun is None:
+            return
+        demonstration, gesture, settings = self._begun
+        if self._history.settings != settings:
+            self._begun = None  # something else was wished meanwhile
+            return
+        there = status.sensor is not None and status.sensor.plate.patch == patch_of(settings)
+        if there and status.slot is not None and not status.computing:
+            self._begun = None
+            self._history.change(demonstration.title, gesture, **demonstration.then)
 
     def toggle(self, name: str) -> None:
         self.wish(name, not getattr(self._history.settings, name))

@@ -22,7 +22,8 @@ def of(**settings: object) -> Spectrum:
 
 
 def demonstration(title: str) -> dict:
-    return next(case.changes() for case in DEMONSTRATIONS if case.title.startswith(title))
+    case = next(case for case in DEMONSTRATIONS if case.title.startswith(title))
+    return case.changes() | dict(case.then)
 
 
 def test_table_1s_functions_are_all_seen_alike() -> None:
@@ -65,7 +66,7 @@ def test_a_shape_is_drawn_with_its_largest_displacement_one() -> None:
 
 def test_every_demonstration_is_a_scene_that_can_be() -> None:
     for case in DEMONSTRATIONS:
-        settings = Settings(**case.changes())
+        settings = Settings(**case.changes() | dict(case.then))
         assert case.holds(settings)
         assert not case.holds(Settings(elements_x=9))
         scene_of(settings)
@@ -131,6 +132,30 @@ def test_a_demonstration_is_one_step_and_back_undoes_it(window: MainWindow, unti
         panel.undo.click()
     assert window.history.settings == was
     assert not panel.undo.isEnabled()
+
+
+def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_one_step(
+    window: MainWindow, until
+) -> None:
+    panel, was = _opened(window, until).stability, window.history.settings
+    panel.buttons[6].click()
+    until(lambda: window.history.settings.fit_edge == "sliding")
+    until(lambda: "moves the skin as a whole" in panel.refused.text())
+    assert panel.refused.text().startswith("In use: 8 x 1.")
+    until(lambda: window.session.estimate is not None and window.badge.state == "SIM")
+    until(lambda: "One of 8 shapes changes no reading" in panel.words.text())
+    panel.undo.click()
+    assert window.history.settings == was
+
+
+def test_a_demonstration_that_is_overtaken_does_not_go_on(window: MainWindow, until) -> None:
+    panel = _opened(window, until).stability
+    panel.buttons[6].click()
+    window.history.stack.undo()
+    until(lambda: window.session.status.sensor is not None and not window.session.status.computing)
+    for _ in range(3):
+        window.wishes.follow(window.session.status)
+    assert window.history.settings.fit_edge == ""
 
 
 def test_how_things_are_shown_stays_through_a_demonstration(window: MainWindow, until) -> None:

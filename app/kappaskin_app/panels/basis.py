@@ -10,6 +10,8 @@ def in_use(status: Status) -> str:
     """Why the functions are not those asked for, and which they are; nothing when they are."""
     if not status.refusal:
         return ""
+    if status.slot is None:
+        return f"Nothing is in use. {status.refusal}."
     setup, sensor = status.setup, status.sensor
     across = 1 if sensor is not None and sensor.layout.patch.strip else setup.Nj
     return f"In use: {setup.Ni} x {across}. {status.refusal}."
