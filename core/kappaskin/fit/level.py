@@ -11,7 +11,8 @@ from kappaskin.frames import Array
 START = 0.1  # m/s, of a contact of which nothing is known
 _SLOWEST, _FASTEST = 1e-4, 30.0
 _NUDGE = 0.05  # of the logarithm of the speed, per standard deviation of its score
-_SWIFT = 6.0  # such deviations at most, towards faster; towards slower a third
+_SLOW = 0.02  # of what a step tells of that logarithm, where it tells little
+_SWIFT = 0.3  # of the logarithm at most
 _MEMORY = 3000.0  # readings over which the noise is averaged
 _FEW = 30.0  # of them that still count when something new touches
 _BREAK = 8.0  # standard deviations of the chi-squared of readings that are something new
@@ -73,8 +74,10 @@ class Level:
     def pace(self, learned: Learned) -> None:
         """Move faster where readings were further off than expected, slower where nearer."""
         if self.variance and learned.information:
-            score = learned.score(self.variance) / math.sqrt(learned.information)
-            step = _NUDGE * min(max(score, -_SWIFT / 3), _SWIFT)
+            root = math.sqrt(learned.information)
+            score = learned.score(self.variance) / root
+            step = score * max(_NUDGE, _SLOW / root)
+            step = min(max(step, -_SWIFT), _SWIFT)
             self.speed = min(max(self.speed * math.exp(step), _SLOWEST), _FASTEST)
 
     def weigh(self, power: float, count: int) -> None:

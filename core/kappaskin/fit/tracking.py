@@ -25,7 +25,7 @@ _HELD = 0.1  # s after which a reading no longer tells what lies between the mod
 _BACK = 0.05  # s by which a clock may go back within one run of a device
 
 
-_COARSE = 16  # modes that make nearly all of the displacement
+_COARSE = 8  # modes that make nearly all of the displacement
 _PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin, as displacement
 
 
@@ -160,7 +160,7 @@ class Tracking(Estimator):
     def choose(self, count: int, position: Array, ahead: float) -> NDArray[np.intp]:
         """The `count` channels to read next, `ahead` s from now, upwards.
 
-        One after the other that which takes most of what is uncertain of the surface, and of where
+        Always the few that take most of what is uncertain of the surface, and of where
         the contact is that was found at `position` (2,) in m, NaN when there is none. Choosing
         looks at the covariance alone. A channel says again what it said until the finest shape has
         moved on: what the modes leave of a reading is no noise that averages out.
@@ -168,9 +168,8 @@ class Tracking(Estimator):
         x, rate = self._filter.halves
         S, count = x + ahead * rate, min(count, int(self.readable.sum()))
         readable = np.flatnonzero(self.readable)
-        B = self._A[readable] @ S.T
-        E = B @ (S @ self._wanted(position).T)
-        return np.sort(readable[telling_most(B, E, self._aged(ahead)[readable], count)])
+        A, worth = self._A[readable], self._aged(ahead)[readable]
+        return np.sort(readable[telling_most(A, S.T @ S, self._wanted(position), worth, count)])
 
     def _wanted(self, position: Array) -> Array:
         """What is wanted of the modes (q, F): displacements in m, and the contact's place."""
