@@ -46,6 +46,7 @@ from kappaskin.fit import FiniteSlope as FiniteSlope
 from kappaskin.fit import Fit as Fit
 from kappaskin.fit import LeastSquares as LeastSquares
 from kappaskin.fit import Robust as Robust
+from kappaskin.fit import Tracking as Tracking
 from kappaskin.fit import estimator_for as estimator_for
 from kappaskin.fit import singular_values as singular_values
 from kappaskin.frames import COMPONENTS as COMPONENTS

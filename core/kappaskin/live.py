@@ -246,7 +246,7 @@ class Loop:
             self._ring.write(estimate)
             self._times.append(frame.host_time)
             if self._steering is not None:
-                self._steering(estimate.touch)
+                self._steering(estimate.touch, self._pipeline.fit)
 
     def _meet(self, sensor: Sensor | None) -> None:
         """A device said what it is: make the pipeline for it."""

@@ -72,7 +72,8 @@ class Pipeline:
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
         self.fit = estimator_for(setup.method, self.basis, layout, rim_sd=rim_sd)
-        self._whole = self.fit(np.zeros((3, len(layout))))  # a frame with every reading
+        self._read_at = sensor.scan().times  # of the first, the second ... channel of a scan
+        self._whole = self.fit.at_rest()
         loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
         self._loosest = math.inf if self.fit.has_prior else loosest
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
@@ -102,18 +103,24 @@ class Pipeline:
             flat = self.past.correct(flat, frame.device_time)
         return flat.reshape(3, -1)
 
-    def _fitted(self, curvature: Array) -> Fit:
+    def _followed(self, frame: Frame, curvature: Array, held: Array) -> Fit:
+        times = np.full(curvature.size, np.nan)
+        times[frame.channels] = frame.device_time + self._read_at[: len(frame.channels)]
+        return self.fit.follow(curvature, times.reshape(curvature.shape), held)
+
+    def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         with suppress(RankDeficient):
-            fit = self.fit(curvature)
+            fit = self._followed(frame, curvature, held)
             if np.linalg.norm(fit.unit_sd) <= self._loosest:
                 return fit
-        unknown = np.full_like(curvature, np.nan)
+        unknown = np.full_like(held, np.nan)
         return Fit(self.fit, unknown, self._no_shape, self._whole.spreads, 0, np.array(math.nan))
 
     def __call__(self, frame: Frame) -> Estimate:
-        curvature, fresh = self.past.hold(frame, self.curvature(frame))
+        scanned = self.curvature(frame)
+        curvature, fresh = self.past.hold(frame, scanned)
         began = time.perf_counter()
-        fit = self._fitted(curvature)
+        fit = self._fitted(frame, scanned, curvature)
         fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
@@ -142,12 +149,19 @@ class Pipeline:
         """Take over what `before` remembers, if its readings are of the same sensor and kind."""
         asked, was = self.setup, before.setup
         alike = (asked.calibration, asked.hold) == (was.calibration, was.hold)
-        if before.sensor is self.sensor and alike:
-            self.past = before.past
+        if before.sensor is not self.sensor or not alike:
+            return
+        self.past = before.past
+        if _estimating(self) == _estimating(before):
+            self.fit = before.fit
 
     def pass_over(self, frame: Frame) -> None:
-        """Hold the readings of a frame of which nobody waits for the estimate."""
-        self.past.hold(frame, self.curvature(frame))
+        """Remember the readings of a frame of which nobody waits for the estimate."""
+        curvature = self.curvature(frame)
+        held, _ = self.past.hold(frame, curvature)
+        if self.fit.remembers:
+            with suppress(RankDeficient):
+                self._followed(frame, curvature, held)
 
     def _compared(
         self, surface: Array, coefficients: Array, truth: Truth | None
@@ -168,3 +182,9 @@ class Pipeline:
             - basis.jet(x, y)[0] @ truth.coefficients.ravel()
         )
         return true_surface, truth.contact, at_load, rms
+
+
+def _estimating(pipeline: Pipeline) -> tuple[object, ...]:
+    """What a setup says that the estimator depends on, besides the sensor."""
+    setup = pipeline.setup
+    return setup.method, pipeline.basis.shape, setup.edge or pipeline.sensor.edge, setup.rim_sd

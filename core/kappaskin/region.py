@@ -16,21 +16,28 @@ from kappaskin.scan import Scan
 from kappaskin.sensor import Sensor
 
 OFF, ELEMENTS, SKIN, INTRINSIC = "off", "elements", "skin", "intrinsic"
+TURNS, ADAPTIVE = "turns", "adaptive"
+_AROUND = (ELEMENTS, SKIN, INTRINSIC, TURNS, ADAPTIVE)
 _FUNCTIONS = 15  # along each side, of the shape a point load makes: Table 1's definition
 _SINGULAR = 1e-6  # share of the best seen direction below which one is not seen at all
 
 
 @dataclass(frozen=True)
 class Region:
-    """Which elements every frame scans; the others take turns.
+    """Which elements every frame scans while the others take turns, or which channels it scans.
 
     `around` is "off" (every frame scans everything), "elements" (those in `elements`), or "skin" or
     "intrinsic": the elements within `radius` m of the contact that the skin itself, or a
     force/torque sensor at the base of the fingertip, reports, and everything while there is none.
     `share` of the other elements are scanned besides in each frame, so that each of them comes up
     every 1 / share frames. With a share of 0 none do, until what is held of them has expired and
-    the readings left decide no shape; then everything is scanned once. `rate` is asked for, in
-    frames/s; the scan may allow fewer.
+    the readings left decide no shape; then everything is scanned once.
+
+    Or `around` is "turns": every frame scans a `share` of all channels, in turn; or "adaptive":
+    as many, those that tell most of the contact and the surface, as an estimator that knows it
+    chooses (`Tracking`); with any other they take turns.
+
+    `rate` is asked for, in frames/s; the scan may allow fewer.
     """
 
     around: str = OFF
@@ -40,10 +47,10 @@ class Region:
     rate: float = 500.0
 
     def __post_init__(self) -> None:
-        if self.around not in (OFF, ELEMENTS, SKIN, INTRINSIC):
+        if self.around not in (OFF, *_AROUND):
             raise Refusal(
-                f"expected a region around {ELEMENTS}, {SKIN} or {INTRINSIC}, or {OFF}, got "
-                f"{self.around!r}"
+                f"expected a region around {', '.join(_AROUND[:-1])} or {_AROUND[-1]}, or {OFF}, "
+                f"got {self.around!r}"
             )
         for name in ("radius", "rate"):
             value = getattr(self, name)
@@ -51,8 +58,15 @@ class Region:
                 raise Refusal(f"expected Region.{name} above zero, got {value}")
         if not 0 <= self.share <= 1:
             raise Refusal(f"expected Region.share between 0 and 1, got {self.share}")
+        if self.by_channel and not self.share:
+            raise Refusal(f"expected Region.share above zero for {self.around}, got 0")
         if self.around == ELEMENTS and not self.elements:
             raise Refusal("expected at least one element in the region, got none; choose some")
+
+    @property
+    def by_channel(self) -> bool:
+        """Whether frames scan a share of all channels."""
+        return self.around in (TURNS, ADAPTIVE)
 
     def chosen(self, count: int) -> Mask:
         """Which of `count` elements are in `elements`."""
@@ -75,6 +89,8 @@ class Scanner:
         self._all = sensor.scan()
         self._inside = region.chosen(len(sensor.layout)) if region.around == ELEMENTS else None
         self._turn = 0
+        self._live = np.flatnonzero(sensor.layout.live.ravel())
+        self._chosen: NDArray[np.intp] | None = None
 
     @property
     def rate(self) -> float:
@@ -96,13 +112,30 @@ class Scanner:
             distance = np.hypot(*(self._sensor.layout.positions - centre).T)
             self._inside = distance <= max(self._region.radius, float(distance.min()))
 
+    @property
+    def count(self) -> int:
+        """How many channels each frame scans where it scans a share of all of them."""
+        return _turn_of(self._region.share, len(self._live))
+
+    def choose(self, channels: NDArray[np.intp]) -> None:
+        """Scan these `channels` in the next frame."""
+        self._chosen = channels
+
     def __call__(self) -> Scan:
         """The next frame's scan; its channels run upwards."""
+        if self._region.by_channel:
+            chosen, self._chosen = self._chosen, None
+            return self._sensor.scan(self._next_channels() if chosen is None else chosen)
         if self._inside is None:
             return self._all
         elements = self._inside.copy()
         elements[self._in_turn()] = True
         return self._sensor.scan(np.flatnonzero(np.tile(elements, 3)))
+
+    def _next_channels(self) -> NDArray[np.intp]:
+        next_ones = (self._turn + np.arange(self.count)) % len(self._live)
+        self._turn = int(next_ones[-1]) + 1
+        return np.sort(self._live[next_ones])
 
     def _in_turn(self) -> NDArray[np.intp]:
         """The next of the elements outside, from where the last frame stopped, round and round."""
@@ -183,7 +216,7 @@ def bargain(sensor: Sensor, region: Region, contact: PointLoad, noise: float) ->
         scanner.follow(contact.centre())
     scan, full = scanner(), sensor.scan()
     inside = scanner.inside
-    weight = np.ones(len(sensor.layout))
+    weight = np.full(len(sensor.layout), region.share if region.by_channel else 1.0)
     if inside is not None and not inside.all():
         outside = int((~inside).sum())
         weight[~inside] = _turn_of(region.share, outside) / outside

@@ -145,13 +145,37 @@ def test_all_elements_by_hand_is_a_full_scan():
     assert len(scanned(scanner)) == 100
 
 
+@pytest.mark.parametrize("around", ["turns", "adaptive"])
+def test_every_channel_comes_up_once_in_one_over_the_share_frames(around):
+    scanner = Scanner(SENSOR, Region(around, share=0.2))
+
+    frames = [scanner().channels for _ in range(10)]
+
+    for round_ in (frames[:5], frames[5:]):
+        assert all((np.diff(channels) > 0).all() for channels in round_)
+        assert sorted(np.concatenate(round_).tolist()) == list(range(300))
+
+
+def test_channels_that_were_chosen_are_scanned_once_and_dead_ones_take_no_turn():
+    dead = replace(SENSOR, layout=SENSOR.layout.without([0, 1]))
+    scanner = Scanner(dead, Region("adaptive", share=0.5))
+    scanner.choose(np.array([7, 50, 299]))
+
+    first, second, third = (scanner().channels for _ in range(3))
+
+    assert first.tolist() == [7, 50, 299]
+    assert scanner.count == 147
+    turns = np.concatenate([second, third])
+    assert sorted(turns.tolist()) == np.flatnonzero(dead.layout.live.ravel()).tolist()
+
+
 # Refusals
 
 
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
-        ({"around": "everything"}, "around elements, skin or intrinsic, or off, got 'everything'"),
+        ({"around": "everything"}, "turns or adaptive, or off, got 'everything'"),
         ({"around": "elements"}, "at least one element in the region, got none"),
         ({"radius": 0.0}, r"Region\.radius above zero, got 0\.0"),
         ({"radius": -0.01}, r"Region\.radius above zero, got -0\.01"),
@@ -161,6 +185,8 @@ def test_all_elements_by_hand_is_a_full_scan():
         ({"rate": math.nan}, r"Region\.rate above zero, got nan"),
         ({"share": -0.1}, r"Region\.share between 0 and 1, got -0\.1"),
         ({"share": 1.1}, r"Region\.share between 0 and 1, got 1\.1"),
+        ({"around": "turns", "share": 0.0}, r"Region\.share above zero for turns, got 0"),
+        ({"around": "adaptive", "share": 0}, r"Region\.share above zero for adaptive, got 0"),
         ({"share": math.nan}, r"Region\.share between 0 and 1, got nan"),
     ],
 )
@@ -276,6 +302,13 @@ def test_readings_that_do_not_decide_bound_nothing():
     assert np.isinf(nothing).all()
     assert np.isinf(no_force).tolist() == [True, True, False]
     assert np.isinf(along).tolist() == [False, True, False]
+
+
+def test_what_takes_turns_counts_by_its_share():
+    told = bargain(SENSOR, Region("turns", share=0.25), CENTRE, NOISE)
+
+    assert (told.channels, told.gain) == (75, pytest.approx(4.0))
+    np.testing.assert_allclose(told.bound, 2 * told.full_bound, rtol=1e-9)
 
 
 def test_a_bargain_that_is_off_is_none():

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from kappaskin import Refusal, Region
-from kappaskin.studies.regions import PERIODS, REGIONS, measured
+from kappaskin.studies.regions import PERIODS, ROWS, TRACKED, measured
 
 FAST = 0.25  # s per turn: 553 mm/s
 FULL, PART = Region(), Region("skin", radius=0.025, rate=1e6)
@@ -49,8 +49,38 @@ def test_a_row_has_what_a_table_prints(fast):
     assert full.keys() == part.keys()
     assert (full["radius_mm"], full["share"]) == (None, None)
     assert (part["radius_mm"], part["share"]) == (25.0, 0.1)
-    assert all(math.isfinite(value) for value in part.values())
-    assert len(PERIODS) * len(REGIONS) == 18
+    numbers = [value for value in part.values() if not isinstance(value, str)]
+    assert all(math.isfinite(value) for value in numbers)
+    assert (full["method"], full["around"]) == ("least-squares", "off")
+    assert len(PERIODS) * len(ROWS) == 30
+
+
+@pytest.fixture(scope="module")
+def tracked():
+    return [measured(FAST, region, 0.3, "tracking") for region in TRACKED]
+
+
+def test_tracked_regions_at_a_fifth_of_the_channels_are_no_worse_than_tracked_full_scans(tracked):
+    full, skin, _, _ = tracked
+
+    assert 60 <= skin["channels"] < 66
+    for error in ("contact_mm", "newest_contact_mm", "newest_shape_mm"):
+        assert skin[error] < full[error]
+    assert skin["shape_mm"] < 1.3 * full["shape_mm"]
+
+
+def test_choosing_channels_beats_taking_turns(tracked):
+    _, _, turns, adaptive = tracked
+
+    assert turns["channels"] == adaptive["channels"] == 60
+    assert adaptive["contact_mm"] < 0.7 * turns["contact_mm"]
+    assert adaptive["newest_contact_mm"] < 0.8 * turns["newest_contact_mm"]
+
+
+def test_tracking_is_nearer_than_least_squares(fast, tracked):
+    for plain, followed in zip(fast, tracked[:2], strict=True):
+        assert followed["newest_contact_mm"] < plain["newest_contact_mm"]
+        assert followed["newest_shape_mm"] < plain["newest_shape_mm"]
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.1, -1.0, math.nan, math.inf])

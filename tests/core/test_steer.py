@@ -55,7 +55,7 @@ class Loop:
             for frame in self.source.read(seconds):
                 seen.append((frame, self.pipeline(frame)))
                 if self.steering is not None:
-                    self.steering(seen[-1][1].touch)
+                    self.steering(seen[-1][1].touch, self.pipeline.fit)
         return seen
 
 

@@ -17,6 +17,7 @@ from kappaskin.fit.finite_slope import NormalCurvature as NormalCurvature
 from kappaskin.fit.least_squares import LeastSquares as LeastSquares
 from kappaskin.fit.robust import WHY as WHY
 from kappaskin.fit.robust import Robust as Robust
+from kappaskin.fit.tracking import Tracking as Tracking
 from kappaskin.fit.unseen import singular_values as singular_values
 from kappaskin.layout import SensorLayout
 
@@ -28,6 +29,7 @@ METHODS: dict[str, type[Estimator]] = {
     "bayes": Bayes,
     "finite-slope": FiniteSlope,
     "robust": Robust,
+    "tracking": Tracking,
 }
 """Ways from readings to coefficients, the default first."""
 

@@ -186,6 +186,8 @@ class Estimator(ABC):
     """Whether M is made, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
     """Whether what the readings do not decide is left to a prior, so that no basis is too large."""
+    remembers: ClassVar = False
+    """Whether frames depend on earlier ones: each is to be followed once, in order."""
 
     def __init__(
         self,
@@ -269,6 +271,18 @@ class Estimator(ABC):
                 why = inner if isinstance(inner, RankDeficient) else error
                 raise RankDeficient(f"frame {first}: {why}") from why
         return gathered(fits, np.argsort(np.argsort(which, kind="stable")))
+
+    def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
+        """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.
+
+        Both are NaN where nothing was read; `held` (3, P) has what is known of earlier frames too.
+        What remembers nothing itself fits that.
+        """
+        return self(held)
+
+    def at_rest(self) -> Fit:
+        """The fit to a skin at rest, of which every reading is there."""
+        return self(np.zeros((3, len(self.layout))))
 
     @abstractmethod
     def _fit(self, flat: Array, used: Mask) -> Fit:

@@ -11,7 +11,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate
 from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Pipeline, Setup
-from kappaskin.region import OFF, SKIN, Region, bargain
+from kappaskin.region import ADAPTIVE, OFF, SKIN, TURNS, Region, bargain
 from kappaskin.scene import TABLE_1_NOISE, Orbit, Scene, load_scene
 from kappaskin.sources import SimulatedSource
 from kappaskin.steer import steered
@@ -26,6 +26,17 @@ REGIONS = (
     *(Region(SKIN, radius=radius, rate=_FASTEST) for radius in (0.015, 0.025, 0.035)),
     *(Region(SKIN, radius=0.025, share=share, rate=_FASTEST) for share in (0.05, 0.2)),
 )
+TRACKED = (
+    Region(OFF),
+    Region(SKIN, radius=0.0195, rate=_FASTEST),  # a fifth of the channels
+    Region(TURNS, share=0.2, rate=_FASTEST),
+    Region(ADAPTIVE, share=0.2, rate=_FASTEST),
+)
+ROWS = (
+    *((region, "least-squares") for region in REGIONS),
+    *((region, "tracking") for region in TRACKED),
+)
+"""Regions, each with the method that the shape is fitted by."""
 _POINTS = 33  # of the surface, along each side
 _SETTLED = 0.1  # s, left out of the measurement
 
@@ -61,11 +72,11 @@ class _Answer:
     channels: int
 
 
-def _answers(scene: Scene, region: Region, seconds: float) -> list[_Answer]:
+def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[_Answer]:
     """What the closed loop answers: each contact moves what the next frame scans."""
     clock = _Clock()
     source = SimulatedSource(scene, clock, clock.sleep)
-    pipeline = Pipeline(source.sensor, Setup(nx=_POINTS, ny=_POINTS), clock=clock)
+    pipeline = Pipeline(source.sensor, Setup(nx=_POINTS, ny=_POINTS, method=method), clock=clock)
     steering = steered(source, region)
     answers: list[_Answer] = []
     while clock.now < seconds:
@@ -75,7 +86,7 @@ def _answers(scene: Scene, region: Region, seconds: float) -> list[_Answer]:
             began = frame.device_time
             answers.append(_Answer(estimate, began, began + duration, len(frame.channels)))
             if steering is not None:
-                steering(estimate.touch)
+                steering(estimate.touch, pipeline.fit)
     return [answer for answer in answers if answer.began >= _SETTLED]
 
 
@@ -100,12 +111,17 @@ def _rms(errors: list[tuple[float, float]]) -> Array:
     return np.sqrt(np.nanmean(np.square(errors), axis=0))
 
 
-def measured(period: float, region: Region, seconds: float) -> dict[str, Any]:
-    """One row of `regions`: a contact that goes round every `period` s, for `seconds`."""
+def measured(
+    period: float, region: Region, seconds: float, method: str = "least-squares"
+) -> dict[str, Any]:
+    """One row of `regions`: a contact that goes round every `period` s, for `seconds`.
+
+    `method` names the estimator, one of `METHODS`.
+    """
     if not _SETTLED + 0.1 <= seconds < math.inf:
         raise Refusal(f"expected at least {_SETTLED + 0.1} s to measure over, got {seconds}")
     scene = scene_of(period)
-    answers, error = _answers(scene, region, seconds), _Errors(scene)
+    answers, error = _answers(scene, region, seconds, method), _Errors(scene)
     own = _rms([error(a.estimate, (a.began + a.ended) / 2) for a in answers])
     # An answer is the newest from its own end to that of the next.
     newest = _rms([error(a.estimate, (a.ended + b.ended) / 2) for a, b in pairwise(answers)])
@@ -114,7 +130,9 @@ def measured(period: float, region: Region, seconds: float) -> dict[str, Any]:
     told = bargain(scene.sensor(), region, PointLoad(x, y, load.force), TABLE_1_NOISE)
     return {
         "speed_mm_s": 1e3 * 2 * math.pi * 0.022 / period,
-        "radius_mm": None if region.around == OFF else 1e3 * region.radius,
+        "method": method,
+        "around": region.around,
+        "radius_mm": 1e3 * region.radius if region.around == SKIN else None,
         "share": None if region.around == OFF else region.share,
         "channels": float(np.mean([a.channels for a in answers])),
         "rate": (len(answers) - 1) / (answers[-1].began - answers[0].began),
@@ -136,4 +154,6 @@ def regions(seconds: float = 1.0) -> list[dict[str, Any]]:
     frame tells of the contact's position at best where the circle begins (see `contact_bound`);
     readings held from earlier frames tell more. `found` is the share of frames with a contact.
     """
-    return [measured(period, region, seconds) for period in PERIODS for region in REGIONS]
+    return [
+        measured(period, region, seconds, method) for period in PERIODS for region, method in ROWS
+    ]

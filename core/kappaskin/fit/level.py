@@ -1,0 +1,102 @@
+"""Readings to how large the noise is, how large the signal, and how fast it moves."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kappaskin.fit.kalman import Learned
+from kappaskin.frames import Array
+
+START = 0.1  # m/s, of a contact of which nothing is known
+_SLOWEST, _FASTEST = 1e-4, 30.0
+_NUDGE = 0.05  # of the logarithm of the speed, per standard deviation of its score
+_SLOW = 0.02  # of what a step tells of that logarithm, where it tells little
+_SWIFT = 0.3  # of the logarithm at most
+_MEMORY = 3000.0  # readings over which the noise is averaged
+_FEW = 30.0  # of them that still count when something new touches
+_BREAK = 8.0  # standard deviations of the chi-squared of readings that are something new
+_BARELY = 10.0  # of that chi-squared: a single reading is no proof
+_FAINT = 0.1  # of the noise: the least signal that is expected
+_USUAL, _USUAL_SD = math.log(100.0), 3.0  # of the signal's variance over the noise's, e-folds
+_RATIOS = np.exp(np.linspace(math.log(1e-4), math.log(1e14), 145))
+
+
+@dataclass(slots=True)
+class Level:
+    """What is known of the noise and the signal, kept up to date.
+
+    `variance` of a reading, known as from `count` readings, infinitely many when it was told; the
+    `amplitude` of modes in units of its root, and the `speed` in m/s with which they move.
+    """
+
+    variance: float
+    count: float
+    amplitude: float = 0.0
+    speed: float = START
+
+    def explain(self, A: Array, readings: Array) -> float:
+        """The amplitude in units of the noise that makes `readings` (R,) likeliest, with the noise.
+
+        Readings A (R, F) of modes have the covariance variance (1 + amplitude^2 A A'), the variance
+        being known as from `count` others (Student's t). An amplitude is expected of which the
+        signal is ten times the noise, give or take three e-folds of its square.
+        """
+        U, s, _ = np.linalg.svd(A.astype(float), full_matrices=False)
+        R, signal = len(readings), float(s @ s) / len(readings)
+        squares = _RATIOS / signal
+        within = (U.T @ readings) ** 2
+        beyond = max(float(readings @ readings - within.sum()), 0.0)
+        grown = 1 + np.multiply.outer(squares, s**2)
+        power = beyond + (within / grown).sum(axis=1)
+        doubt = np.log(grown).sum(axis=1) + ((np.log(_RATIOS) - _USUAL) / _USUAL_SD) ** 2
+        if math.isinf(self.count):
+            return math.sqrt(squares[int(np.argmin(power / self.variance + doubt))])
+        known = min(self.count, _FEW) if self.variance else 0.0
+        total = known * self.variance + power
+        if not total.all():  # nothing but zeros was ever read
+            return math.sqrt(math.exp(_USUAL) / signal)
+        best = int(np.argmin((known + R) * np.log(total) + doubt))
+        self.variance, self.count = float(total[best]) / (known + R), known
+        return math.sqrt(squares[best])
+
+    def renew(self, A: Array, ahead: Array) -> float:
+        """How much of something else `ahead` (R,) of A (R, F) tells, as an amplitude."""
+        extra = self.explain(A, ahead)
+        self.amplitude = max(self.amplitude, extra)
+        self.speed = max(self.speed, START)
+        return extra
+
+    def surprised(self, power: float, count: int) -> bool:
+        """Whether chi-squared times the variance, of `count` readings, is beyond all chance."""
+        return power > self.variance * (count + _BREAK * math.sqrt(2 * count) + _BARELY)
+
+    def pace(self, learned: Learned) -> None:
+        """Move faster where readings were further off than expected, slower where nearer."""
+        if self.variance and learned.information:
+            root = math.sqrt(learned.information)
+            score = learned.score(self.variance) / root
+            step = score * max(_NUDGE, _SLOW / root)
+            step = min(max(step, -_SWIFT), _SWIFT)
+            self.speed = min(max(self.speed * math.exp(step), _SLOWEST), _FASTEST)
+
+    def weigh(self, power: float, count: int) -> None:
+        """Learn the noise: what was ahead of `count` readings times what was left averages to it.
+
+        That holds for any weights which a right model gives (doi:10.1256/qj.05.108).
+        """
+        if not math.isinf(self.count):
+            known = min(self.count, _MEMORY)
+            self.variance = max(known * self.variance + power, 0.0) / (known + count)
+            self.count = known + count
+
+    def size(self, x: Array, undecided: float, signal: float) -> None:
+        """Learn the amplitude from the modes x (F,), `undecided` the sum of their variances.
+
+        Both count as far as readings decided them (MacKay, doi:10.1162/neco.1992.4.3.415).
+        `signal` is the variance of a reading for unit amplitude.
+        """
+        decided = len(x) - undecided / self.amplitude**2
+        if decided > 1 and self.variance:
+            found = max(float(x @ x) / self.variance / decided, _FAINT**2 / signal)
+            self.amplitude *= (found / self.amplitude**2) ** (_NUDGE / 2)

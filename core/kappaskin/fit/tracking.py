@@ -1,0 +1,299 @@
+"""Frames and parts of frames, each reading at its own time, to the shape of a moving skin."""
+
+import math
+from copy import copy
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from kappaskin.bases import Basis
+from kappaskin.errors import Refusal
+from kappaskin.fit.choosing import telling_most
+from kappaskin.fit.estimator import RIM_SD, Estimator, Fit, Spread, gathered
+from kappaskin.fit.kalman import MovingModes
+from kappaskin.fit.level import START, Level
+from kappaskin.fit.prior import prior_root
+from kappaskin.frames import Array, Mask
+from kappaskin.layout import SensorLayout
+
+_MOST = 100  # readings that share one step of the filter
+_PHASE = 0.5  # rad that the fastest mode turns meanwhile at most, or
+_SHORTEST = 1e-3  # s, if that is longer: a step must not take longer than its readings
+_HELD = 0.1  # s after which a reading no longer tells what lies between the modes
+_BACK = 0.05  # s by which a clock may go back within one run of a device
+
+
+_COARSE = 8  # modes that make nearly all of the displacement
+_PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin, as displacement
+
+
+class TrackedSpread:
+    """The spread that a root S tells of amplitudes of `modes` (N, F): modes S' S modes'."""
+
+    def __init__(self, modes: Array, root: Array) -> None:
+        self._modes, self._root = modes, root
+
+    @cached_property
+    def _half(self) -> Array:
+        return self._root.astype(float) @ self._modes.T
+
+    @property
+    def sd(self) -> Array:
+        return np.linalg.norm(self._half, axis=0)
+
+    def of(self, rows: Array) -> Array:
+        half = rows @ self._half.T
+        return half @ half.swapaxes(-1, -2)
+
+    def sd_of(self, rows: Array) -> Array:
+        return np.linalg.norm(rows @ self._half.T, axis=-1)
+
+
+class Tracking(Estimator):
+    """`fit = Tracking(basis, layout)`; `fit(curvature)` follows frame after frame.
+
+    A Kalman filter of what the skin does: a plate under loads that nobody knows (`prior_root`),
+    each of its shapes moving the faster the finer it is (`MovingModes`). It remembers: every frame,
+    whole or not, is taken in at the times of its readings, and the answer is the shape at the last
+    of them. `period` in s is what a frame takes that comes without times.
+
+    How large shapes are, how fast they move and, without a `sigma`, the noise are found on the way:
+    from the first frame by its evidence, then by what is left unexplained. Readings that are beyond
+    what was expected are a touch or its end; the filter then expects anything once more.
+    """
+
+    remembers = True
+    has_prior = True
+
+    def __init__(
+        self,
+        basis: Basis,
+        layout: SensorLayout,
+        sigma: ArrayLike | None = None,
+        rim_sd: float = RIM_SD,
+        dtype: DTypeLike = np.float64,
+        period: float = 6e-3,
+    ) -> None:
+        super().__init__(basis, layout, sigma, rim_sd, dtype)
+        if not 0 < period < math.inf:
+            raise Refusal(f"expected a period above zero in s, got {period}")
+        self._period = period
+        if not self.readable.any():
+            raise self.refusal(0, 0)
+        self._modes, self._wavenumbers, self._displacements = _principal(basis)
+        A = self.weight[:, None] * (self.M @ self._modes)
+        A[~self.readable] = 0.0
+        self._A = A.astype(self.dtype)
+        self._signal = float(np.vdot(A, A)) / int(self.readable.sum())
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget every frame."""
+        self._filter = MovingModes(self._wavenumbers, self.dtype)
+        self._level: Level | None = None
+        self._now = -math.inf
+        self._left = np.full(self._A.shape[0], np.nan)
+        self._read = np.full(self._A.shape[0], -math.inf)
+
+    def at_rest(self) -> Fit:
+        """The fit to a skin at rest by which nothing is remembered."""
+        fresh = copy(self)
+        fresh.restart()
+        return fresh(np.zeros((3, len(self.layout))))
+
+    def __call__(self, curvature: ArrayLike) -> Fit:
+        """Take in the next frame (3, P), or the next T frames (T, 3, P), a period after another."""
+        K = self._checked(curvature)
+        if K.ndim == 2:
+            return self.follow(K, np.full(K.shape, self._next))
+        if not len(K):
+            raise Refusal("expected at least one frame to follow, got none")
+        fits = [self.follow(frame, np.full(frame.shape, self._next)) for frame in K]
+        return _in_time(fits)
+
+    @property
+    def _next(self) -> float:
+        """When a frame is read of which nobody says when."""
+        return self._now + self._period if math.isfinite(self._now) else 0.0
+
+    def follow(self, curvature: ArrayLike, times: ArrayLike, held: Array | None = None) -> Fit:
+        """Take in `curvature` (3, P) in 1/m read at `times` (3, P) in s on the device's clock.
+
+        NaN and infinity mean a missing reading; the time of a channel that was not read at all is
+        NaN. Readings of one channel are to come in the order of their times. A clock that goes back
+        is that of a device that started anew. What is `held` of earlier frames is known already.
+        """
+        frame, when = self._checked(curvature), np.asarray(times, float)
+        if frame.ndim != 2 or when.shape != frame.shape:
+            raise Refusal(
+                f"expected curvature and times of shape (3, {len(self.layout)}), got {frame.shape} "
+                f"and {when.shape}"
+            )
+        K, t = frame.ravel(), when.ravel()
+        used = np.flatnonzero(np.isfinite(K) & self.readable)
+        scanned = ~np.isnan(t)
+        if not np.isfinite(t[scanned]).all() or not scanned[used].all():
+            raise Refusal("expected a time in s with every reading, got NaN or infinity")
+        self._begin(t[scanned])
+        if self._level is None:
+            if not used.size:
+                raise self.refusal(0, 0)
+            self._start(self.weight[used] * K[used], self._A[used])
+        self._read[scanned] = -math.inf  # a channel that was read and failed has no reading
+        for channels in self._groups(used, t):
+            self._take(channels, K[channels], t[channels])
+        if scanned.any():
+            self._advance(float(t[scanned].max()))
+        return self._fitted()
+
+    def _checked(self, curvature: ArrayLike) -> Array:
+        K = np.asarray(curvature, float)
+        if K.ndim not in (2, 3) or K.shape[-2:] != (3, len(self.layout)):
+            raise Refusal(
+                f"expected curvature of shape (3, {len(self.layout)}) or (T, 3, "
+                f"{len(self.layout)}), got {K.shape}"
+            )
+        return K
+
+    def choose(self, count: int, position: Array, ahead: float) -> NDArray[np.intp]:
+        """The `count` channels to read next, `ahead` s from now, upwards.
+
+        Always the few that take most of what is uncertain of the surface, and of where
+        the contact is that was found at `position` (2,) in m, NaN when there is none. Choosing
+        looks at the covariance alone. A channel says again what it said until the finest shape has
+        moved on: what the modes leave of a reading is no noise that averages out.
+        """
+        x, rate = self._filter.halves
+        S, count = x + ahead * rate, min(count, int(self.readable.sum()))
+        readable = np.flatnonzero(self.readable)
+        A, worth = self._A[readable], self._aged(ahead)[readable]
+        return np.sort(readable[telling_most(A, S.T @ S, self._wanted(position), worth, count)])
+
+    def _wanted(self, position: Array) -> Array:
+        """What is wanted of the modes (q, F): displacements in m, and the contact's place."""
+        coarse = np.diag(self._displacements)[: min(_COARSE, self.unknowns)]
+        if not np.isfinite(position).all():
+            return coarse
+        jet = self.basis.jet(*position.tolist()) @ self._modes
+        w, _, _, xx, _, yy = (jet @ self._filter.mean[0]).tolist()
+        # Where the surface is deepest moves by the change of slope over the curvature.
+        share = _PLACE * abs(w) / self.basis.patch.a / max(abs(xx + yy) / 2, 1e-30)
+        return np.vstack([coarse, share * jet[1:3]])
+
+    def _aged(self, ahead: float) -> Array:
+        """How much of a reading (3 P,) would be new."""
+        level = self._level
+        speed = START if level is None else level.speed
+        finest = math.sqrt(3) * speed * float(self._wavenumbers.max())
+        return -np.expm1(-finest * (self._now + ahead - self._read))
+
+    def _begin(self, times: Array) -> None:
+        """Start anew where the clock went back."""
+        if times.size and times.min() < self._now - _BACK:
+            self.restart()
+
+    def _groups(self, used: NDArray[np.intp], t: Array) -> list[NDArray[np.intp]]:
+        """The channels `used` in the order of their times, as many at once as move together."""
+        order = used[np.argsort(t[used], kind="stable")]
+        if not order.size:
+            return []
+        level = cast("Level", self._level)
+        fastest = math.sqrt(3) * level.speed * float(self._wavenumbers.max())
+        span = max(_PHASE / fastest, _SHORTEST)
+        later = np.flatnonzero(np.diff((t[order] - t[order[0]]) // span)) + 1
+        return [
+            group
+            for together in np.split(order, later)
+            for group in np.array_split(together, math.ceil(len(together) / _MOST))
+        ]
+
+    def _start(self, readings: Array, A: Array) -> None:
+        """Expect what the evidence of the first readings says."""
+        self._level = Level(1.0, math.inf) if self.told_sigma else Level(0.0, 0.0)
+        self._filter.expect(self._level.renew(A, readings), START)
+
+    def _advance(self, time: float) -> None:
+        level = cast("Level", self._level)
+        if time > self._now and math.isfinite(self._now):
+            self._filter.advance(time - self._now, level.amplitude, level.speed)
+        self._now = max(time, self._now)
+
+    def _take(self, channels: NDArray[np.intp], K: Array, t: Array) -> None:
+        """Take in readings of `channels`, in the order of their times `t`."""
+        level, filter_ = cast("Level", self._level), self._filter
+        self._advance(float(t[-1]))
+        A, lag = self._A[channels], (t - self._now).astype(self.dtype)
+        readings = (self.weight[channels] * K).astype(self.dtype)
+        mean, root = filter_.mean, filter_.root
+        ahead = (readings - filter_.foreseen(A, lag)).astype(float)
+        learned = filter_.absorb(A, lag, readings)
+        power = float(ahead @ learned.left)  # chi-squared, times the noise's variance
+        if level.surprised(power, len(K)):
+            filter_.mean, filter_.root = mean, root
+            filter_.expect(level.renew(A, ahead), level.speed)
+            learned = filter_.absorb(A, lag, readings)
+            power = float(ahead @ learned.left)
+        else:
+            level.pace(learned)
+        self._left[channels] = learned.left / self.weight[channels]
+        self._read[channels] = t
+        level.weigh(power, len(K))
+        S1, _ = filter_.halves
+        level.size(filter_.mean[0], float(np.vdot(S1, S1)), self._signal)
+
+    def _fitted(self) -> Fit:
+        level = cast("Level", self._level)
+        c = (self._modes @ self._filter.mean[0]).reshape(self.basis.shape).astype(self.dtype)
+        there = self._read > self._now - _HELD
+        K = np.where(there, self._left, np.nan) + self.predicted(c).ravel()
+        noise = 1.0 if self.told_sigma else math.sqrt(level.variance)
+        spare = int(there.sum()) if self.told_sigma else int(level.count)
+        return Fit(
+            self,
+            K.reshape(3, -1).astype(self.dtype),
+            c,
+            TrackedSpread(self._modes, self._filter.halves[0]),
+            spare,
+            np.array(noise),
+        )
+
+    def _fit(self, flat: Array, used: Mask) -> Fit:
+        return self(flat.reshape(*flat.shape[:-1], 3, -1))
+
+
+def _in_time(fits: list[Fit]) -> Fit:
+    """One fit of T frames from theirs."""
+    return gathered(
+        [
+            Fit(
+                fit.estimator,
+                fit.curvature[None],
+                fit.coefficients[None],
+                [cast("Spread", fit.spreads)],
+                np.reshape(fit.spare, (1,)),
+                np.reshape(cast("Array", fit.told_noise), (1,)),
+            )
+            for fit in fits
+        ],
+        np.arange(len(fits)),
+    )
+
+
+def _principal(basis: Basis) -> tuple[Array, Array, Array]:
+    """Shapes (N, F) that are expected independently, their wave numbers (F,) in rad/m, and RMS.
+
+    The largest first; their displacements are orthogonal over the skin.
+    """
+    L = prior_root(basis)
+    points, weights = basis.quadrature()
+    w = np.sqrt(weights / weights.sum())[:, None]
+
+    def rms(shapes: Array, *order: int) -> Array:
+        return np.linalg.norm(w * (basis.at(points, *order) @ shapes), axis=0)
+
+    f = cast("Array", np.linalg.qr(w * basis.at(points), mode="r")) @ L
+    modes = L @ np.linalg.svd(f)[2].T
+    slopes, displacements = np.hypot(rms(modes, 1, 0), rms(modes, 0, 1)), rms(modes, 0, 0)
+    return modes, slopes / displacements, displacements
