@@ -331,7 +331,7 @@ def test_several_frames_are_followed_one_after_the_other():
 def test_a_touch_and_its_end_are_followed_at_once():
     rng, c, rows = np.random.default_rng(0), still_shape(), displacement_rows()
     fit = Tracking(FOURS, SIXES)
-    sd = NOISE * LeastSquares(FOURS, SIXES).complete.sd_of(rows).max()
+    sd = NOISE * LeastSquares(FOURS, SIXES)(np.zeros((3, 36))).spreads.sd_of(rows).max()
 
     for shape in [0 * c, c, 0 * c, -2 * c] * 3:
         for n in range(30):
@@ -374,7 +374,7 @@ def test_after_a_gap_less_is_certain_and_the_next_frame_counts(gap):
     after = fit.follow(read(SIXES, FOURS, -c, rng), late)
 
     assert (blind.sd_of(rows) >= before.sd_of(rows) * (1 - 1e-9)).all()
-    sd = NOISE * LeastSquares(FOURS, SIXES).complete.sd_of(rows).max()
+    sd = NOISE * LeastSquares(FOURS, SIXES)(np.zeros((3, 36))).spreads.sd_of(rows).max()
     assert np.abs(rows @ (after.coefficients.ravel() + c)).max() < 5 * sd
 
 

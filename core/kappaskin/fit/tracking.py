@@ -109,7 +109,9 @@ class Tracking(Estimator):
         if K.ndim == 2:
             return self.follow(K, np.full(K.shape, self._next))
         if not len(K):
-            raise Refusal("expected at least one frame to follow, got none")
+            none = np.empty(0)
+            c = np.empty((0, *self.basis.shape), self.dtype)
+            return Fit(self, K.astype(self.dtype), c, [], none, none)
         fits = [self.follow(frame, np.full(frame.shape, self._next)) for frame in K]
         return _in_time(fits)
 
