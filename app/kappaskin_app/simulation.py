@@ -42,6 +42,7 @@ _CHAINS = {
     "first": FIRST_GENERATION,
 }
 _LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
+_LEAST_SCANNED = 0.05  # of the channels, where they are scanned as they tell most
 _CREEPING = 5.0  # s, the time constant of the creep
 _OFFSET = 10.0  # 1/m of offset for a gain that is off by 1
 
@@ -76,7 +77,8 @@ def region_of(settings: Settings) -> Region:
     s = settings
     if s.region == "elements" and not s.region_elements:
         return Region()
-    return Region(s.region, s.region_elements, s.region_radius, s.region_share)
+    share = max(s.region_share, _LEAST_SCANNED) if s.region == "adaptive" else s.region_share
+    return Region(s.region, s.region_elements, s.region_radius, share)
 
 
 def patch_of(settings: Settings) -> Patch:

@@ -93,12 +93,14 @@ class Scanning:
         Choice(
             "Scan",
             "Sampling a region of interest buys rate (paper, section 6.2). The force/torque sensor "
-            "stands at the base of the fingertip (intrinsic contact sensing).",
+            "stands at the base of the fingertip (intrinsic contact sensing). What tells most is "
+            "chosen by the estimator Tracking; with any other the channels take turns.",
             (
                 ("off", "All elements"),
                 ("skin", "Around the contact"),
                 ("intrinsic", "By force and torque"),
                 ("elements", "Chosen elements"),
+                ("adaptive", "What tells most"),
             ),
         ),
     )
@@ -117,9 +119,10 @@ class Scanning:
     region_share: float = asked(
         0.1,
         Range(
-            "Others",
-            "Share of the other elements that take their turn in each frame; their last readings "
-            "are held until then.",
+            "Share",
+            "Of the other elements, those that take their turn in each frame; their last readings "
+            "are held until then. Of all channels, those that are scanned where they tell most, "
+            "at least 5 %.",
             0.0,
             1.0,
             0.05,

@@ -16,6 +16,7 @@ METHOD_NAMES = (
     ("as-printed", "As printed (Eq. 6)"),
     ("direct", "Direct, each frame anew"),
     ("fast", "Fast, a regular grid"),
+    ("tracking", "Tracking, from frame to frame"),
     ("bayes", "Bayes, a plate's prior"),
     ("finite-slope", "Finite slope"),
     ("robust", "Robust, leaves out bad elements"),
