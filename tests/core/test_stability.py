@@ -151,6 +151,17 @@ def test_finite_slopes_converge_in_float32_as_in_float64(rows):
         assert verdicts(rows, case=case, method="finite-slope") == ["exact", "exact"]
 
 
+@pytest.mark.parametrize(
+    "case", ["no load, exact", "pairs 1e-09 m apart", "pairs 1e-16 m apart", "spikes", "all NaN"]
+)
+def test_the_hardest_cases_raise_no_warnings(rows, case):
+    # Here, where warnings are errors; the gallery runs in processes of its own.
+    again = rows_of(CASES[case])
+
+    expected = [r for r in rows if r["case"] == case]
+    assert [r["verdict"] for r in again] == [r["verdict"] for r in expected]
+
+
 # The command
 
 
