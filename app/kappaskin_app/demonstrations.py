@@ -34,14 +34,16 @@ class Demonstration:
         return all(getattr(settings, name) == value for name, value in whole.items())
 
 
+_WIDTH = 0.01  # m
 _FINGERTIP = {
     "shape": "strip",
     **SHAPES["strip"].asks,
-    "force": SHAPES["strip"].begins["force"],
+    "side_y": _WIDTH,
     "elements_y": 1,
     "load_case": "centre",
+    "force": SHAPES["strip"].begins["force"],
     "x": SHAPES["strip"].asks["side_x"] / 2,
-    "y": SHAPES["strip"].asks["side_y"] / 2,
+    "y": _WIDTH / 2,
 }
 _ROW = tuple(range(40, 50))
 _QUARTER = tuple(p + 10 * q for q in range(5) for p in range(5))

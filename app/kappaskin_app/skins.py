@@ -47,8 +47,8 @@ SHAPES = {
     "strip": Shape(
         "Strip (fingertip)",
         _strip,
-        {"side_x": math.pi * _FINGERTIP, "side_y": 0.01, "base_radius": _FINGERTIP},
-        {"force": 1.2, "exaggeration": 30.0},
+        {"side_x": math.pi * _FINGERTIP, "side_y": 0.04, "base_radius": _FINGERTIP},
+        {"force": 0.5, "exaggeration": 30.0},
     ),
     "disk": Shape("Disk", Disk, {"rim_radius": 0.05}, _AS_TABLE_1, rate=200.0),
     "hexagon": Shape("Hexagon", _hexagon, {"rim_radius": 0.05}, _AS_TABLE_1, rate=100.0),

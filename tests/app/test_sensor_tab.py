@@ -47,7 +47,7 @@ def test_other_elements_are_no_longer_those_chosen():
 
     changed = with_consequences(settings, scene_of(settings), "elements_x", 5)
 
-    assert changed == {"elements_x": 5, "region_elements": ()}
+    assert changed == {"elements_x": 5, "region_elements": (), "dead_elements": ()}
 
 
 def test_until_elements_are_chosen_all_are_scanned():

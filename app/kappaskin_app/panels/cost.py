@@ -150,7 +150,7 @@ class CostPanel(QWidget):
     def _take(self) -> None:
         cost = self._frontier.cheapest(self._accuracy)
         now = self._costing
-        if now is not None and cost is not None and cost.setting != now.present:
+        if now is not None and cost is not None:
             now.choose(cost)
 
     # What is so.
