@@ -171,6 +171,11 @@ def displacement_rows(basis=FOURS):
     return basis.at(np.stack(np.meshgrid(grid, grid), -1).reshape(-1, 2))
 
 
+def one_frame_sd(rows):
+    """The greatest standard deviation of least squares on one frame."""
+    return NOISE * LeastSquares(FOURS, SIXES)(np.zeros((3, 36))).spreads.sd_of(rows).max()
+
+
 def test_the_first_frame_is_sound(held_skin):
     basis = held_skin.basis()
     layout = SensorLayout.regular(held_skin.patch, 8, 1 if held_skin.patch.strip else 8)
@@ -331,7 +336,7 @@ def test_several_frames_are_followed_one_after_the_other():
 def test_a_touch_and_its_end_are_followed_at_once():
     rng, c, rows = np.random.default_rng(0), still_shape(), displacement_rows()
     fit = Tracking(FOURS, SIXES)
-    sd = NOISE * LeastSquares(FOURS, SIXES)(np.zeros((3, 36))).spreads.sd_of(rows).max()
+    sd = one_frame_sd(rows)
 
     for shape in [0 * c, c, 0 * c, -2 * c] * 3:
         for n in range(30):
@@ -374,7 +379,7 @@ def test_after_a_gap_less_is_certain_and_the_next_frame_counts(gap):
     after = fit.follow(read(SIXES, FOURS, -c, rng), late)
 
     assert (blind.sd_of(rows) >= before.sd_of(rows) * (1 - 1e-9)).all()
-    sd = NOISE * LeastSquares(FOURS, SIXES)(np.zeros((3, 36))).spreads.sd_of(rows).max()
+    sd = one_frame_sd(rows)
     assert np.abs(rows @ (after.coefficients.ravel() + c)).max() < 5 * sd
 
 
@@ -400,6 +405,18 @@ def test_nothing_is_not_the_end():
     assert (np.abs(error) < 5 * touched[-1].sd.ravel()).all()
     assert np.isfinite(silent[-1].sd).all()
     assert np.abs(silent[-1].coefficients).max() < 1e-5
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_readings_without_noise_are_followed_to_rounding(dtype):
+    c, rng = still_shape(basis=SineBasis(SQUARE, 8, 8)), np.random.default_rng(0)
+    fit = Tracking(SineBasis(SQUARE, 8, 8), SIXES, dtype=dtype)  # 64 functions, 36 elements
+    for size in (1.0, 1.0, 1.0, 0.5, 0.5):
+        answer = fit(read(SIXES, fit.basis, size * c, rng, 0))
+
+    error = np.abs(answer.coefficients.ravel() - 0.5 * c)
+    assert error.max() < 1e-2 * np.abs(c).max()  # where the prior decides
+    assert (error < 6 * answer.sd.ravel() + 1e-7 * np.abs(c).max()).all()
 
 
 # Laws

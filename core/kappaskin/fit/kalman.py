@@ -10,7 +10,7 @@ from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
 from kappaskin.frames import Array
 
-_BLOCK = 16  # columns that LAPACK reflects at once: the fastest of 8, 16 and 32 for 128 of them
+_BLOCK, _BLOCK_OF_READINGS = 16, 32  # columns that LAPACK reflects at once: the fastest, of 128
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +48,7 @@ class MovingModes:
         n = 2 * len(wavenumbers)
         self._nb, self._eye = min(_BLOCK, n), np.eye(n, dtype=dtype, order="F")
         self._tpqrt = cast("Any", get_lapack_funcs("tpqrt", (self._eye,)))
+        self._tpmqrt = cast("Any", get_lapack_funcs("tpmqrt", (self._eye,)))
         self._trsm = cast("Any", get_blas_funcs("trsm", (self._eye,)))
         self.mean = np.zeros((2, len(wavenumbers)), dtype)
         self.root = np.zeros((n, n), dtype)
@@ -114,15 +115,19 @@ class MovingModes:
         """Take in `readings` (R,) of A (R, F) times the modes, with unit noise, read at `lag` s."""
         ahead = readings - self.foreseen(A, lag)
         S1, S2 = self.halves
-        Z = (S1 @ A.T + (S2 @ A.T) * lag).T
-        U = self._triangle(self._eye.copy(order="F"), Z)
-        # P+ = S' (1 + Z'Z)^-1 S with 1 + Z'Z = U'U, and G = H S+' = Z U^-1; the gain is S+' G'.
-        self.root = self._trsm(1.0, U, self.root, trans_a=1)
-        G = self._trsm(1.0, U, Z, side=1)
-        step = self.root.T @ (G.T @ ahead)
-        self.mean = self.mean + step.reshape(self.mean.shape)
-        left = readings - self.foreseen(A, lag)
-        # H P+ H' = G G' = 1 - V^-1 with V = 1 + Z Z' the covariance of what was ahead.
-        seen: Array = (G @ G.T).astype(float)
-        surprise = float(np.sum((Z.T.astype(float) @ left) ** 2))
+        Z, R = S1 @ A.T + (S2 @ A.T) * lag, len(readings)  # their covariance is V = 1 + Z'Z
+        one = np.eye(R, dtype=Z.dtype, order="F")
+        U, reflectors, t, _ = self._tpqrt(0, min(_BLOCK_OF_READINGS, R), one, Z)
+        # The reflections that make [1; Z] to [U; 0], U'U = V, make [0; S] to [U'^-1 Z'S; S+], whose
+        # products are those of [0; S]: S'S less what was learned. The gain is S'Z U^-1 U'^-1.
+        nothing = np.zeros((R, len(S1)), Z.dtype, order="F")
+        learned, self.root, _ = self._tpmqrt(
+            0, reflectors, t, nothing, self.root, trans="T", overwrite_a=1
+        )
+        white = self._trsm(1.0, U, ahead[:, None], trans_a=1)
+        self.mean = self.mean + (learned.T @ white[:, 0]).reshape(self.mean.shape)
+        left = self._trsm(1.0, U, white)[:, 0]  # V^-1 ahead
+        seen: Array = self._trsm(1.0, U, Z.T, trans_a=1).astype(float)  # 1 - V^-1, but for a turn
+        seen = seen @ seen.T
+        surprise = float(np.sum((Z @ left).astype(float) ** 2))
         return Learned(left, surprise, float(np.trace(seen)), float(np.sum(seen**2)) / 2)

@@ -27,13 +27,20 @@ class Level:
     """What is known of the noise and the signal, kept up to date.
 
     `variance` of a reading, known as from `count` readings, infinitely many when it was told; the
-    `amplitude` of modes in units of its root, and the `speed` in m/s with which they move.
+    `amplitude` of modes in units of its root, and the `speed` in m/s with which they move. Of a
+    number, a share as large as `rounding` is not known.
     """
 
     variance: float
     count: float
+    rounding: float
     amplitude: float = 0.0
     speed: float = START
+
+    @property
+    def _most(self) -> float:
+        """Of the signal's variance over the noise's, what can be computed with."""
+        return self.rounding**-1.5
 
     def explain(self, A: Array, readings: Array) -> float:
         """The amplitude in units of the noise that makes `readings` (R,) likeliest, with the noise.
@@ -44,12 +51,13 @@ class Level:
         """
         U, s, _ = np.linalg.svd(A.astype(float), full_matrices=False)
         R, signal = len(readings), float(s @ s) / len(readings)
-        squares = _RATIOS / signal
+        squares = _RATIOS[self._most >= _RATIOS] / signal
         within = (U.T @ readings) ** 2
         beyond = max(float(readings @ readings - within.sum()), 0.0)
         grown = 1 + np.multiply.outer(squares, s**2)
         power = beyond + (within / grown).sum(axis=1)
-        doubt = np.log(grown).sum(axis=1) + ((np.log(_RATIOS) - _USUAL) / _USUAL_SD) ** 2
+        doubt = np.log(grown).sum(axis=1)
+        doubt += ((np.log(squares * signal) - _USUAL) / _USUAL_SD) ** 2
         if math.isinf(self.count):
             return math.sqrt(squares[int(np.argmin(power / self.variance + doubt))])
         known = min(self.count, _FEW) if self.variance else 0.0
@@ -80,14 +88,15 @@ class Level:
             step = min(max(step, -_SWIFT), _SWIFT)
             self.speed = min(max(self.speed * math.exp(step), _SLOWEST), _FASTEST)
 
-    def weigh(self, power: float, count: int) -> None:
-        """Learn the noise: what was ahead of `count` readings times what was left averages to it.
+    def weigh(self, power: float, readings: Array) -> None:
+        """Learn the noise: what was ahead of `readings` (R,) times what was left averages to it.
 
         That holds for any weights which a right model gives (doi:10.1256/qj.05.108).
         """
         if not math.isinf(self.count):
-            known = min(self.count, _MEMORY)
-            self.variance = max(known * self.variance + power, 0.0) / (known + count)
+            known, count = min(self.count, _MEMORY), len(readings)
+            least = self.rounding**2 * float(readings @ readings) / count
+            self.variance = max((known * self.variance + power) / (known + count), least)
             self.count = known + count
 
     def size(self, x: Array, undecided: float, signal: float) -> None:
@@ -98,5 +107,6 @@ class Level:
         """
         decided = len(x) - undecided / self.amplitude**2
         if decided > 1 and self.variance:
-            found = max(float(x @ x) / self.variance / decided, _FAINT**2 / signal)
+            found = float(x @ x) / self.variance / decided
+            found = min(max(found, _FAINT**2 / signal), self._most / signal)
             self.amplitude *= (found / self.amplitude**2) ** (_NUDGE / 2)

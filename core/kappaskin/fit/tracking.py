@@ -3,7 +3,7 @@
 import math
 from copy import copy
 from functools import cached_property
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -64,8 +64,8 @@ class Tracking(Estimator):
     what was expected are a touch or its end; the filter then expects anything once more.
     """
 
-    remembers = True
-    has_prior = True
+    remembers: ClassVar = True
+    has_prior: ClassVar = True
 
     def __init__(
         self,
@@ -109,11 +109,9 @@ class Tracking(Estimator):
         if K.ndim == 2:
             return self.follow(K, np.full(K.shape, self._next))
         if not len(K):
-            none = np.empty(0)
-            c = np.empty((0, *self.basis.shape), self.dtype)
-            return Fit(self, K.astype(self.dtype), c, [], none, none)
-        fits = [self.follow(frame, np.full(frame.shape, self._next)) for frame in K]
-        return _in_time(fits)
+            none = np.empty((0, *self.basis.shape), self.dtype)
+            return Fit(self, K.astype(self.dtype), none, [], np.zeros(0), np.zeros(0))
+        return _in_time([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
 
     @property
     def _next(self) -> float:
@@ -213,7 +211,8 @@ class Tracking(Estimator):
 
     def _start(self, readings: Array, A: Array) -> None:
         """Expect what the evidence of the first readings says."""
-        self._level = Level(1.0, math.inf) if self.told_sigma else Level(0.0, 0.0)
+        told = (1.0, math.inf) if self.told_sigma else (0.0, 0.0)
+        self._level = Level(*told, float(np.finfo(self.dtype).eps))
         self._filter.expect(self._level.renew(A, readings), START)
 
     def _advance(self, time: float) -> None:
@@ -241,7 +240,7 @@ class Tracking(Estimator):
             level.pace(learned)
         self._left[channels] = learned.left / self.weight[channels]
         self._read[channels] = t
-        level.weigh(power, len(K))
+        level.weigh(power, readings.astype(float))
         S1, _ = filter_.halves
         level.size(filter_.mean[0], float(np.vdot(S1, S1)), self._signal)
 
