@@ -25,7 +25,7 @@ from kappaskin_app.views.spectrum import SpectrumPlot
 _COLUMNS = 3
 _GRID = 65  # points of a map along each side
 _REAL = "The hard cases are for the simulation inside the app (Ctrl+M)."
-_TRY = "Hard cases to try, each undone by one step back:"
+_TRY = "Hard cases to try; Back undoes each in one step."
 
 
 class StabilityPanel(QWidget):
