@@ -26,7 +26,8 @@ from kappaskin import (
 from kappaskin.fit import METHODS
 from kappaskin.fit.estimator import DenseSpread
 from kappaskin.studies import stability as study
-from kappaskin.studies.stability.gallery import Kind, gallery
+from kappaskin.studies.stability.case import Kind
+from kappaskin.studies.stability.gallery import gallery
 from kappaskin.studies.stability.precise import least_squares
 from kappaskin.studies.stability.reference import reference_of
 from kappaskin.studies.stability.run import rows_of

@@ -1,105 +1,25 @@
-"""Hard cases for a reconstruction, as frozen values: what is hard, what is read, what is true.
-
-Where a case does not say otherwise, 40 frames are read of a shape whose every function bends the
-skin alike, by about 0.3 1/m, with Gaussian noise of the paper's 0.231 1/m; all seeded.
-"""
+"""The hard cases themselves, made one by one when they are asked for."""
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 
 import numpy as np
 
-from kappaskin.bases import Basis, CurvatureMap, SineBasis
+from kappaskin.bases import CurvatureMap, SineBasis
 from kappaskin.fit import FiniteSlope
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.patch import Patch
 from kappaskin.scene import TABLE_1_NOISE, scaled_to
+from kappaskin.studies.stability.case import FRAMES, SEED, Case, Kind, case_of
 from kappaskin.studies.tables import RADIUS
 from kappaskin.transduction import Transduction
 
-FRAMES = 40
-"""Frames of a case, each with its own noise: an error bar is judged by all of them."""
-
 _PATTERNS = 4  # of missing readings
-_BENDS = 0.3  # 1/m by each function: slopes are then too slight to matter
-_SEED = 8
 _SQUARE = Patch(0.1, 0.1)
 _TENS = SensorLayout.regular(_SQUARE, 10, 10)
-
-
-class Kind(Enum):
-    """What a case asks of a method; which methods claim it follows."""
-
-    ANY = "any method that takes the skin"
-    LINEAR = "readings as a skin of slight slope gives them, to more digits than slopes allow"
-    SLOPES = "readings of a skin with slopes near one"
-    SEQUENCE = "more frames than a method that solves each anew is asked for"
-    DENSE = "as many functions as dense algebra does quickly, but nothing slower"
-    LARGE = "more functions than a dense matrix is made for"
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """`curvature` (T, 3, P) in 1/m, read of the shape with coefficients `truth` in m.
-
-    `truth` is (Ri, Rj), or (T, Ri, Rj) of a shape that moves, of the functions of `true_basis`.
-    `hard` says in one sentence what is hard; `announced` why an answer may be less than exact, or
-    none; empty where nothing excuses it.
-    """
-
-    name: str
-    hard: str
-    basis: Basis
-    layout: SensorLayout
-    true_basis: Basis
-    truth: Array
-    curvature: Array
-    announced: str = ""
-    kind: Kind = Kind.ANY
-
-    @property
-    def in_reach(self) -> bool:
-        """Whether the functions that are fitted can be the truth."""
-        return self.true_basis == self.basis
-
-
-def _case(
-    name: str,
-    hard: str,
-    layout: SensorLayout,
-    functions: tuple[int, int],
-    *,
-    announced: str = "",
-    noise: float = TABLE_1_NOISE,
-    kind: Kind = Kind.ANY,
-    basis: Basis | None = None,
-    true_basis: Basis | None = None,
-    truth: Array | None = None,
-    spoilt: Callable[[Array], Array] = lambda K: K,
-) -> Case:
-    """A case of `functions` on a `layout`; `spoilt` makes of clean, noisy readings what comes."""
-    rng = np.random.default_rng(_SEED)
-    basis = SineBasis(layout.patch, *functions) if basis is None else basis
-    true_basis = basis if true_basis is None else true_basis
-    M = layout.curvature_operator(true_basis)
-    c = _even(true_basis, M, rng) if truth is None else truth
-    clean = np.dot(c.reshape(-1, true_basis.size), M.T).reshape(-1, 3, len(layout))
-    frames = (FRAMES if len(clean) == 1 else len(clean)) if noise else 1
-    K = clean + rng.normal(0.0, noise, (frames, 3, len(layout)))
-    return Case(name, hard, basis, layout, true_basis, c, spoilt(K), announced, kind)
-
-
-def _even(basis: Basis, M: Array, rng: np.random.Generator) -> Array:
-    """Coefficients (Ni, Nj) of which each function that is free bends the skin alike."""
-    W = np.eye(basis.size) if basis.free is None else basis.free
-    A = M @ W
-    length = np.linalg.norm(A, axis=0) / math.sqrt(len(A))
-    length[length <= 1e-9 * length.max(initial=1.0)] = np.inf  # it would move without bending
-    return (W @ (_BENDS * rng.normal(size=len(length)) / length)).reshape(basis.shape)
 
 
 def _dent(functions: int) -> Array:
@@ -109,8 +29,8 @@ def _dent(functions: int) -> Array:
 
 
 def _sizes() -> Iterator[Case]:
-    yield _case("paper", "nothing: the paper's grid and basis, to compare with", _TENS, (8, 8))
-    yield _case(
+    yield case_of("paper", "nothing: the paper's grid and basis, to compare with", _TENS, (8, 8))
+    yield case_of(
         "paper, exact",
         "nothing, and readings without noise: only rounding is left",
         _TENS,
@@ -118,19 +38,19 @@ def _sizes() -> Iterator[Case]:
         noise=0,
         kind=Kind.LINEAR,
     )
-    yield _case(
+    yield case_of(
         "Ni = m",
         "the last function has another norm: its cosine vanishes at every element",
         _TENS,
         (10, 10),
     )
-    yield _case(
+    yield case_of(
         "Ni > m",
         "functions 11 and 12 look like 9 and 8 in each channel; three channels tell them apart",
         _TENS,
         (12, 10),
     )
-    yield _case(
+    yield case_of(
         "Ni > m, Nj > n",
         "four mixtures of functions beyond the elements change no reading",
         _TENS,
@@ -138,7 +58,7 @@ def _sizes() -> Iterator[Case]:
         truth=_dent(12),
         announced="140 of 144 coefficients are determined",
     )
-    yield _case(
+    yield case_of(
         "Ni > m, Nj > n, exact",
         "the same without noise: rounding alone fills what is not determined",
         _TENS,
@@ -148,14 +68,14 @@ def _sizes() -> Iterator[Case]:
         kind=Kind.LINEAR,
         announced="140 of 144 coefficients are determined",
     )
-    yield _case(
+    yield case_of(
         "Ni = 2m",
         "a function that is zero at every element is seen by its twist alone",
         _TENS,
         (20, 8),
         kind=Kind.DENSE,
     )
-    yield _case(
+    yield case_of(
         "Ni = 2m, Nj = 2n",
         "400 coefficients of 300 readings",
         _TENS,
@@ -164,14 +84,14 @@ def _sizes() -> Iterator[Case]:
         announced="there are fewer readings than coefficients",
         kind=Kind.DENSE,
     )
-    yield _case(
+    yield case_of(
         "Ni = 64",
         "unscaled, the lengths of the columns differ by a factor of thousands",
         SensorLayout.regular(Patch(0.5, 0.5), 65, 3),
         (64, 2),
         kind=Kind.DENSE,
     )
-    yield _case(
+    yield case_of(
         "16 x 16",
         "256 unknowns of 867 readings, by dense algebra",
         SensorLayout.regular(_SQUARE, 17, 17),
@@ -188,11 +108,11 @@ def _arcs() -> Iterator[Case]:
     a0 = 0.63e-3 / 4
     dent = np.zeros((8, 1))
     dent[0], dent[2] = a0, -3 * a0
-    yield _case("fingertip, exact", f"{hard}; pinned ends decide it", layout, (8, 1), truth=dent,
-                noise=0, kind=Kind.LINEAR)  # fmt: skip
-    yield _case("fingertip", f"{hard}; pinned ends decide it, noise of 4.5 1/m", layout, (8, 1),
-                truth=dent, noise=4.5, basis=pinned)  # fmt: skip
-    yield _case(
+    yield case_of("fingertip, exact", f"{hard}; pinned ends decide it", layout, (8, 1), truth=dent,
+                  noise=0, kind=Kind.LINEAR)  # fmt: skip
+    yield case_of("fingertip", f"{hard}; pinned ends decide it, noise of 4.5 1/m", layout, (8, 1),
+                  truth=dent, noise=4.5, basis=pinned)  # fmt: skip
+    yield case_of(
         "fingertip, free ends",
         f"{hard}; nothing decides it",
         layout,
@@ -213,7 +133,7 @@ def _loads() -> Iterator[Case]:
     for name, (x, y, where) in places.items():
         w = Plate(_SQUARE).deflection([PointLoad(x, y)], fine)
         peak = np.abs(fine.on_grid(*_SQUARE.grid(101, 101))(w)).max()
-        yield _case(
+        yield case_of(
             name,
             f"{where}; curvature peaks there, and 8 x 8 functions cannot follow 15 x 15",
             _TENS,
@@ -222,16 +142,16 @@ def _loads() -> Iterator[Case]:
             truth=1e-3 * w / peak,
             kind=Kind.LINEAR,
         )
-    yield _case(
+    yield case_of(
         "load on the edge",
         "the edge holds: a load moves nothing, whatever its force",
         _TENS,
         (8, 8),
         truth=Plate(_SQUARE).deflection([PointLoad(0.0, 0.04, 100.0)], SineBasis(_SQUARE, 8, 8)),
     )
-    yield _case("no load", "nothing but noise", _TENS, (8, 8), truth=np.zeros((8, 8)))
-    yield _case("no load, exact", "every reading is zero: there is no scale to compare with", _TENS,
-                (8, 8), truth=np.zeros((8, 8)), noise=0)  # fmt: skip
+    yield case_of("no load", "nothing but noise", _TENS, (8, 8), truth=np.zeros((8, 8)))
+    yield case_of("no load, exact", "every reading is zero: there is no scale to compare with",
+                  _TENS, (8, 8), truth=np.zeros((8, 8)), noise=0)  # fmt: skip
 
 
 def _only(channel: int) -> SensorLayout:
@@ -242,28 +162,28 @@ def _only(channel: int) -> SensorLayout:
 
 def _elements() -> Iterator[Case]:
     for channel, name in enumerate(COMPONENTS):
-        yield _case(f"only {name}", "one channel kind of three", _only(channel), (8, 8))
-    yield _case("dead elements", "five elements of a hundred read nothing",
-                _TENS.without([0, 11, 12, 57, 99]), (8, 8))  # fmt: skip
-    yield _case("dead row", "a row of ten elements reads nothing",
-                _TENS.without(range(40, 50)), (8, 8))  # fmt: skip
+        yield case_of(f"only {name}", "one channel kind of three", _only(channel), (8, 8))
+    yield case_of("dead elements", "five elements of a hundred read nothing",
+                  _TENS.without([0, 11, 12, 57, 99]), (8, 8))  # fmt: skip
+    yield case_of("dead row", "a row of ten elements reads nothing",
+                  _TENS.without(range(40, 50)), (8, 8))  # fmt: skip
     quarter = _TENS.without(p + 10 * q for p in range(5) for q in range(5))
-    yield _case("dead quarter", "a quarter of the skin is not read", quarter, (5, 5))
-    yield _case("dead quarter, 8 x 8", "a quarter is not read, and functions are fine enough to "
-                "hide in it", quarter, (8, 8),
-                announced="float32 has too few digits for what hides there")  # fmt: skip
-    yield _case("all dead", "no element reads anything", _TENS.without(range(100)), (8, 8),
-                truth=np.zeros((8, 8)), announced="there is nothing to go by")  # fmt: skip
-    rng = np.random.default_rng(_SEED)
+    yield case_of("dead quarter", "a quarter of the skin is not read", quarter, (5, 5))
+    yield case_of("dead quarter, 8 x 8", "a quarter is not read, and functions are fine enough to "
+                  "hide in it", quarter, (8, 8),
+                  announced="float32 has too few digits for what hides there")  # fmt: skip
+    yield case_of("all dead", "no element reads anything", _TENS.without(range(100)), (8, 8),
+                  truth=np.zeros((8, 8)), announced="there is nothing to go by")  # fmt: skip
+    rng = np.random.default_rng(SEED)
     points = rng.uniform(0.0, 0.1, (60, 2))
-    yield _case("scattered", "60 elements anywhere", _scattered(points), (6, 5))
+    yield case_of("scattered", "60 elements anywhere", _scattered(points), (6, 5))
     clusters = np.repeat(rng.uniform(0.01, 0.09, (6, 2)), 12, axis=0)
     clusters += rng.normal(0.0, 1e-3, clusters.shape)
-    yield _case("clustered", "72 elements in six heaps of 2 mm", _scattered(clusters), (5, 5),
-                announced="between the heaps little is seen")  # fmt: skip
-    yield _case("nearly coincident", "40 elements, each with another 1 nm beside it",
-                _scattered(np.vstack([points[:40], points[:40] * (1 - 1e-8)])),
-                (6, 5))  # fmt: skip
+    yield case_of("clustered", "72 elements in six heaps of 2 mm", _scattered(clusters), (5, 5),
+                  announced="between the heaps little is seen")  # fmt: skip
+    yield case_of("nearly coincident", "40 elements, each with another 1 nm beside it",
+                  _scattered(np.vstack([points[:40], points[:40] * (1 - 1e-8)])),
+                  (6, 5))  # fmt: skip
     for gap in (1e-5, 1e-9, 1e-16):
         yield _pair(gap)
 
@@ -276,7 +196,7 @@ def _pair(gap: float) -> Case:
     """Two places, each with two elements, that tell two functions apart by the `gap` in m."""
     x = np.repeat([0.03 - gap / 2, 0.03 + gap / 2], 2)
     points = np.column_stack([x, np.full(4, 0.01)])
-    return _case(
+    return case_of(
         f"pairs {gap:.0e} m apart",
         "two functions, seen from nearly the same place: all that is not noise is what they share",
         SensorLayout.scattered(Patch(0.1, 0.02, strip=True), points),
@@ -287,15 +207,15 @@ def _pair(gap: float) -> Case:
 
 def _scales() -> Iterator[Case]:
     for name, side in (("1 mm", 1e-3), ("1 m", 1.0)):
-        yield _case(f"{name} patch", f"the lengths of M's columns go with 1/{name}^2",
+        yield case_of(f"{name} patch", f"the lengths of M's columns go with 1/{name}^2",
                     SensorLayout.regular(Patch(side, side), 10, 10), (8, 8),
                     kind=Kind.LINEAR)  # fmt: skip
-    yield _case("1:100", "functions across bend ten thousand times as much as those along",
-                SensorLayout.regular(Patch(0.01, 1.0), 4, 20), (3, 15))  # fmt: skip
+    yield case_of("1:100", "functions across bend ten thousand times as much as those along",
+                  SensorLayout.regular(Patch(0.01, 1.0), 4, 20), (3, 15))  # fmt: skip
 
 
 def _readings() -> Iterator[Case]:
-    holes = np.random.default_rng(_SEED).random((_PATTERNS, 3, 100))
+    holes = np.random.default_rng(SEED).random((_PATTERNS, 3, 100))
     holes = np.tile(holes, (FRAMES // _PATTERNS, 1, 1))
 
     def spiked(K: Array) -> Array:
@@ -305,23 +225,23 @@ def _readings() -> Iterator[Case]:
     def lost(share: float, what: float) -> Callable[[Array], Array]:
         return lambda K: np.where(holes < share, what, K)
 
-    yield _case("NaN", "one reading in ten is missing, others in the next frame", _TENS, (8, 8),
-                spoilt=lost(0.1, np.nan))  # fmt: skip
-    yield _case("infinity", "one reading in ten is infinite", _TENS, (8, 8),
-                spoilt=lost(0.1, np.inf))  # fmt: skip
-    yield _case("all NaN", "every reading is missing", _TENS, (8, 8), spoilt=lost(2.0, np.nan),
-                announced="there is nothing to go by")  # fmt: skip
+    yield case_of("NaN", "one reading in ten is missing, others in the next frame", _TENS, (8, 8),
+                  spoilt=lost(0.1, np.nan))  # fmt: skip
+    yield case_of("infinity", "one reading in ten is infinite", _TENS, (8, 8),
+                  spoilt=lost(0.1, np.inf))  # fmt: skip
+    yield case_of("all NaN", "every reading is missing", _TENS, (8, 8), spoilt=lost(2.0, np.nan),
+                  announced="there is nothing to go by")  # fmt: skip
     chain = Transduction()
-    yield _case("rails", "bent so far that the electronics stand on a rail where it matters most",
-                _TENS, (8, 8), truth=_strong(chain), noise=0.1, kind=Kind.LINEAR,
-                spoilt=lambda K: chain.curvature(chain.counts(K)))  # fmt: skip
-    yield _case("spikes", "one reading of each frame is off by 1e6 1/m", _TENS, (8, 8),
-                spoilt=spiked, announced="a spike is no noise: bars widen by as much")  # fmt: skip
+    yield case_of("rails", "bent so far that the electronics stand on a rail where it matters most",
+                  _TENS, (8, 8), truth=_strong(chain), noise=0.1, kind=Kind.LINEAR,
+                  spoilt=lambda K: chain.curvature(chain.counts(K)))  # fmt: skip
+    yield case_of("spikes", "one reading of each frame is off by 1e6 1/m", _TENS, (8, 8),
+                  spoilt=spiked, announced="a spike is no noise: bars widen with it")  # fmt: skip
     dent = _dent(8)
     signal = _TENS.curvature_operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
     noise = 10 * float(np.sqrt(np.mean(signal**2)))
-    yield _case("noise 10 times the signal", "readings tell more of the noise than of the shape",
-                _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
+    yield case_of("noise 10 times the signal", "readings tell more of the noise than of the shape",
+                  _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
 
 
 def _strong(chain: Transduction) -> Array:
@@ -340,7 +260,7 @@ def _slopes() -> Iterator[Case]:
     for steepest in (0.5, 0.9):
         truth = c * steepest / slope
         skin = FiniteSlope(basis, _TENS)
-        rng = np.random.default_rng(_SEED)
+        rng = np.random.default_rng(SEED)
         K = skin.predicted(truth) + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, 3, 100))
         yield Case(f"slopes of {steepest}", "gages sense the curvature of the bent surface, which "
                    "is not that of Eqs. 3-5", basis, _TENS, basis, truth, K,
@@ -356,8 +276,9 @@ def _sequence(frames: int, elements: int, functions: int) -> Case:
     way = Plate(_SQUARE).compliance(basis).values * basis.at(places)
     way *= 1e-3 / np.abs(way).max()
     truth = way[np.arange(frames) % len(way)].reshape(frames, *basis.shape)
-    return _case(f"{frames} frames", "errors of many steps could add up, and a covariance lose its "
-                 "definiteness", layout, basis.shape, truth=truth, kind=Kind.SEQUENCE)  # fmt: skip
+    return case_of(f"{frames} frames", "errors of many steps could add up, and a covariance lose "
+                   "its definiteness", layout, basis.shape, truth=truth,
+                   kind=Kind.SEQUENCE)  # fmt: skip
 
 
 def _large(count: int) -> Case:
@@ -367,8 +288,8 @@ def _large(count: int) -> Case:
         SineBasis(patch, count, count),
         SensorLayout.regular(patch, count + 1, count + 1),
     )
-    rng = np.random.default_rng(_SEED)
-    c = _BENDS * rng.normal(size=basis.shape) / basis.laplacian / count
+    rng = np.random.default_rng(SEED)
+    c = 0.3 / count * rng.normal(size=basis.shape) / basis.laplacian
     x, y = patch.cell_centres(count + 1, count + 1)
     clean = np.stack([CurvatureMap(basis, name, x, y)(c).ravel() for name in COMPONENTS])
     K = clean + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, *clean.shape))

@@ -29,7 +29,7 @@ from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, Fit
 from kappaskin.fit.estimator import gathered
 from kappaskin.frames import Array
-from kappaskin.studies.stability.gallery import Case, Kind
+from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.reference import Reference
 
 Precision = np.dtype[np.floating[Any]]

@@ -16,7 +16,7 @@ from scipy import fft
 from kappaskin.fit import singular_values
 from kappaskin.fit.estimator import column_lengths
 from kappaskin.frames import Array
-from kappaskin.studies.stability.gallery import Case, Kind
+from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.precise import least_squares
 
 _Precise = NDArray[np.longdouble]

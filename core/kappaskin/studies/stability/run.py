@@ -15,7 +15,8 @@ from kappaskin.engine import one_thread_per_process
 from kappaskin.errors import Refusal
 from kappaskin.fit import METHODS, Estimator
 from kappaskin.frames import Array
-from kappaskin.studies.stability.gallery import Case, Kind, gallery
+from kappaskin.studies.stability.case import Case, Kind
+from kappaskin.studies.stability.gallery import gallery
 from kappaskin.studies.stability.judge import Answer, answered, verdict
 from kappaskin.studies.stability.reference import Reference, reference_of
 
