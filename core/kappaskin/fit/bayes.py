@@ -17,6 +17,7 @@ from kappaskin.layout import SensorLayout
 _REMEMBERED = 8  # sets of missing readings whose factors are kept
 _LEAST, _MOST = -12.0, 60.0  # ln of signal over noise in power, of the best seen direction
 _GRID = np.linspace(_LEAST, _MOST, 145)
+_AWAY = 0.9  # the power of scale and noise in their density
 _NEWTON = 3  # steps from the best of them
 
 
@@ -46,8 +47,9 @@ class PosteriorSpread:
 #     -2 ln p(K | gamma) = R ln sigma^2 + sum_k ln d_k,
 # or, where sigma is told and the readings are in units of it, sum_k y_k^2 / d_k + ln d_k. Where
 # noise hides the signal this may be least at tau = 0, and where there are more functions than
-# readings at sigma = 0, with error bars of nothing. A density that grows with both keeps it from
-# there (doi:10.1007/s11336-013-9328-2): -2 ln (tau sigma) = -ln gamma - 2 ln sigma^2 more.
+# readings at sigma = 0, with error bars of nothing. A density that grows as a power of both keeps
+# it from there (doi:10.1007/s11336-013-9328-2): -2 p ln (tau sigma) = -p ln gamma - 2 p ln sigma^2
+# more. With p = 1, one function that is seen among others unseen would let tau run away.
 class Evidence:
     """The prior's scale and the noise that make readings K = A z most likely, A (R, F)."""
 
@@ -58,7 +60,7 @@ class Evidence:
         self.s2 = np.zeros(len(Vt))
         self.s2[:k] = s**2
         self._k, self._told = k, told
-        self._readings = max(len(A) - 2, 1)  # less what the density of sigma takes
+        self._readings = max(len(A) - 2 * _AWAY, 1.0)  # less what the density of sigma takes
         self._top = math.log(self.s2[0]) if s[0] > 0 else 0.0
         self._floor = floor  # of the readings' own power: what their rounding leaves
         d = 1 + np.exp(_GRID - self._top)[:, None] * self.s2[:k]
@@ -73,7 +75,7 @@ class Evidence:
         left = np.maximum(np.vecdot(rest, rest), self._floor * power)
         y2 = y**2
         fit = y2 @ self._share.T + left[:, None]
-        cost = self._cost(fit, self._volume) - _GRID
+        cost = self._cost(fit, self._volume) - _AWAY * _GRID
         best = np.argmin(cost, axis=1)
         t = self._refined(_GRID[best], y2, left)
         gamma = np.exp(t - self._top)
@@ -102,11 +104,11 @@ class Evidence:
             f1, f2 = -np.vecdot(e, q), np.vecdot(e, q * (2 * q - 1))
             v1, v2 = q.sum(axis=1), (q * (1 - q)).sum(axis=1)
             if self._told:
-                slope, bend = f1 + v1 - 1, f2 + v2
+                slope, bend = f1 + v1 - _AWAY, f2 + v2
             else:
                 fit = np.maximum(fit, np.finfo(float).tiny)
                 R = self._readings
-                slope, bend = R * f1 / fit + v1 - 1, R * (f2 / fit - (f1 / fit) ** 2) + v2
+                slope, bend = R * f1 / fit + v1 - _AWAY, R * (f2 / fit - (f1 / fit) ** 2) + v2
             step = np.divide(-slope, bend, where=bend > 0, out=np.zeros_like(t))
             t = np.clip(t + step, low, high)
         return t
