@@ -14,7 +14,7 @@ from kappaskin_app.settings import METHOD_NAMES
 from kappaskin_app.theme import LIGHT, SERIES, Theme
 from kappaskin_app.views.log_axis import LogAxis
 
-_LEFT, _BOTTOM, _TOP = 62.0, 34.0, 10.0
+_LEFT, _BOTTOM, _TOP = 76.0, 34.0, 10.0
 _LEGEND = 196.0  # px right of the plot
 _SIZE = 4.0  # px from a point's middle to its rim
 _NEAR = 10.0  # px from the mouse to the point that it means
