@@ -23,7 +23,7 @@ from kappaskin import (
     local_geometry,
 )
 from kappaskin.bases import ORDERS
-from kappaskin.fit.estimator import DenseSpread
+from kappaskin.fit.fit import DenseSpread
 from kappaskin.geometry import surface_geometry
 
 FLAT = Patch(0.1, 0.08)

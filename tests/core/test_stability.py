@@ -24,7 +24,7 @@ from kappaskin import (
     singular_values,
 )
 from kappaskin.fit import METHODS
-from kappaskin.fit.estimator import DenseSpread
+from kappaskin.fit.fit import DenseSpread
 from kappaskin.studies import stability as study
 from kappaskin.studies.stability.case import Kind
 from kappaskin.studies.stability.gallery import gallery

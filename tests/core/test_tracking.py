@@ -620,9 +620,3 @@ def test_a_first_frame_without_a_reading_is_refused_plainly():
 def test_readings_without_places_or_times_are_refused(curvature, times, match):
     with pytest.raises(Refusal, match=match):
         Tracking(FOURS, SIXES).follow(curvature, times)
-
-
-@pytest.mark.parametrize("period", [0.0, -1.0, math.nan, math.inf])
-def test_a_period_that_is_none_is_refused(period):
-    with pytest.raises(Refusal, match="a period above zero in s"):
-        Tracking(FOURS, SIXES, period=period)

@@ -1,34 +1,17 @@
 """The ways from curvature to coefficients that others take, for teaching and comparison."""
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike
 
-from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient
-from kappaskin.fit.estimator import (
-    RIM_SD,
-    DenseSpread,
-    Estimator,
-    Fit,
-    Spread,
-    column_lengths,
-)
+from kappaskin.fit.estimator import Estimator, column_lengths
+from kappaskin.fit.fit import DenseSpread, Fit
 from kappaskin.frames import Array, Mask
-from kappaskin.layout import SensorLayout
 
 
 class _PerFrame(Estimator):
     """An estimator that factors nothing: A = M with its weights is solved anew in each call."""
 
-    def __init__(
-        self,
-        basis: Basis,
-        layout: SensorLayout,
-        sigma: ArrayLike | None = None,
-        rim_sd: float = RIM_SD,
-        dtype: DTypeLike = np.float64,
-    ) -> None:
-        super().__init__(basis, layout, sigma, rim_sd, dtype)
+    def _set_up(self) -> None:
         self._A = (self.weight[:, None] * self._columns()).astype(self.dtype)
 
     def _columns(self) -> Array:
@@ -38,17 +21,6 @@ class _PerFrame(Estimator):
         """Of the readings used: A (R, F) and K (R, T), weighted."""
         weight = self.weight[used].astype(self.dtype)
         return self._A[used], (flat[..., used] * weight).T
-
-    def _fitted(self, flat: Array, used: Mask, c: Array, spread: Spread) -> Fit:
-        frames = flat.shape[:-1]
-        return Fit(
-            self,
-            flat.reshape(*frames, 3, len(self.layout)),
-            c.reshape(*frames, *self.basis.shape),
-            [spread] * frames[0] if frames else spread,
-            np.broadcast_to(int(used.sum()) - self.unknowns, frames),
-            np.ones(frames) if self.told_sigma else None,
-        )
 
 
 class AsPrinted(_PerFrame):
@@ -74,7 +46,7 @@ class AsPrinted(_PerFrame):
             N: Array = A.astype(np.float64)
             return np.linalg.pinv(N.T @ N).astype(np.float64)
 
-        return self._fitted(flat, used, c.T, DenseSpread(covariance))
+        return self._answer(flat, c.T, DenseSpread(covariance), len(A) - self.unknowns)
 
 
 class Direct(_PerFrame):
@@ -104,4 +76,5 @@ class Direct(_PerFrame):
             root = back @ np.linalg.pinv(A.astype(float))
             return root @ root.T
 
-        return self._fitted(flat, used, (back @ g).T.astype(self.dtype), DenseSpread(covariance))
+        c = (back @ g).T.astype(self.dtype)
+        return self._answer(flat, c, DenseSpread(covariance), len(A) - self.unknowns)

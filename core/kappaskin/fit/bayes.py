@@ -1,20 +1,17 @@
 """The shape of a skin that bends as a plate does: a prior where the readings do not decide."""
 
 import math
-from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike
 from scipy import linalg
 
-from kappaskin.bases import Basis
-from kappaskin.fit.estimator import RIM_SD, Estimator, Fit
+from kappaskin.fit.estimator import Estimator
+from kappaskin.fit.fit import Fit
 from kappaskin.fit.prior import prior_root
+from kappaskin.fit.remembered import Remembered
 from kappaskin.frames import Array, Mask
-from kappaskin.layout import SensorLayout
 
-_REMEMBERED = 8  # sets of missing readings whose factors are kept
 _LEAST, _MOST = -12.0, 60.0  # ln of signal over noise in power, of the best seen direction
 _GRID = np.linspace(_LEAST, _MOST, 145)
 _AWAY = 0.9  # the power of scale and noise in their density
@@ -134,34 +131,22 @@ class Bayes(Estimator):
 
     has_prior = True
 
-    def __init__(
-        self,
-        basis: Basis,
-        layout: SensorLayout,
-        sigma: ArrayLike | None = None,
-        rim_sd: float = RIM_SD,
-        dtype: DTypeLike = np.float64,
-    ) -> None:
-        super().__init__(basis, layout, sigma, rim_sd, dtype)
-        self._root = prior_root(basis)
-        self._solvers: OrderedDict[bytes, _Solver] = OrderedDict()
+    def _set_up(self) -> None:
+        self._root = prior_root(self.basis)
+        self._solvers = Remembered[_Solver]()
         if self.readable.any():
-            self._solver(self.readable)
+            self._solvers(self.readable, self._made)
 
-    def _solver(self, used: Mask) -> _Solver:
-        key = used.tobytes()
-        if key not in self._solvers:
-            A = self.weight[used, None] * (self.M[used] @ self._root)
-            evidence = Evidence(A, self.told_sigma, float(np.finfo(self.dtype).eps) ** 2)
-            self._solvers[key] = _Solver(evidence, self._root @ evidence.V)
-            if len(self._solvers) > _REMEMBERED:
-                self._solvers.popitem(last=False)
-        return self._solvers[key]
+    def _made(self, used: Mask) -> _Solver:
+        A = self.weight[used, None] * (self.M[used] @ self._root)
+        told, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
+        evidence = Evidence(A, told, rounding**2)
+        return _Solver(evidence, self._root @ evidence.V)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         if not used.any():
             raise self.refusal(0, 0)
-        solver, frames = self._solver(used), flat.shape[:-1]
+        solver, frames = self._solvers(used, self._made), flat.shape[:-1]
         evidence, B = solver.evidence, solver.B
         y, gamma, sigma = evidence(np.atleast_2d(flat[..., used] * self.weight[used]))
         d = 1 + gamma[:, None] * evidence.s2

@@ -1,166 +1,22 @@
-"""What every estimator takes and answers: curvature to coefficients, error bars, what is left."""
+"""What every estimator takes and how it is asked: curvature to coefficients with error bars."""
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol, cast
+from typing import ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike
 
 from kappaskin.bases import Basis
 from kappaskin.bases.basis import curvature_at
 from kappaskin.errors import RankDeficient, Refusal
+from kappaskin.fit.fit import Fit, Spread, gathered
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
 RIM_SD = 0.2e-3
 """How far in m a rim that gives is expected to move, unless said otherwise."""
-
-_MOST = 10_000  # coefficients: their covariance takes 800 MB
-
-
-class Spread(Protocol):
-    """How far the N coefficients of a frame may be off, for unit noise."""
-
-    @property
-    def sd(self) -> Array:
-        """Standard deviations (N,) of the coefficients in m for noise of 1 1/m."""
-        ...
-
-    def of(self, rows: Array) -> Array:
-        """Covariance (..., R, R) of `rows` (..., R, N) times the coefficients."""
-        ...
-
-    def sd_of(self, rows: Array) -> Array:
-        """Standard deviations (R,) of `rows` (R, N) times the coefficients."""
-        ...
-
-
-class DenseSpread:
-    """The spread that a covariance (N, N) tells; it is made when first asked for."""
-
-    def __init__(self, make: Callable[[], Array]) -> None:
-        self._make = make
-
-    @cached_property
-    def covariance(self) -> Array:
-        return self._make()
-
-    @property
-    def sd(self) -> Array:
-        return _root(np.diag(self.covariance))
-
-    def of(self, rows: Array) -> Array:
-        return rows @ self.covariance @ rows.swapaxes(-1, -2)
-
-    def sd_of(self, rows: Array) -> Array:
-        return _root(np.vecdot(rows @ self.covariance, rows))
-
-
-def _root(variance: Array) -> Array:
-    """Standard deviations; NaN where rounding has left no variance."""
-    return np.sqrt(np.where(variance >= 0, variance, np.nan))
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """The shape that answers the readings best, of one frame or of T (leading axis).
-
-    `curvature` (..., 3, P) in 1/m is what it rests on, NaN where a reading is missing or was not
-    trusted; `coefficients` (..., Ni, Nj) in m; `spreads` says how far they may be off for unit
-    noise, of each frame when there are several; `spare` (...) how many readings there are beyond
-    those that the shape took. `told_noise` (...) is the noise in 1/m where the estimator knows it.
-    An iteration took `steps` (...); where it has not `converged` (...), the answer is that of
-    least squares. `suspect` (..., P) says which elements were left out and why, by their number in
-    `WHY`; None where none is ever suspected.
-    """
-
-    estimator: "Estimator"
-    curvature: Array
-    coefficients: Array
-    spreads: "Spread | Sequence[Spread]"
-    spare: ArrayLike
-    told_noise: Array | None = None
-    steps: ArrayLike = 0
-    converged: ArrayLike = True
-    suspect: "NDArray[np.uint8] | None" = None
-
-    @cached_property
-    def residual(self) -> Array:
-        """What the shape leaves of the readings, (..., 3, P) in 1/m; NaN where it rests on none."""
-        return self.curvature - self.estimator.predicted(self.coefficients)
-
-    @cached_property
-    def noise(self) -> Array:
-        """Standard deviation (...) of a reading in 1/m; 1 where the fit was told each one's sigma.
-
-        It is as the residual tells it, NaN when every reading was spent on a coefficient, or as
-        the estimator knows it.
-        """
-        if self.told_noise is not None:
-            return self.told_noise
-        left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
-        squares = np.vecdot(left, left)
-        if np.count_nonzero(squares != squares):  # NaN, told in a tenth of the time of any()
-            left = np.where(np.isnan(left), 0.0, left)
-            squares = np.vecdot(left, left)
-        spare = np.array(self.spare, float)
-        spare[spare <= 0] = np.nan
-        return np.sqrt(squares / spare)
-
-    def _each(self, told: Callable[[Spread], Array], shape: tuple[int, ...]) -> Array:
-        """What is `told` of the spread, of this `shape`, for each frame when there are several."""
-        if not isinstance(self.spreads, Sequence):
-            return told(self.spreads).reshape(shape)
-        once = {id(spread): spread for spread in self.spreads}
-        known = {number: told(spread) for number, spread in once.items()}
-        frames = [known[id(spread)] for spread in self.spreads]
-        return np.reshape(frames, (len(frames), *shape))
-
-    @cached_property
-    def unit_sd(self) -> Array:
-        """Standard deviations (..., Ni, Nj) of the coefficients for unit noise."""
-        return self._each(lambda spread: spread.sd, self.estimator.basis.shape)
-
-    @property
-    def sd(self) -> Array:
-        """Standard deviations (..., Ni, Nj) of the coefficients in m."""
-        seen = self.noise[..., None, None] * self.unit_sd
-        undecided = np.linalg.norm(self.estimator.undecided, axis=1)
-        return np.hypot(seen, undecided.reshape(self.estimator.basis.shape))
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients in m^2; made on demand."""
-        if (N := self.estimator.basis.size) > _MOST:
-            raise Refusal(
-                f"expected at most {_MOST} coefficients whose covariance is made, got {N} x {N} "
-                "numbers; ask for the covariance_of what is wanted"
-            )
-        return self.covariance_of(np.eye(N))
-
-    def covariance_of(self, rows: Array) -> Array:
-        """Covariance (..., R, R) of `rows` (..., R, N) times the flattened coefficients.
-
-        With several frames `rows` are those of all of them, (R, N).
-        """
-        unit = self._each(lambda spread: spread.of(rows), (*rows.shape[:-1], rows.shape[-2]))
-        undecided = rows @ self.estimator.undecided
-        noise = np.expand_dims(self.noise, tuple(range(self.noise.ndim, unit.ndim)))
-        return noise**2 * unit + undecided @ undecided.swapaxes(-1, -2)
-
-    def sd_of(self, rows: Array) -> Array:
-        """Standard deviations (..., R) of `rows` (R, N) times the flattened coefficients."""
-        seen = self.noise[..., None] * self._each(lambda spread: spread.sd_of(rows), (len(rows),))
-        return np.hypot(seen, np.linalg.norm(rows @ self.estimator.undecided, axis=-1))
-
-    def surface_sd(self, positions: Array) -> Array:
-        """Standard deviations (..., P) of the displacement in m at `positions` (P, 2)."""
-        return self.sd_of(self.estimator.basis.at(positions))
-
 
 _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 
@@ -201,23 +57,29 @@ class Estimator(ABC):
             raise Refusal(f"expected a rim_sd of at least zero in m, got {rim_sd}")
         if np.dtype(dtype).name not in ("float64", "float32"):
             raise Refusal(f"expected float64 or float32 to compute in, got {np.dtype(dtype)}")
-        self.basis, self.layout = basis, layout
+        self.basis, self.layout, self.rim_sd = basis, layout, rim_sd
         # Typed as float64: what holds for one holds for the other.
         self.dtype = cast("np.dtype[np.float64]", np.dtype(dtype))
         unseen = np.empty((basis.size, 0)) if basis.unseen is None else basis.unseen
         self.undecided = rim_sd * unseen
         """Shapes (N, q) in m that no reading sees, each as far as it is expected to go."""
-        self.told_sigma = sigma is not None
-        self.weight = self._weights(1.0 if sigma is None else sigma)
+        self.sigma = None if sigma is None else np.array(sigma, float)
+        """The standard deviations in 1/m that were told, one or (3, P); None if none were."""
+        self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
         """What each reading (3 P,) is worth, 1 / sigma in m; 1 for all without a sigma."""
         self.readable: Mask = layout.live.ravel() & (self.weight > 0)
         """Which readings (3 P,) are used when they are there."""
         self._all_readable = bool(self.readable.all())
         self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
         """How many numbers there are to tell: the coefficients less what the edges decide."""
+        self._set_up()
 
-    def _weights(self, sigma: ArrayLike) -> Array:
-        sigma = np.asarray(sigma, float)
+    @abstractmethod
+    def _set_up(self) -> None:
+        """Make once what no frame changes; raises a `Refusal` when no shape can be told."""
+
+    def _weights(self, sigma: float | Array) -> Array:
+        sigma = np.asarray(sigma)
         if sigma.shape not in ((), (3, len(self.layout))):
             raise Refusal(
                 f"expected sigma to be one number or (3, {len(self.layout)}), got {sigma.shape}"
@@ -241,14 +103,17 @@ class Estimator(ABC):
         flat = coefficients.reshape(*frames, self.basis.size)
         return np.dot(flat, self._M_T).reshape(*frames, 3, len(self.layout))
 
-    def __call__(self, curvature: ArrayLike) -> Fit:
-        """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading."""
-        K = np.array(curvature, self.dtype)  # ours: residuals are told from it later
+    def _check_shape(self, K: Array) -> None:
         if K.ndim not in (2, 3) or K.shape[-2:] != (3, len(self.layout)):
             raise Refusal(
                 f"expected curvature of shape (3, {len(self.layout)}) or (T, 3, "
                 f"{len(self.layout)}), got {K.shape}"
             )
+
+    def __call__(self, curvature: ArrayLike) -> Fit:
+        """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading."""
+        K = np.array(curvature, self.dtype)  # ours: residuals are told from it later
+        self._check_shape(K)
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
         if self._all_readable and _surely_finite(K.reshape(-1)):
             return self._fit(flat, self.readable)
@@ -287,6 +152,21 @@ class Estimator(ABC):
     @abstractmethod
     def _fit(self, flat: Array, used: Mask) -> Fit:
         """Fit readings (3 P,) or (T, 3 P) of which those `used` (3 P,) are there, the rest NaN."""
+
+    def _answer(
+        self, flat: Array, c: Array, spread: Spread, spare: int, steps: ArrayLike = 0
+    ) -> Fit:
+        """The fit of `c` (..., N) or (..., Ni, Nj) to `flat` (..., 3 P), all of one `spread`."""
+        frames = flat.shape[:-1]
+        return Fit(
+            self,
+            flat.reshape(*frames, 3, len(self.layout)),
+            c.reshape(*frames, *self.basis.shape),
+            [spread] * frames[0] if frames else spread,
+            spare,
+            None if self.sigma is None else np.ones(frames),
+            steps,
+        )
 
     def _moves_as_a_whole(self) -> bool:
         """Whether the basis has a function that changes no curvature anywhere; only arcs may."""
@@ -337,31 +217,3 @@ def _surely_finite(a: Array) -> bool:
     """Whether the sum of squares of `a` is finite: told fastest, and false for huge numbers too."""
     with np.errstate(over="ignore"):
         return math.isfinite(a.dot(a))
-
-
-def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
-    """One fit of T frames from the fits of groups of them."""
-
-    def joined(parts: list[Array]) -> Array:
-        return np.concatenate(parts)[order]
-
-    def of_each(name: str) -> Array:
-        return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
-
-    spreads: list[Spread] = []
-    for fit in fits:
-        own = fit.spreads
-        spreads.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
-    told = [fit.told_noise for fit in fits if fit.told_noise is not None]
-    suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
-    return Fit(
-        fits[0].estimator,
-        joined([fit.curvature for fit in fits]),
-        joined([fit.coefficients for fit in fits]),
-        [spreads[int(place)] for place in order],
-        of_each("spare"),
-        joined(told) if told else None,
-        of_each("steps"),
-        of_each("converged"),
-        np.concatenate(suspect)[order] if suspect else None,
-    )

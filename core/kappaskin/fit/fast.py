@@ -1,23 +1,23 @@
 """Least squares on a regular grid in as much time as a few fast transforms, without a matrix."""
 
 import math
-from collections import OrderedDict
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import eigvalsh_tridiagonal
 
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.fit.estimator import RIM_SD, Estimator, Fit
+from kappaskin.fit.estimator import Estimator
+from kappaskin.fit.fit import Fit
+from kappaskin.fit.remembered import Remembered
 from kappaskin.fit.transforms import Scaled, Transforms, cells_of
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
-_REMEMBERED = 8  # sets of missing readings that are known to decide a shape
 _STEPS = 1000  # at most; most sets of missing readings that decide a shape take 10 to 100
 _LOOK = 20  # steps after which to look whether a shape is hardly seen
 _SURE = 1e-6  # of its part in a random shape: what is left of one that was seen
@@ -215,27 +215,19 @@ class Fast(Estimator):
 
     has_matrix = False
 
-    def __init__(
-        self,
-        basis: Basis,
-        layout: SensorLayout,
-        sigma: ArrayLike | None = None,
-        rim_sd: float = RIM_SD,
-        dtype: DTypeLike = np.float64,
-    ) -> None:
-        sines = _sines(basis, layout)
+    def _set_up(self) -> None:
+        sines, layout = _sines(self.basis, self.layout), self.layout
         m, n, self._cells = cells_of(layout)
         if sines.Ni > m or sines.Nj > n:
             raise Refusal(
                 f"expected at most {m} x {n} functions for the fast transforms of {layout}, got "
                 f"{sines.Ni} x {sines.Nj}; use fewer, or least-squares"
             )
-        super().__init__(basis, layout, sigma, rim_sd, dtype)
         self._exact = Transforms(sines, m, n)
         exactly = self.dtype == np.float64
         self._transforms = self._exact if exactly else Transforms(sines, m, n, self.dtype)
         self._least = math.sqrt(np.finfo(self.dtype).eps)  # half of the digits are left
-        self._solvers: OrderedDict[bytes, _Solver] = OrderedDict()
+        self._solvers = Remembered[_Solver]()
         self._whole = self._made(self.readable)
 
     def _on_grid(self, flat: Array) -> Array:
@@ -266,17 +258,6 @@ class Fast(Estimator):
             raise self._hardly(count)
         A = Scaled(self._transforms, w.astype(self.dtype), root.astype(self.dtype))
         return _Solver(count, scale, inverse, spread, A)
-
-    def _solver(self, used: Mask) -> _Solver:
-        """What is known of the readings `used` (3 P,), remembered for the next frames."""
-        if used is self.readable:
-            return self._whole
-        key = used.tobytes()
-        if key not in self._solvers:
-            self._solvers[key] = self._made(used)
-            if len(self._solvers) > _REMEMBERED:
-                self._solvers.popitem(last=False)
-        return self._solvers[key]
 
     def predicted(self, coefficients: Array) -> Array:
         """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
@@ -313,21 +294,16 @@ class Fast(Estimator):
         )
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
-        solver, frames = self._solver(used), flat.shape[:-1]
+        whole, frames = used is self.readable, flat.shape[:-1]
+        solver = self._whole if whole else self._solvers(used, self._made)
         every = flat.reshape(-1, flat.shape[-1])
         parts = _parts(len(every), flat.shape[-1])
         solved = [self._solved(solver, self._on_grid(every[part])) for part in parts]
         c = _joined([c for c, _ in solved])
         steps = _joined([steps for _, steps in solved])
-        return Fit(
-            self,
-            flat.reshape(*frames, 3, len(self.layout)),
-            c.reshape(*frames, *solver.inverse.shape).swapaxes(-1, -2),
-            [solver.spread] * frames[0] if frames else solver.spread,
-            solver.count - self.unknowns,
-            np.ones(frames) if self.told_sigma else None,
-            steps.reshape(frames),
-        )
+        spare = solver.count - self.unknowns
+        c = c.reshape(*frames, *solver.inverse.shape).swapaxes(-1, -2)
+        return self._answer(flat, c, solver.spread, spare, steps.reshape(frames))
 
 
 def _sines(basis: Basis, layout: SensorLayout) -> SineBasis:

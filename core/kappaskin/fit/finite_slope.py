@@ -1,11 +1,12 @@
 """Least squares that knows the skin's slopes: gages sense the curvature of the bent surface."""
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike
+from numpy.typing import DTypeLike
 
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
-from kappaskin.fit.estimator import RIM_SD, Estimator, Fit
+from kappaskin.fit.estimator import Estimator
+from kappaskin.fit.fit import Fit
 from kappaskin.fit.least_squares import LeastSquares
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
@@ -53,17 +54,10 @@ class FiniteSlope(Estimator):
     `Fit.converged` says no.
     """
 
-    def __init__(
-        self,
-        basis: Basis,
-        layout: SensorLayout,
-        sigma: ArrayLike | None = None,
-        rim_sd: float = RIM_SD,
-        dtype: DTypeLike = np.float64,
-    ) -> None:
-        super().__init__(basis, layout, sigma, rim_sd, dtype)
-        self._sensed = NormalCurvature(basis, layout, dtype)
-        self._linear = LeastSquares(basis, layout, sigma, rim_sd, dtype)
+    def _set_up(self) -> None:
+        basis, layout = self.basis, self.layout
+        self._sensed = NormalCurvature(basis, layout, self.dtype)
+        self._linear = LeastSquares(basis, layout, self.sigma, self.rim_sd, self.dtype)
 
     # Steps that run away may overflow: what is infinitely steep reads nothing, and what is no
     # number does not converge.

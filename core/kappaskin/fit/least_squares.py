@@ -1,19 +1,16 @@
 """Least squares, factored once: curvature to the coefficients of the shape, with error bars."""
 
-from collections import OrderedDict
 from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike
 from scipy import linalg
 
-from kappaskin.bases import Basis
-from kappaskin.fit.estimator import RIM_SD, DenseSpread, Estimator, Fit, column_lengths
+from kappaskin.fit.estimator import Estimator, column_lengths
+from kappaskin.fit.fit import DenseSpread, Fit
+from kappaskin.fit.remembered import Remembered
 from kappaskin.frames import Array, Mask
-from kappaskin.layout import SensorLayout
 
-_REMEMBERED = 8  # sets of missing readings whose operators are kept
 _MILD = 100.0  # a condition up to which a product of factors rounds no worse than they do
 _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits: factor anew
 
@@ -43,21 +40,13 @@ class LeastSquares(Estimator):
     `RankDeficient` when the readings do not decide the coefficients.
     """
 
-    def __init__(
-        self,
-        basis: Basis,
-        layout: SensorLayout,
-        sigma: ArrayLike | None = None,
-        rim_sd: float = RIM_SD,
-        dtype: DTypeLike = np.float64,
-    ) -> None:
-        super().__init__(basis, layout, sigma, rim_sd, dtype)
+    def _set_up(self) -> None:
         readings = int(self.readable.sum())
         if readings < self.unknowns:  # before any memory is taken for it
             raise self.refusal(readings, readings)
         self._factor(self.readable)
         self._solver = self._made(self.readable, self._root, self._U)
-        self._reduced: OrderedDict[bytes, _Solver] = OrderedDict()
+        self._reduced = Remembered[_Solver]()
 
     def _factor(self, used: Mask) -> None:
         """U (R, F) orthonormal and root (N, F) with operator = root U^T, for the readings used."""
@@ -78,21 +67,14 @@ class LeastSquares(Estimator):
     def _made(self, used: Mask, root: Array, U: Array, inverse: Array | None = None) -> _Solver:
         """The solver root X U^T, whose covariance is root X root^T; X = 1 without an `inverse`."""
         left = root if inverse is None else root @ inverse
-        seen = self.weight[used, None] * U if self.told_sigma else U
+        seen = U if self.sigma is None else self.weight[used, None] * U
         factors = ((left @ seen.T).T,) if self.condition <= _MILD else (seen, left.T)
         spread = DenseSpread(lambda: left @ root.T)
         return _Solver(used, tuple(f.astype(self.dtype) for f in factors), spread, len(U))
 
     def _without(self, used: Mask) -> _Solver:
         """The solver for the readings `used` (3 P,), remembered for the next frames."""
-        if used is self.readable:
-            return self._solver
-        key = used.tobytes()
-        if key not in self._reduced:
-            self._reduced[key] = self._downdate(used)
-            if len(self._reduced) > _REMEMBERED:
-                self._reduced.popitem(last=False)
-        return self._reduced[key]
+        return self._solver if used is self.readable else self._reduced(used, self._downdate)
 
     def _downdate(self, used: Mask) -> _Solver:
         # With the rows U_k of U taken out, U_r^T U_r = I - U_k^T U_k, whose inverse is
@@ -112,15 +94,8 @@ class LeastSquares(Estimator):
         return self._made(used, self._root, U_r, inverse)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
-        solver, shape, frames = self._without(used), self.basis.shape, flat.shape[:-1]
+        solver = self._without(used)
         c = flat if solver.count == flat.shape[-1] else flat[..., used]
         for factor in solver.factors:
             c = np.dot(c, factor)
-        return Fit(
-            self,
-            flat.reshape(*frames, 3, len(self.layout)),
-            c.reshape(*frames, *shape),
-            [solver.spread] * frames[0] if frames else solver.spread,
-            solver.count - self.unknowns,
-            np.ones(frames) if self.told_sigma else None,
-        )
+        return self._answer(flat, c, solver.spread, solver.count - self.unknowns)

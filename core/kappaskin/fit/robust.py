@@ -1,21 +1,22 @@
 """Least squares without the elements that the rest of the skin contradicts, and why."""
 
-from collections import OrderedDict, deque
+from collections import deque
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import NDArray
 from scipy import special
 
 from kappaskin.bases import Basis
 from kappaskin.fit.bayes import Evidence
-from kappaskin.fit.estimator import RIM_SD, Estimator, Fit
+from kappaskin.fit.estimator import Estimator
+from kappaskin.fit.fit import Fit
 from kappaskin.fit.least_squares import LeastSquares
 from kappaskin.fit.prior import prior_root
+from kappaskin.fit.remembered import Remembered
 from kappaskin.frames import Array, Mask
-from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
 
 _FUNCTIONS = 15  # along each side at least, of the shapes that elements are judged by
@@ -81,26 +82,19 @@ class Robust(Estimator):
     is left out and `Fit.converged` says no.
     """
 
-    def __init__(
-        self,
-        basis: Basis,
-        layout: SensorLayout,
-        sigma: ArrayLike | None = None,
-        rim_sd: float = RIM_SD,
-        dtype: DTypeLike = np.float64,
-    ) -> None:
-        super().__init__(basis, layout, sigma, rim_sd, dtype)
-        self._linear = LeastSquares(basis, layout, sigma, rim_sd, dtype)
+    def _set_up(self) -> None:
+        basis, layout = self.basis, self.layout
+        self._linear = LeastSquares(basis, layout, self.sigma, self.rim_sd, self.dtype)
         across = 1 if basis.patch.strip else max(basis.shape[1], _FUNCTIONS)
         rich = replace(cast("Any", basis), Ni=max(basis.shape[0], _FUNCTIONS), Nj=across)
         self._A: Array = self.weight[:, None] * (layout.curvature_operator(rich) @ prior_root(rich))
         self._take_presses(rich)
-        self._judges: OrderedDict[bytes, _Judge] = OrderedDict()
+        self._judges = Remembered[_Judge]()
         P = len(layout)
         sensing = np.maximum(layout.live.sum(axis=0), 1)
         self._limit: Array = special.chdtri(sensing, _ALARM / P)
         self._history = _History()
-        self._judge(self.readable)
+        self._judges(self.readable, self._judge)
 
     def _take_presses(self, rich: Basis) -> None:
         """What a load at each of G places does to the readings, and how it changes from there."""
@@ -125,18 +119,12 @@ class Robust(Estimator):
         return np.divide((view.r @ self._forces) ** 2, seen, where=known, out=np.zeros_like(seen))
 
     def _judge(self, used: Mask) -> _Judge:
-        key = used.tobytes()
-        if key not in self._judges:
-            evidence = Evidence(self._A[used], self.told_sigma, 1e-10)
-            U = np.zeros((len(used), evidence.U.shape[1]))
-            U[used] = evidence.U
-            by_press = (self._forces.T @ U) ** 2
-            beyond = np.sum(self._forces[used] ** 2, axis=0) - by_press.sum(axis=1)
-            count = int(used.sum())
-            self._judges[key] = _Judge(evidence, U, by_press, np.maximum(beyond, 0.0), used, count)
-            if len(self._judges) > 8:
-                self._judges.popitem(last=False)
-        return self._judges[key]
+        evidence = Evidence(self._A[used], self.sigma is not None, 1e-10)
+        U = np.zeros((len(used), evidence.U.shape[1]))
+        U[used] = evidence.U
+        by_press = (self._forces.T @ U) ** 2
+        beyond = np.sum(self._forces[used] ** 2, axis=0) - by_press.sum(axis=1)
+        return _Judge(evidence, U, by_press, np.maximum(beyond, 0.0), used, int(used.sum()))
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         if not used.any():
@@ -158,7 +146,7 @@ class Robust(Estimator):
         )
 
     def _told(self, flat: Array, used: Mask) -> _Verdict:
-        judge, P = self._judge(used), len(self.layout)
+        judge, P = self._judges(used, self._judge), len(self.layout)
         K = np.where(used, flat, 0.0) * self.weight
         suspects, loads, rounds = self._outrageous(K), list[int](), 0
         (gamma,) = judge.evidence(K[None, used])[1]
@@ -167,7 +155,8 @@ class Robust(Estimator):
             view = _View(judge, K, free, float(gamma))
             _, (gamma,), (sigma,) = judge.evidence((K - view.explained)[None, used])
             left = judge.count - free.shape[1]
-            variance = 1.0 if self.told_sigma else float(sigma) ** 2 * judge.count / left
+            given = self.sigma is not None
+            variance = 1.0 if given else float(sigma) ** 2 * judge.count / left
             found, place = self._found(view, judge, suspects, variance)
             if place is not None and len(loads) < _LOADS:
                 loads.append(place)

@@ -6,25 +6,24 @@ from functools import cached_property
 from typing import ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.fit.choosing import telling_most
-from kappaskin.fit.estimator import RIM_SD, Estimator, Fit, Spread, gathered
+from kappaskin.fit.estimator import Estimator
+from kappaskin.fit.fit import Fit, Spread, gathered
 from kappaskin.fit.kalman import MovingModes
 from kappaskin.fit.level import START, Level
 from kappaskin.fit.prior import prior_root
 from kappaskin.frames import Array, Mask
-from kappaskin.layout import SensorLayout
 
 _MOST = 100  # readings that share one step of the filter
 _PHASE = 0.5  # rad that the fastest mode turns meanwhile at most, or
 _SHORTEST = 1e-3  # s, if that is longer: a step must not take longer than its readings
+_PERIOD = 6e-3  # s that a frame takes which comes without times: the paper's 300 channels
 _HELD = 0.1  # s after which a reading no longer tells what lies between the modes
 _BACK = 0.05  # s by which a clock may go back within one run of a device
-
-
 _COARSE = 8  # modes that make nearly all of the displacement
 _PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin, as displacement
 
@@ -57,7 +56,7 @@ class Tracking(Estimator):
     A Kalman filter of what the skin does: a plate under loads that nobody knows (`prior_root`),
     each of its shapes moving the faster the finer it is (`MovingModes`). It remembers: every frame,
     whole or not, is taken in at the times of its readings, and the answer is the shape at the last
-    of them. `period` in s is what a frame takes that comes without times.
+    of them. A frame that comes without times is read 6 ms after the one before.
 
     How large shapes are, how fast they move and, without a `sigma`, the noise are found on the way:
     from the first frame by its evidence, then by what is left unexplained. Readings that are beyond
@@ -67,22 +66,10 @@ class Tracking(Estimator):
     remembers: ClassVar = True
     has_prior: ClassVar = True
 
-    def __init__(
-        self,
-        basis: Basis,
-        layout: SensorLayout,
-        sigma: ArrayLike | None = None,
-        rim_sd: float = RIM_SD,
-        dtype: DTypeLike = np.float64,
-        period: float = 6e-3,
-    ) -> None:
-        super().__init__(basis, layout, sigma, rim_sd, dtype)
-        if not 0 < period < math.inf:
-            raise Refusal(f"expected a period above zero in s, got {period}")
-        self._period = period
+    def _set_up(self) -> None:
         if not self.readable.any():
             raise self.refusal(0, 0)
-        self._modes, self._wavenumbers, self._displacements = _principal(basis)
+        self._modes, self._wavenumbers, self._displacements = _principal(self.basis)
         A = self.weight[:, None] * (self.M @ self._modes)
         A[~self.readable] = 0.0
         self._A = A.astype(self.dtype)
@@ -104,8 +91,9 @@ class Tracking(Estimator):
         return fresh(np.zeros((3, len(self.layout))))
 
     def __call__(self, curvature: ArrayLike) -> Fit:
-        """Take in the next frame (3, P), or the next T frames (T, 3, P), a period after another."""
-        K = self._checked(curvature)
+        """Take in the next frame (3, P) or T of them (T, 3, P), read 6 ms after each other."""
+        K = np.asarray(curvature, float)
+        self._check_shape(K)
         if K.ndim == 2:
             return self.follow(K, np.full(K.shape, self._next))
         if not len(K):
@@ -116,7 +104,7 @@ class Tracking(Estimator):
     @property
     def _next(self) -> float:
         """When a frame is read of which nobody says when."""
-        return self._now + self._period if math.isfinite(self._now) else 0.0
+        return self._now + _PERIOD if math.isfinite(self._now) else 0.0
 
     def follow(self, curvature: ArrayLike, times: ArrayLike, held: Array | None = None) -> Fit:
         """Take in `curvature` (3, P) in 1/m read at `times` (3, P) in s on the device's clock.
@@ -125,7 +113,8 @@ class Tracking(Estimator):
         NaN. Readings of one channel are to come in the order of their times. A clock that goes back
         is that of a device that started anew. What is `held` of earlier frames is known already.
         """
-        frame, when = self._checked(curvature), np.asarray(times, float)
+        frame, when = np.asarray(curvature, float), np.asarray(times, float)
+        self._check_shape(frame)
         if frame.ndim != 2 or when.shape != frame.shape:
             raise Refusal(
                 f"expected curvature and times of shape (3, {len(self.layout)}), got {frame.shape} "
@@ -147,15 +136,6 @@ class Tracking(Estimator):
         if scanned.any():
             self._advance(float(t[scanned].max()))
         return self._fitted()
-
-    def _checked(self, curvature: ArrayLike) -> Array:
-        K = np.asarray(curvature, float)
-        if K.ndim not in (2, 3) or K.shape[-2:] != (3, len(self.layout)):
-            raise Refusal(
-                f"expected curvature of shape (3, {len(self.layout)}) or (T, 3, "
-                f"{len(self.layout)}), got {K.shape}"
-            )
-        return K
 
     def choose(self, count: int, position: Array, ahead: float) -> NDArray[np.intp]:
         """The `count` channels to read next, `ahead` s from now, upwards.
@@ -211,7 +191,7 @@ class Tracking(Estimator):
 
     def _start(self, readings: Array, A: Array) -> None:
         """Expect what the evidence of the first readings says."""
-        told = (1.0, math.inf) if self.told_sigma else (0.0, 0.0)
+        told = (0.0, 0.0) if self.sigma is None else (1.0, math.inf)
         self._level = Level(*told, float(np.finfo(self.dtype).eps))
         self._filter.expect(self._level.renew(A, readings), START)
 
@@ -249,8 +229,10 @@ class Tracking(Estimator):
         c = (self._modes @ self._filter.mean[0]).reshape(self.basis.shape).astype(self.dtype)
         there = self._read > self._now - _HELD
         K = np.where(there, self._left, np.nan) + self.predicted(c).ravel()
-        noise = 1.0 if self.told_sigma else math.sqrt(level.variance)
-        spare = int(there.sum()) if self.told_sigma else int(level.count)
+        if self.sigma is None:
+            noise, spare = math.sqrt(level.variance), int(level.count)
+        else:
+            noise, spare = 1.0, int(there.sum())
         return Fit(
             self,
             K.reshape(3, -1).astype(self.dtype),

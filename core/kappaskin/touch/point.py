@@ -1,7 +1,6 @@
 """From the readings and the shape fitted to them to the contact: where and how hard."""
 
 import math
-from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +8,7 @@ from scipy.linalg import blas
 
 from kappaskin.bases import basis_for
 from kappaskin.fit import Fit
+from kappaskin.fit.remembered import Remembered
 from kappaskin.frames import Array, Mask, Touch
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
@@ -20,7 +20,6 @@ _STEPS = 20  # of Gauss-Newton at most; 2 or 3 do but for the last millimetres a
 _CONVERGED = 1e-4  # of a side: the step after one as short is shorter than 1e-6
 _RIDGE = 1e-12  # keeps a load on the rim, which moves nothing, solvable
 _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
-_REMEMBERED = 8  # sets of missing readings whose tables are kept
 
 _AS_WELL = 1.2  # times the residual of the fitted shape that a single point load may leave
 _REACH = 1.96  # standard deviations to either side in a 95 % interval
@@ -70,26 +69,22 @@ class PointContact:
         points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
         self._still = ~self.patch.moves(points).reshape(len(self._y), -1)
         self._functions = np.where(self._still.reshape(-1, 1), 0.0, self.basis.at(points))
-        self._remembered: OrderedDict[bytes, _Tables] = OrderedDict()
-        self._tables(self._live)
+        self._remembered = Remembered[_Tables]()
+        self._remembered(self._live, self._tables)
 
     def _tables(self, used: Mask) -> _Tables:
-        """The tables for the readings `used` (3 P,), remembered for the next frames."""
-        key = used.tobytes()
-        if key not in self._remembered:
-            M = self._M[used]
-            G: Array = np.asfortranarray(M.T @ M)
-            squares = np.vecdot(self._functions @ G, self._functions).reshape(self._still.shape)
-            self._remembered[key] = _Tables(G, np.where(self._still, 1.0, squares))
-            if len(self._remembered) > _REMEMBERED:
-                self._remembered.popitem(last=False)
-        return self._remembered[key]
+        """The tables for the readings `used` (3 P,)."""
+        M = self._M[used]
+        G: Array = np.asfortranarray(M.T @ M)
+        squares = np.vecdot(self._functions @ G, self._functions).reshape(self._still.shape)
+        return _Tables(G, np.where(self._still, 1.0, squares))
 
     def __call__(self, curvature: Array, fit: Fit) -> Touch:
         """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
         used = self._live & np.isfinite(curvature).ravel()
         K = np.where(used, curvature.ravel(), 0.0)
-        tables, readings = self._tables(used), _Readings(K @ self._M, float(K @ K), int(used.sum()))
+        tables = self._remembered(used, self._tables)
+        readings = _Readings(K @ self._M, float(K @ K), int(used.sum()))
         explained = self._map(readings.h.reshape(self.basis.shape)) ** 2 / tables.norm
         explained[self._still] = 0.0
         row, column = divmod(int(explained.argmax()), len(self._x))

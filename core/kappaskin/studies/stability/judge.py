@@ -27,7 +27,7 @@ from scipy import special
 
 from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, Fit
-from kappaskin.fit.estimator import gathered
+from kappaskin.fit.fit import gathered
 from kappaskin.frames import Array
 from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.reference import Reference
@@ -81,7 +81,7 @@ class Answer:
 def _reach(fit: Fit) -> Array:
     """Half widths of 95 % in standard deviations, (T,): Student's t where noise is estimated."""
     frames = len(fit.curvature)
-    if fit.estimator.told_sigma:
+    if fit.estimator.sigma is not None:
         return np.full(frames, special.ndtri(0.975))
     spare = np.broadcast_to(np.asarray(fit.spare, float), (frames,))
     return np.asarray(special.stdtrit(np.where(spare > 0, spare, np.nan), 0.975), float)
