@@ -1,0 +1,34 @@
+"""What the commands share: their exit codes, and how they read pairs and print JSON."""
+
+import json
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from kappaskin.errors import Refusal
+
+FAILED = 1
+"""Exit code of a command that was done, with something in the result that failed."""
+
+REFUSED = 2
+"""Exit code of a command that cannot be done, with the reason on standard error."""
+
+Switch = Annotated[bool, Parameter(negative="")]
+"""An option that is there or not."""
+
+Pair = Annotated[str, Parameter(allow_leading_hyphen=True)]
+"""Two numbers such as 8x8; a hyphen is let through so that -1x8 is refused as that."""
+
+
+def pair(text: str, what: str) -> tuple[int, int]:
+    """The two numbers of `text`; raises a `Refusal` that names `what` was expected."""
+    try:
+        first, second = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        raise Refusal(f"expected {what} as two numbers such as 8x8, got {text!r}") from None
+    return first, second
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON value on a line."""
+    print(json.dumps(value, allow_nan=False))

@@ -1,0 +1,47 @@
+"""A simulated sensor on a pseudo-terminal."""
+
+import json
+import signal
+import sys
+from dataclasses import replace
+
+from kappaskin.errors import Refusal
+from kappaskin.scene import load_scene
+
+
+def device(scene: str = "", *, rate: float | None = None, dwell: float | None = None) -> None:
+    """Play a simulated sensor on a pseudo-terminal, as a real one would on a serial port.
+
+    Prints one JSON line with the port, then serves until stopped (Ctrl+C); then tells on standard
+    error how many messages it spent a sequence number on and how many it could not send.
+
+    Example: `kappaskin device circle --rate 500`
+
+    Parameters
+    ----------
+    scene
+        What to simulate; the default scene when left out.
+    rate
+        Frames per second; the scene's when left out.
+    dwell
+        Seconds on each cylinder, in the scene `calibration`; one when left out.
+    """
+    try:
+        from kappaskin.sources.device import PseudoDevice
+    except ImportError as error:
+        raise Refusal("expected a system with pseudo-terminals (Linux, macOS)") from error
+    played = load_scene(scene)
+    if dwell is not None:
+        if played.laid is None:
+            raise Refusal(
+                f"the scene {played.name} has no cylinders to dwell on; leave --dwell out"
+            )
+        played = replace(played, laid=replace(played.laid, dwell=dwell))
+    server = PseudoDevice(played if rate is None else replace(played, rate=rate))
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda got, _: stopped.append(got))
+    print(json.dumps({"port": server.port, "rate": server.rate}), flush=True)
+    server.serve(lambda: bool(stopped))
+    server.close()
+    print(json.dumps({"spent": server.spent, "unsent": server.unsent}), file=sys.stderr)

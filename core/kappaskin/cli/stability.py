@@ -1,0 +1,31 @@
+"""Hard cases through every method."""
+
+import sys
+
+from kappaskin.cli.common import Switch, print_json
+from kappaskin.studies.stability import stability as measured_stability
+from kappaskin.studies.stability import stability_text
+
+
+def stability(
+    *,
+    json: Switch = False,
+    long: Switch = False,
+) -> None:
+    """Run hard cases through every method that claims them, and judge each answer.
+
+    Example: `kappaskin stability --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    long
+        Run the longest cases too: a million frames, up to 512 functions a side.
+    """
+    told = sys.stderr.isatty()
+    rows = measured_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
+    if json:
+        print_json(rows)
+    else:
+        print(stability_text(rows))
