@@ -42,7 +42,8 @@ CHECKS = (
     ("ruff", "format", "--check"),
     ("basedpyright",),
     ("lint-imports",),
-    ("pytest",),
+    # One process for the windows, one for the rest; -n0 among ARGUMENTS makes it one for all.
+    ("pytest", "-n2", "--dist=loadgroup"),
 )
 # Benchmark files are named so that plain pytest passes them by.
 BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")

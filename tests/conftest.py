@@ -43,6 +43,13 @@ def _children() -> set[int]:
     return {int(pid) for pid in found.split()}
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep a file's tests in one process, and all windows in one: they share a keyboard."""
+    for item in items:
+        group = "windows" if "app" in item.path.parts else item.path.name
+        item.add_marker(pytest.mark.xdist_group(group))
+
+
 @pytest.fixture(autouse=True)
 def nothing_left_behind(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     blocks: list[str] = []

@@ -9,6 +9,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from scipy.fft import dct, dst
+from scipy.sparse.linalg import svds
 
 from kappaskin import Fast, LeastSquares, Patch, SensorLayout, SineBasis
 
@@ -123,3 +124,38 @@ def test_one_frame_takes_a_few_times_a_bare_matrix_product(medians, figure) -> N
         f"{with_noise / bare:.1f} times a bare matrix product ({bare * 1e6:.1f} us)"
     )
     assert with_noise < 20 * bare
+
+
+def test_4096_functions_are_solved_as_exactly_as_rounding_allows(request, figure) -> None:
+    if not request.config.getoption("--long"):
+        pytest.skip("takes minutes: --long")
+    rng = np.random.default_rng(0)
+    places = PATCH.cell_centres(65, 65)
+    grid = np.stack(np.meshgrid(*places), -1).reshape(-1, 2)
+    layout = SensorLayout.scattered(PATCH, grid + rng.uniform(-2e-4, 2e-4, grid.shape))
+    basis = SineBasis(PATCH, 64, 64)
+    start = time.thread_time()
+    fit = LeastSquares(basis, layout)
+    taken = time.thread_time() - start
+    length = np.linalg.norm(fit.M, axis=0)
+    A = fit.M / length
+    most = float(svds(A, 1, return_singular_vectors=False)[0])
+
+    def solved(b):
+        g = length * fit(b.reshape(3, -1)).coefficients.ravel()
+        return g, b - A @ g
+
+    # Of readings of anything the residual r stands on every column, but for what A would have to
+    # change by, -r r'A / r'r; of a shape's it is rounding.
+    _, r = solved(rng.normal(size=len(A)))
+    backward = np.linalg.norm(A.T @ r) / np.linalg.norm(r) / most
+    g, r = solved(A @ rng.normal(size=basis.size))
+    left = np.linalg.norm(r) / (2 * most * np.linalg.norm(g))
+    eps = np.finfo(float).eps
+    figure(
+        f"64 x 64 functions of 65 x 65 scattered elements, factored in {taken:.0f} s: the exact "
+        f"answer for an M {backward / eps:.1f} roundings away; of a shape's readings "
+        f"{left / eps:.1f} roundings are left"
+    )
+    assert backward < 20 * np.sqrt(len(A)) * eps
+    assert left < 20 * np.sqrt(len(A)) * eps
