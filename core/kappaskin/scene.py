@@ -8,7 +8,7 @@ import numpy as np
 
 from kappaskin.bases import Basis, SineBasis, basis_for
 from kappaskin.calibration import Presentation, schedule
-from kappaskin.effects import SECOND_GENERATION_LOOPS, Effect, Tolerance, UniformNoise
+from kappaskin.effects import SECOND_GENERATION_LOOPS, ReadingEffect, Tolerance, UniformNoise
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
@@ -51,7 +51,7 @@ class Scene:
     layout: SensorLayout
     loads: tuple[Load, ...] = ()
     motion: Orbit | None = None
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[ReadingEffect, ...] = ()
     transduction: Transduction = field(default_factory=Transduction)
     rate: float = 500.0
     seed: int = 0

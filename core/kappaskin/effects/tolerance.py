@@ -2,21 +2,26 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from kappaskin.effects.effect import Running
+from kappaskin.effects.effect import ReadingEffect, Running, Size
+from kappaskin.effects.survey import Survey
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class Tolerance(ReadingEffect):
     """Each channel reads gain times curvature plus offset, with both drawn once by `seed`.
 
     Gains are normal about 1 with standard deviation `gain_sd`, offsets about 0 with `offset_sd` in
     1/m. The seed is the skin's own: another seed of the scene leaves the skin the same.
     """
+
+    name: ClassVar = "tolerance"
+    formula: ClassVar = "spread of the gains, plus that of the offsets over peak curvature"
 
     gain_sd: float
     offset_sd: float
@@ -32,6 +37,13 @@ class Tolerance:
         rng = np.random.default_rng(self.seed)
         return rng.normal(1.0, self.gain_sd, shape), rng.normal(0.0, self.offset_sd, shape)
 
+    def size(self, survey: Survey) -> Size:
+        gain, offset = self.errors((3 * len(survey.layout),))
+        K = survey.curvature.reshape(len(survey.times), -1)
+        off = survey.share((gain - 1) * K + offset)
+        return Size(self.gain_sd + self.offset_sd / survey.peak, off)
+
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
-        gain, offset = self.errors(shape)
-        return lambda curvature, _: gain * curvature + offset
+        from kappaskin.effects.at_work.tolerance import tolerance
+
+        return tolerance(*self.errors(shape))
