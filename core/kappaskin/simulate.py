@@ -53,7 +53,7 @@ class Simulator:
             return self._still
         loads = self.scene.loads_at(time)
         truth = Truth(self._shape(loads), contact_of(loads), self.scene.edge)
-        if self.scene.motion is None:
+        if not self.scene.moves:
             self._still = truth
         return truth
 
@@ -65,7 +65,7 @@ class Simulator:
     def _read(self, scan: Scan, time: float, truth: Truth) -> Array:
         """Curvature (3 P,) of a scan begun at `time`; channels outside it as at the start."""
         scene, first = self.scene, self._operator @ truth.coefficients.ravel()
-        if scene.motion is None:
+        if not scene.moves:
             return first
         # The parabola through start, middle and end, at the share s of the scan.
         middle, last = (

@@ -25,7 +25,8 @@ PATCH = Patch(0.1, 0.1)
 
 
 def scene(*loads, motion=None):
-    return Scene("a scene", Plate(PATCH), SensorLayout.regular(PATCH, 4, 4), loads, motion)
+    bare = Scene("a scene", Plate(PATCH), SensorLayout.regular(PATCH, 4, 4))
+    return bare.touched_by(*loads, motion=motion)
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -15,7 +15,7 @@ from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.patch import Patch
-from kappaskin.scene import Scene, load_scene, scaled_to
+from kappaskin.scene import Scene, Stimulus, load_scene, scaled_to
 
 DRAWS = 200
 RADIUS = 12.9e-3
@@ -163,7 +163,7 @@ def fingertip_scene(applied: float, radius: float = RADIUS) -> Scene:
         f"{applied:.2f}",
         plate,
         SensorLayout.regular(patch, 10, 1),
-        (load,),
+        (Stimulus(load),),
         effects=(UniformNoise(4.5),),
         reference=reference,
     )

@@ -10,10 +10,11 @@ from kappaskin.bases import Basis, SineBasis, basis_for
 from kappaskin.calibration import Presentation, schedule
 from kappaskin.effects import SECOND_GENERATION_LOOPS, ReadingEffect, Tolerance, UniformNoise
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import LineLoad, Load, Plate, PointLoad
 from kappaskin.patch import Patch
+from kappaskin.scene.motion import Motion, Orbit
+from kappaskin.scene.stimulus import Stimulus
 from kappaskin.sensor import Sensor
 from kappaskin.transduction import Amplifier, Transduction
 
@@ -21,25 +22,9 @@ TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
 
 
-@dataclass(frozen=True)
-class Orbit:
-    """A motion in a circle: loads go round by `radius` m once every `period` s."""
-
-    radius: float
-    period: float
-
-    def __post_init__(self) -> None:
-        if not (self.radius >= 0 and self.period > 0):
-            raise Refusal(f"expected a radius >= 0 m and a period > 0 s, got {self}")
-
-    def offset(self, time: float) -> tuple[float, float]:
-        angle = 2 * math.pi * time / self.period
-        return self.radius * math.cos(angle), self.radius * math.sin(angle)
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A simulated skin and what happens to it; `loads` and `effects` may be empty.
+    """A simulated skin and what happens to it; `stimuli` and `effects` may be empty.
 
     `reference` is the number of functions (Ri, Rj) of the true shape: Table 1 defines its truth
     with 15 x 15, since the curvature under a point load grows with every further function. `edge`
@@ -49,8 +34,7 @@ class Scene:
     name: str
     plate: Plate
     layout: SensorLayout
-    loads: tuple[Load, ...] = ()
-    motion: Orbit | None = None
+    stimuli: tuple[Stimulus, ...] = ()
     effects: tuple[ReadingEffect, ...] = ()
     transduction: Transduction = field(default_factory=Transduction)
     rate: float = 500.0
@@ -60,11 +44,13 @@ class Scene:
     laid: Presentation | None = None
 
     def __post_init__(self) -> None:
-        if self.laid and self.loads:
+        if self.laid and self.stimuli:
             raise Refusal(f"expected no loads on a skin that lies on cylinders, got {self.loads}")
-        turns = [0.0] if self.motion is None else [self.motion.period * q / 4 for q in range(4)]
-        for load in (load for time in turns for load in self.loads_at(time)):
-            self.plate.check(load)
+        for stimulus in self.stimuli:
+            self.plate.check(stimulus.load)
+            for time in stimulus.motion.moments if stimulus.motion else ():
+                if load := stimulus.load_at(time):
+                    self.plate.check(load)
 
     @property
     def basis(self) -> Basis:
@@ -84,12 +70,28 @@ class Scene:
             simulated=True,
         )
 
+    def touched_by(self, *loads: Load, motion: Motion | None = None) -> "Scene":
+        """The same scene under other loads, all of which move as `motion` says."""
+        return replace(self, stimuli=tuple(Stimulus(load, motion) for load in loads))
+
+    def laid_on(self, laid: Presentation) -> "Scene":
+        """The same skin laid on one cylinder after the other."""
+        return replace(self, stimuli=(), laid=laid)
+
+    @property
+    def loads(self) -> tuple[Load, ...]:
+        """The loads where they are before they move, pressing wholly."""
+        return tuple(stimulus.load for stimulus in self.stimuli)
+
     def loads_at(self, time: float) -> tuple[Load, ...]:
-        """The loads where they are at `time` in s."""
-        if self.motion is None:
-            return self.loads
-        dx, dy = self.motion.offset(time)
-        return tuple(load.shifted(dx, dy) for load in self.loads)
+        """The loads that press, where they are at `time` in s."""
+        there = (stimulus.load_at(time) for stimulus in self.stimuli)
+        return tuple(load for load in there if load is not None)
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything that touches the skin moves."""
+        return any(stimulus.motion is not None for stimulus in self.stimuli)
 
 
 def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Load:
@@ -104,25 +106,17 @@ def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Lo
     return load.scaled(displacement / at)
 
 
-def contact_of(loads: tuple[Load, ...]) -> Array:
-    """The centre of force (2,) in m of `loads`; NaN when there is none."""
-    total = sum(abs(load.force) for load in loads)
-    if not total:
-        return np.full(2, np.nan)
-    return np.sum([abs(load.force) * load.centre() for load in loads], axis=0) / total
-
-
 def _table_1(name: str, load: Load, displacement: float) -> Scene:
     patch = Patch(0.1, 0.1)
     plate = Plate(patch)
     load = scaled_to(plate, load, displacement, SineBasis(patch, 15, 15))
     layout = SensorLayout.regular(patch, 10, 10)
-    return Scene(name, plate, layout, (load,), effects=(UniformNoise(TABLE_1_NOISE),))
+    return Scene(name, plate, layout, (Stimulus(load),), effects=(UniformNoise(TABLE_1_NOISE),))
 
 
 def _circle() -> Scene:
     still = _table_1("circle", PointLoad(0.05, 0.05), 4.70e-3)
-    return replace(still, motion=Orbit(radius=0.022, period=4.0))
+    return still.touched_by(*still.loads, motion=Orbit(radius=0.022, period=4.0))
 
 
 def _calibration() -> Scene:
