@@ -13,6 +13,7 @@ from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import LineLoad, Load, Plate, PointLoad
 from kappaskin.patch import Patch
+from kappaskin.scene.choice import LINEAR, Choice
 from kappaskin.scene.motion import Motion, Orbit
 from kappaskin.scene.stimulus import Stimulus
 from kappaskin.sensor import Sensor
@@ -28,7 +29,8 @@ class Scene:
 
     `reference` is the number of functions (Ri, Rj) of the true shape: Table 1 defines its truth
     with 15 x 15, since the curvature under a point load grows with every further function. `edge`
-    says how the skin is held, unless it is `laid` on one cylinder after the other instead.
+    says how the skin is held, unless it is `laid` on one cylinder after the other instead. Of what
+    spoils its readings, `choice` says what is simulated. `title` and `text` say what there is to see.
     """
 
     name: str
@@ -42,6 +44,9 @@ class Scene:
     reference: tuple[int, int] = (15, 15)
     edge: str = "hinged"
     laid: Presentation | None = None
+    choice: Choice = LINEAR
+    title: str = ""
+    text: str = ""
 
     def __post_init__(self) -> None:
         if self.laid and self.stimuli:
@@ -89,6 +94,19 @@ class Scene:
         return tuple(load for load in there if load is not None)
 
     @property
+    def duration(self) -> float:
+        """Seconds after which the longest motion begins anew; one where nothing moves."""
+        if self.laid is not None:
+            return self.laid.duration
+        return max((s.motion.duration for s in self.stimuli if s.motion), default=1.0)
+
+    @property
+    def moments(self) -> list[float]:
+        """Times in s, up to `duration`, between which all motions are smooth."""
+        each = (s.motion.moments for s in self.stimuli if s.motion)
+        return sorted({time for moments in each for time in moments})
+
+    @property
     def moves(self) -> bool:
         """Whether anything that touches the skin moves."""
         return any(stimulus.motion is not None for stimulus in self.stimuli)
@@ -104,55 +122,3 @@ def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Lo
             "held, press further inside"
         )
     return load.scaled(displacement / at)
-
-
-def _table_1(name: str, load: Load, displacement: float) -> Scene:
-    patch = Patch(0.1, 0.1)
-    plate = Plate(patch)
-    load = scaled_to(plate, load, displacement, SineBasis(patch, 15, 15))
-    layout = SensorLayout.regular(patch, 10, 10)
-    return Scene(name, plate, layout, (Stimulus(load),), effects=(UniformNoise(TABLE_1_NOISE),))
-
-
-def _circle() -> Scene:
-    still = _table_1("circle", PointLoad(0.05, 0.05), 4.70e-3)
-    return still.touched_by(*still.loads, motion=Orbit(radius=0.022, period=4.0))
-
-
-def _calibration() -> Scene:
-    """An uncalibrated second prototype, laid on the cylinders of a calibration, a second each."""
-    patch = Patch(0.1, 0.1)
-    return Scene(
-        "calibration",
-        Plate(patch),
-        SensorLayout.regular(patch, 10, 10),
-        effects=(
-            SECOND_GENERATION_LOOPS,
-            Tolerance(gain_sd=0.05, offset_sd=3.0),
-            UniformNoise(TABLE_1_NOISE),
-        ),
-        # A third of the gain: the smallest cylinder bends twice as far as Table 1's skins read.
-        transduction=Transduction(amplifier=Amplifier(gain=35.0)),
-        laid=Presentation(schedule(), dwell=1.0),
-    )
-
-
-SCENES: dict[str, Callable[[], Scene]] = {
-    "circle": _circle,
-    "centre": lambda: _table_1("centre", PointLoad(0.05, 0.05), 4.70e-3),
-    "off-centre": lambda: _table_1("off-centre", PointLoad(0.02, 0.08), 4.89e-3),
-    "line": lambda: _table_1("line", LineLoad(0.01, 0.09, 0.09, 0.01), 4.68e-3),
-    "calibration": _calibration,
-}
-"""Ready scenes by name: the paper's three load cases (Table 1), a load moving in a circle, and a
-skin that is laid on the cylinders of a calibration (Figs. 7, 8)."""
-
-DEFAULT_SCENE = "circle"
-
-
-def load_scene(name: str = "") -> Scene:
-    """The ready scene `name`, the default one when empty."""
-    name = name or DEFAULT_SCENE
-    if name not in SCENES:
-        raise Refusal(f"expected a scene among {', '.join(SCENES)}; got {name!r}")
-    return SCENES[name]()

@@ -1,0 +1,278 @@
+"""The text of a scene file to the scene: strict, and every refusal names its line."""
+
+import math
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from kappaskin.bases import EDGES, basis_for
+from kappaskin.calibration import Presentation, schedule
+from kappaskin.effects import EFFECTS, FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS, ReadingEffect
+from kappaskin.errors import Refusal
+from kappaskin.layout import SensorLayout
+from kappaskin.mechanics import (
+    DiscLoad,
+    GaussianLoad,
+    LineLoad,
+    Load,
+    Plate,
+    PointLoad,
+    RectangleLoad,
+)
+from kappaskin.patch import Disk, Patch, Polygon
+from kappaskin.scene.choice import LINEAR, Choice
+from kappaskin.scene.lines import Lines
+from kappaskin.scene.motion import (
+    Hold,
+    Motion,
+    Orbit,
+    Path,
+    Press,
+    Recorded,
+    Release,
+    Slide,
+    Step,
+    Tap,
+    Turn,
+)
+from kappaskin.scene.scene import Scene, scaled_to
+from kappaskin.scene.stimulus import Stimulus
+from kappaskin.scene.table import Table
+from kappaskin.transduction import FIRST_GENERATION, SECOND_GENERATION, Transduction
+
+FORMAT = 1
+_LARGEST = 2**24  # bytes
+
+_STEPS: dict[str, type[Step]] = {
+    "press": Press,
+    "hold": Hold,
+    "release": Release,
+    "slide": Slide,
+    "roll": Slide,
+    "turn": Turn,
+    "tap": Tap,
+}
+_LOADS: dict[str, type[Load]] = {
+    "point": PointLoad,
+    "line": LineLoad,
+    "disc": DiscLoad,
+    "rectangle": RectangleLoad,
+    "gaussian": GaussianLoad,
+}
+_ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
+_LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
+
+
+def read_scene(text: str, name: str, folder: FilePath) -> Scene:
+    """The scene that `text` describes, called `name`; files it names are in `folder`."""
+    try:
+        said = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise Refusal(f"{name}: expected a scene in TOML, got a mistake in it: {error}") from error
+    top = Table(said, Lines(text), name)
+    if (version := top.get("format", int)) != FORMAT:
+        raise top.refusal(
+            f"expected a scene of format {FORMAT}, got {version}; get a newer kappaskin"
+            if version > FORMAT
+            else f"expected format = {FORMAT}, got {version}",
+            "format",
+        )
+    plate, edge = _skin(top.table("skin"))
+    reference = top.get("reference", tuple[int, int], (15, 1 if plate.patch.strip else 15))
+    basis = partial(basis_for, plate.patch, edge, *reference)
+    with top.blamed("reference"):
+        basis()
+    stimuli = tuple(
+        _stimulus(table, lambda load: scaled_to(plate, load[0], load[1], basis()), folder)
+        for table in top.tables("touch")
+    )
+    choice, effects = _effects(top)
+    with top.blamed():
+        scene = Scene(
+            name,
+            plate,
+            _elements(top.table("elements"), plate.patch),
+            stimuli,
+            effects,
+            _electronics(top.table("electronics")),
+            top.get("rate", float, 500.0),
+            top.get("seed", int, 0),
+            reference,
+            edge,
+            choice=choice,
+            title=top.get("title", str, name),
+            text=top.get("text", str, ""),
+        )
+        scene.sensor()
+        if "cylinders" in top:
+            scene = scene.laid_on(_cylinders(top.table("cylinders"), scene))
+    top.done()
+    return scene
+
+
+def _skin(table: Table) -> tuple[Plate, str]:
+    shapes: dict[str, Callable[[], Patch]] = {
+        "rectangle": lambda: _rectangle(table, strip=False),
+        "strip": lambda: _rectangle(table, strip=True),
+        "disk": lambda: Disk(table.get("rim_radius", float)),
+        "polygon": lambda: Polygon(table.get("outline", tuple[tuple[float, float], ...])),
+    }
+    make = table.choose("shape", shapes, "rectangle")
+    with table.blamed():
+        patch = make()
+    plate = table.make(Plate, patch=patch)
+    edge = table.choose("edge", {edge: edge for edge in EDGES}, "hinged")
+    table.done()
+    return plate, edge
+
+
+def _rectangle(table: Table, strip: bool) -> Patch:
+    a, b = table.get("size", tuple[float, float])
+    return Patch(a, b, table.get("radius", float, math.inf), strip)
+
+
+def _elements(table: Table, patch: Patch) -> SensorLayout:
+    with table.blamed():
+        if "positions" in table:
+            layout = SensorLayout.scattered(
+                patch, table.get("positions", tuple[tuple[float, float], ...])
+            )
+        else:
+            layout = SensorLayout.regular(patch, *table.get("grid", tuple[int, int], (10, 10)))
+        layout = layout.without(table.get("dead", tuple[int, ...], ()))
+        layout = replace(layout, gage_length=table.get("gage_length", float, 0.0))
+    table.done()
+    return layout
+
+
+def _electronics(table: Table) -> Transduction:
+    chain = table.choose("like", _ELECTRONICS, "modern")
+    parts = {
+        name: _changed(table.table(name), getattr(chain, name))
+        for name in ("bridge", "multiplexer", "amplifier", "converter")
+    }
+    table.done()
+    with table.blamed():
+        return replace(chain, **parts)
+
+
+def _changed(table: Table, part: Any) -> Any:
+    """The `part` of the electronics with what the table says of it."""
+    made = table.make(type(part), **{k: v for k, v in vars(part).items() if k not in table})
+    table.done()
+    return made
+
+
+def _stimulus(
+    table: Table, moved: Callable[[tuple[Load, float]], Load], folder: FilePath
+) -> Stimulus:
+    kind = table.choose("what", _LOADS)
+    load = table.make(kind)
+    if "displacement" in table:
+        if "force" in table:
+            raise table.refusal("expected a force or a displacement, got both", "displacement")
+        with table.blamed("displacement"):
+            load = moved((load, table.get("displacement", float)))
+    motion = _motion(table, folder)
+    table.done()
+    with table.blamed():
+        return Stimulus(load, motion)
+
+
+def _motion(table: Table, folder: FilePath) -> Motion | None:
+    given = [key for key in ("path", "orbit", "recorded") if key in table]
+    if len(given) > 1:
+        raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
+    if "orbit" in table:
+        orbit = table.table("orbit")
+        made = orbit.make(Orbit)
+        orbit.done()
+        return made
+    if "recorded" in table:
+        with table.blamed("recorded"):
+            return _recorded(folder / table.get("recorded", str))
+    steps = [_step(step) for step in table.tables("path")]
+    with table.blamed("path"):
+        return Path(tuple(steps)) if "path" in table else None
+
+
+def _step(table: Table) -> Step:
+    made = table.make(table.choose("step", _STEPS))
+    table.done()
+    return made
+
+
+def _recorded(file: FilePath) -> Recorded:
+    """A motion from a CSV file with the columns time, dx, dy and amount."""
+    try:
+        with file.open(encoding="utf-8") as lines:
+            heading = next(lines, "").strip().replace(" ", "")
+            if heading != "time,dx,dy,amount":
+                raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r}")
+            rows = np.loadtxt(lines, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise Refusal(
+            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
+        ) from error
+    if rows.shape[1:] != (4,):
+        raise Refusal(f"{file}: expected four numbers a line, got {rows.shape[1]}")
+    return Recorded(rows[:, 0], rows[:, 1:])
+
+
+def _cylinders(table: Table, scene: Scene) -> Presentation:
+    hold = table.get("hold", float, 0.0)
+    radii = table.get("radii", tuple[float, ...], ())
+    with table.blamed():
+        strip = scene.plate.patch.strip
+        steps = schedule(radii, hold, strip) if radii else schedule(hold=hold, strip=strip)
+        made = Presentation(steps, table.get("dwell", float, 1.0))
+    table.done()
+    return made
+
+
+def _effects(top: Table) -> tuple[Choice, tuple[ReadingEffect, ...]]:
+    """Which effects the file chooses, and those that it says the parameters of."""
+    table = top.table("effects")
+    known = {name: kind for name, kind in EFFECTS.items() if issubclass(kind, ReadingEffect)}
+    found = list[ReadingEffect]()
+    for name, kind in known.items():
+        if name in table:
+            said = table.table(name)
+            if name == "hysteresis" and "like" in said:
+                found.append(said.choose("like", _LOOPS))
+            else:
+                found.append(said.make(kind))
+            said.done()
+    accuracy = top.get("accuracy", float, 0.01)
+    with table.blamed("choose"):
+        choice = _choice(table, accuracy)
+    table.done()
+    return choice, tuple(found)
+
+
+def _choice(table: Table, accuracy: float) -> Choice:
+    """`choose` is auto, all, linear or a list of names; `on` and `off` force some."""
+    on, off = (frozenset(table.get(key, tuple[str, ...], ())) for key in ("on", "off"))
+    if not isinstance(named := table.get("choose", str | tuple[str, ...], "auto"), str):
+        return Choice(False, accuracy, frozenset(), frozenset(EFFECTS) - frozenset(named))
+    choices = {"auto": Choice(auto=True), "all": Choice(), "linear": LINEAR}
+    if named not in choices:
+        raise Refusal(f"expected auto, all, linear or a list of effects, got {named!r}")
+    chosen = choices[named]
+    return Choice(chosen.auto, accuracy, on, (chosen.off - on) | off)
+
+
+def read_scene_file(file: FilePath) -> Scene:
+    """The scene in `file`."""
+    try:
+        if file.stat().st_size > _LARGEST:
+            raise Refusal(f"{file}: expected a scene of at most {_LARGEST} bytes, got a larger file")
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
+    return read_scene(text, file.stem, file.parent)
