@@ -29,7 +29,9 @@ class Simulator:
         Another list of them, another seed or another number of elements does.
         """
         was, self.scene, self._still = self.scene, scene, None
-        same_elements = np.array_equal(scene.layout.positions, was.layout.positions)
+        same_elements = scene.layout.gage_length == was.layout.gage_length and np.array_equal(
+            scene.layout.positions, was.layout.positions
+        )
         skin = (scene.plate, scene.edge, scene.reference)
         if not (same_elements and skin == (was.plate, was.edge, was.reference)):
             self._take_skin(scene)

@@ -7,8 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from kappaskin.effects.parameters import check
 from kappaskin.effects.survey import Survey
 from kappaskin.frames import Array
+from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
 
 Running = Callable[[Array, float], Array]
@@ -39,6 +41,11 @@ class Effect(ABC):
     """What scenes and plans call it."""
     formula: ClassVar[str]
     """The number of its `Size`, in words."""
+    authored: ClassVar[bool] = False
+    """Whether only a scene's author decides on it: a failure, whose `Size` tells of no error."""
+
+    def __post_init__(self) -> None:
+        check(self.name, self)
 
     @abstractmethod
     def size(self, survey: Survey) -> Size:
@@ -62,3 +69,15 @@ class SkinEffect(Effect):
     @abstractmethod
     def of(self, plate: Plate) -> Plate:
         """The skin with the effect."""
+
+    @abstractmethod
+    def off(self, plate: Plate) -> Plate:
+        """The skin without it."""
+
+
+class LayoutEffect(Effect):
+    """An effect that makes other elements: longer ones, or dead ones."""
+
+    @abstractmethod
+    def of(self, layout: SensorLayout) -> SensorLayout:
+        """The elements with the effect."""

@@ -2,21 +2,18 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from kappaskin.effects.effect import ReadingEffect, Running, Size
+from kappaskin.effects.parameters import Within
 from kappaskin.effects.survey import Survey
-from kappaskin.errors import Refusal
 
-_LARGEST = 4.5
-"""Standard deviations that the largest of the readings of many frames is off by."""
+LARGEST = 6.0
+"""Standard deviations that no reading of many frames is off by: one of 500 million is."""
 
-
-def _check_rms(rms: float) -> None:
-    if not (math.isfinite(rms) and rms >= 0):
-        raise Refusal(f"expected a noise RMS of at least 0 1/m, got {rms}")
+_RMS = Within(0, unit="1/m")
 
 
 @dataclass(frozen=True)
@@ -26,10 +23,7 @@ class UniformNoise(ReadingEffect):
     name: ClassVar = "uniform-noise"
     formula: ClassVar = "RMS of the noise over peak curvature"
 
-    rms: float
-
-    def __post_init__(self) -> None:
-        _check_rms(self.rms)
+    rms: Annotated[float, _RMS]
 
     def size(self, survey: Survey) -> Size:
         number = self.rms / survey.peak
@@ -48,14 +42,11 @@ class GaussianNoise(ReadingEffect):
     name: ClassVar = "gaussian-noise"
     formula: ClassVar = "RMS of the noise over peak curvature"
 
-    rms: float
-
-    def __post_init__(self) -> None:
-        _check_rms(self.rms)
+    rms: Annotated[float, _RMS]
 
     def size(self, survey: Survey) -> Size:
         number = self.rms / survey.peak
-        return Size(number, _LARGEST * number)
+        return Size(number, LARGEST * number)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
         from kappaskin.effects.at_work.noise import gaussian

@@ -40,6 +40,31 @@ class Survey:
         return max(float(np.abs(self.curvature).max(initial=0.0)), self.transduction.resolution)
 
     @cached_property
+    def operator(self) -> Array:
+        """Coefficients to readings of point-like elements, (3 P, N)."""
+        return self.layout.curvature_operator(self.basis)
+
+    @cached_property
+    def wavenumber(self) -> float:
+        """k in 1/m of the scene: k^2 is the largest reading over the largest deflection."""
+        bent = np.abs(self.coefficients @ self.operator.T).max(initial=0.0)
+        deflection = self.coefficients @ self.basis.at(self.layout.positions).T
+        most = np.abs(deflection).max(initial=0.0)
+        return float(np.sqrt(bent / most)) if most else 0.0
+
+    @cached_property
+    def _whole(self) -> Array:
+        return self._on(self.plate)
+
+    def _on(self, plate: Plate) -> Array:
+        # A compliance is symmetric: the rows are C F.
+        return plate.compliance(self.basis).after(self.forces) @ self.operator.T
+
+    def readings_on(self, plate: Plate) -> Array:
+        """What point-like elements would read of the same forces on another `plate`, (S, 3 P)."""
+        return self._whole if plate == self.plate else self._on(plate)
+
+    @cached_property
     def slopes(self) -> Array:
         """Slopes (S, 2, P) of the skin along x and y at its elements."""
         places = self.layout.positions

@@ -1,14 +1,13 @@
 """The fixed gain and offset errors of a sensor that was never calibrated."""
 
-import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from kappaskin.effects.effect import ReadingEffect, Running, Size
+from kappaskin.effects.parameters import Within
 from kappaskin.effects.survey import Survey
-from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
 
@@ -23,14 +22,9 @@ class Tolerance(ReadingEffect):
     name: ClassVar = "tolerance"
     formula: ClassVar = "spread of the gains, plus that of the offsets over peak curvature"
 
-    gain_sd: float
-    offset_sd: float
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for sd in (self.gain_sd, self.offset_sd):
-            if not (math.isfinite(sd) and sd >= 0):
-                raise Refusal(f"expected standard deviations of at least 0, got {self}")
+    gain_sd: Annotated[float, Within(0)]
+    offset_sd: Annotated[float, Within(0, unit="1/m")]
+    seed: Annotated[int, Within(0, 2**63 - 1, whole=True)] = 0
 
     def errors(self, shape: tuple[int, ...]) -> tuple[Array, Array]:
         """Gain and offset in 1/m of every channel of a skin of `shape`."""

@@ -10,10 +10,11 @@ from scipy import special
 from kappaskin.bases import basis_for
 from kappaskin.effects import UniformNoise
 from kappaskin.errors import Refusal
-from kappaskin.fit import METHODS, Estimator, Fit, NormalCurvature, estimator_for
+from kappaskin.fit import METHODS, Estimator, Fit, estimator_for
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate, PointLoad
+from kappaskin.normal_curvature import NormalCurvature
 from kappaskin.patch import Patch
 from kappaskin.scene import Scene, Stimulus, load_scene, scaled_to
 
