@@ -260,8 +260,10 @@ class _History:
     def _by_the_past(self, why: NDArray[np.uint8], suspects: NDArray[np.intp]) -> None:
         Ks, were, offs = (np.stack(part) for part in zip(*self._frames, strict=True))
         latest = Ks[-_ENOUGH:]
-        still = (latest == latest[-1]).all(axis=(0, 1))
-        moving = np.nanmedian(np.ptp(latest, axis=0)) > 0
+        # A missing reading, as of a dead channel, contradicts nothing.
+        still = ((latest == latest[-1]) | np.isnan(latest)).all(axis=(0, 1))
+        spans = np.ptp(latest, axis=0)
+        moving = np.count_nonzero(spans > 0) > np.count_nonzero(spans == 0)
         for p in suspects:
             if still[p] and moving:
                 why[p] = WHY.index("stuck")
@@ -275,6 +277,7 @@ class _History:
     ) -> None:
         told = K - off
         for p, q in combinations(suspects, 2):
-            crossed = np.sum((K[:, p] - told[:, q]) ** 2 + (K[:, q] - told[:, p]) ** 2)
-            if crossed < _CROSSED * np.sum(off[:, p] ** 2 + off[:, q] ** 2):
+            both = np.isfinite(K[:, p] + K[:, q])  # channels
+            crossed = (K[both, p] - told[both, q]) ** 2 + (K[both, q] - told[both, p]) ** 2
+            if crossed.sum() < _CROSSED * np.sum(off[both, p] ** 2 + off[both, q] ** 2):
                 why[[p, q]] = WHY.index("swapped")
