@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.fit.choosing import telling_most
-from kappaskin.fit.estimator import Estimator
+from kappaskin.fit.estimator import Estimator, numbers
 from kappaskin.fit.fit import Fit, Spread, gathered
 from kappaskin.fit.kalman import MovingModes
 from kappaskin.fit.level import START, Level
@@ -92,7 +92,7 @@ class Tracking(Estimator):
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Take in the next frame (3, P) or T of them (T, 3, P), read 6 ms after each other."""
-        K = np.asarray(curvature, float)
+        K = numbers(curvature, "curvature")
         self._check_shape(K)
         if K.ndim == 2:
             return self.follow(K, np.full(K.shape, self._next))
@@ -109,11 +109,12 @@ class Tracking(Estimator):
     def follow(self, curvature: ArrayLike, times: ArrayLike, held: Array | None = None) -> Fit:
         """Take in `curvature` (3, P) in 1/m read at `times` (3, P) in s on the device's clock.
 
-        NaN and infinity mean a missing reading; the time of a channel that was not read at all is
-        NaN. Readings of one channel are to come in the order of their times. A clock that goes back
-        is that of a device that started anew. What is `held` of earlier frames is known already.
+        Which readings are missing is told as in any call of an estimator; the time of a channel
+        that was not read at all is NaN. Readings of one channel are to come in the order of their
+        times. A clock that goes back is that of a device that started anew. What is `held` of
+        earlier frames is known already.
         """
-        frame, when = np.asarray(curvature, float), np.asarray(times, float)
+        frame, when = numbers(curvature, "curvature"), numbers(times, "times")
         self._check_shape(frame)
         if frame.ndim != 2 or when.shape != frame.shape:
             raise Refusal(
@@ -121,7 +122,7 @@ class Tracking(Estimator):
                 f"and {when.shape}"
             )
         K, t = frame.ravel(), when.ravel()
-        used = np.flatnonzero(np.isfinite(K) & self.readable)
+        used = np.flatnonzero((np.abs(K) <= self._largest) & self.readable)
         scanned = ~np.isnan(t)
         if not np.isfinite(t[scanned]).all() or not scanned[used].all():
             raise Refusal("expected a time in s with every reading, got NaN or infinity")
