@@ -12,6 +12,7 @@ from kappaskin import (
     Patch,
     Plate,
     PointLoad,
+    RankDeficient,
     Robust,
     SensorLayout,
     SineBasis,
@@ -203,6 +204,37 @@ def test_two_halves_of_a_skin_may_be_read_in_turn():
         assert bool(fit(K).suspect[20]) == (t % 2 == 0)
 
 
+def test_the_frames_of_a_batch_are_told_of_in_the_order_of_time():
+    K = frames("centre", 18)
+    K[4:, :, 44] = 3.0, -2.0, 1.0
+    K[::8, :, 71] += 20.0
+    K[1::3, :, 3] = np.nan
+    fit = Robust(EIGHT, TENS)
+
+    batch = Robust(EIGHT, TENS)(K)
+
+    np.testing.assert_array_equal(batch.suspect, [fit(frame).suspect for frame in K])
+
+
+def test_a_frame_of_a_batch_that_decides_no_shape_is_named():
+    K = frames("centre", 3)
+    K[0, 0, 0] = K[2, :, 20:] = np.nan
+
+    with pytest.raises(RankDeficient, match=r"^frame 2: .* 60 readings"):
+        Robust(EIGHT, TENS)(K)
+
+
+def test_a_skin_at_rest_is_no_frame_of_the_past():
+    fit, other = Robust(EIGHT, TENS), Robust(EIGHT, TENS)
+    fit.at_rest()
+
+    for K in frames("centre", 6):
+        K[:, 23] += 6.0
+        told, same = fit(K).suspect[23], other(K).suspect[23]
+
+        assert told == same
+
+
 def test_a_suspect_is_missing_from_what_the_fit_rests_on():
     K = frames("centre", 1)[0]
     K[:, 30] = 40.0
@@ -212,6 +244,17 @@ def test_a_suspect_is_missing_from_what_the_fit_rests_on():
     assert np.isnan(answer.residual[:, 30]).all()
     assert np.isfinite(np.delete(answer.residual, 30, axis=1)).all()
     assert answer.steps > 0
+
+
+def test_where_few_elements_are_read_a_bad_one_is_found_among_them():
+    few = np.arange(0, 100, 5)
+    K = np.full((3, 100), np.nan)
+    K[:, few] = frames("centre", 1)[0][:, few]
+    fit = Robust(SineBasis(SQUARE, 3, 3), TENS)
+
+    assert not fit(K).suspect.any()
+    K[:, 45] = 60.0
+    assert np.flatnonzero(fit(K).suspect).tolist() == [45]
 
 
 def test_where_most_contradict_each_other_none_is_left_out_and_it_says_so():

@@ -12,7 +12,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.fit.choosing import telling_most
 from kappaskin.fit.estimator import Estimator, numbers
-from kappaskin.fit.fit import Fit, Spread, gathered
+from kappaskin.fit.fit import Fit, in_time
 from kappaskin.fit.kalman import MovingModes
 from kappaskin.fit.level import START, Level
 from kappaskin.fit.prior import prior_root
@@ -99,7 +99,7 @@ class Tracking(Estimator):
         if not len(K):
             none = np.empty((0, *self.basis.shape), self.dtype)
             return Fit(self, K.astype(self.dtype), none, [], np.zeros(0), np.zeros(0))
-        return _in_time([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
+        return in_time([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
 
     @property
     def _next(self) -> float:
@@ -245,24 +245,6 @@ class Tracking(Estimator):
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         return self(flat.reshape(*flat.shape[:-1], 3, -1))
-
-
-def _in_time(fits: list[Fit]) -> Fit:
-    """One fit of T frames from theirs."""
-    return gathered(
-        [
-            Fit(
-                fit.estimator,
-                fit.curvature[None],
-                fit.coefficients[None],
-                [cast("Spread", fit.spreads)],
-                np.reshape(fit.spare, (1,)),
-                np.reshape(cast("Array", fit.told_noise), (1,)),
-            )
-            for fit in fits
-        ],
-        np.arange(len(fits)),
-    )
 
 
 def _principal(basis: Basis) -> tuple[Array, Array, Array]:
