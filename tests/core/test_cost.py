@@ -293,8 +293,15 @@ def test_what_is_better_by_too_little_to_wait_for_is_no_frontier() -> None:
     fast, slow = cost_of(1e-5, 1e-5), cost_of(0.995e-5, 2e-5)
     assert frontier([slow, fast]) == (fast,)
     slowest = cost_of(0.987e-5, 3e-5)
-    assert frontier([slowest, slow, fast]) == (fast,)
+    assert frontier([slowest, slow, fast]) == (fast, slowest)
     assert frontier([slowest, fast]) == (fast, slowest)
+
+
+def test_many_steps_too_little_to_wait_for_are_worth_it_together() -> None:
+    steps = [cost_of(1e-5 * 0.995**n, 1e-5 * (n + 1)) for n in range(60)]
+    best = frontier(steps)
+    assert best[-1].rms < steps[-1].rms / (1 - ALIKE)
+    assert all(b.rms < (1 - ALIKE) * a.rms for a, b in pairwise(best))
 
 
 def test_who_is_further_off_than_the_shape_is_large_is_beaten_by_silence() -> None:
