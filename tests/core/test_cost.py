@@ -515,6 +515,17 @@ def test_a_process_that_dies_is_told_of() -> None:
         assert measuring.done
 
 
+def test_what_was_measured_before_a_process_died_is_told_first() -> None:
+    deadly = replace(EIGHT, functions=("eight", "eight"))
+    with Measuring(CENTRE, [EIGHT, deadly]) as measuring:
+        (child,) = [p for p in multiprocessing.active_children() if p.name == "kappaskin-cost"]
+        child.join()
+        (told,) = measuring.poll()
+        assert told.setting == EIGHT
+        with pytest.raises(Refusal, match="ended unexpectedly; measure again"):
+            measuring.poll()
+
+
 @pytest.fixture
 def few(monkeypatch) -> None:
     """The command tries little."""
