@@ -270,6 +270,16 @@ def test_the_readings_are_left_as_they_came_and_may_be_written_over(method):
 
 
 @every_method
+def test_who_writes_on_error_bars_changes_no_later_ones(method):
+    fit, other = made(method), made(method)
+
+    fit(noisy()).unit_sd[:] = 0
+    other(noisy())
+
+    np.testing.assert_array_equal(fit(noisy(1)).sd, other(noisy(1)).sd)
+
+
+@every_method
 def test_a_batch_of_no_frames_has_no_answers(method):
     answer = made(method)(np.empty((0, 3, 100)))
 
