@@ -24,6 +24,7 @@ _SHORTEST = 1e-3  # s, if that is longer: a step must not take longer than its r
 _PERIOD = 6e-3  # s that a frame takes which comes without times: the paper's 300 channels
 _HELD = 0.1  # s after which a reading no longer tells what lies between the modes
 _BACK = 0.05  # s by which a clock may go back within one run of a device
+_FORGOTTEN = 1e9  # s: of what is so long ago nothing is left, and squares are still numbers
 _COARSE = 8  # modes that make nearly all of the displacement
 _PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin, as displacement
 
@@ -166,8 +167,9 @@ class Tracking(Estimator):
     def _aged(self, ahead: float) -> Array:
         """How much of a reading (3 P,) would be new."""
         level = self._level
-        speed = START if level is None else level.speed
-        finest = math.sqrt(3) * speed * float(self._wavenumbers.max())
+        if level is None:  # nothing was read yet
+            return np.ones(len(self._read))
+        finest = math.sqrt(3) * level.speed * float(self._wavenumbers.max())
         return -np.expm1(-finest * (self._now + ahead - self._read))
 
     def _begin(self, times: Array) -> None:
@@ -199,7 +201,8 @@ class Tracking(Estimator):
     def _advance(self, time: float) -> None:
         level = cast("Level", self._level)
         if time > self._now and math.isfinite(self._now):
-            self._filter.advance(time - self._now, level.amplitude, level.speed)
+            passed = min(time - self._now, _FORGOTTEN)
+            self._filter.advance(passed, level.amplitude, level.speed)
         self._now = max(time, self._now)
 
     def _take(self, channels: NDArray[np.intp], K: Array, t: Array) -> None:
