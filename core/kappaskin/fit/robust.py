@@ -80,7 +80,8 @@ class Robust(Estimator):
     left out one round after the other, and let in again where the rest agrees with them after
     all; the shape is that of `LeastSquares` with them dead. `Fit.suspect` says which and why:
     what the last frames tell. Where more than a quarter of the elements contradict the rest, none
-    is left out and `Fit.converged` says no.
+    is left out and `Fit.converged` says no; without a `sigma` they may pass for noise, which is
+    then told as large.
     """
 
     def _set_up(self) -> None:
