@@ -23,7 +23,7 @@ from kappaskin import (
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.history import History
 from kappaskin_app.session import Session
-from kappaskin_app.settings import METHOD_NAMES
+from kappaskin_app.settings import METHOD_SHORT
 from kappaskin_app.simulation import elements_of, scene_of_sensor
 from kappaskin_app.wishes import Wishes
 
@@ -39,7 +39,7 @@ _NOISIER = 1.5  # times more or less noise is other noise
 
 def in_words(setting: Setting, elements: int = 0) -> str:
     """A setting in words; `elements` is how many there are where they are no full grid."""
-    name = dict(METHOD_NAMES).get(setting.method, setting.method)
+    name = METHOD_SHORT.get(setting.method, setting.method)
     times = "\N{THIN SPACE}\N{MULTIPLICATION SIGN}\N{THIN SPACE}"
     m_n = times.join(map(str, setting.elements)) if setting.elements else str(elements)
     return f"{name}, {times.join(map(str, setting.functions))} functions, {m_n} elements"

@@ -141,7 +141,7 @@ def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_o
     panel.buttons[6].click()
     until(lambda: window.history.settings.fit_edge == "sliding")
     until(lambda: "moves the skin as a whole" in panel.refused.text())
-    assert panel.refused.text().startswith("In use: 8 x 1.")
+    assert panel.refused.text().startswith("In use: Least squares, 8 x 1 functions. 10")
     until(lambda: window.session.estimate is not None and window.badge.state == "SIM")
     until(lambda: "One of 8 shapes changes no reading" in panel.words.text())
     panel.undo.click()

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 from kappaskin import Cost
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.costing import Frontier, in_words
-from kappaskin_app.settings import METHOD_NAMES
+from kappaskin_app.settings import METHOD_SHORT
 from kappaskin_app.theme import LIGHT, SERIES, Theme
 from kappaskin_app.views.log_axis import LogAxis
 
@@ -249,9 +249,9 @@ def _tick(value: float, said: Callable[[float], str]) -> str:
     return f"{float(number):g} {unit}"
 
 
-_METHODS = [name for name, _ in METHOD_NAMES]
+_METHODS = list(METHOD_SHORT)
 _SHORT = {
-    **{name: words.split(",")[0].split(" (")[0] for name, words in METHOD_NAMES},
+    **METHOD_SHORT,
     "own": "filled: elements as now",
     "other": "open: other elements",
     "present": "in use, as predicted",
