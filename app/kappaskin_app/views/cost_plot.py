@@ -145,7 +145,7 @@ class CostPlot(QWidget):
                 left = min(x - width / 2, area.right() - width + 4)
                 box = QRectF(max(left, area.left()), area.bottom() + 1, width, line)
                 painter.drawText(box, flags.AlignCenter, words)
-        free = area.bottom() + line
+        free = math.inf
         for value, written in self._y.ticks():
             y = self.at(value, 1.0).y()
             painter.setPen(QPen(QColor(theme.line), 1))
