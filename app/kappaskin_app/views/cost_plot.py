@@ -19,6 +19,7 @@ _LEGEND = 196.0  # px right of the plot
 _SIZE = 4.0  # px from a point's middle to its rim
 _NEAR = 10.0  # px from the mouse to the point that it means
 _TICK = 74  # px that a written time needs
+_ROWS = len(METHOD_SHORT) + 5  # of the legend
 
 Point = tuple[float, float]
 
@@ -37,7 +38,7 @@ class CostPlot(QWidget):
         self._theme, self._empty = LIGHT, ""
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(470, 130)
+        self.setMinimumSize(470, _ROWS * self.fontMetrics().height())
         self.setAccessibleName("Error against time")
 
     def sizeHint(self) -> QSize:
