@@ -143,7 +143,7 @@ def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_o
     until(lambda: "moves the skin as a whole" in panel.refused.text())
     assert panel.refused.text().startswith("In use: Least squares, 8 x 1 functions. 10")
     until(lambda: window.session.estimate is not None and window.badge.state == "SIM")
-    until(lambda: "One of 8 shapes changes no reading" in panel.words.text())
+    until(lambda: "infinite: one of 8 shapes changes no reading" in panel.words.text())
     panel.undo.click()
     assert window.history.settings == was
 
