@@ -211,6 +211,7 @@ class Costing(QObject):
             if self.scene is None:
                 self._look()
             missing = [setting for setting in self._asked() if setting not in self.costs]
+            missing.sort(key=lambda setting: setting != self.present)
             if self.scene is not None and missing:
                 self._measuring = Measuring(self.scene, missing)
         except Refusal as refusal:

@@ -206,6 +206,9 @@ class CostPanel(QWidget):
     def _show_slider(self, present: Cost | None) -> None:
         best = self._frontier.best
         self.wanted.setEnabled(len(best) > 0)
+        if not best:
+            self._accuracy = math.nan  # what was wanted of another skin says nothing of this one
+            self._show_wanted()
         if not best or self.wanted.isSliderDown():
             return
         errors = [cost.rms for cost in best]
