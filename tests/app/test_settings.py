@@ -179,3 +179,7 @@ def test_a_choice_without_room_for_all_its_words_says_so(panels: Panels) -> None
     assert box.words_shown().endswith("\N{HORIZONTAL ELLIPSIS}")
     box.resize(400, box.height())
     assert box.words_shown() == box.currentText()
+    for name in ("noise_kind", "load_case", "electronics"):
+        box = panels.findChild(QComboBox, name)
+        box.resize(box.sizeHint())
+        assert box.words_shown() == box.currentText()

@@ -58,7 +58,7 @@ class _ChoiceBox(QComboBox):
         self.initStyleOption(option)
         field = QStyle.SubControl.SC_ComboBoxEditField
         kind = QStyle.ComplexControl.CC_ComboBox
-        room = self.style().subControlRect(kind, option, field, self).width() - 4
+        room = self.style().subControlRect(kind, option, field, self).width() - 2
         words = self.currentText()
         return self.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room)
 
