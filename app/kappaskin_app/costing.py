@@ -34,6 +34,7 @@ ELEMENTS = (6, 16)
 _MOST_FUNCTIONS = 400  # of a setting that is measured because it is the present one
 _SHOWN = 0.2  # s between two looks: faster cannot be read
 _SMOOTHED = 0.5  # s that the measured error and time of the present frame are taken over
+_WHOLE = "Predicted is what scans of all elements give, without the region."
 _NOISIER = 1.5  # times more or less noise is other noise
 
 
@@ -182,6 +183,11 @@ class Costing(QObject):
         )
         return Frontier(known, frontier(known))
 
+    def note(self) -> str:
+        """What to bear in mind while comparing."""
+        whole = "" if self._history.settings.region == "off" else _WHOLE
+        return " ".join(filter(None, [self.about, whole]))
+
     def unlike(self) -> str:
         """What is not as it was when the costs were measured, or nothing."""
         if self.scene is None:
@@ -271,7 +277,9 @@ def _unlike(was: Scene, now: Scene) -> str:
     dead, dead_now = (np.flatnonzero(~scene.layout.live[0]).tolist() for scene in (was, now))
     if (was.plate, was.edge) != (now.plate, now.edge):
         return "on another skin"
-    if (was.effects, was.transduction) != (now.effects, now.transduction):
+    if was.transduction != now.transduction:
+        return "with other electronics"
+    if was.effects != now.effects:
         return "with other noise"
     if dead != dead_now:
         return "with other elements dead"

@@ -214,6 +214,17 @@ def test_another_basis_is_measured_too_and_another_skin_only_when_asked(
     until(lambda: not message.isVisible())
     measured.history.change("Load", -1, load_case="centre")
     until(lambda: "under another load" in message.text())
+    measured.history.change("Bits", -1, bits=12)
+    until(lambda: "with other electronics" in message.text())
+
+
+def test_a_region_is_said_not_to_be_in_what_is_predicted(measured: MainWindow, until) -> None:
+    message = measured.cost.message
+    assert not message.isVisible()
+    measured.history.change("Region", -1, region="adaptive")
+    until(lambda: message.text().endswith("without the region."))
+    measured.history.stack.undo()
+    until(lambda: not message.isVisible())
 
 
 def test_a_skin_without_a_load_is_refused_in_words(window: MainWindow, until) -> None:

@@ -182,7 +182,7 @@ class CostPanel(QWidget):
 
     def _show_message(self, now: Costing, text: str) -> None:
         hint = not text
-        text = now.about if hint else text
+        text = now.note() if hint else text
         if (text, hint) != (self.message.text(), self._hint):
             self._hint = hint
             self.message.setText(text)
