@@ -127,6 +127,7 @@ def test_a_demonstration_is_one_step_and_back_undoes_it(window: MainWindow, unti
         button.click()
     assert window.history.settings.shape == "strip"
     until(lambda: window.membrane.skin.patch.strip)
+    assert "dead" not in window.panels.connection.device.text()  # of xx, which it has
     until(lambda: window.session.estimate is not None)
     for _ in range(6):
         panel.undo.click()
