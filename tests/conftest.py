@@ -43,6 +43,7 @@ def _children() -> set[int]:
     return {int(pid) for pid in found.split()}
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist looks for groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Keep a file's tests in one process, and all windows in one: they share a keyboard."""
     for item in items:

@@ -23,7 +23,7 @@ from kappaskin import (
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.history import History
 from kappaskin_app.session import Session
-from kappaskin_app.settings import METHOD_NAMES
+from kappaskin_app.settings import METHOD_SHORT
 from kappaskin_app.simulation import elements_of, scene_of_sensor
 from kappaskin_app.wishes import Wishes
 
@@ -34,12 +34,13 @@ ELEMENTS = (6, 16)
 _MOST_FUNCTIONS = 400  # of a setting that is measured because it is the present one
 _SHOWN = 0.2  # s between two looks: faster cannot be read
 _SMOOTHED = 0.5  # s that the measured error and time of the present frame are taken over
+_WHOLE = "Predicted is what scans of all elements give, without the region."
 _NOISIER = 1.5  # times more or less noise is other noise
 
 
 def in_words(setting: Setting, elements: int = 0) -> str:
     """A setting in words; `elements` is how many there are where they are no full grid."""
-    name = dict(METHOD_NAMES).get(setting.method, setting.method)
+    name = METHOD_SHORT.get(setting.method, setting.method)
     times = "\N{THIN SPACE}\N{MULTIPLICATION SIGN}\N{THIN SPACE}"
     m_n = times.join(map(str, setting.elements)) if setting.elements else str(elements)
     return f"{name}, {times.join(map(str, setting.functions))} functions, {m_n} elements"
@@ -182,6 +183,11 @@ class Costing(QObject):
         )
         return Frontier(known, frontier(known))
 
+    def note(self) -> str:
+        """What to bear in mind while comparing."""
+        whole = "" if self._history.settings.region == "off" else _WHOLE
+        return " ".join(filter(None, [self.about, whole]))
+
     def unlike(self) -> str:
         """What is not as it was when the costs were measured, or nothing."""
         if self.scene is None:
@@ -211,6 +217,7 @@ class Costing(QObject):
             if self.scene is None:
                 self._look()
             missing = [setting for setting in self._asked() if setting not in self.costs]
+            missing.sort(key=lambda setting: setting != self.present)
             if self.scene is not None and missing:
                 self._measuring = Measuring(self.scene, missing)
         except Refusal as refusal:
@@ -270,7 +277,9 @@ def _unlike(was: Scene, now: Scene) -> str:
     dead, dead_now = (np.flatnonzero(~scene.layout.live[0]).tolist() for scene in (was, now))
     if (was.plate, was.edge) != (now.plate, now.edge):
         return "on another skin"
-    if (was.effects, was.transduction) != (now.effects, now.transduction):
+    if was.transduction != now.transduction:
+        return "with other electronics"
+    if was.effects != now.effects:
         return "with other noise"
     if dead != dead_now:
         return "with other elements dead"

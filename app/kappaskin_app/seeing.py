@@ -62,7 +62,7 @@ class Spectrum:
         )
         if not self.silent:
             return f"Condition number {_times(worst)}: of {count} shapes {seen}."
-        what = f"{self.silent} of {count} shapes" if self.silent > 1 else f"One of {count} shapes"
+        what = f"{self.silent} of {count} shapes" if self.silent > 1 else f"one of {count} shapes"
         verb = "change" if self.silent > 1 else "changes"
         return (
             f"Condition number infinite: {what} {verb} no reading, and only a prior could decide "

@@ -88,6 +88,7 @@ class MainWindow(QMainWindow):
         ]
         self.tabifyDockWidget(*self._docks[2:])
         for dock in self._docks[2:]:
+            dock.setAllowedAreas(area.TopDockWidgetArea | below)  # wider than a column beside it
             dock.hide()  # so that a small window is left to the skin until they are asked for
         self.actions_by_name = Actions(self)
         self._make_actions()

@@ -117,6 +117,44 @@ def test_what_is_predicted_and_what_is_measured_stand_beside_each_other(
     assert 0 < time < 1
 
 
+def test_the_setting_in_use_is_measured_first(window: MainWindow, until) -> None:
+    window.history.change("Odd", -1, method="bayes", functions_x=7, functions_y=5)
+    until(lambda: window.session.status.setup.Ni == 7)
+    window.actions_by_name["dock-cost"].trigger()
+    until(lambda: window.costing.progress[0] > 0, 60.0)
+    assert next(iter(window.costing.costs)) == Setting("bayes", (7, 5), (10, 10))
+
+
+@pytest.mark.parametrize("method", [name for name, _ in METHOD_NAMES])
+def test_any_setting_in_use_is_read_whole(window: MainWindow, until, method: str) -> None:
+    window.actions_by_name["dock-cost"].trigger()
+    line = window.cost.setting
+    line.show_text(in_words(Setting(method, (12, 12), (16, 16))))
+    assert line.whole
+
+
+def test_every_line_of_the_legend_has_room(measured: MainWindow, until) -> None:
+    plot, dock = measured.cost.plot, measured.cost.parent()
+    measured.resizeDocks([dock], [1], Qt.Orientation.Vertical)
+    until(lambda: plot.height() < 200)
+    assert plot.height() >= 13 * plot.fontMetrics().height()
+
+
+def test_both_ends_of_the_error_axis_are_written(measured: MainWindow) -> None:
+    plot = measured.cost.plot
+    picture, x, y = plot.grab().toImage(), 71, plot.at(1e-9, 1e-9).toPoint().y()
+    ground = picture.pixel(1, 1)
+
+    def ink(top: int, height: int) -> bool:
+        return any(
+            picture.pixel(i, j) != ground for i in range(x) for j in range(top, top + height)
+        )
+
+    line = plot.fontMetrics().height()
+    assert ink(y - line // 2, line // 2)
+    assert ink(10, line // 2)
+
+
 def test_the_slider_takes_the_cheapest_setting_that_is_accurate_enough(
     measured: MainWindow, qtbot
 ) -> None:
@@ -133,6 +171,19 @@ def test_the_slider_takes_the_cheapest_setting_that_is_accurate_enough(
     s = measured.history.settings
     chosen = Setting(s.method, (s.functions_x, s.functions_y), (s.elements_x, s.elements_y))
     assert chosen == measured.costing.frontier().best[-1].setting
+
+
+def test_measuring_anew_forgets_what_was_wanted_of_the_skin_before(
+    measured: MainWindow, until, qtbot
+) -> None:
+    panel = measured.cost
+    qtbot.keyClick(panel.wanted, Qt.Key.Key_Home)
+    until(lambda: panel.wanted.value() == 0)
+    assert panel.cheapest.text()
+    panel.again.click()
+    assert not panel.wanted.isEnabled()
+    assert (panel.wanted_words.text(), panel.cheapest.text()) == ("", "")
+    until(lambda: panel.wanted_words.text() == panel.figures["Predicted", "RMS error"].text(), 60.0)
 
 
 def test_a_slider_held_by_the_mouse_switches_when_it_is_let_go(measured: MainWindow) -> None:
@@ -163,6 +214,17 @@ def test_another_basis_is_measured_too_and_another_skin_only_when_asked(
     until(lambda: not message.isVisible())
     measured.history.change("Load", -1, load_case="centre")
     until(lambda: "under another load" in message.text())
+    measured.history.change("Bits", -1, bits=12)
+    until(lambda: "with other electronics" in message.text())
+
+
+def test_a_region_is_said_not_to_be_in_what_is_predicted(measured: MainWindow, until) -> None:
+    message = measured.cost.message
+    assert not message.isVisible()
+    measured.history.change("Region", -1, region="adaptive")
+    until(lambda: message.text().endswith("without the region."))
+    measured.history.stack.undo()
+    until(lambda: not message.isVisible())
 
 
 def test_a_skin_without_a_load_is_refused_in_words(window: MainWindow, until) -> None:

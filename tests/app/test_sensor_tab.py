@@ -17,6 +17,7 @@ from kappaskin import (
 from kappaskin_app.panels.sensor import RegionPanel
 from kappaskin_app.settings import Settings
 from kappaskin_app.simulation import region_of, scene_of, with_consequences
+from kappaskin_app.skins import SHAPES
 
 
 def test_the_default_gages_spoil_nothing_but_the_noise():
@@ -121,3 +122,14 @@ def test_elements_bent_beyond_their_limit_are_crossed_out(window, until):
     curvature[0, 7] = 1.1 * limit
 
     assert np.flatnonzero(window.display.marks(curvature)[0]).tolist() == [7]
+
+
+def test_a_strip_tells_where_the_contact_is_along_it_alone(qapp) -> None:
+    sensor = scene_of(Settings(shape="strip", **SHAPES["strip"].asks)).sensor()
+    region = Region(around="adaptive", share=0.2)
+    panel = RegionPanel()
+    panel.show_settings(Settings(region="adaptive"))
+    panel.show_bargain(bargain(sensor, region, PointLoad(0.02, 0.02, 0.5), 0.2))
+    panel.show_status(Status(state="streaming", sensor=sensor, region=region), True)
+    assert "costs accuracy" in panel.message.text()
+    assert "0.04 mm at best, all channels to \N{PLUS-MINUS SIGN}0.02 mm" in panel.message.text()

@@ -170,3 +170,16 @@ def test_a_skin_that_cannot_be_is_explained_until_it_can(panels: Panels) -> None
     shape.show_refusal("")
     shape.show_status(status, simulating=True)
     assert shape.message.text() == ""
+
+
+def test_a_choice_without_room_for_all_its_words_says_so(panels: Panels) -> None:
+    box = panels.basis.editor("method")
+    box.setCurrentText("Robust, leaves out bad elements")
+    box.resize(110, box.height())
+    assert box.words_shown().endswith("\N{HORIZONTAL ELLIPSIS}")
+    box.resize(400, box.height())
+    assert box.words_shown() == box.currentText()
+    for name in ("noise_kind", "load_case", "electronics"):
+        box = panels.findChild(QComboBox, name)
+        box.resize(box.sizeHint())
+        assert box.words_shown() == box.currentText()

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QSlider
+from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QDockWidget, QSlider
 
 from kappaskin import Refusal, SensorLayout, SineBasis, singular_values
 from kappaskin_app.demonstrations import DEMONSTRATIONS
@@ -127,6 +127,7 @@ def test_a_demonstration_is_one_step_and_back_undoes_it(window: MainWindow, unti
         button.click()
     assert window.history.settings.shape == "strip"
     until(lambda: window.membrane.skin.patch.strip)
+    assert "dead" not in window.panels.connection.device.text()  # of xx, which it has
     until(lambda: window.session.estimate is not None)
     for _ in range(6):
         panel.undo.click()
@@ -141,9 +142,9 @@ def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_o
     panel.buttons[6].click()
     until(lambda: window.history.settings.fit_edge == "sliding")
     until(lambda: "moves the skin as a whole" in panel.refused.text())
-    assert panel.refused.text().startswith("In use: 8 x 1.")
+    assert panel.refused.text().startswith("In use: Least squares, 8 x 1 functions. 10")
     until(lambda: window.session.estimate is not None and window.badge.state == "SIM")
-    until(lambda: "One of 8 shapes changes no reading" in panel.words.text())
+    until(lambda: "infinite: one of 8 shapes changes no reading" in panel.words.text())
     panel.undo.click()
     assert window.history.settings == was
 
@@ -269,3 +270,18 @@ def test_singular_values_are_those_of_the_scaled_operator() -> None:
     layout = SensorLayout.regular(spectrum.basis.patch, 10, 10).without([0, 17])
     values, _ = singular_values(SineBasis(layout.patch, 8, 8), layout)
     assert spectrum.values == pytest.approx(values)
+
+
+def test_the_panels_below_the_skin_cannot_be_dropped_into_a_column(window: MainWindow) -> None:
+    beside = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
+    for panel in (window.cost, window.stability):
+        dock = panel.parent()
+        assert isinstance(dock, QDockWidget)
+        assert dock.isAreaAllowed(Qt.DockWidgetArea.BottomDockWidgetArea)
+        assert not any(dock.isAreaAllowed(area) for area in beside)
+
+
+def test_what_is_in_use_is_said_where_the_method_is_refused(window: MainWindow, until) -> None:
+    window.history.change("Fast", -1, method="fast", functions_x=12, functions_y=12)
+    message = window.panels.basis.message
+    until(lambda: message.text().startswith("In use: Least squares, 8 x 8 functions. Expected"))

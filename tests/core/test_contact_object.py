@@ -490,7 +490,7 @@ def test_a_skin_that_cannot_tell_is_refused():
     strip, patch = Patch(0.1, 0.01, strip=True), Patch(SIDE, SIDE)
     drum = Plate(patch, rigidity=0.0, tension=1.0)
     for plate, elements, why in (
-        (Plate(strip), (20, 1), "a strip is alike across"),
+        (Plate(strip), (20, 1), "a strip bends along x alone"),
         (drum, (10, 10), "a drum head has no curvature"),
         (Plate(patch), (60, 40), "at most 2000 elements to tell objects by, got 2400"),
     ):

@@ -294,8 +294,15 @@ def test_what_is_better_by_too_little_to_wait_for_is_no_frontier() -> None:
     fast, slow = cost_of(1e-5, 1e-5), cost_of(0.995e-5, 2e-5)
     assert frontier([slow, fast]) == (fast,)
     slowest = cost_of(0.987e-5, 3e-5)
-    assert frontier([slowest, slow, fast]) == (fast,)
+    assert frontier([slowest, slow, fast]) == (fast, slowest)
     assert frontier([slowest, fast]) == (fast, slowest)
+
+
+def test_many_steps_too_little_to_wait_for_are_worth_it_together() -> None:
+    steps = [cost_of(1e-5 * 0.995**n, 1e-5 * (n + 1)) for n in range(60)]
+    best = frontier(steps)
+    assert best[-1].rms < steps[-1].rms / (1 - ALIKE)
+    assert all(b.rms < (1 - ALIKE) * a.rms for a, b in pairwise(best))
 
 
 def test_who_is_further_off_than_the_shape_is_large_is_beaten_by_silence() -> None:
@@ -507,6 +514,17 @@ def test_a_process_that_dies_is_told_of() -> None:
         with pytest.raises(Refusal, match="ended unexpectedly; measure again"):
             list(measuring.wait())
         assert measuring.done
+
+
+def test_what_was_measured_before_a_process_died_is_told_first() -> None:
+    deadly = replace(EIGHT, functions=("eight", "eight"))
+    with Measuring(CENTRE, [EIGHT, deadly]) as measuring:
+        (child,) = [p for p in multiprocessing.active_children() if p.name == "kappaskin-cost"]
+        child.join()
+        (told,) = measuring.poll()
+        assert told.setting == EIGHT
+        with pytest.raises(Refusal, match="ended unexpectedly; measure again"):
+            measuring.poll()
 
 
 @pytest.fixture

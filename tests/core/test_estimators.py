@@ -270,6 +270,16 @@ def test_the_readings_are_left_as_they_came_and_may_be_written_over(method):
 
 
 @every_method
+def test_who_writes_on_error_bars_changes_no_later_ones(method):
+    fit, other = made(method), made(method)
+
+    fit(noisy()).unit_sd[:] = 0
+    other(noisy())
+
+    np.testing.assert_array_equal(fit(noisy(1)).sd, other(noisy(1)).sd)
+
+
+@every_method
 def test_a_batch_of_no_frames_has_no_answers(method):
     answer = made(method)(np.empty((0, 3, 100)))
 
@@ -283,6 +293,45 @@ def test_a_batch_of_no_frames_has_no_answers(method):
 def test_curvature_of_another_shape_is_refused(method, wrong):
     with pytest.raises(Refusal, match=r"expected curvature of shape \(3, 100\).*got \("):
         made(method)(wrong)
+
+
+@every_method
+@pytest.mark.parametrize(
+    "wrong",
+    ["abc", [[1, 2], [1], [2]], np.zeros((3, 100), complex), np.ma.zeros((3, 100)), None],
+    ids=["text", "ragged", "complex", "masked", "nothing"],
+)
+def test_what_is_no_array_of_real_numbers_is_refused(method, wrong):
+    with pytest.raises(Refusal, match="expected curvature as an array of real numbers"):
+        made(method)(wrong)
+    if wrong is not None:
+        with pytest.raises(Refusal, match="expected sigma as an array of real numbers"):
+            made(method, sigma=wrong)
+
+
+@every_method
+@pytest.mark.parametrize(("dtype", "huge"), [("float64", 1e160), ("float32", 1e30)])
+def test_a_reading_too_large_to_compute_with_is_missing(method, dtype, huge):
+    missing, too_large = noisy(frames=2), noisy(frames=2)
+    missing[0, 1, 20], too_large[0, 1, 20] = np.nan, huge
+
+    answer, other = made(method, dtype=dtype)(missing), made(method, dtype=dtype)(too_large)
+
+    np.testing.assert_array_equal(other.coefficients, answer.coefficients)
+    np.testing.assert_array_equal(other.residual, answer.residual)
+
+
+@every_method
+@pytest.mark.parametrize(("dtype", "far"), [("float64", 1e61), ("float32", 4e7)])
+def test_a_sigma_beyond_all_sense_is_refused_and_one_short_of_it_is_computed(method, dtype, far):
+    for sigma in (far, 1 / far):
+        answer = made(method, sigma=sigma, dtype=dtype)(noisy())
+        assert np.isfinite(answer.coefficients).all()
+        assert np.isfinite(answer.sd).all()
+        assert (answer.sd > 0).all()
+    for sigma in (10 * far, 0.1 / far):
+        with pytest.raises(Refusal, match=f"every sigma from .* in {dtype}"):
+            made(method, sigma=sigma, dtype=dtype)
 
 
 @every_method

@@ -273,7 +273,7 @@ def test_float32_leaves_out_what_is_missing_as_well_as_float32_can():
     assert 0 < answer.steps < 20
 
 
-@pytest.mark.parametrize("size", [1e-200, 1e-30, 1e30, 1e200])
+@pytest.mark.parametrize("size", [1e-200, 1e-30, 1e30, 1e70])
 def test_tiny_and_huge_readings_are_fitted_alike(size):
     setup = of(12, 10, 11, 9)
     K = readings(*setup)

@@ -215,7 +215,7 @@ class Pseudo(AsPrinted):
     def _fit(self, flat, used):
         c = np.linalg.pinv(self.M[used], rcond=1e-9) @ flat[..., used].T
         bars = DenseSpread(lambda: np.linalg.pinv(self.M[used].T @ self.M[used], rcond=1e-15))
-        return self._fitted(flat, used, c.T, bars)
+        return self._answer(flat, c.T, bars, int(used.sum()) - self.unknowns)
 
 
 class Off(LeastSquares):

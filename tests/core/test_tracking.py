@@ -367,7 +367,7 @@ def test_a_device_that_starts_anew_is_followed_anew():
     np.testing.assert_array_equal(again.coefficients, Tracking(FOURS, SIXES)(K).coefficients)
 
 
-@pytest.mark.parametrize("gap", [1e-9, 0.1, 10.0, 1e9])
+@pytest.mark.parametrize("gap", [1e-9, 0.1, 10.0, 1e9, 1e300])
 def test_after_a_gap_less_is_certain_and_the_next_frame_counts(gap):
     rng, c, rows = np.random.default_rng(0), still_shape(), displacement_rows()
     fit, t = Tracking(FOURS, SIXES), np.full((3, 36), 0.0)
@@ -555,6 +555,12 @@ def test_channels_are_chosen_near_the_contact_and_again_only_once_they_are_old()
     nothing[first], times[first] = 0.0, 1e-3
     fit.follow(nothing.reshape(3, -1), times.reshape(3, -1))
     assert len(set(fit.choose(60, contact, 1e-6).tolist()) & set(first.tolist())) < 30
+
+
+def test_channels_can_be_chosen_before_anything_was_read():
+    chosen = Tracking(FOURS, SIXES).choose(60, np.full(2, np.nan), 1e-3)
+
+    assert len(set(chosen.tolist())) == 60
 
 
 # In a pipeline

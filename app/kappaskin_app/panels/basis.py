@@ -3,18 +3,21 @@
 from PySide6.QtWidgets import QWidget
 
 from kappaskin import Status, edges_of
+from kappaskin_app.panels.calibration.parts import sentence
 from kappaskin_app.panels.form import Form
+from kappaskin_app.settings import METHOD_SHORT
 
 
 def in_use(status: Status) -> str:
-    """Why the functions are not those asked for, and which they are; nothing when they are."""
+    """Why the fit is not the one asked for, and which it is; nothing when it is."""
     if not status.refusal:
         return ""
     if status.slot is None:
-        return f"Nothing is in use. {status.refusal}."
+        return f"Nothing is in use. {sentence(status.refusal)}"
     setup, sensor = status.setup, status.sensor
     across = 1 if sensor is not None and sensor.layout.patch.strip else setup.Nj
-    return f"In use: {setup.Ni} x {across}. {status.refusal}."
+    method = METHOD_SHORT.get(setup.method, setup.method)
+    return f"In use: {method}, {setup.Ni} x {across} functions. {sentence(status.refusal)}"
 
 
 class BasisPanel(Form):

@@ -97,10 +97,12 @@ class ConnectionPanel(Panel):
 
 def _said(sensor: Sensor, calibration: Calibration | None) -> str:
     """What a sensor is, in words."""
-    patch, dead = sensor.layout.patch, int((~sensor.layout.live).sum())
+    patch, live = sensor.layout.patch, sensor.layout.live
+    sensing = live[:1] if patch.strip else live  # a strip bends along x alone
+    dead = int((~sensing).sum())
     a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
     bent = f", radius {radius:g} mm" if patch.base_curvature else ""
-    health = f"\n{dead} of {sensor.channels} channels dead" if dead else ""
+    health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
     calibrated = f"\n{said(calibration)}" if calibration else ""
     return (
         f"{sensor.name} ({sensor.serial_number})\n{sensor.layout}, {sensor.edge}{health}\n"

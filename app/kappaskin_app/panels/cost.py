@@ -182,7 +182,7 @@ class CostPanel(QWidget):
 
     def _show_message(self, now: Costing, text: str) -> None:
         hint = not text
-        text = now.about if hint else text
+        text = now.note() if hint else text
         if (text, hint) != (self.message.text(), self._hint):
             self._hint = hint
             self.message.setText(text)
@@ -206,6 +206,9 @@ class CostPanel(QWidget):
     def _show_slider(self, present: Cost | None) -> None:
         best = self._frontier.best
         self.wanted.setEnabled(len(best) > 0)
+        if not best:
+            self._accuracy = math.nan  # what was wanted of another skin says nothing of this one
+            self._show_wanted()
         if not best or self.wanted.isSliderDown():
             return
         errors = [cost.rms for cost in best]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt
-from PySide6.QtGui import QKeyEvent, QKeySequence, QStandardItemModel, QValidator
+from PySide6.QtGui import QKeyEvent, QKeySequence, QPaintEvent, QStandardItemModel, QValidator
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -15,6 +15,9 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QSizePolicy,
     QSpinBox,
+    QStyle,
+    QStyleOptionComboBox,
+    QStylePainter,
     QWidget,
 )
 
@@ -45,6 +48,26 @@ class _RealBox(QDoubleSpinBox):
     def fixup(self, text: str) -> str:
         typed = float(text.removesuffix(self.suffix()) or self.value())
         return self.textFromValue(min(max(typed, self.minimum()), self.maximum()))
+
+
+class _ChoiceBox(QComboBox):
+    """Where there is no room for all of the words, dots say so."""
+
+    def words_shown(self) -> str:
+        option = QStyleOptionComboBox()
+        self.initStyleOption(option)
+        field = QStyle.SubControl.SC_ComboBoxEditField
+        kind = QStyle.ComplexControl.CC_ComboBox
+        room = self.style().subControlRect(kind, option, field, self).width() - 2
+        words = self.currentText()
+        return self.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter, option = QStylePainter(self), QStyleOptionComboBox()
+        self.initStyleOption(option)
+        option.currentText = self.words_shown()  # pyright: ignore[reportAttributeAccessIssue]
+        painter.drawComplexControl(QStyle.ComplexControl.CC_ComboBox, option)
+        painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
 
 
 def _typing(box: QSpinBox | QDoubleSpinBox, text: str) -> QValidator.State:
@@ -125,7 +148,7 @@ def _tip_of(how: Range, most: float) -> str:
 
 
 def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:
-    box = QComboBox()
+    box = _ChoiceBox()
     for value, words in how.options:
         box.addItem(words, value)
     if max(len(words) for _, words in how.options) > _LONG:

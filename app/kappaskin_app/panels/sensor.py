@@ -95,10 +95,17 @@ def _words(bargain: Bargain, asked: float, without: float) -> str:
         else f"buys no rate: all channels come at {full_rate:.0f} frames/s as well"
     )
     more = f" (it could be {bargain.rate:.0f})" if bargain.rate > 1.005 * rate else ""
-    mm, full = (1e3 * max(bound[:2]) for bound in (bargain.bound, bargain.full_bound))
+    told = [axis for axis in (0, 1) if math.isfinite(bargain.full_bound[axis])]  # a strip's x alone
+    if not told:
+        return f"Scans {bargain.channels} channels a frame. It {buys}{more}."
+    mm, full = (1e3 * max(bound[told]) for bound in (bargain.bound, bargain.full_bound))
+    all_tell = f"all channels to \N{PLUS-MINUS SIGN}{full:.2f} mm"
+    if not math.isfinite(mm):
+        costs = f"costs accuracy: one frame does not tell where the contact is, {all_tell} at best"
+        return f"Scans {bargain.channels} channels a frame. It {buys}{more}. It {costs}."
     costs = (
         f"costs accuracy: one frame tells where the contact is to \N{PLUS-MINUS SIGN}{mm:.2f} mm "
-        f"at best, all channels to \N{PLUS-MINUS SIGN}{full:.2f} mm"
+        f"at best, {all_tell}"
         if mm > 1.005 * full
         else f"costs no accuracy: \N{PLUS-MINUS SIGN}{full:.2f} mm at best, as all channels"
     )

@@ -52,7 +52,7 @@ class StabilityPanel(QWidget):
         self.on_skin.setChecked(True)
         self.on_skin.setToolTip(
             "Colour the skin above by this shape instead of what is measured, while this panel is "
-            "seen."
+            "seen. Where all are seen alike, only by one that you choose."
         )
         self.buttons = [
             button(demonstration.title, f"demonstration-{number}", demonstration.told)

@@ -21,6 +21,7 @@ from kappaskin_app.settings.sensor import Scanning as Scanning
 from kappaskin_app.settings.sensor import Spoils as Spoils
 from kappaskin_app.settings.shown import COLOURS as COLOURS
 from kappaskin_app.settings.shown import METHOD_NAMES as METHOD_NAMES
+from kappaskin_app.settings.shown import METHOD_SHORT as METHOD_SHORT
 from kappaskin_app.settings.shown import Fit as Fit
 from kappaskin_app.settings.shown import View
 from kappaskin_app.settings.skin import Skin

@@ -21,6 +21,7 @@ METHOD_NAMES = (
     ("finite-slope", "Finite slope"),
     ("robust", "Robust, leaves out bad elements"),
 )
+METHOD_SHORT = {name: words.split(",")[0].split(" (")[0] for name, words in METHOD_NAMES}
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ class Fit:
         "least-squares",
         Choice(
             "Estimator",
-            "How the shape is found from the readings. Every way tells its error bars; the page "
-            "Cost shows what each takes and gives.",
+            "How the shape is found from the readings. Every way tells its error bars; Cost of "
+            "accuracy (F9) shows what each takes and gives.",
             METHOD_NAMES,
         ),
     )

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 from kappaskin import Cost
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.costing import Frontier, in_words
-from kappaskin_app.settings import METHOD_NAMES
+from kappaskin_app.settings import METHOD_SHORT
 from kappaskin_app.theme import LIGHT, SERIES, Theme
 from kappaskin_app.views.log_axis import LogAxis
 
@@ -19,6 +19,7 @@ _LEGEND = 196.0  # px right of the plot
 _SIZE = 4.0  # px from a point's middle to its rim
 _NEAR = 10.0  # px from the mouse to the point that it means
 _TICK = 74  # px that a written time needs
+_ROWS = len(METHOD_SHORT) + 5  # of the legend
 
 Point = tuple[float, float]
 
@@ -37,7 +38,7 @@ class CostPlot(QWidget):
         self._theme, self._empty = LIGHT, ""
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(470, 130)
+        self.setMinimumSize(470, _ROWS * self.fontMetrics().height())
         self.setAccessibleName("Error against time")
 
     def sizeHint(self) -> QSize:
@@ -145,7 +146,7 @@ class CostPlot(QWidget):
                 left = min(x - width / 2, area.right() - width + 4)
                 box = QRectF(max(left, area.left()), area.bottom() + 1, width, line)
                 painter.drawText(box, flags.AlignCenter, words)
-        free = area.bottom() + line
+        free = math.inf
         for value, written in self._y.ticks():
             y = self.at(value, 1.0).y()
             painter.setPen(QPen(QColor(theme.line), 1))
@@ -249,9 +250,9 @@ def _tick(value: float, said: Callable[[float], str]) -> str:
     return f"{float(number):g} {unit}"
 
 
-_METHODS = [name for name, _ in METHOD_NAMES]
+_METHODS = list(METHOD_SHORT)
 _SHORT = {
-    **{name: words.split(",")[0].split(" (")[0] for name, words in METHOD_NAMES},
+    **METHOD_SHORT,
     "own": "filled: elements as now",
     "other": "open: other elements",
     "present": "in use, as predicted",

@@ -108,10 +108,11 @@ class SpectrumPlot(QWidget):
     def _paint_axes(self, painter: QPainter, area: QRectF, count: int) -> None:
         theme, flags = self._theme, Qt.AlignmentFlag
         line = painter.fontMetrics().height()
-        free = area.bottom() + line
-        for value, written in self._axis.ticks():
+        free = -math.inf
+        # From the top, where values of 1 are: what is not written for want of room lies below.
+        for value, written in reversed(self._axis.ticks()):
             y = area.bottom() - self._axis.share(value) * area.height()
-            if not written or free - y < 1.3 * line:
+            if not written or y - free < 1.3 * line:
                 continue
             free = y
             painter.setPen(QPen(QColor(theme.line), 1))
@@ -120,7 +121,7 @@ class SpectrumPlot(QWidget):
             top = min(y - line / 2, area.bottom() - line + 3)
             box = QRectF(0, top, _LEFT - 5, line)
             painter.drawText(box, flags.AlignRight | flags.AlignVCenter, _power(value))
-        for number in sorted({1, count // 2, count} - {0}):
+        for number in sorted({1, (count + 1) // 2, count}):
             x = self.place_of(number).x()
             box = QRectF(x - 30, area.bottom() + 1, 60, line)
             painter.setPen(QColor(theme.faint))

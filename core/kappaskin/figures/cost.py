@@ -63,7 +63,7 @@ def draw(figure: style.Figure, scene: Scene, costs: Sequence[Cost | Refused]) ->
     style.key(figure, panels[0], 9.5)
     more = len(known) - len(shown)
     for y, text in (
-        (4.8, f"scene {scene.name}; line: no other setting is faster and as accurate; "
+        (4.8, f"scene {scene.name}; line: no other setting beats these in both; "
               "its labels: functions on elements"),
         (1.8, "larger: more elements; hollow: not all channels scanned"
               + (f"; left out: {more} with errors above the shape itself" if more else "")),

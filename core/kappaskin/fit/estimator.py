@@ -1,6 +1,5 @@
 """What every estimator takes and how it is asked: curvature to coefficients with error bars."""
 
-import math
 from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import ClassVar, cast
@@ -18,7 +17,27 @@ from kappaskin.layout import SensorLayout
 RIM_SD = 0.2e-3
 """How far in m a rim that gives is expected to move, unless said otherwise."""
 
+# Powers of the largest number: the squares of readings over sigmas, added up, stay below it.
+_SAFE, _SAFE_SIGMA = 0.25, 0.2
 _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
+
+
+def numbers(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Array:
+    """A copy of `values` in this `dtype`; raises a `Refusal` where they are no real numbers."""
+    try:
+        given = np.asarray(values)
+    except ValueError as error:  # rows of different lengths
+        raise Refusal(f"expected {what} as an array of real numbers, got {error}") from error
+    # A masked array would lose its mask.
+    if given.dtype.kind not in "biuf" or hasattr(values, "filled"):
+        raise Refusal(
+            f"expected {what} as an array of real numbers, NaN where one is missing; got "
+            f"{type(values).__name__} of {given.dtype}"
+        )
+    if given.dtype == dtype:  # as in most frames: the fastest
+        return given.copy()
+    with np.errstate(over="ignore"):  # to infinity, in float32
+        return given.astype(dtype)
 
 
 def column_lengths(A: Array) -> Array:
@@ -63,7 +82,8 @@ class Estimator(ABC):
         unseen = np.empty((basis.size, 0)) if basis.unseen is None else basis.unseen
         self.undecided = rim_sd * unseen
         """Shapes (N, q) in m that no reading sees, each as far as it is expected to go."""
-        self.sigma = None if sigma is None else np.array(sigma, float)
+        self._largest = float(np.finfo(self.dtype).max) ** _SAFE
+        self.sigma = None if sigma is None else numbers(sigma, "sigma")
         """The standard deviations in 1/m that were told, one or (3, P); None if none were."""
         self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
         """What each reading (3 P,) is worth, 1 / sigma in m; 1 for all without a sigma."""
@@ -86,6 +106,12 @@ class Estimator(ABC):
             )
         if not np.all(sigma > 0):
             raise Refusal("expected every sigma above zero in 1/m, got zero, less or NaN")
+        known, most = sigma[sigma < np.inf], float(np.finfo(self.dtype).max) ** _SAFE_SIGMA
+        if np.any((known > most) | (known < 1 / most)):
+            raise Refusal(
+                f"expected every sigma from {1 / most:.1g} to {most:.1g} 1/m, or infinite, in "
+                f"{self.dtype}, got {known.min():g} to {known.max():g}"
+            )
         return np.broadcast_to(1 / sigma, (3, len(self.layout))).reshape(-1)
 
     @cached_property
@@ -111,13 +137,16 @@ class Estimator(ABC):
             )
 
     def __call__(self, curvature: ArrayLike) -> Fit:
-        """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading."""
-        K = np.array(curvature, self.dtype)  # ours: residuals are told from it later
+        """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading.
+
+        So do readings that are too large to compute with, of 4e9 in float32 and 1e77 in float64.
+        """
+        K = numbers(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
         self._check_shape(K)
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
-        if self._all_readable and _surely_finite(K.reshape(-1)):
+        if self._all_readable and _squared(K.reshape(-1)) <= self._largest**2:
             return self._fit(flat, self.readable)
-        used = np.isfinite(flat) & self.readable
+        used = (np.abs(flat) <= self._largest) & self.readable
         flat[~used] = np.nan
         if np.all(used == self.readable):
             return self._fit(flat, self.readable)
@@ -213,7 +242,7 @@ class Estimator(ABC):
         )
 
 
-def _surely_finite(a: Array) -> bool:
-    """Whether the sum of squares of `a` is finite: told fastest, and false for huge numbers too."""
+def _squared(a: Array) -> float:
+    """The sum of squares of `a`: of all that tells whether it is finite and small, the fastest."""
     with np.errstate(over="ignore"):
-        return math.isfinite(a.dot(a))
+        return float(a.dot(a))

@@ -157,7 +157,7 @@ class _GridSpread:
 
     @property
     def sd(self) -> Array:
-        return self._sd
+        return self._sd.copy()  # who asked may write on it
 
     @cached_property
     def _sd(self) -> Array:

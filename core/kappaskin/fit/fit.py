@@ -1,9 +1,9 @@
 """What every estimator answers: the shape of a frame or of several, and how well it is known."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -183,3 +183,22 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
         of_each("converged"),
         np.concatenate(suspect)[order] if suspect else None,
     )
+
+
+def in_time(fits: Sequence[Fit]) -> Fit:
+    """One fit of T frames from the fits of each of them."""
+
+    def alone(fit: Fit) -> Fit:
+        return replace(
+            fit,
+            curvature=fit.curvature[None],
+            coefficients=fit.coefficients[None],
+            spreads=[cast("Spread", fit.spreads)],
+            spare=np.reshape(fit.spare, (1,)),
+            told_noise=None if fit.told_noise is None else np.reshape(fit.told_noise, (1,)),
+            steps=np.reshape(fit.steps, (1,)),
+            converged=np.reshape(fit.converged, (1,)),
+            suspect=None if fit.suspect is None else fit.suspect[None],
+        )
+
+    return gathered([alone(fit) for fit in fits], np.arange(len(fits)))

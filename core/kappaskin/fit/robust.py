@@ -6,13 +6,14 @@ from itertools import combinations
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from kappaskin.bases import Basis
+from kappaskin.errors import RankDeficient
 from kappaskin.fit.bayes import Evidence
-from kappaskin.fit.estimator import Estimator
-from kappaskin.fit.fit import Fit
+from kappaskin.fit.estimator import Estimator, numbers
+from kappaskin.fit.fit import Fit, in_time
 from kappaskin.fit.least_squares import LeastSquares
 from kappaskin.fit.prior import prior_root
 from kappaskin.fit.remembered import Remembered
@@ -79,7 +80,8 @@ class Robust(Estimator):
     left out one round after the other, and let in again where the rest agrees with them after
     all; the shape is that of `LeastSquares` with them dead. `Fit.suspect` says which and why:
     what the last frames tell. Where more than a quarter of the elements contradict the rest, none
-    is left out and `Fit.converged` says no.
+    is left out and `Fit.converged` says no; without a `sigma` they may pass for noise, which is
+    then told as large.
     """
 
     def _set_up(self) -> None:
@@ -126,6 +128,30 @@ class Robust(Estimator):
         beyond = np.sum(self._forces[used] ** 2, axis=0) - by_press.sum(axis=1)
         return _Judge(evidence, U, by_press, np.maximum(beyond, 0.0), used, int(used.sum()))
 
+    def __call__(self, curvature: ArrayLike) -> Fit:
+        """Fit `curvature` (3, P), or (T, 3, P) in the order of time, in 1/m."""
+        K = numbers(curvature, "curvature", self.dtype)
+        self._check_shape(K)
+        there = np.abs(K) <= self._largest
+        if K.ndim == 2 or (there == there[:1]).all():
+            return super().__call__(K)
+        # Not those together that lack the same readings: the why is told by the frames before.
+        return in_time([self._next(frame, t) for t, frame in enumerate(K)])
+
+    def _next(self, frame: Array, number: int) -> Fit:
+        try:
+            return super().__call__(frame)
+        except RankDeficient as error:
+            raise RankDeficient(f"frame {number}: {error}") from error
+
+    def at_rest(self) -> Fit:
+        """The fit to a skin at rest, which is no frame of the past."""
+        past, self._history = self._history, _History()
+        try:
+            return super().at_rest()
+        finally:
+            self._history = past
+
     def _fit(self, flat: Array, used: Mask) -> Fit:
         if not used.any():
             raise self.refusal(0, 0)
@@ -148,9 +174,10 @@ class Robust(Estimator):
     def _told(self, flat: Array, used: Mask) -> _Verdict:
         judge, P = self._judges(used, self._judge), len(self.layout)
         K = np.where(used, flat, 0.0) * self.weight
-        suspects, loads, rounds = self._outrageous(K), list[int](), 0
+        there = cast("Mask", used.reshape(3, P).any(axis=0))
+        suspects, loads, rounds = _outrageous(K, there), list[int](), 0
         (gamma,) = judge.evidence(K[None, used])[1]
-        while suspects.sum() <= _MOST * P:
+        while suspects.sum() <= _MOST * there.sum():
             free = np.hstack([_columns(suspects), *(self._presses[:, g] for g in loads)])
             view = _View(judge, K, free, float(gamma))
             _, (gamma,), (sigma,) = judge.evidence((K - view.explained)[None, used])
@@ -184,11 +211,12 @@ class Robust(Estimator):
         found = t > np.where(suspects, _BACK * self._limit, least)
         return found, place if press[place] > max(most, self._press_limit) else None
 
-    def _outrageous(self, K: Array) -> Mask:
-        """The elements (P,) that read so much more than most that they are suspected at once."""
-        size = np.abs(K.reshape(3, -1)).max(axis=0)
-        found = size > _OUTRAGEOUS * np.quantile(size, 1 - _MOST)
-        return found & (found.mean() <= _MOST)
+
+def _outrageous(K: Array, there: Mask) -> Mask:
+    """The elements (P,) that read so much more than most of those `there`: suspected at once."""
+    size = np.abs(K.reshape(3, -1)).max(axis=0)
+    found = size > _OUTRAGEOUS * np.quantile(size[there], 1 - _MOST)
+    return found & (found.sum() <= _MOST * there.sum())
 
 
 def _columns(elements: Mask) -> Array:
@@ -260,8 +288,10 @@ class _History:
     def _by_the_past(self, why: NDArray[np.uint8], suspects: NDArray[np.intp]) -> None:
         Ks, were, offs = (np.stack(part) for part in zip(*self._frames, strict=True))
         latest = Ks[-_ENOUGH:]
-        still = (latest == latest[-1]).all(axis=(0, 1))
-        moving = np.nanmedian(np.ptp(latest, axis=0)) > 0
+        # A missing reading, as of a dead channel, contradicts nothing.
+        still = ((latest == latest[-1]) | np.isnan(latest)).all(axis=(0, 1))
+        spans = np.ptp(latest, axis=0)
+        moving = np.count_nonzero(spans > 0) > np.count_nonzero(spans == 0)
         for p in suspects:
             if still[p] and moving:
                 why[p] = WHY.index("stuck")
@@ -275,6 +305,7 @@ class _History:
     ) -> None:
         told = K - off
         for p, q in combinations(suspects, 2):
-            crossed = np.sum((K[:, p] - told[:, q]) ** 2 + (K[:, q] - told[:, p]) ** 2)
-            if crossed < _CROSSED * np.sum(off[:, p] ** 2 + off[:, q] ** 2):
+            both = np.isfinite(K[:, p] + K[:, q])  # channels
+            crossed = (K[both, p] - told[both, q]) ** 2 + (K[both, q] - told[both, p]) ** 2
+            if crossed.sum() < _CROSSED * np.sum(off[both, p] ** 2 + off[both, q] ** 2):
                 why[[p, q]] = WHY.index("swapped")

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.fit.choosing import telling_most
-from kappaskin.fit.estimator import Estimator
-from kappaskin.fit.fit import Fit, Spread, gathered
+from kappaskin.fit.estimator import Estimator, numbers
+from kappaskin.fit.fit import Fit, in_time
 from kappaskin.fit.kalman import MovingModes
 from kappaskin.fit.level import START, Level
 from kappaskin.fit.prior import prior_root
@@ -24,6 +24,7 @@ _SHORTEST = 1e-3  # s, if that is longer: a step must not take longer than its r
 _PERIOD = 6e-3  # s that a frame takes which comes without times: the paper's 300 channels
 _HELD = 0.1  # s after which a reading no longer tells what lies between the modes
 _BACK = 0.05  # s by which a clock may go back within one run of a device
+_FORGOTTEN = 1e9  # s: of what is so long ago nothing is left, and squares are still numbers
 _COARSE = 8  # modes that make nearly all of the displacement
 _PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin, as displacement
 
@@ -92,14 +93,14 @@ class Tracking(Estimator):
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Take in the next frame (3, P) or T of them (T, 3, P), read 6 ms after each other."""
-        K = np.asarray(curvature, float)
+        K = numbers(curvature, "curvature")
         self._check_shape(K)
         if K.ndim == 2:
             return self.follow(K, np.full(K.shape, self._next))
         if not len(K):
             none = np.empty((0, *self.basis.shape), self.dtype)
             return Fit(self, K.astype(self.dtype), none, [], np.zeros(0), np.zeros(0))
-        return _in_time([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
+        return in_time([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
 
     @property
     def _next(self) -> float:
@@ -109,11 +110,12 @@ class Tracking(Estimator):
     def follow(self, curvature: ArrayLike, times: ArrayLike, held: Array | None = None) -> Fit:
         """Take in `curvature` (3, P) in 1/m read at `times` (3, P) in s on the device's clock.
 
-        NaN and infinity mean a missing reading; the time of a channel that was not read at all is
-        NaN. Readings of one channel are to come in the order of their times. A clock that goes back
-        is that of a device that started anew. What is `held` of earlier frames is known already.
+        Which readings are missing is told as in any call of an estimator; the time of a channel
+        that was not read at all is NaN. Readings of one channel are to come in the order of their
+        times. A clock that goes back is that of a device that started anew. What is `held` of
+        earlier frames is known already.
         """
-        frame, when = np.asarray(curvature, float), np.asarray(times, float)
+        frame, when = numbers(curvature, "curvature"), numbers(times, "times")
         self._check_shape(frame)
         if frame.ndim != 2 or when.shape != frame.shape:
             raise Refusal(
@@ -121,7 +123,7 @@ class Tracking(Estimator):
                 f"and {when.shape}"
             )
         K, t = frame.ravel(), when.ravel()
-        used = np.flatnonzero(np.isfinite(K) & self.readable)
+        used = np.flatnonzero((np.abs(K) <= self._largest) & self.readable)
         scanned = ~np.isnan(t)
         if not np.isfinite(t[scanned]).all() or not scanned[used].all():
             raise Refusal("expected a time in s with every reading, got NaN or infinity")
@@ -165,8 +167,9 @@ class Tracking(Estimator):
     def _aged(self, ahead: float) -> Array:
         """How much of a reading (3 P,) would be new."""
         level = self._level
-        speed = START if level is None else level.speed
-        finest = math.sqrt(3) * speed * float(self._wavenumbers.max())
+        if level is None:  # nothing was read yet
+            return np.ones(len(self._read))
+        finest = math.sqrt(3) * level.speed * float(self._wavenumbers.max())
         return -np.expm1(-finest * (self._now + ahead - self._read))
 
     def _begin(self, times: Array) -> None:
@@ -198,7 +201,8 @@ class Tracking(Estimator):
     def _advance(self, time: float) -> None:
         level = cast("Level", self._level)
         if time > self._now and math.isfinite(self._now):
-            self._filter.advance(time - self._now, level.amplitude, level.speed)
+            passed = min(time - self._now, _FORGOTTEN)
+            self._filter.advance(passed, level.amplitude, level.speed)
         self._now = max(time, self._now)
 
     def _take(self, channels: NDArray[np.intp], K: Array, t: Array) -> None:
@@ -244,24 +248,6 @@ class Tracking(Estimator):
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         return self(flat.reshape(*flat.shape[:-1], 3, -1))
-
-
-def _in_time(fits: list[Fit]) -> Fit:
-    """One fit of T frames from theirs."""
-    return gathered(
-        [
-            Fit(
-                fit.estimator,
-                fit.curvature[None],
-                fit.coefficients[None],
-                [cast("Spread", fit.spreads)],
-                np.reshape(fit.spare, (1,)),
-                np.reshape(cast("Array", fit.told_noise), (1,)),
-            )
-            for fit in fits
-        ],
-        np.arange(len(fits)),
-    )
 
 
 def _principal(basis: Basis) -> tuple[Array, Array, Array]:

@@ -46,10 +46,19 @@ class Measuring:
         theirs.close()
 
     def poll(self) -> list[Cost | Refused]:
-        """What has been measured since the last call; a `Refusal` when the process has died."""
+        """What has been measured since the last call.
+
+        Raises a `Refusal` when the process has died, once all that it measured is told.
+        """
         found: list[Cost | Refused] = []
         while not self.done and self._pipe.poll():
-            found += self._next()
+            try:
+                found += self._next()
+            except Refusal:
+                if not found:
+                    raise
+                self.done = False  # the next call tells
+                break
         return found
 
     def wait(self) -> Generator[Cost | Refused]:

@@ -14,15 +14,15 @@ def frontier(costs: Iterable[Cost | Refused], total: bool = False) -> tuple[Cost
     """The costs that no other beats in both RMS error, with noise, and time; fastest first.
 
     The time is that of the arithmetic in a frame; with `total`, conversion counts too. A slower one
-    must be better by more than `ALIKE`. To say nothing beats what is further off than the shape.
+    must be better than the faster ones here by more than `ALIKE`. To say nothing beats what is
+    further off than the shape.
     """
     known = [cost for cost in costs if isinstance(cost, Cost) and cost.rms < cost.shape_rms]
     kept: list[Cost] = []
-    least = math.inf
     for cost in sorted(known, key=lambda cost: (_time(cost, total), cost.rms)):
-        if cost.rms < (1 - ALIKE) * least:
+        # Better than those kept, not than all: many small steps make a large one.
+        if not kept or cost.rms < (1 - ALIKE) * kept[-1].rms:
             kept.append(cost)
-        least = min(least, cost.rms)
     return tuple(kept)
 
 

@@ -95,7 +95,7 @@ frame   median from readings to coefficients, and over numpy.linalg.lstsq on the
 scan    conversion of the channels; set-up to the first answer, memory at its highest point
 RMS     error over the skin, mean of {DRAWS} frames with the scene's noise; exact: without noise
 E       signed error at the load, mean +- standard deviation of those frames
-* +     no other setting is faster and as accurate within {ALIKE:.0%}: *frame, +scan and frame"""
+* +     more accurate, by {ALIKE:.0%} at least, than all that are faster: *frame, +scan and frame"""
 
 
 def _outro(costs: Sequence[Cost | Refused]) -> str:
