@@ -15,10 +15,10 @@ from kappaskin.transduction import Transduction
 class StrainLimit(ReadingEffect):
     """y = x + share z: beyond the elastic limit of metal foil the zero shifts, and stays shifted.
 
-    z is how far the channel went beyond `strain_limit_curvature` of `transduction`, a play that
-    far wide: it grows while the curvature does, stays when it comes back, and only bending beyond
-    the limit the other way takes it back. Assumed: the `share` is the same everywhere and from the
-    first time on, time does not heal it, and of the twist's two gages counts what they differ by.
+    z is how far the channel went beyond `strain_limit_curvature` of `transduction`: a play, which
+    grows with the curvature, stays as that comes back, and shrinks where it is the limit below z.
+    Assumed: the `share` is the same everywhere and from the first time on, time does not heal it,
+    and of the twist's two gages counts what they differ by.
     """
 
     name: ClassVar = "strain-limit"

@@ -27,7 +27,7 @@ def stuck(channels: NDArray[np.intp], since: float) -> Running:
 def intermittent(
     channels: NDArray[np.intp], on: float, off: float, rng: np.random.Generator
 ) -> Running:
-    there = np.less(rng.random(channels.shape[1]), on / (on + off))
+    there = rng.random(len(channels[0])) < on / (on + off)
     last = math.nan
 
     def read(curvature: Array, time: float) -> Array:
