@@ -5,6 +5,7 @@ from kappaskin.effects.converter import Saturation as Saturation
 from kappaskin.effects.creep import Creep as Creep
 from kappaskin.effects.creep import StandardLinearSolid as StandardLinearSolid
 from kappaskin.effects.cross_talk import CrossTalk as CrossTalk
+from kappaskin.effects.effect import NOTHING as NOTHING
 from kappaskin.effects.effect import Effect as Effect
 from kappaskin.effects.effect import LayoutEffect as LayoutEffect
 from kappaskin.effects.effect import ReadingEffect as ReadingEffect

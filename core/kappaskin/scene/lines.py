@@ -21,20 +21,19 @@ class Lines:
         within, counts = list[str | int](), dict[str, int]()
         for number, line in enumerate(text.splitlines(), 1):
             if header := _HEADER.match(line):
-                within = list(_names(header[2]))
                 if header[1] == "[[":
                     counts[header[2]] = counts.get(header[2], -1) + 1
-                within = self._counted(within, counts)
+                within = self._counted(_names(header[2]), counts)
                 self._lines[tuple(within)] = number
             elif key := _KEY.match(line):
                 self._lines.setdefault((*within, *_names(key[1])), number)
 
     @staticmethod
-    def _counted(names: list[str | int], counts: dict[str, int]) -> list[str | int]:
+    def _counted(names: list[str], counts: dict[str, int]) -> list[str | int]:
         """The names with the number of the last table after those that are arrays of tables."""
         place, dotted = list[str | int](), list[str]()
         for name in names:
-            dotted.append(str(name))
+            dotted.append(name)
             place.append(name)
             if ".".join(dotted) in counts:
                 place.append(counts[".".join(dotted)])

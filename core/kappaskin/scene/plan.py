@@ -4,13 +4,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from kappaskin.effects import (
     EFFECTS,
     NOTHING,
+    DeadElements,
     Effect,
     FiniteSlope,
-    Foam,
     Fluid,
+    Foam,
     GageLength,
     Quantisation,
     Saturation,
@@ -18,6 +21,7 @@ from kappaskin.effects import (
     Skew,
     Tension,
 )
+from kappaskin.scene.choice import Choice
 from kappaskin.scene.scene import Scene
 from kappaskin.scene.survey import survey
 
@@ -74,6 +78,8 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
         there.append(Fluid())
     if layout.gage_length:
         there.append(GageLength(layout.gage_length))
+    if dead := tuple(np.flatnonzero(~layout.live.any(axis=0)).tolist()):
+        there.append(DeadElements(dead))
     if not plate.patch.base_curvature and scene.laid is None:
         there.append(FiniteSlope())
     if scene.moves:

@@ -12,7 +12,12 @@ import numpy as np
 
 from kappaskin.bases import EDGES, basis_for
 from kappaskin.calibration import Presentation, schedule
-from kappaskin.effects import EFFECTS, FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS, ReadingEffect
+from kappaskin.effects import (
+    EFFECTS,
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION_LOOPS,
+    ReadingEffect,
+)
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import (
@@ -271,7 +276,9 @@ def read_scene_file(file: FilePath) -> Scene:
     """The scene in `file`."""
     try:
         if file.stat().st_size > _LARGEST:
-            raise Refusal(f"{file}: expected a scene of at most {_LARGEST} bytes, got a larger file")
+            raise Refusal(
+                f"{file}: expected a scene of at most {_LARGEST} bytes, got a larger file"
+            )
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error

@@ -18,9 +18,7 @@ _ENDING = ".toml"
 
 SCENES = tuple(
     sorted(
-        file.name.removesuffix(_ENDING)
-        for file in _FOLDER.iterdir()
-        if file.name.endswith(_ENDING)
+        file.name.removesuffix(_ENDING) for file in _FOLDER.iterdir() if file.name.endswith(_ENDING)
     )
 )
 """Names of the ready scenes."""

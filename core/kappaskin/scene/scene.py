@@ -1,23 +1,21 @@
 """What is in a scene: a skin, what touches it, and what spoils its readings."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kappaskin.bases import Basis, SineBasis, basis_for
-from kappaskin.calibration import Presentation, schedule
-from kappaskin.effects import SECOND_GENERATION_LOOPS, ReadingEffect, Tolerance, UniformNoise
+from kappaskin.bases import Basis, basis_for
+from kappaskin.calibration import Presentation
+from kappaskin.effects import ReadingEffect
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
-from kappaskin.mechanics import LineLoad, Load, Plate, PointLoad
-from kappaskin.patch import Patch
+from kappaskin.mechanics import Load, Plate
 from kappaskin.scene.choice import LINEAR, Choice
-from kappaskin.scene.motion import Motion, Orbit
+from kappaskin.scene.motion import Motion
 from kappaskin.scene.stimulus import Stimulus
 from kappaskin.sensor import Sensor
-from kappaskin.transduction import Amplifier, Transduction
+from kappaskin.transduction import Transduction
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""

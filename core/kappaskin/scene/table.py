@@ -13,7 +13,12 @@ from kappaskin.scene.lines import Lines, Place
 _Made = TypeVar("_Made")
 _REQUIRED = object()
 
-_KINDS: dict[Any, str] = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+_KINDS: dict[Any, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "a text",
+}
 
 
 class Table:
