@@ -28,7 +28,9 @@ class ElasticSkin:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, functions: int) -> None:
         patch = plate.patch
         if patch.strip:
-            raise Refusal("a strip bends along x alone: expected a skin with two sides to tell objects by")
+            raise Refusal(
+                "a strip bends along x alone: expected a skin with two sides to tell objects by"
+            )
         if not plate.rigidity:
             raise Refusal("a drum head has no curvature to tell objects by: expected a rigidity")
         if len(layout) > _MOST:
