@@ -6,6 +6,7 @@ from kappaskin.scene.motion import Motion as Motion
 from kappaskin.scene.motion import Orbit as Orbit
 from kappaskin.scene.plan import Entry as Entry
 from kappaskin.scene.plan import Plan as Plan
+from kappaskin.scene.plan import effects_of as effects_of
 from kappaskin.scene.plan import kept_of as kept_of
 from kappaskin.scene.plan import plan as plan
 from kappaskin.scene.read import read_scene as read_scene

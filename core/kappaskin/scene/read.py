@@ -3,10 +3,10 @@
 import math
 import tomllib
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -168,9 +168,11 @@ def _electronics(table: Table) -> Transduction:
 
 def _changed(table: Table, part: Any) -> Any:
     """The `part` of the electronics with what the table says of it."""
-    made = table.make(type(part), **{k: v for k, v in vars(part).items() if k not in table})
+    hints = get_type_hints(type(part))
+    said = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
     table.done()
-    return made
+    with table.blamed():
+        return replace(part, **said)
 
 
 def _stimulus(
@@ -276,9 +278,7 @@ def read_scene_file(file: FilePath) -> Scene:
     """The scene in `file`."""
     try:
         if file.stat().st_size > _LARGEST:
-            raise Refusal(
-                f"{file}: expected a scene of at most {_LARGEST} bytes, got a larger file"
-            )
+            raise Refusal(f"{file}: expected a scene of at most {_LARGEST} bytes, got more")
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error

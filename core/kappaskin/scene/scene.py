@@ -28,7 +28,8 @@ class Scene:
     `reference` is the number of functions (Ri, Rj) of the true shape: Table 1 defines its truth
     with 15 x 15, since the curvature under a point load grows with every further function. `edge`
     says how the skin is held, unless it is `laid` on one cylinder after the other instead. Of what
-    spoils its readings, `choice` says what is simulated. `title` and `text` say what there is to see.
+    spoils its readings, `choice` says what is simulated. `title` and `text` say what there is to
+    see.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """A table of a TOML file to values of the kinds asked for; what nobody asks for is refused."""
 
 import difflib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from types import UnionType
@@ -34,7 +34,7 @@ class Table:
         return Refusal(f"{self._name}, line {self._lines.of(place)}: {_dotted(place)}{why}")
 
     @contextmanager
-    def blamed(self, key: str = "") -> Iterator[None]:
+    def blamed(self, key: str = "") -> Generator[None]:
         """Say of what is refused meanwhile where it stands in the file."""
         try:
             yield
@@ -55,9 +55,8 @@ class Table:
 
     def _as(self, value: Any, kind: Any, key: str) -> Any:
         if isinstance(kind, UnionType):
-            lists = [one for one in get_args(kind) if get_origin(one) is tuple]
-            others = [one for one in get_args(kind) if get_origin(one) is not tuple]
-            kind = (lists if isinstance(value, list) else others)[0]
+            listed = isinstance(value, list)
+            kind = next(k for k in get_args(kind) if listed == (get_origin(k) is tuple))
         if get_origin(kind) is tuple and isinstance(value, list):
             kinds, values = get_args(kind), cast("list[Any]", value)
             each = kinds[:1] * len(values) if kinds[1:] == (...,) else kinds
@@ -81,11 +80,12 @@ class Table:
         """The tables of the array [[key]]."""
         self._asked.add(key)
         said = self._said.get(key, [])
-        if not (isinstance(said, list) and all(isinstance(one, dict) for one in said)):
+        many = cast("list[Any]", said) if isinstance(said, list) else [said]
+        if not all(isinstance(one, dict) for one in many):
             raise self.refusal(f"expected an array of tables [[{key}]], got {said!r:.60}", key)
-        many = cast("list[dict[str, Any]]", said)
         return [
-            Table(one, self._lines, self._name, (*self.place, key, n)) for n, one in enumerate(many)
+            Table(cast("dict[str, Any]", one), self._lines, self._name, (*self.place, key, n))
+            for n, one in enumerate(many)
         ]
 
     def make(self, kind: Callable[..., _Made], *leave: str, **given: Any) -> _Made:
@@ -113,10 +113,8 @@ class Table:
         for key in self._said:
             if key not in self._asked:
                 near = "".join(f"; did you mean {one}?" for one in _nearest(key, list(self._asked)))
-                raise self.refusal(
-                    f"expected no such key{near or '; known are ' + ', '.join(sorted(self._asked))}",
-                    key,
-                )
+                known = near or f"; known are {', '.join(sorted(self._asked))}"
+                raise self.refusal(f"expected no such key{known}", key)
 
 
 def _nearest(name: str, known: list[str]) -> list[str]:
