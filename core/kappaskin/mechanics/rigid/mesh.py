@@ -4,7 +4,7 @@ import struct
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +70,7 @@ class Mesh:
         if not 0 < unit < np.inf:
             raise Refusal(f"expected a unit above zero in m, got {unit}")
         try:
-            mesh = trimesh.load_mesh(str(path))
+            mesh = cast("Any", trimesh).load_mesh(str(path))  # not typed throughout
         except (OSError, ValueError, LookupError, TypeError, AttributeError, struct.error) as error:
             raise Refusal(f"cannot read a mesh from {path}: {error}") from error
         if not len(mesh.faces):
@@ -102,17 +102,16 @@ def _lowest(triangles: Array, nx: int, ny: int) -> Array:
     first = np.maximum(np.ceil(triangles[..., :2].min(axis=1)), 0).astype(int)
     last = np.minimum(np.floor(triangles[..., :2].max(axis=1)), (nx - 1, ny - 1)).astype(int)
     across, up = np.maximum(last - first + 1, 0).T
-    ends = np.cumsum(across * up)
-    for part in np.split(
-        np.arange(len(triangles)), np.searchsorted(ends, np.arange(_AT_ONCE, ends[-1], _AT_ONCE))
-    ):
-        count = (across * up)[part]
+    pixels = across * up
+    batch = np.cumsum(pixels) // _AT_ONCE
+    for number in range(int(batch[-1]) + 1):
+        part = np.flatnonzero(batch == number)
+        count = pixels[part]
         which = np.repeat(part, count)
-        number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-        x = first[which, 0] + number % across[which]
-        y = first[which, 1] + number // across[which]
-        z = _plane(triangles[which], x, y)
-        np.minimum.at(heights, (y, x), z)
+        step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        x = first[which, 0] + step % across[which]
+        y = first[which, 1] + step // across[which]
+        np.minimum.at(heights, (y, x), _plane(triangles[which], x, y))
     return heights
 
 
