@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.rigid.relief import HeightMap
+from kappaskin.outline import turn
 
 _FILES = (".stl", ".ply", ".obj")
 _MOST = 2_000_000  # triangles
 _PIXELS = 256  # along the longer side of the map
 _AT_ONCE = 2**21  # pixels tried against triangles at a time
 _SIZES = (1e-4, 1.0)  # m
+_EDGE_ON = 1e-9  # pixels: a face seen with less area is seen from the side
+_ON_EDGE = 1e-9  # of a face: a pixel as far beside it is on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +102,8 @@ class Mesh:
 def _lowest(triangles: Array, nx: int, ny: int) -> Array:
     """The least z (ny, nx) of `triangles` (F, 3, 3) over whole x < nx and y < ny; else infinite."""
     heights = np.full((ny, nx), np.inf)
+    seen = np.abs(turn(*np.moveaxis(triangles[..., :2], 1, 0))) > _EDGE_ON
+    triangles = triangles[seen]
     first = np.maximum(np.ceil(triangles[..., :2].min(axis=1)), 0).astype(int)
     last = np.minimum(np.floor(triangles[..., :2].max(axis=1)), (nx - 1, ny - 1)).astype(int)
     across, up = np.maximum(last - first + 1, 0).T
@@ -111,22 +116,15 @@ def _lowest(triangles: Array, nx: int, ny: int) -> Array:
         step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
         x = first[which, 0] + step % across[which]
         y = first[which, 1] + step // across[which]
-        np.minimum.at(heights, (y, x), _plane(triangles[which], x, y))
+        np.minimum.at(heights, (y, x), _plane(triangles[which], np.column_stack([x, y])))
     return heights
 
 
-def _plane(triangles: Array, x: NDArray[np.intp], y: NDArray[np.intp]) -> Array:
-    """The z (P,) of each of `triangles` (P, 3, 3) at its x and y; infinite beside it."""
-    (a, b, c) = np.moveaxis(triangles[..., :2], 1, 0)
-    place = np.column_stack([x, y])
-
-    def twice(u: Array, v: Array) -> Array:
-        return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-
-    whole = twice(b - a, c - a)
-    with np.errstate(divide="ignore", invalid="ignore"):  # of triangles seen edge on
-        s, t = twice(place - a, c - a) / whole, twice(b - a, place - a) / whole
-        z = triangles[:, 0, 2] + s * (triangles[:, 1, 2] - triangles[:, 0, 2])
-        z += t * (triangles[:, 2, 2] - triangles[:, 0, 2])
-    inside = (whole != 0) & (s >= -1e-9) & (t >= -1e-9) & (s + t <= 1 + 1e-9)
-    return cast("Array", np.where(inside, z, np.inf))
+def _plane(triangles: Array, place: Array) -> Array:
+    """The z (P,) of each of `triangles` (P, 3, 3) at its `place` (P, 2); infinite beside it."""
+    a, b, c = np.moveaxis(triangles[..., :2], 1, 0)
+    whole = turn(a, b, c)
+    s, t = turn(a, place, c) / whole, turn(a, b, place) / whole
+    shares = np.column_stack([1 - s - t, s, t])
+    z = np.sum(shares * triangles[..., 2], axis=1)
+    return np.where((shares >= -_ON_EDGE).all(axis=1), z, np.inf)

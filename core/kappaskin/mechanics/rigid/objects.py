@@ -11,6 +11,7 @@ from kappaskin.frames import Array, Mask
 
 _SIDE = np.linspace(-1.0, 1.0, 17)
 _RIM = 64
+_ON = 1 + 1e-9  # of a size: a point of the keel on the rim, as computed, is on the object
 
 
 class RigidObject(Protocol):
@@ -43,6 +44,12 @@ def _above(height: Array, on: Mask) -> Array:
     return np.where(on, height, np.inf)
 
 
+def _inside(points: Array, extent: tuple[float, float]) -> Mask:
+    """Which of `points` (P, 2) lie in the rectangle of that extent."""
+    x, y = np.abs(points.T)
+    return (x <= _ON * extent[0]) & (y <= _ON * extent[1])
+
+
 def _round(radius: float, away: Array) -> Array:
     """How far a circle has risen at `away` in m from its lowest point, at most its radius."""
     away = np.minimum(np.abs(away), radius)
@@ -69,7 +76,7 @@ class Sphere:
 
     def height(self, points: Array) -> Array:
         away = np.hypot(points[:, 0], points[:, 1])
-        return _above(_round(self.radius, away), away <= self.radius)
+        return _above(_round(self.radius, away), away <= _ON * self.radius)
 
     def keel(self) -> Array:
         return np.zeros((1, 2))
@@ -90,8 +97,7 @@ class Cylinder:
         return self.length / 2, self.radius
 
     def height(self, points: Array) -> Array:
-        x, y = np.abs(points.T)
-        return _above(_round(self.radius, y), (x <= self.length / 2) & (y <= self.radius))
+        return _above(_round(self.radius, points[:, 1]), _inside(points, self.extent))
 
     def keel(self) -> Array:
         return _along_x(self.length)
@@ -127,12 +133,12 @@ class Wedge:
         return self.length / 2, self.width / 2
 
     def height(self, points: Array) -> Array:
-        x, y = np.abs(points.T)
+        y = np.abs(points[:, 1])
         half, r = self.angle / 2, self.tip_radius
         # A flank touches the round tip at y = r cos(half) and goes on from there.
         flank = y / math.tan(half) - r * (1 / math.sin(half) - 1)
         height = np.where(y < r * math.cos(half), _round(r, y), flank) if r else flank
-        return _above(height, (x <= self.length / 2) & (y <= self.width / 2))
+        return _above(height, _inside(points, self.extent))
 
     def keel(self) -> Array:
         return _along_x(self.length)
@@ -153,7 +159,7 @@ class Punch:
 
     def height(self, points: Array) -> Array:
         away = np.hypot(points[:, 0], points[:, 1])
-        return _above(np.zeros(len(points)), away <= self.radius)
+        return _above(np.zeros(len(points)), away <= _ON * self.radius)
 
     def keel(self) -> Array:
         angle = 2 * np.pi * np.arange(_RIM) / _RIM
@@ -175,8 +181,7 @@ class Block:
         return self.length / 2, self.width / 2
 
     def height(self, points: Array) -> Array:
-        x, y = np.abs(points.T)
-        return _above(np.zeros(len(points)), (x <= self.length / 2) & (y <= self.width / 2))
+        return _above(np.zeros(len(points)), _inside(points, self.extent))
 
     def keel(self) -> Array:
         one, side = np.ones_like(_SIDE), _SIDE[:-1]

@@ -32,9 +32,8 @@ from kappaskin.frames import Array, Mask
 
 Indices = NDArray[np.intp]
 
-_MOST_PLACES, _MOST_STEPS = 1024, 2000  # some seconds' work
-_TIGHT = 1e-10  # of the largest force: a gap that closes under less is closed
-_ROUNDING = 1e-14  # of the deepest place: what a gap is known to
+_MOST_PLACES, _MOST_STEPS = 1024, 500  # some seconds
+_ROUNDING = 1e-14  # of what sums to it: a gap is known to that
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,9 +161,10 @@ class _Task:
 
     def entered(self, found: Bearing, one: bool) -> Indices:
         """The places without force that the object enters deepest, of each region or only `one`."""
-        reach = np.abs(self.under.slant * (found.depth - self.under.height)).max()
-        allowed = _TIGHT * found.forces.max() * self.support.own + _ROUNDING * reach
-        gap = np.where(found.forces > 0, np.inf, found.gap + allowed)
+        # A place's own give and another's bound what a force on the one does to the other.
+        root = np.sqrt(self.support.own)
+        known = _ROUNDING * (abs(found.depth) + root * (root @ found.forces))
+        gap = np.where(found.forces > 0, np.inf, found.gap + known)
         inside = np.flatnonzero(gap < 0)
         inside = inside[np.argsort(gap[inside])]
         if one:
