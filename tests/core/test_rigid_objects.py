@@ -183,6 +183,14 @@ def test_a_mesh_is_the_same_raster_in_one_batch_as_in_many(monkeypatch):
     np.testing.assert_array_equal(of_triangles(BALL).height(at([1, 1], [-2, 0.3], [0, 3])), whole)
 
 
+def test_a_mesh_that_is_seen_edge_on_only_is_refused_when_pressed():
+    corners = np.array([[0, 0, 0], [5e-3, 0, 0], [0, 0, 5e-3], [5e-3, 0, 5e-3], [0, 1e-3, 0]])
+    leaf = np.array([[0, 1, 2], [1, 3, 2], [0, 2, 1], [1, 2, 3]])  # its last vertex is no face's
+
+    with pytest.raises(Refusal, match="nothing in it"):
+        Mesh(corners, leaf).height(np.zeros((1, 2)))
+
+
 # What is refused
 
 

@@ -1,7 +1,7 @@
 """Objects of triangles, from STL, PLY or OBJ files: their underside as a map of heights."""
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
@@ -17,7 +17,7 @@ from kappaskin.outline import turn
 _FILES = (".stl", ".ply", ".obj")
 _MOST = 2_000_000  # triangles
 _PIXELS = 256  # along the longer side of the map
-_AT_ONCE = 2**21  # pixels tried against triangles at a time
+_AT_ONCE = 2**18  # pixels tried against triangles at a time
 _SIZES = (1e-4, 1.0)  # m
 _EDGE_ON = 1e-9  # pixels: a face seen with less area is seen from the side
 _ON_EDGE = 1e-9  # of a face: a pixel as far beside it is on it
@@ -31,8 +31,8 @@ class Mesh:
     along its longer side map it.
     """
 
-    vertices: Array
-    faces: NDArray[np.intp]
+    vertices: Array = field(repr=False)
+    faces: NDArray[np.intp] = field(repr=False)
 
     def __post_init__(self) -> None:
         if self.vertices.shape[1:] != (3,) or self.faces.shape[1:] != (3,):
@@ -109,7 +109,7 @@ def _lowest(triangles: Array, nx: int, ny: int) -> Array:
     across, up = np.maximum(last - first + 1, 0).T
     pixels = across * up
     batch = np.cumsum(pixels) // _AT_ONCE
-    for number in range(int(batch[-1]) + 1):
+    for number in range(int(batch.max(initial=0)) + 1):
         part = np.flatnonzero(batch == number)
         count = pixels[part]
         which = np.repeat(part, count)

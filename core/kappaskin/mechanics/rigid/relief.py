@@ -2,7 +2,7 @@
 
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
@@ -28,7 +28,7 @@ class HeightMap:
     and at the lowest pixel of each of 8 x 8 blocks.
     """
 
-    heights: Array
+    heights: Array = field(repr=False)
     length: float
     width: float
 

@@ -42,7 +42,8 @@ class Support:
 
     `felt` are the functions (k, N) at given places, `after` what (k, N) answers to forces there,
     `deflection` (n,) in m that of coefficients (N,), `soft` (n,) in m/N the layer's compression
-    per force, `own` (n,) in m/N how far a place gives under a force on it alone.
+    per force, `own` (n,) in m/N how far a place gives under a force on it alone, `region` (n,) the
+    number of the part of the skin that it is in.
     """
 
     points: Array
