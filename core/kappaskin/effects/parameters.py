@@ -1,8 +1,10 @@
 """The numbers that effects are told by: their ranges and units, and the refusal of others."""
 
 import math
+import sys
 from dataclasses import dataclass, fields
 from functools import cache
+from numbers import Integral, Real
 from typing import Any, get_type_hints
 
 from kappaskin.errors import Refusal
@@ -21,13 +23,10 @@ class Within:
     whole: bool = False
 
     def __contains__(self, value: object) -> bool:
-        kinds = int if self.whole else (int, float)
-        return (
-            isinstance(value, kinds)
-            and not isinstance(value, bool)
-            and math.isfinite(value)
-            and self.least <= value <= self.most
-        )
+        if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
+            return False
+        finite = abs(value) <= sys.float_info.max  # a whole number may be too large for a float
+        return finite and self.least <= float(value) <= self.most
 
     def __str__(self) -> str:
         upward = math.isinf(self.most)
