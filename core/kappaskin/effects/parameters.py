@@ -1,7 +1,6 @@
 """The numbers that effects are told by: their ranges and units, and the refusal of others."""
 
 import math
-import sys
 from dataclasses import dataclass, fields
 from functools import cache
 from numbers import Integral, Real
@@ -25,8 +24,11 @@ class Within:
     def __contains__(self, value: object) -> bool:
         if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
             return False
-        finite = abs(value) <= sys.float_info.max  # a whole number may be too large for a float
-        return finite and self.least <= float(value) <= self.most
+        try:
+            number = float(value)
+        except OverflowError:
+            return False
+        return math.isfinite(number) and self.least <= number <= self.most
 
     def __str__(self) -> str:
         upward = math.isinf(self.most)
