@@ -13,6 +13,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.patch import Patch
 
+_SHORTEST = 1e-6  # m: shorter gages than that tell no mean, only rounding
 _ROUNDING = 1e-9  # of a depth: gages as long as elements are apart end on the rim
 
 
@@ -57,10 +58,10 @@ class SensorLayout:
 
     def _check_gages(self) -> None:
         L = self.gage_length
-        if not 0 <= L < math.inf:
-            raise Refusal(f"expected a gage length of at least 0 m, got {L}")
         if not L:
             return
+        if not _SHORTEST <= L < math.inf:
+            raise Refusal(f"expected a gage length of 0 m, or {_SHORTEST:g} m and more, got {L}")
         depth = self.patch.depth(self.positions)
         least = int(np.argmin(depth))
         if depth[least] * (1 + _ROUNDING) < L / 2:

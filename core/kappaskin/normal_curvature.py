@@ -16,9 +16,12 @@ def steepness(slope_x: Array, slope_y: Array) -> Array:
     xy: W sqrt((1 + f_x^2) (1 + f_y^2)).
     """
     along_x, along_y = 1 + slope_x**2, 1 + slope_y**2
-    W2 = along_x + along_y - 1
-    inclined = np.stack([along_x**2, along_y**2, along_x * along_y], axis=-2)
-    return np.sqrt(W2[..., None, :] * inclined)
+    W = np.sqrt(along_x + along_y - 1)
+    times = np.empty((*W.shape[:-1], 3, W.shape[-1]), W.dtype)
+    times[..., 0, :] = W * along_x
+    times[..., 1, :] = W * along_y
+    times[..., 2, :] = W * np.sqrt(along_x * along_y)
+    return times
 
 
 class NormalCurvature:

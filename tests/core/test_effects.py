@@ -162,6 +162,9 @@ def test_a_range_tells_itself_in_words():
     assert str(Within(0, 0.5)) == "0 to 0.5"
     assert str(Within(0, 9, whole=True)) == "0 to 9, a whole number"
     assert 1.5 not in Within(0, 9, whole=True)
+    assert np.int32(3) in Within(0, 9, whole=True)
+    assert np.float32(3) in Within(0, 9)
+    assert 10**400 not in Within(0)
     assert [value in Within(0, 0.5) for value in (0, 0.5, 0.500001, -1e-9)] == [1, 1, 0, 0]
 
 

@@ -1,4 +1,4 @@
-"""What gages of some length read: the mean over each of the curvature along it."""
+"""What gages of some length read: the mean of the curvature along each of them."""
 
 import math
 
@@ -41,20 +41,32 @@ def mean_curvature_at(basis: Basis, positions: Array, gage_length: float) -> Arr
     """
     if not gage_length:
         return curvature_at(basis, positions)
-    if isinstance(basis, SineBasis) and not basis.patch.base_curvature:
-        return curvature_at(basis, positions) * multipliers(basis, gage_length).reshape(3, 1, -1)
-    return _by_quadrature(basis, positions, gage_length)
+    mean = _over_points if basis.patch.base_curvature else _between_ends
+
+    def along(x: float, y: float) -> Array:
+        return mean(basis, positions, gage_length, x, y)
+
+    rising, falling = along(_DIAGONAL, _DIAGONAL), along(_DIAGONAL, -_DIAGONAL)
+    return np.stack([along(1.0, 0.0), along(0.0, 1.0), (rising - falling) / 2])
 
 
-def _by_quadrature(basis: Basis, positions: Array, gage_length: float) -> Array:
-    along, weights = gauss(gage_length, _POINTS)
+def _between_ends(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
+    """The mean curvature along (x, y): by how much the slope differs between the gages' ends.
 
-    def mean(x: float, y: float) -> Array:
-        steps = np.multiply.outer(along - gage_length / 2, (x, y))
-        places = (positions + steps[:, None]).reshape(-1, 2)
-        xx, yy, xy = curvature_at(basis, places)
-        normal = (x * x * xx + y * y * yy + 2 * x * y * xy).reshape(_POINTS, len(positions), -1)
-        return np.einsum("q,qpn->pn", weights / gage_length, normal)
+    It is exact also for functions whose curvature jumps between triangles.
+    """
+    half = L / 2 * np.array([x, y])
 
-    rising, falling = mean(_DIAGONAL, _DIAGONAL), mean(_DIAGONAL, -_DIAGONAL)
-    return np.stack([mean(1.0, 0.0), mean(0.0, 1.0), (rising - falling) / 2])
+    def slope(places: Array) -> Array:
+        return x * basis.at(places, 1, 0) + y * basis.at(places, 0, 1)
+
+    return (slope(positions + half) - slope(positions - half)) / L
+
+
+def _over_points(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
+    """The mean curvature along (x, y) by Gauss: on a bent skin it is more than a derivative."""
+    along, weights = gauss(L, _POINTS)
+    steps = np.multiply.outer(along - L / 2, (x, y))
+    xx, yy, xy = curvature_at(basis, (positions + steps[:, None]).reshape(-1, 2))
+    normal = (x * x * xx + y * y * yy + 2 * x * y * xy).reshape(_POINTS, len(positions), -1)
+    return np.einsum("q,qpn->pn", weights / L, normal)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, fields
 from functools import cache
+from numbers import Integral, Real
 from typing import Any, get_type_hints
 
 from kappaskin.errors import Refusal
@@ -21,13 +22,13 @@ class Within:
     whole: bool = False
 
     def __contains__(self, value: object) -> bool:
-        kinds = int if self.whole else (int, float)
-        return (
-            isinstance(value, kinds)
-            and not isinstance(value, bool)
-            and math.isfinite(value)
-            and self.least <= value <= self.most
-        )
+        if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
+            return False
+        try:
+            number = float(value)
+        except OverflowError:
+            return False
+        return math.isfinite(number) and self.least <= number <= self.most
 
     def __str__(self) -> str:
         upward = math.isinf(self.most)

@@ -15,16 +15,18 @@ def flicker(
     # is added at random that its power stays. The fastest moves with every frame, of the others
     # one at a time: the k-th with every 2^k-th frame, in which it moves no farther than the one
     # before does in half as many, since they are at least an octave apart.
-    parts = rng.normal(0.0, rms / math.sqrt(len(corners)), (len(corners), *shape))
-    sd, moved, frames = rms / math.sqrt(len(corners)), [math.nan] * len(corners), 0
+    sd = rms / math.sqrt(len(corners))
+    parts, drawn = rng.normal(0.0, sd, (len(corners), *shape)), np.empty(shape)
+    moved, frames = [math.nan] * len(corners), 0
 
     def move(k: int, time: float) -> None:
         elapsed, moved[k] = time - moved[k], time
         # A first frame finds the parts as they are; a clock that went back tells of no time.
         if elapsed > 0:
             z = 2 * math.pi * corners[k] * elapsed
+            rng.standard_normal(out=drawn)
             parts[k] *= math.exp(-z)
-            parts[k] += rng.normal(0.0, sd * math.sqrt(-math.expm1(-2 * z)), shape)
+            parts[k] += np.multiply(drawn, sd * math.sqrt(-math.expm1(-2 * z)), out=drawn)
 
     def read(curvature: Array, time: float) -> Array:
         nonlocal frames
@@ -33,6 +35,6 @@ def flicker(
         turn = (frames & -frames).bit_length()
         if turn < len(corners):
             move(turn, time)
-        return curvature + parts.sum(axis=0)
+        return curvature + np.add.reduce(parts)
 
     return read
