@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Load, Plate
 from kappaskin.scene.choice import LINEAR, Choice
 from kappaskin.scene.motion import Motion
-from kappaskin.scene.stimulus import Stimulus
+from kappaskin.scene.stimulus import Indenter, Stimulus
 from kappaskin.sensor import Sensor
 from kappaskin.transduction import Transduction
 
@@ -50,13 +51,19 @@ class Scene:
     def __post_init__(self) -> None:
         if self.laid and self.stimuli:
             raise Refusal(f"expected no loads on a skin that lies on cylinders, got {self.loads}")
+        if self.indenter and len(self.stimuli) > 1:
+            raise Refusal(
+                f"expected a rigid object to press alone, got {len(self.stimuli)} stimuli; what "
+                "else presses would bend the skin below it: take loads, or one object"
+            )
         for stimulus in self.stimuli:
-            self.plate.check(stimulus.load)
+            if not isinstance(stimulus.what, Indenter):
+                self.plate.check(stimulus.what)
             for time in stimulus.motion.moments if stimulus.motion else ():
                 if load := stimulus.load_at(time):
                     self.plate.check(load)
 
-    @property
+    @cached_property
     def basis(self) -> Basis:
         return basis_for(self.plate.patch, self.edge, *self.reference)
 
@@ -85,7 +92,13 @@ class Scene:
     @property
     def loads(self) -> tuple[Load, ...]:
         """The loads where they are before they move, pressing wholly."""
-        return tuple(stimulus.load for stimulus in self.stimuli)
+        each = (stimulus.what for stimulus in self.stimuli)
+        return tuple(what for what in each if not isinstance(what, Indenter))
+
+    @property
+    def indenter(self) -> Stimulus | None:
+        """The rigid object that presses, if one does."""
+        return next((s for s in self.stimuli if isinstance(s.what, Indenter)), None)
 
     def loads_at(self, time: float) -> tuple[Load, ...]:
         """The loads that press, where they are at `time` in s."""
