@@ -17,7 +17,7 @@ from kappaskin.effects import (
 from kappaskin.frames import Array, Frame, Truth
 from kappaskin.mechanics import Load
 from kappaskin.scan import Scan
-from kappaskin.scene import Scene, contact_of, effects_of, kept_of
+from kappaskin.scene import Pressing, Scene, effects_of, kept_of
 
 
 class Simulator:
@@ -33,6 +33,7 @@ class Simulator:
         self._still: Truth | None = None
         self._kept = kept_of(scene)
         self._take_skin()
+        self._pressing = Pressing(scene, self._plate)
         self._start_effects()
 
     def change(self, scene: Scene) -> None:
@@ -47,6 +48,7 @@ class Simulator:
         same_skin = skin == (was.plate, was.edge, was.reference, was.layout.gage_length)
         if not (same_elements and same_skin and _of_skin(before) == _of_skin(self._kept)):
             self._take_skin()
+        self._pressing = Pressing(scene, self._plate)
         same_size = len(scene.layout) == len(was.layout)
         reading = scene.seed, _of_readings(self._kept)
         if not same_size or reading != (was.seed, _of_readings(before)):
@@ -69,7 +71,7 @@ class Simulator:
         if GageLength not in kinds:
             layout = replace(layout, gage_length=0.0)
         self._basis = scene.basis
-        self._compliance = plate.compliance(self._basis)
+        self._plate, self._compliance = plate, plate.compliance(self._basis)
         self._skewed = Skew in kinds
         self._scan = scene.sensor().scan()
         sloped = [effect for effect in self._kept if isinstance(effect, FiniteSlope)]
@@ -81,16 +83,15 @@ class Simulator:
     def _truth(self, time: float) -> Truth:
         if self._still is not None:
             return self._still
-        loads = self.scene.loads_at(time)
-        truth = Truth(self._shape(loads), contact_of(loads), self.scene.edge)
+        pressed = self._pressing(time)
+        truth = Truth(self._compliance(pressed.force), pressed.contact, self.scene.edge)
         if not self.scene.moves:
             self._still = truth
         return truth
 
-    def _shape(self, loads: tuple[Load, ...]) -> Array:
-        """Coefficients (Ri, Rj) in m of the deflection under `loads`."""
-        force = sum((load.modal(self._basis) for load in loads), np.zeros(self._basis.shape))
-        return self._compliance(force)
+    def loads(self, time: float) -> tuple[Load, ...]:
+        """What presses at `time` in s; a rigid object as the points that bear it."""
+        return self._pressing(time).loads
 
     def _read(self, scan: Scan, time: float, truth: Truth) -> Array:
         """Curvature (3 P,) of a scan begun at `time`; channels outside it as at the start."""
@@ -99,7 +100,7 @@ class Simulator:
             return first
         # The parabola through start, middle and end, at the share s of the scan.
         middle, last = (
-            self._sensed(self._shape(scene.loads_at(t)))
+            self._sensed(self._compliance(self._pressing(t).force))
             for t in (time + scan.duration / 2, time + scan.duration)
         )
         s = np.zeros(len(first))

@@ -1,6 +1,6 @@
 """What a scene does to its skin, before anything spoils it: by this effects are judged."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -42,7 +42,7 @@ class Survey:
     @cached_property
     def operator(self) -> Array:
         """Coefficients to readings of point-like elements, (3 P, N)."""
-        return self.layout.curvature_operator(self.basis)
+        return replace(self.layout, gage_length=0.0).curvature_operator(self.basis)
 
     @cached_property
     def wavenumber(self) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path as FilePath
-from typing import Any, get_type_hints
+from typing import Any, cast, get_type_hints
 
 import numpy as np
 
@@ -168,7 +168,7 @@ def _electronics(table: Table) -> Transduction:
 
 def _changed(table: Table, part: Any) -> Any:
     """The `part` of the electronics with what the table says of it."""
-    hints = get_type_hints(type(part))
+    hints = get_type_hints(cast("type[Any]", type(part)))
     said = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
     table.done()
     with table.blamed():

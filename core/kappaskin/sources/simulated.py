@@ -85,8 +85,8 @@ class SimulatedSource:
 
     def wrench(self) -> Wrench:
         """What `base` reads of the contact, at the time of the last frame."""
-        scene = self._simulator.scene
-        return self.base.read(scene.plate.patch, scene.loads_at(self._taken), self._base_noise)
+        patch, loads = self._sensor.layout.patch, self._simulator.loads(self._taken)
+        return self.base.read(patch, loads, self._base_noise)
 
     def read(self, timeout: float) -> list[Frame]:
         now, due = self._clock(), self._start + self._due()
