@@ -43,7 +43,7 @@ CHECKS = (
     ("basedpyright",),
     ("lint-imports",),
     # One process for the windows, one for the rest; -n0 among ARGUMENTS makes it one for all.
-    ("pytest", "-n2", "--dist=loadgroup"),
+    ("pytest", "-n2"),
 )
 # Benchmark files are named so that plain pytest passes them by.
 BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")

@@ -13,6 +13,8 @@ from pathlib import Path
 import psutil
 import pytest
 from hypothesis import settings
+from xdist.remote import Producer
+from xdist.scheduler import LoadFileScheduling
 
 # Steady: a first run on a fresh machine tests what every run tests. To look for more, run
 # `pytest --hypothesis-profile=explore`.
@@ -43,12 +45,15 @@ def _children() -> set[int]:
     return {int(pid) for pid in found.split()}
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist looks for groups
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep a file's tests in one process, and all windows in one: they share a keyboard."""
-    for item in items:
-        group = "windows" if "app" in item.path.parts else item.path.name
-        item.add_marker(pytest.mark.xdist_group(group))
+class ByFile(LoadFileScheduling):
+    """Keeps a file's tests in one process, and all windows in one: they share a keyboard."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return "windows" if nodeid.startswith("tests/app/") else super()._split_scope(nodeid)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:
+    return ByFile(config, log)
 
 
 @pytest.fixture(autouse=True)
