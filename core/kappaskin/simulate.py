@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from kappaskin.effects import (
+    CorruptedFrames,
+    DroppedFrames,
     Effect,
     FiniteSlope,
     GageLength,
@@ -59,6 +61,11 @@ class Simulator:
         self._effects = [
             effect.start(shape, _stream(self.scene.seed, effect.name))
             for effect in _of_readings(self._kept)
+        ]
+        self._link = [
+            (effect.name, effect.start(_stream(self.scene.seed, effect.name)))
+            for effect in self._kept
+            if isinstance(effect, DroppedFrames | CorruptedFrames)
         ]
 
     def _take_skin(self) -> None:
@@ -121,6 +128,10 @@ class Simulator:
             curvature = effect(curvature, time)
         curvature[~self.scene.layout.live.ravel()] = 0.0
         return truth, curvature
+
+    def failure(self, n: int) -> str:
+        """What becomes of frame `n` on the link: the name of what fails, nothing if it arrives."""
+        return next((name for name, hits in self._link if hits(n)), "")
 
     def frame(self, n: int, clock: Callable[[], float]) -> Frame:
         """Frame `n` of all channels, begun at device time n / rate."""

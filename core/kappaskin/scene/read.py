@@ -16,18 +16,27 @@ from kappaskin.effects import (
     EFFECTS,
     FIRST_GENERATION_LOOPS,
     SECOND_GENERATION_LOOPS,
-    ReadingEffect,
+    Effect,
+    StrainLimit,
 )
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import (
+    Block,
+    Cylinder,
     DiscLoad,
     GaussianLoad,
+    HeightMap,
     LineLoad,
     Load,
+    Mesh,
     Plate,
     PointLoad,
+    Punch,
     RectangleLoad,
+    RigidObject,
+    Sphere,
+    Wedge,
 )
 from kappaskin.patch import Disk, Patch, Polygon
 from kappaskin.scene.choice import LINEAR, Choice
@@ -46,7 +55,7 @@ from kappaskin.scene.motion import (
     Turn,
 )
 from kappaskin.scene.scene import Scene, scaled_to
-from kappaskin.scene.stimulus import Stimulus
+from kappaskin.scene.stimulus import Indenter, Stimulus
 from kappaskin.scene.table import Table
 from kappaskin.transduction import FIRST_GENERATION, SECOND_GENERATION, Transduction
 
@@ -69,7 +78,29 @@ _LOADS: dict[str, type[Load]] = {
     "rectangle": RectangleLoad,
     "gaussian": GaussianLoad,
 }
+_OBJECTS: dict[str, type[RigidObject]] = {
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "wedge": Wedge,
+    "punch": Punch,
+    "block": Block,
+    "heights": HeightMap,
+    "mesh": Mesh,
+}
 _ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
+_ELSEWHERE = {
+    "tension": "[skin] has the tension",
+    "foam": "[skin] has the foundation",
+    "fluid": "[skin] has the fluid",
+    "dead": "[elements] has those that are dead",
+    "gage-length": "[elements] has the gage_length",
+    "finite-slope": "it has no numbers: name it in choose, on or off",
+    "skew": "the converter's times make it",
+    "saturation": "the amplifier and the converter make it",
+    "quantisation": "the converter makes it",
+}
+"""Effects that follow from what a scene says elsewhere."""
+
 _LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 
 
@@ -93,10 +124,11 @@ def read_scene(text: str, name: str, folder: FilePath) -> Scene:
     with top.blamed("reference"):
         basis()
     stimuli = tuple(
-        _stimulus(table, lambda load: scaled_to(plate, load[0], load[1], basis()), folder)
+        _stimulus(table, lambda load, by: scaled_to(plate, load, by, basis()), folder)
         for table in top.tables("touch")
     )
-    choice, effects = _effects(top)
+    electronics = _electronics(top.table("electronics"))
+    choice, effects = _effects(top, electronics)
     with top.blamed():
         scene = Scene(
             name,
@@ -104,7 +136,7 @@ def read_scene(text: str, name: str, folder: FilePath) -> Scene:
             _elements(top.table("elements"), plate.patch),
             stimuli,
             effects,
-            _electronics(top.table("electronics")),
+            electronics,
             top.get("rate", float, 500.0),
             top.get("seed", int, 0),
             reference,
@@ -175,20 +207,32 @@ def _changed(table: Table, part: Any) -> Any:
         return replace(part, **said)
 
 
-def _stimulus(
-    table: Table, moved: Callable[[tuple[Load, float]], Load], folder: FilePath
-) -> Stimulus:
-    kind = table.choose("what", _LOADS)
-    load = table.make(kind)
-    if "displacement" in table:
-        if "force" in table:
-            raise table.refusal("expected a force or a displacement, got both", "displacement")
-        with table.blamed("displacement"):
-            load = moved((load, table.get("displacement", float)))
+def _stimulus(table: Table, moved: Callable[[Load, float], Load], folder: FilePath) -> Stimulus:
+    what: Load | Indenter
+    if (name := table.choose("what", {name: name for name in (*_LOADS, *_OBJECTS)})) in _OBJECTS:
+        what = table.make(Indenter, rigid=_object(table, _OBJECTS[name], folder))
+    else:
+        what = table.make(_LOADS[name])
+        if "displacement" in table:
+            if "force" in table:
+                raise table.refusal("expected a force or a displacement, got both", "displacement")
+            with table.blamed("displacement"):
+                what = moved(what, table.get("displacement", float))
     motion = _motion(table, folder)
     table.done()
     with table.blamed():
-        return Stimulus(load, motion)
+        return Stimulus(what, motion)
+
+
+def _object(table: Table, kind: type[RigidObject], folder: FilePath) -> RigidObject:
+    """The rigid object that the table describes, read from a file in `folder` if it has one."""
+    with table.blamed():
+        if kind is Mesh:
+            return Mesh.read(folder / table.get("file", str), table.get("unit", float, 1.0))
+        if kind is HeightMap:
+            sizes = (table.get(key, float) for key in ("length", "width", "relief"))
+            return HeightMap.read(folder / table.get("file", str), *sizes)
+        return table.make(kind)
 
 
 def _motion(table: Table, folder: FilePath) -> Motion | None:
@@ -242,16 +286,19 @@ def _cylinders(table: Table, scene: Scene) -> Presentation:
     return made
 
 
-def _effects(top: Table) -> tuple[Choice, tuple[ReadingEffect, ...]]:
+def _effects(top: Table, electronics: Transduction) -> tuple[Choice, tuple[Effect, ...]]:
     """Which effects the file chooses, and those that it says the parameters of."""
     table = top.table("effects")
-    known = {name: kind for name, kind in EFFECTS.items() if issubclass(kind, ReadingEffect)}
-    found = list[ReadingEffect]()
-    for name, kind in known.items():
+    found = list[Effect]()
+    for name, kind in EFFECTS.items():
         if name in table:
             said = table.table(name)
+            if name in _ELSEWHERE:
+                raise said.refusal(f"expected no such table; {_ELSEWHERE[name]}")
             if name == "hysteresis" and "like" in said:
                 found.append(said.choose("like", _LOOPS))
+            elif kind is StrainLimit:
+                found.append(said.make(kind, transduction=electronics))
             else:
                 found.append(said.make(kind))
             said.done()

@@ -8,7 +8,7 @@ import numpy as np
 
 from kappaskin.bases import Basis, basis_for
 from kappaskin.calibration import Presentation
-from kappaskin.effects import ReadingEffect
+from kappaskin.effects import Effect, ReadingEffect
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Load, Plate
@@ -37,7 +37,7 @@ class Scene:
     plate: Plate
     layout: SensorLayout
     stimuli: tuple[Stimulus, ...] = ()
-    effects: tuple[ReadingEffect, ...] = ()
+    effects: tuple[Effect, ...] = ()
     transduction: Transduction = field(default_factory=Transduction)
     rate: float = 500.0
     seed: int = 0
@@ -104,6 +104,11 @@ class Scene:
         """The loads that press, where they are at `time` in s."""
         there = (stimulus.load_at(time) for stimulus in self.stimuli)
         return tuple(load for load in there if load is not None)
+
+    @property
+    def reading_effects(self) -> tuple[ReadingEffect, ...]:
+        """Those of its effects that change one reading after the other."""
+        return tuple(effect for effect in self.effects if isinstance(effect, ReadingEffect))
 
     @property
     def duration(self) -> float:

@@ -100,8 +100,10 @@ class SimulatedSource:
         frames: list[Frame] = []
         while (now - self._start - self._due()) * self._rate + _ROUNDING >= 0:
             frames.append(self._next())
-        self._accepted += len(frames)
-        return frames
+        arrived = [frame for frame in frames if not self._simulator.failure(frame.sequence)]
+        self._accepted += len(arrived)
+        self._lost += len(frames) - len(arrived)
+        return arrived
 
     def accounting(self) -> Accounting:
         return Accounting(

@@ -103,7 +103,7 @@ class _Case:
     def noisy(self) -> Array:
         """`DRAWS` frames of curvature (T, 3, P) with the scene's noise, seeded."""
         rng = np.random.default_rng(self.scene.seed)
-        (noise,) = self.scene.effects
+        (noise,) = self.scene.reading_effects
         curvature = np.repeat(self.curvature[None], DRAWS, axis=0)
         return noise.start(curvature.shape, rng)(curvature, 0.0)
 
