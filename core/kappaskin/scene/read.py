@@ -305,7 +305,7 @@ def _effects(top: Table, electronics: Transduction) -> tuple[Choice, tuple[Effec
     accuracy = top.get("accuracy", float, 0.01)
     with table.blamed("choose"):
         choice = _choice(table, accuracy)
-    table.done()
+    table.done(*EFFECTS)
     return choice, tuple(found)
 
 

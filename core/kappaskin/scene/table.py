@@ -108,11 +108,13 @@ class Table:
             raise self.refusal(f"expected one of {', '.join(among)}, got {name!r}{near}", key)
         return among[name]
 
-    def done(self) -> None:
-        """Refuse a key that nobody asked for."""
+    def done(self, *others: str) -> None:
+        """Refuse a key that nobody asked for; it may be meant as one of those or of `others`."""
         for key in self._said:
             if key not in self._asked:
-                near = "".join(f"; did you mean {one}?" for one in _nearest(key, list(self._asked)))
+                near = "".join(
+                    f"; did you mean {one}?" for one in _nearest(key, [*self._asked, *others])
+                )
                 known = near or f"; known are {', '.join(sorted(self._asked))}"
                 raise self.refusal(f"expected no such key{known}", key)
 
