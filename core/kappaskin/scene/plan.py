@@ -40,7 +40,7 @@ class Entry:
         return {
             "effect": self.name,
             "size": self.size.number,
-            "formula": EFFECTS[self.name].formula,
+            "formula": (self.effect or EFFECTS[self.name]).formula,
             "error": self.size.error,
             "kept": self.kept,
             "why": self.why,
@@ -49,13 +49,13 @@ class Entry:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is simulated of a scene: one entry for every effect that is known, in their order."""
+    """What is simulated of a scene: an entry for every effect that is known.
+
+    Those `kept` are in the order in which they come about.
+    """
 
     entries: tuple[Entry, ...]
-
-    @property
-    def kept(self) -> tuple[Effect, ...]:
-        return tuple(e.effect for e in self.entries if e.kept and e.effect is not None)
+    kept: tuple[Effect, ...]
 
     @property
     def left_out(self) -> float:
@@ -67,7 +67,7 @@ class Plan:
 
 
 def effects_of(scene: Scene) -> dict[str, Effect]:
-    """Everything that there is of `scene` to spoil its readings, by name, in order."""
+    """Everything that there is of `scene` to spoil its readings, by name, as it comes about."""
     plate, layout = scene.plate, scene.layout
     there: list[Effect] = []
     if plate.tension:
@@ -84,9 +84,8 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
         there.append(FiniteSlope())
     if scene.moves:
         there.append(Skew())
-    there += [*scene.effects, Quantisation(scene.transduction), Saturation(scene.transduction)]
-    by_name = {effect.name: effect for effect in there}
-    return {name: by_name[name] for name in EFFECTS if name in by_name}
+    there += [*scene.effects, Saturation(scene.transduction), Quantisation(scene.transduction)]
+    return {effect.name: effect for effect in there}
 
 
 def plan(scene: Scene) -> Plan:
@@ -99,8 +98,9 @@ def plan(scene: Scene) -> Plan:
             Entry(name, sizes[name], *reasons[name], there[name])
             if name in there
             else Entry(name, NOTHING, False, "not in this scene")
-            for name in EFFECTS
-        )
+            for name in dict.fromkeys((*EFFECTS, *there))
+        ),
+        tuple(effect for name, effect in there.items() if reasons[name][0]),
     )
 
 
