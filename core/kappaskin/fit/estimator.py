@@ -24,6 +24,8 @@ _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as
 
 def numbers(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Array:
     """A copy of `values` in this `dtype`; raises a `Refusal` where they are no real numbers."""
+    if type(values) is np.ndarray and values.dtype == dtype:  # as in most frames: the fastest
+        return values.copy()
     try:
         given = np.asarray(values)
     except ValueError as error:  # rows of different lengths
@@ -34,8 +36,6 @@ def numbers(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Arra
             f"expected {what} as an array of real numbers, NaN where one is missing; got "
             f"{type(values).__name__} of {given.dtype}"
         )
-    if given.dtype == dtype:  # as in most frames: the fastest
-        return given.copy()
     with np.errstate(over="ignore"):  # to infinity, in float32
         return given.astype(dtype)
 
