@@ -283,6 +283,6 @@ def _unlike(was: Scene, now: Scene) -> str:
         return "with other noise"
     if dead != dead_now:
         return "with other elements dead"
-    if (was.loads, was.motion) != (now.loads, now.motion):
+    if was.stimuli != now.stimuli:
         return "under another load"
     return ""

@@ -188,4 +188,4 @@ class Display:
     def _show_loads(self, estimate: Estimate) -> None:
         scene = self._session.scene
         loads = scene.loads if self._session.simulating else ()
-        self.membrane.show_loads(loads, estimate.true_contact if scene.motion else None)
+        self.membrane.show_loads(loads, estimate.true_contact if scene.moves else None)

@@ -22,6 +22,7 @@ from kappaskin import (
     Refusal,
     Scene,
     SensorLayout,
+    Stimulus,
     basis_for,
     load_scene,
 )
@@ -94,8 +95,8 @@ def _placed(load: Load, was: Patch, patch: Patch) -> PointLoad | LineLoad:
 
 
 @lru_cache(len(LOAD_CASES) * _REMEMBERED)
-def ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit | None]:
-    """Loads and motion of a ready scene; on another skin, at the same shares of its sides.
+def ready(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...]:
+    """What touches the skin in a ready scene; on another skin, at the same shares of its sides.
 
     What moves by W on the patch of side L moves by W s there, whose shorter side is s L: the slopes
     stay as they are. It moves less where it would bend so much that elements stand on a rail.
@@ -103,7 +104,7 @@ def ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit |
     paper = load_scene(case)
     compliance, patch = compliance_of(plate, edge), plate.patch
     if (plate, edge) == (paper.plate, paper.edge):
-        return paper.loads, paper.motion
+        return paper.stimuli
     was = paper.plate.patch
     size = min(patch.a / was.a, patch.b / was.b)
     moved = _moved(paper.loads[0], paper.basis, compliance_of(paper.plate, paper.edge))
@@ -118,8 +119,10 @@ def ready(case: str, plate: Plate, edge: str) -> tuple[tuple[Load, ...], Orbit |
     load = load.scaled(size * moved / gives)
     bent = SensorLayout.regular(patch, 21, 21).curvature_operator(basis)
     most = float(np.abs(bent @ compliance(load.modal(basis)).ravel()).max())
-    motion = paper.motion and replace(paper.motion, radius=paper.motion.radius * size)
-    return (load.scaled(min(1.0, _MOST_BENT / most)),), motion
+    motion = paper.stimuli[0].motion
+    if isinstance(motion, Orbit):
+        motion = replace(motion, radius=motion.radius * size)
+    return (Stimulus(load.scaled(min(1.0, _MOST_BENT / most)), motion),)
 
 
 def dragged(

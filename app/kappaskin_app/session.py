@@ -155,7 +155,7 @@ class Session(QObject):
         try:
             scene = scene_of(self._history.settings)
             laid = self._laid and Presentation((self._laid,), 1.0)
-            self.scene = replace(scene, loads=(), motion=None, laid=laid) if laid else scene
+            self.scene = scene.laid_on(laid) if laid else scene
         except Refusal as refusal:
             why = str(refusal)
         self.engine.play(self.scene)

@@ -21,6 +21,7 @@ from kappaskin import (
     Scene,
     Sensor,
     SensorLayout,
+    Stimulus,
     Tolerance,
     Transduction,
     UniformNoise,
@@ -110,16 +111,16 @@ def scene_of(settings: Settings) -> Scene:
     layout = layout.without(settings.dead_elements)
     if settings.load_case in FREE_CASES:
         compliance_of(plate, settings.edge)  # for its refusal
-        loads, motion = free_loads(settings), None
+        loads = free_loads(settings)
         _check_on(loads, plate)
+        stimuli = tuple(map(Stimulus, loads))
     else:
-        loads, motion = ready(settings.load_case, plate, settings.edge)
+        stimuli = ready(settings.load_case, plate, settings.edge)
     scene = Scene(
         settings.load_case,
         plate,
         layout,
-        loads,
-        motion,
+        stimuli,
         _effects(settings),
         _transduction(settings),
         seed=settings.noise_seed,
@@ -133,12 +134,11 @@ def scene_of(settings: Settings) -> Scene:
 def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
     """A scene on a real `sensor`: a point load in its middle, and `noise` in 1/m as it has."""
     plate, edge = sensor.plate, sensor.edge
-    loads, _ = ready("centre", plate, edge)
     return Scene(
         sensor.name,
         plate,
         sensor.layout,
-        loads,
+        ready("centre", plate, edge),
         effects=(GaussianNoise(noise),),
         transduction=sensor.transduction,
         rate=sensor.rate,

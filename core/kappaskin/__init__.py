@@ -84,6 +84,7 @@ from kappaskin.scan import Scan as Scan
 from kappaskin.scene import SCENES as SCENES
 from kappaskin.scene import Orbit as Orbit
 from kappaskin.scene import Scene as Scene
+from kappaskin.scene import Stimulus as Stimulus
 from kappaskin.scene import load_scene as load_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator

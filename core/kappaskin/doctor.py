@@ -15,6 +15,8 @@ PACKAGES = (
     "scipy",
     "pyserial",
     "cyclopts",
+    "pillow",
+    "trimesh",
     "PySide6-Essentials",
     "pyvista",
     "pyvistaqt",

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -55,7 +55,7 @@ def _simulated(name: str, radii: tuple[float, ...] | None, hold: float, dwell: f
     """The scene called `name`, laid on the cylinders as fast as it can be computed."""
     clock, scene = _Virtual(), load_scene(name)
     laid = Presentation(_steps(scene.sensor(), radii, hold), dwell)
-    return SimulatedSource(replace(scene, loads=(), motion=None, laid=laid), clock, clock.sleep)
+    return SimulatedSource(scene.laid_on(laid), clock, clock.sleep)
 
 
 class _Listener:

@@ -1,16 +1,20 @@
 """Where the elements are and what they sense."""
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kappaskin.bases import Basis
-from kappaskin.bases.basis import curvature_at
+from kappaskin.bases.gage import mean_curvature_at
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.patch import Patch
+
+_SHORTEST = 1e-6  # m: shorter gages than that tell no mean, only rounding
+_ROUNDING = 1e-9  # of a depth: gages as long as elements are apart end on the rim
 
 
 def _channels(patch: Patch, elements: int) -> Mask:
@@ -25,13 +29,15 @@ class SensorLayout:
     """P elements at `positions` (P, 2) in m; each senses curvature xx, yy and xy.
 
     `live` (3, P) is False for the channels that are dead. `shape` is (m, n) for a regular grid,
-    with element `p + m q` in column p (along x) and row q (along y), and None otherwise.
+    with element `p + m q` in column p (along x) and row q (along y), and None otherwise. Each reads
+    the mean over gages of `gage_length` in m along x, along y and along both diagonals.
     """
 
     patch: Patch
     positions: Array
     live: Mask
     shape: tuple[int, int] | None = None
+    gage_length: float = 0.0
 
     def __post_init__(self) -> None:
         P = self.positions
@@ -47,6 +53,22 @@ class SensorLayout:
             raise Refusal(
                 f"{outside.size} of {len(P)} elements lie outside the {self.patch.name}: element "
                 f"{p} is at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0"
+            )
+        self._check_gages()
+
+    def _check_gages(self) -> None:
+        L = self.gage_length
+        if not L:
+            return
+        if not _SHORTEST <= L < math.inf:
+            raise Refusal(f"expected a gage length of 0 m, or {_SHORTEST:g} m and more, got {L}")
+        depth = self.patch.depth(self.positions)
+        least = int(np.argmin(depth))
+        if depth[least] * (1 + _ROUNDING) < L / 2:
+            raise Refusal(
+                f"gages of {L:g} m reach over the rim of the {self.patch.name}: element {least} is "
+                f"{depth[least]:.4g} m inside; expected a gage length of at most "
+                f"{2 * depth[least]:.4g} m"
             )
 
     @classmethod
@@ -79,7 +101,7 @@ class SensorLayout:
         if any(not 0 <= p < len(self) for p in dead):
             raise Refusal(f"expected dead elements between 0 and {len(self) - 1}, got {dead}")
         live[:, dead] = False
-        return SensorLayout(self.patch, self.positions, live, self.shape)
+        return replace(self, live=live)
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -91,4 +113,5 @@ class SensorLayout:
         """M (3 P, N): `M @ coefficients.ravel()` is curvature (3, P) flattened (Eqs. 2-5, 11)."""
         if basis.patch != self.patch:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
-        return curvature_at(basis, self.positions).reshape(3 * len(self), basis.size)
+        K = mean_curvature_at(basis, self.positions, self.gage_length)
+        return K.reshape(3 * len(self), basis.size)

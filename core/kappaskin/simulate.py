@@ -1,26 +1,41 @@
 """A scene to frames: the counts a real device would send, with the truth beside them."""
 
+import zlib
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
+from kappaskin.effects import (
+    CorruptedFrames,
+    DroppedFrames,
+    Effect,
+    FiniteSlope,
+    GageLength,
+    ReadingEffect,
+    Skew,
+    SkinEffect,
+)
 from kappaskin.frames import Array, Frame, Truth
 from kappaskin.mechanics import Load
 from kappaskin.scan import Scan
-from kappaskin.scene import Scene, contact_of
+from kappaskin.scene import Pressing, Scene, effects_of, kept_of
 
 
 class Simulator:
     """Makes the frames of a scene; they must be asked for in order to repeat with a seed.
 
-    Each channel is read at its own instant of the scan, on a skin that moves meanwhile; the truth
-    that comes with a frame is that of its start.
+    Only the effects that the scene calls for are there. With skew, each channel is read at its own
+    instant of the scan, on a skin that moves meanwhile; the truth that comes with a frame is that
+    of its start. Every effect draws from a random stream of its own.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._still: Truth | None = None
-        self._take_skin(scene)
+        self._kept = kept_of(scene)
+        self._take_skin()
+        self._pressing = Pressing(scene, self._plate)
         self._start_effects()
 
     def change(self, scene: Scene) -> None:
@@ -29,47 +44,70 @@ class Simulator:
         Another list of them, another seed or another number of elements does.
         """
         was, self.scene, self._still = self.scene, scene, None
+        before, self._kept = self._kept, kept_of(scene)
         same_elements = np.array_equal(scene.layout.positions, was.layout.positions)
-        skin = (scene.plate, scene.edge, scene.reference)
-        if not (same_elements and skin == (was.plate, was.edge, was.reference)):
-            self._take_skin(scene)
+        skin = (scene.plate, scene.edge, scene.reference, scene.layout.gage_length)
+        same_skin = skin == (was.plate, was.edge, was.reference, was.layout.gage_length)
+        if not (same_elements and same_skin and _of_skin(before) == _of_skin(self._kept)):
+            self._take_skin()
+        self._pressing = Pressing(scene, self._plate)
         same_size = len(scene.layout) == len(was.layout)
-        if not same_size or (scene.seed, scene.effects) != (was.seed, was.effects):
+        reading = scene.seed, _of_readings(self._kept)
+        if not same_size or reading != (was.seed, _of_readings(before)):
             self._start_effects()
 
     def _start_effects(self) -> None:
-        rng, shape = np.random.default_rng(self.scene.seed), (3 * len(self.scene.layout),)
-        self._effects = [effect.start(shape, rng) for effect in self.scene.effects]
+        shape = (3 * len(self.scene.layout),)
+        self._effects = [
+            effect.start(shape, _stream(self.scene.seed, effect.name))
+            for effect in _of_readings(self._kept)
+        ]
+        self._link = [
+            (effect.name, effect.start(_stream(self.scene.seed, effect.name)))
+            for effect in self._kept
+            if isinstance(effect, DroppedFrames | CorruptedFrames)
+        ]
 
-    def _take_skin(self, scene: Scene) -> None:
+    def _take_skin(self) -> None:
         """Compute what depends on the skin alone."""
+        scene, plate, layout = self.scene, self.scene.plate, self.scene.layout
+        kinds = {type(effect) for effect in self._kept}
+        for effect in effects_of(scene).values():
+            if isinstance(effect, SkinEffect) and type(effect) not in kinds:
+                plate = effect.off(plate)
+        if GageLength not in kinds:
+            layout = replace(layout, gage_length=0.0)
         self._basis = scene.basis
-        self._compliance = scene.plate.compliance(self._basis)
-        self._operator = scene.layout.curvature_operator(self._basis)
+        self._plate, self._compliance = plate, plate.compliance(self._basis)
+        self._skewed = Skew in kinds
         self._scan = scene.sensor().scan()
+        sloped = [effect for effect in self._kept if isinstance(effect, FiniteSlope)]
+        if sloped:
+            self._sensed = sloped[0].sensed(self._basis, layout)
+        else:
+            self._sensed = _linear(layout.curvature_operator(self._basis))
 
     def _truth(self, time: float) -> Truth:
         if self._still is not None:
             return self._still
-        loads = self.scene.loads_at(time)
-        truth = Truth(self._shape(loads), contact_of(loads), self.scene.edge)
-        if self.scene.motion is None:
+        pressed = self._pressing(time)
+        truth = Truth(self._compliance(pressed.force), pressed.contact, self.scene.edge)
+        if not self.scene.moves:
             self._still = truth
         return truth
 
-    def _shape(self, loads: tuple[Load, ...]) -> Array:
-        """Coefficients (Ri, Rj) in m of the deflection under `loads`."""
-        force = sum((load.modal(self._basis) for load in loads), np.zeros(self._basis.shape))
-        return self._compliance(force)
+    def loads(self, time: float) -> tuple[Load, ...]:
+        """What presses at `time` in s; a rigid object as the points that bear it."""
+        return self._pressing(time).loads
 
     def _read(self, scan: Scan, time: float, truth: Truth) -> Array:
         """Curvature (3 P,) of a scan begun at `time`; channels outside it as at the start."""
-        scene, first = self.scene, self._operator @ truth.coefficients.ravel()
-        if scene.motion is None:
+        scene, first = self.scene, self._sensed(truth.coefficients)
+        if not (scene.moves and self._skewed):
             return first
         # The parabola through start, middle and end, at the share s of the scan.
         middle, last = (
-            self._operator @ self._shape(scene.loads_at(t)).ravel()
+            self._sensed(self._compliance(self._pressing(t).force))
             for t in (time + scan.duration / 2, time + scan.duration)
         )
         s = np.zeros(len(first))
@@ -83,16 +121,42 @@ class Simulator:
         truth = self._truth(time)
         return truth, self._read(scan, time, truth)
 
+    def reading(self, scan: Scan, time: float) -> tuple[Truth | None, Array]:
+        """The truth, and the curvature (3 P,) in 1/m that is read; dead channels read nothing."""
+        truth, curvature = self._true(scan, time)
+        for effect in self._effects:
+            curvature = effect(curvature, time)
+        curvature[~self.scene.layout.live.ravel()] = 0.0
+        return truth, curvature
+
+    def failure(self, n: int) -> str:
+        """What becomes of frame `n` on the link: the name of what fails, nothing if it arrives."""
+        return next((name for name, hits in self._link if hits(n)), "")
+
     def frame(self, n: int, clock: Callable[[], float]) -> Frame:
         """Frame `n` of all channels, begun at device time n / rate."""
         return self.scanned(self._scan, n, n / self.scene.rate, clock)
 
     def scanned(self, scan: Scan, n: int, time: float, clock: Callable[[], float]) -> Frame:
-        """Frame `n` of what `scan` reads, begun at device `time`; dead channels read nothing."""
-        scene = self.scene
-        truth, curvature = self._true(scan, time)
-        for effect in self._effects:
-            curvature = effect(curvature, time)
-        curvature[~scene.layout.live.ravel()] = 0.0
-        counts = scene.transduction.counts(curvature[scan.channels])
+        """Frame `n` of what `scan` reads, begun at device `time`."""
+        truth, curvature = self.reading(scan, time)
+        counts = self.scene.transduction.counts(curvature[scan.channels])
         return Frame(n & 0xFFFFFFFF, time, clock(), scan.channels, counts, truth)
+
+
+def _linear(operator: Array) -> Callable[[Array], Array]:
+    """Coefficients (Ni, Nj) to curvature (3 P,) by an `operator` (3 P, N)."""
+    return lambda coefficients: operator @ coefficients.ravel()
+
+
+def _of_readings(effects: tuple[Effect, ...]) -> list[ReadingEffect]:
+    return [effect for effect in effects if isinstance(effect, ReadingEffect)]
+
+
+def _of_skin(effects: tuple[Effect, ...]) -> list[Effect]:
+    return [effect for effect in effects if not isinstance(effect, ReadingEffect)]
+
+
+def _stream(seed: int, name: str) -> np.random.Generator:
+    """The random stream of one effect, the same whatever others there are."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode())])

@@ -1,14 +1,13 @@
 """What touches the skin, in words, beside the picture."""
 
 import time
-from dataclasses import replace
 
 from kappaskin import Pipeline, PointLoad, Setup, Simulator, load_scene
 from kappaskin_app.naming import curved
 
 
 def _estimate(*loads):
-    scene = replace(load_scene("centre"), loads=loads)
+    scene = load_scene("centre").touched_by(*loads)
     return Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, time.monotonic))
 
 

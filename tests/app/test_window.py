@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin import EDGES, SCENES, Disk
 from kappaskin_app.panels.form import Form
-from kappaskin_app.settings import Settings
+from kappaskin_app.settings import READY_CASES, Settings
 from kappaskin_app.views.line import Line
 from kappaskin_app.window import MainWindow
 
@@ -212,7 +212,7 @@ def test_a_scene_of_its_own_is_shown_as_it_is_and_leaves_the_load_to_itself(open
     assert window.session.simulating
 
 
-@pytest.mark.parametrize("name", [name for name in SCENES if name != "calibration"])
+@pytest.mark.parametrize("name", READY_CASES)
 def test_a_ready_scene_becomes_the_load_case(opened, until, name: str) -> None:
     window = opened(f"sim:{name}")
     until(lambda: window.session.estimate is not None)

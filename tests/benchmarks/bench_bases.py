@@ -61,7 +61,8 @@ def test_64_modes_are_ready_within_2_seconds(name, edge, figure) -> None:
 
 def estimate(patch, layout):
     """A frame of a touched skin to its estimate, as a device without a truth has it."""
-    scene = replace(SCENE, plate=Plate(patch), layout=layout, loads=(PointLoad(0.03, 0.04, 0.3),))
+    scene = replace(SCENE, plate=Plate(patch), layout=layout, stimuli=())
+    scene = scene.touched_by(PointLoad(0.03, 0.04, 0.3))
     pipeline = Pipeline(scene.sensor(), Setup())
     frame = replace(Simulator(scene).frame(0, time.monotonic), truth=None)
     assert pipeline(frame).touch.force > 0.2

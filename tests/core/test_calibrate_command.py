@@ -20,6 +20,7 @@ import pytest
 
 from kappaskin import (
     ADVICE,
+    Creep,
     Frame,
     GaussianNoise,
     Presentation,
@@ -32,6 +33,7 @@ from kappaskin import (
     schedule,
 )
 from kappaskin.calibration.file import from_toml
+from kappaskin.effects import ReadingEffect, Size, Survey
 from kappaskin.errors import SourceError
 from kappaskin.guide import summary, take_sweep
 
@@ -81,10 +83,8 @@ def test_json_tells_every_channel_and_nothing_else(run, tmp_path) -> None:
 
 
 def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> None:
-    from kappaskin import SCENES, Creep
-
     creeping = replace(SCENE, effects=(Creep(0.05, 2.0), *SCENE.effects[1:]))
-    monkeypatch.setitem(SCENES, "creeping", lambda: creeping)
+    monkeypatch.setattr("kappaskin.guide.load_scene", lambda name: creeping)
     out = tmp_path / "s.toml"
     _, printed, told = run("calibrate", "sim:creeping", "--out", out, "--hold", "10", *FAST)
     assert "held for 10 s" in told
@@ -93,15 +93,18 @@ def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> 
 
 
 def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monkeypatch) -> None:
-    from kappaskin import SCENES
+    class Broken(ReadingEffect):
+        name, formula = "broken", "none"
 
-    class Broken:
+        def size(self, survey: Survey) -> Size:
+            return Size(1.0, 1.0)
+
         def start(self, shape: tuple[int, ...], _: object) -> Any:
             alive = np.arange(shape[0]) != 217
             return lambda curvature, _: curvature * alive
 
     broken = replace(SCENE, effects=(Broken(), GaussianNoise(0.2)))
-    monkeypatch.setitem(SCENES, "broken", lambda: broken)
+    monkeypatch.setattr("kappaskin.guide.load_scene", lambda name: broken)
     out = tmp_path / "s.toml"
 
     code, printed, _ = run("calibrate", "sim:broken", "--out", out, *FAST)

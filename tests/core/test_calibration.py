@@ -38,6 +38,7 @@ from kappaskin import (
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.calibration.lines import lines
 from kappaskin.calibration.loops import identify, thresholds
+from kappaskin.effects import ReadingEffect, Size
 from kappaskin.ring import Ring
 
 DATE = datetime(2026, 3, 1, 12, tzinfo=UTC)
@@ -206,8 +207,14 @@ def test_the_report_shows_the_loops_and_what_is_left_of_them(second):
 
 
 def test_a_skin_that_was_bent_before_is_calibrated_as_well_as_one_at_rest():
-    class Used:
+    class Used(ReadingEffect):
         """The second prototype's loops, with a past."""
+
+        name = "used-loops"
+        formula = "none"
+
+        def size(self, survey):
+            return Size(1.0, 1.0)
 
         def start(self, shape, rng):
             running = SECOND_GENERATION_LOOPS.start(shape, rng)
@@ -262,8 +269,14 @@ def test_every_channel_has_its_own_loops():
         for weights in ((0.0,) * 3, (0.02,) * 3, (0.1,) * 3)
     )
 
-    class Mixed:
+    class Mixed(ReadingEffect):
         """A skin whose elements are glued on differently."""
+
+        name = "mixed-loops"
+        formula = "none"
+
+        def size(self, survey):
+            return Size(1.0, 1.0)
 
         def start(self, shape, rng):
             third = [effect.start(shape, rng) for effect in (none, narrow, wide)]
@@ -280,8 +293,14 @@ def test_every_channel_has_its_own_loops():
 
 
 def test_loops_of_another_make_shrink_as_well():
-    class Smooth:
+    class Smooth(ReadingEffect):
         """Many plays on a smoothly bent scale, none of the thresholds or kinks of ours."""
+
+        name = "smooth-loops"
+        formula = "none"
+
+        def size(self, survey):
+            return Size(1.0, 1.0)
 
         def start(self, shape, rng):
             r = np.geomspace(1.0, 40.0, 60)[:, None]

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -9,22 +10,52 @@ import pytest
 from kappaskin import (
     FIRST_GENERATION_LOOPS,
     SECOND_GENERATION_LOOPS,
+    Amplifier,
     Creep,
     GaussianNoise,
+    HalfBridge,
     Refusal,
     Tolerance,
+    Transduction,
     UniformNoise,
+)
+from kappaskin.effects import (
+    EFFECTS,
+    CrossTalk,
+    FlickerNoise,
+    GageLength,
+    Hysteresis,
+    IntermittentElements,
+    MainsHum,
+    Quantisation,
+    Saturation,
+    StrainLimit,
+    StuckElements,
+    Temperature,
+    Within,
+    parameters,
 )
 
 DRAWS = 200_000
-EFFECTS = [
+EFFECTS_AT_WORK = [
     UniformNoise(0.3),
     GaussianNoise(0.3),
     Tolerance(0.05, 3.0),
     SECOND_GENERATION_LOOPS,
     FIRST_GENERATION_LOOPS,
     Creep(0.03, 20.0),
+    CrossTalk(0.02),
+    Temperature(15.0, 0.5, 0.3, spread=0.2, gain=2e-4),
+    FlickerNoise(0.3),
+    MainsHum(0.3),
+    Quantisation(Transduction()),
+    Saturation(Transduction(amplifier=Amplifier(gain=400.0))),
+    StrainLimit(Transduction(HalfBridge(substrate_thickness=1e-3)), 0.2),
+    StuckElements((1, 3), since=0.3),
+    IntermittentElements((0, 2), on=0.2, off=0.1),
 ]
+ALIKE = (Tolerance, Temperature, MainsHum, Quantisation, Saturation)  # whatever came before
+SOMETIMES = (StuckElements, IntermittentElements, Saturation)
 
 
 def played(running, frames=30):
@@ -33,7 +64,7 @@ def played(running, frames=30):
     return np.array([running(60 * np.sin(k / 3 + phase), k / 50) for k in range(frames)])
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", EFFECTS_AT_WORK)
 def test_an_effect_leaves_what_it_is_given_and_what_it_gave_alone(effect):
     running = effect.start((3, 4), np.random.default_rng(1))
     given = np.linspace(-70, 70, 12).reshape(3, 4)
@@ -41,27 +72,106 @@ def test_an_effect_leaves_what_it_is_given_and_what_it_gave_alone(effect):
 
     first = running(given, 0.0)
     answered = first.copy()
-    then = running(given, 10.0)
+    then = running(-given / 2, 10.0)
 
     np.testing.assert_array_equal(given, kept)
     np.testing.assert_array_equal(first, answered)
     assert first.shape == (3, 4)
-    assert (then != given).any()
+    assert (then != -given / 2).any() or isinstance(effect, SOMETIMES)
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", EFFECTS_AT_WORK)
 def test_an_effect_started_twice_has_two_states(effect):
     one = effect.start((3, 4), np.random.default_rng(1))
     begun = played(one)
 
     np.testing.assert_array_equal(played(effect.start((3, 4), np.random.default_rng(1))), begun)
-    assert (played(one) != begun).any() == (not isinstance(effect, Tolerance))
+    assert (played(one) != begun).any() == (not isinstance(effect, ALIKE))
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", EFFECTS_AT_WORK)
 def test_effects_that_spoil_alike_are_equal_also_after_a_way_through_a_pipe(effect):
     assert pickle.loads(pickle.dumps(effect)) == effect
-    assert [other == effect for other in EFFECTS].count(True) == 1
+    assert [other == effect for other in EFFECTS_AT_WORK].count(True) == 1
+
+
+NONE = [
+    UniformNoise(0.0),
+    GaussianNoise(0.0),
+    Tolerance(0.0, 0.0),
+    Hysteresis((2.0,), (0.0,)),
+    Creep(0.0, 20.0),
+    CrossTalk(0.0),
+    Temperature(0.0, 0.5, 0.3, spread=0.2, gain=2e-4),
+    Temperature(15.0, 0.5, 0.0, spread=0.2),
+    FlickerNoise(0.0),
+    MainsHum(0.0),
+    StrainLimit(Transduction(HalfBridge(substrate_thickness=1e-3)), 0.0),
+    StuckElements(()),
+    IntermittentElements(()),
+]
+
+
+@pytest.mark.parametrize("effect", NONE)
+def test_an_effect_of_no_size_changes_nothing(effect):
+    unspoilt = played(lambda curvature, _: curvature)
+
+    spoilt = played(effect.start((3, 4), np.random.default_rng(1)))
+
+    np.testing.assert_allclose(spoilt, unspoilt, rtol=1e-15)
+
+
+@pytest.mark.parametrize("effect", EFFECTS_AT_WORK)
+def test_another_stream_of_random_numbers_changes_only_what_is_drawn_from_it(effect):
+    one, other = (played(effect.start((3, 4), np.random.default_rng(n))) for n in (1, 2))
+
+    random = (UniformNoise, GaussianNoise, FlickerNoise, MainsHum, IntermittentElements)
+    assert (one != other).any() == isinstance(effect, random)
+
+
+def test_every_effect_has_a_name_and_a_formula_of_its_own_kind():
+    for name, effect in EFFECTS.items():
+        assert effect.name == name
+        assert effect.formula
+
+
+NUMBERS = [(kind, name) for kind in EFFECTS.values() for name in parameters(kind)]
+
+
+@pytest.mark.parametrize(("kind", "parameter"), NUMBERS)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1e300, "1", None, True, 1j, [0.1]])
+def test_a_number_out_of_its_range_is_refused_with_range_and_unit(kind, parameter, value):
+    told = {name: note.least for name, note in parameters(kind).items()}
+    for field in fields(kind):
+        if field.name in ("transduction", "elements"):
+            told[field.name] = Transduction() if field.name == "transduction" else (0,)
+    if kind is FlickerNoise:
+        told["high"] = 1.0
+    kind(**told)
+
+    with pytest.raises(Refusal) as refused:
+        kind(**{**told, parameter: value})
+
+    for part in (kind.name, parameter, str(parameters(kind)[parameter]), f"got {value!r}"):
+        assert part in str(refused.value)
+
+
+def test_a_range_tells_itself_in_words():
+    assert str(Within(0, unit="1/m")) == "at least 0 1/m"
+    assert str(Within(-200, 200, "K")) == "-200 to 200 K"
+    assert str(Within(0, 0.5)) == "0 to 0.5"
+    assert str(Within(0, 9, whole=True)) == "0 to 9, a whole number"
+    assert 1.5 not in Within(0, 9, whole=True)
+    assert np.int32(3) in Within(0, 9, whole=True)
+    assert np.float32(3) in Within(0, 9)
+    assert 10**400 not in Within(0)
+    assert [value in Within(0, 0.5) for value in (0, 0.5, 0.500001, -1e-9)] == [1, 1, 0, 0]
+
+
+@pytest.mark.parametrize("length", [-1e-3, 11.0, math.nan])
+def test_a_length_that_is_none_is_refused_in_metres(length):
+    with pytest.raises(Refusal, match=f"gage-length with length of 0 to 10 m, got {length}"):
+        GageLength(length)
 
 
 def noise(effect, seed=0, shape=(DRAWS,)):
@@ -144,5 +254,5 @@ def test_tolerances_belong_to_the_skin_and_not_to_the_noise():
 @pytest.mark.parametrize("sd", [-0.1, math.nan, math.inf])
 def test_a_tolerance_that_is_none_is_refused(sd):
     for pair in ((sd, 1.0), (0.1, sd)):
-        with pytest.raises(Refusal, match="standard deviations of at least 0"):
+        with pytest.raises(Refusal, match="sd of at least 0"):
             Tolerance(*pair)

@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -23,6 +22,7 @@ from kappaskin import (
     Scene,
     SensorLayout,
     Setup,
+    Stimulus,
     load_scene,
 )
 from kappaskin.engine import Engine
@@ -172,7 +172,7 @@ def test_another_scene_plays_on_the_same_line(engine) -> None:
     before = next_estimate(engine)
     here = np.array([0.03, 0.06])
 
-    engine.play(replace(load_scene("centre"), loads=(PointLoad(*here, 0.5),)))
+    engine.play(load_scene("centre").touched_by(PointLoad(*here, 0.5)))
 
     assert wait_for(lambda: np.array_equal(next_estimate(engine).true_contact, here))
     after = wait_for(lambda: next_estimate(engine))
@@ -186,7 +186,7 @@ def test_another_skin_is_met_as_another_device_is(engine) -> None:
     patch = Patch(0.04, 0.03, 0.0129)
     layout = SensorLayout.regular(patch, 7, 9)
 
-    engine.play(Scene("arc", Plate(patch), layout, (PointLoad(0.02, 0.015, 0.2),)))
+    engine.play(Scene("arc", Plate(patch), layout, (Stimulus(PointLoad(0.02, 0.015, 0.2)),)))
     after = next_estimate(engine, before.generation)
 
     status = engine.status()

@@ -229,7 +229,7 @@ def test_without_a_truth_there_is_no_error():
 
 
 def test_an_unloaded_skin_is_flat_and_untouched():
-    scene = replace(QUIET, loads=())
+    scene = QUIET.touched_by()
 
     estimate = pipeline_of(scene)(frame_of(scene))
 
@@ -240,7 +240,7 @@ def test_an_unloaded_skin_is_flat_and_untouched():
 
 
 def test_the_noise_of_an_untouched_skin_is_no_contact():
-    scene = replace(load_scene("centre"), loads=())
+    scene = load_scene("centre").touched_by()
     simulator, pipeline = Simulator(scene), pipeline_of(scene)
 
     touches = [pipeline(simulator.frame(n, lambda: 0.0)).touch for n in range(500)]
@@ -276,7 +276,7 @@ def test_the_frame_is_left_as_it_came():
 
 def test_the_force_follows_the_rigidity_of_the_skin():
     plate = replace(QUIET.plate, rigidity=2 * QUIET.plate.rigidity)
-    stiff = replace(QUIET, plate=plate, loads=(QUIET.loads[0].scaled(2),))
+    stiff = replace(QUIET, plate=plate).touched_by(QUIET.loads[0].scaled(2))
 
     soft_touch, stiff_touch = (pipeline_of(s)(frame_of(s)).touch for s in (QUIET, stiff))
 

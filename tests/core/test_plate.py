@@ -24,6 +24,7 @@ from kappaskin import (
     Scene,
     SensorLayout,
     SineBasis,
+    Stimulus,
     basis_for,
 )
 
@@ -232,7 +233,7 @@ def test_under_a_point_a_drum_head_gives_way_without_limit_and_that_is_refused()
         with pytest.raises(Refusal, match="without limit under a point: expected a distributed"):
             drum.deflection([disc, point], basis)
     with pytest.raises(Refusal, match="expected a distributed load"):
-        Scene("drum", drum, SensorLayout.regular(SQUARE, 4, 4), (PointLoad(0.05, 0.05),))
+        Scene("drum", drum, SensorLayout.regular(SQUARE, 4, 4), (Stimulus(PointLoad(0.05, 0.05)),))
     # The sum over modes grows as their logarithm, by P / (2 pi T) for every factor e.
     centre = PointLoad(0.05, 0.05)
     few, many = (

@@ -26,7 +26,7 @@ pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice
 
 SCENE = load_scene("circle")
-MOTION = SCENE.motion or Orbit(0.022, 4.0)
+MOTION = Orbit(0.022, 4.0)
 
 
 def wait_for(ask: Callable[[], Any], within: float = 5.0) -> Any:
@@ -248,7 +248,8 @@ def test_the_command_ends_at_once_when_told_with_a_listener_or_without(how) -> N
 
 
 def contact_at(time: float) -> np.ndarray:
-    return np.array([0.05, 0.05]) + MOTION.offset(time)
+    pose = MOTION.at(time)
+    return np.array([0.05 + pose.dx, 0.05 + pose.dy])
 
 
 def test_an_engine_on_a_real_port_loses_nothing_and_follows_the_contact(device) -> None:

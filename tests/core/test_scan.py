@@ -18,6 +18,7 @@ from kappaskin import (
     Scene,
     SensorLayout,
     Simulator,
+    Stimulus,
     Transduction,
     load_scene,
 )
@@ -28,8 +29,7 @@ MOVING = Scene(
     "moving",
     Plate(PATCH),
     SensorLayout.regular(PATCH, 10, 10),
-    (PointLoad(0.05, 0.05, 0.15),),
-    Orbit(0.02, 0.5),
+    (Stimulus(PointLoad(0.05, 0.05, 0.15), Orbit(0.02, 0.5)),),
     transduction=SECOND_GENERATION,
     rate=160.0,
 )
@@ -133,7 +133,7 @@ def test_the_parabola_through_a_scan_converges_with_the_third_power_of_its_lengt
 
 
 def test_a_skin_that_rests_has_no_skew():
-    still = replace(MOVING, motion=None)
+    still = MOVING.touched_by(*MOVING.loads)
 
     forth = Simulator(still).scanned(still.sensor().scan(), 0, 0.0, lambda: 0.0)
     back = Simulator(still).scanned(still.sensor().scan(np.arange(300)[::-1]), 0, 0.0, lambda: 0.0)

@@ -24,8 +24,8 @@ from kappaskin import (
 )
 
 PATCH = Patch(0.1, 0.1)
-QUIET = Scene(
-    "quiet", Plate(PATCH), SensorLayout.regular(PATCH, 5, 4), (PointLoad(0.03, 0.06, 0.15),)
+QUIET = Scene("quiet", Plate(PATCH), SensorLayout.regular(PATCH, 5, 4)).touched_by(
+    PointLoad(0.03, 0.06, 0.15)
 )
 NOISY = replace(QUIET, effects=(UniformNoise(0.2), GaussianNoise(0.1)), seed=3)
 
@@ -100,7 +100,7 @@ def test_the_truth_travels_with_the_frame():
 
 
 def test_the_truth_moves_with_the_load():
-    scene = replace(QUIET, motion=Orbit(0.01, 4.0))
+    scene = QUIET.touched_by(*QUIET.loads, motion=Orbit(0.01, 4.0))
     simulator = Simulator(scene)
 
     truth = simulator.frame(500, lambda: 0.0).truth
@@ -114,7 +114,7 @@ def test_the_truth_moves_with_the_load():
 def test_a_changed_load_shows_in_the_next_frame():
     simulator = Simulator(QUIET)
     simulator.frame(0, lambda: 0.0)
-    other = replace(QUIET, loads=(PointLoad(0.07, 0.02, 0.1),))
+    other = QUIET.touched_by(PointLoad(0.07, 0.02, 0.1))
 
     simulator.change(other)
     frame = simulator.frame(1, lambda: 0.0)
@@ -127,7 +127,7 @@ def test_changing_only_the_load_goes_on_with_the_noise():
     simulator = Simulator(NOISY)
     simulator.frame(0, lambda: 0.0)
 
-    simulator.change(replace(NOISY, motion=Orbit(0.0, 1.0)))
+    simulator.change(NOISY.touched_by(*NOISY.loads, motion=Orbit(0.0, 1.0)))
 
     np.testing.assert_array_equal(simulator.frame(1, lambda: 0.0).counts, counts(NOISY)[1])
 
@@ -147,17 +147,18 @@ def test_changing_only_the_load_keeps_the_loops_and_the_creep():
     for n in range(50):
         changed.frame(n, lambda: 0.0)
 
-    changed.change(replace(lasting, loads=()))
+    changed.change(lasting.touched_by())
 
     left = changed.frame(50, lambda: 0.0).counts
     assert np.abs(left).max() > 10  # what remains of the load
-    fresh.change(replace(lasting, loads=(), effects=(Creep(0.2, 0.01), SECOND_GENERATION_LOOPS)))
+    effects = Creep(0.2, 0.01), SECOND_GENERATION_LOOPS
+    fresh.change(replace(lasting, stimuli=(), effects=effects))
     assert not fresh.frame(51, lambda: 0.0).counts.any()
 
 
 def test_a_skin_laid_on_cylinders_bends_alike_everywhere_and_has_no_coefficients():
     steps = (Step(1), Step(2, 0.05, "x"), Step(3, 0.04, "diagonal", -1))
-    simulator = Simulator(replace(QUIET, loads=(), laid=Presentation(steps, 0.01)))
+    simulator = Simulator(QUIET.laid_on(Presentation(steps, 0.01)))
 
     frames = [simulator.frame(n, lambda: 0.0) for n in range(30)]
 

@@ -143,7 +143,7 @@ def test_other_loads_play_on_without_a_gap() -> None:
     clock = Clock()
     source = source_of("circle", clock)
     before = read_until(source, clock, clock.now + 0.5)
-    scene = replace(load_scene("circle"), loads=(PointLoad(0.03, 0.06, 0.2),), motion=None)
+    scene = load_scene("circle").touched_by(PointLoad(0.03, 0.06, 0.2))
 
     source.play(scene)
     after = read_until(source, clock, clock.now + 0.5)
@@ -219,7 +219,7 @@ def test_a_scene_that_is_refused_leaves_the_one_that_plays() -> None:
 
 def test_no_load_reads_nothing_but_noise() -> None:
     clock = Clock()
-    source = source_of(clock=clock, loads=(), effects=())
+    source = source_of(clock=clock, stimuli=(), effects=())
     (frame,) = source.read(0.0)
     assert not frame.counts.any()
     assert frame.truth is not None

@@ -20,10 +20,10 @@ from kappaskin.sources import SimulatedSource
 from kappaskin.steer import steered
 
 RATE = 1e6  # frames/s asked for: as many as the scan allows
+_ROUND = load_scene("circle")
 CIRCLE = replace(
-    load_scene("circle"),
+    _ROUND.touched_by(*_ROUND.loads, motion=Orbit(0.022, 1.0)),
     transduction=SECOND_GENERATION,
-    motion=Orbit(0.022, 1.0),
     rate=1 / SECOND_GENERATION.scan_time(300),
 )
 
@@ -105,9 +105,9 @@ def test_when_the_contact_is_lost_everything_is_scanned_again(around):
     loop = Loop(Region(around, radius=0.02, rate=RATE))
     touched = loop.run(0.1)
 
-    loop.source.play(replace(CIRCLE, loads=()))
+    loop.source.play(CIRCLE.touched_by())
     lifted = loop.run(0.1)
-    loop.source.play(replace(CIRCLE, loads=(PointLoad(0.03, 0.07, 0.3),), motion=None))
+    loop.source.play(CIRCLE.touched_by(PointLoad(0.03, 0.07, 0.3)))
     again = loop.run(0.1)
 
     assert len(touched[-1][0].channels) < 90
@@ -118,11 +118,11 @@ def test_when_the_contact_is_lost_everything_is_scanned_again(around):
 
 
 def test_a_load_elsewhere_is_seen_through_the_elements_in_turn():
-    still = replace(CIRCLE, motion=None, loads=(PointLoad(0.02, 0.02, 0.2),))
+    still = CIRCLE.touched_by(PointLoad(0.02, 0.02, 0.2))
     loop = Loop(Region("skin", radius=0.02, share=0.1, rate=RATE), still)
     loop.run(0.05)
 
-    loop.source.play(replace(still, loads=(PointLoad(0.08, 0.075, 0.2),)))
+    loop.source.play(still.touched_by(PointLoad(0.08, 0.075, 0.2)))
     seen = loop.run(0.05)
 
     assert seen[-1][1].touch.position == pytest.approx([0.08, 0.075], abs=1e-3)

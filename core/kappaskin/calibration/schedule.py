@@ -214,6 +214,11 @@ class Presentation:
     def _ends(self) -> list[float]:
         return list(accumulate(max(self.dwell, step.hold) for step in self.steps))
 
+    @property
+    def duration(self) -> float:
+        """Seconds until the last step is over."""
+        return self._ends[-1]
+
     def index(self, time: float) -> int:
         """Which step is presented at `time` in s, their number once all are over."""
         return bisect_right(self._ends, time + _ROUNDING)

@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from kappaskin.effects.effect import Running
+from kappaskin.effects.effect import ReadingEffect, Running, Size
+from kappaskin.effects.survey import Survey
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
@@ -92,8 +94,11 @@ class Restoring(_Slow):
 
 
 @dataclass(frozen=True)
-class Creep:
+class Creep(ReadingEffect):
     """Of every reading the `share` relaxes away, with the `time_constant` in s."""
+
+    name: ClassVar = "creep"
+    formula: ClassVar = "share that relaxes away while the scene lasts"
 
     share: float
     time_constant: float
@@ -105,6 +110,11 @@ class Creep:
         """The same creep in each of so many `channels`."""
         return StandardLinearSolid(np.full(channels, float(self.share)), self.time_constant)
 
+    def size(self, survey: Survey) -> Size:
+        gone = -self.share * math.expm1(-survey.duration / self.time_constant)
+        return Size(gone, gone)
+
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
-        relaxing = self.solid(int(np.prod(shape))).start()
-        return lambda curvature, time: relaxing(curvature.ravel(), time).reshape(shape)
+        from kappaskin.effects.at_work.creep import creep
+
+        return creep(self.solid(int(np.prod(shape))), shape)

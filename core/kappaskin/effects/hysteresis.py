@@ -1,10 +1,12 @@
 """Hysteresis: curvature to a reading that depends on the way the curvature came, and back."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from kappaskin.effects.effect import Running
+from kappaskin.effects.effect import ReadingEffect, Running, Size
+from kappaskin.effects.survey import Survey
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
@@ -94,12 +96,15 @@ class Plays:
 
 
 @dataclass(frozen=True)
-class Hysteresis:
+class Hysteresis(ReadingEffect):
     """The same loops in every channel: plays of `weights` at `thresholds` in 1/m.
 
     Loops on positive curvature are `asymmetry` times wider than on negative curvature, in which
     thresholds count. A long way in one direction is read with its true slope of 1.
     """
+
+    name: ClassVar = "hysteresis"
+    formula: ClassVar = "how far the plays lag behind, over peak curvature"
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
@@ -125,9 +130,17 @@ class Hysteresis:
         a = np.full(channels, float(self.asymmetry))
         return PrandtlIshlinskii(everywhere(self.thresholds), p, 1 - p.sum(axis=0), a)
 
+    def size(self, survey: Survey) -> Size:
+        # Each play lags behind by its threshold, or by all there is to lag behind of.
+        wider = max(self.asymmetry, 1.0)
+        lags = np.minimum(np.array(self.thresholds) * wider, survey.peak) * self.weights
+        number = float(lags.sum()) / survey.peak
+        return Size(number, number)
+
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
-        plays = self.operator(int(np.prod(shape))).start()
-        return lambda curvature, _: plays(curvature.ravel()).reshape(shape)
+        from kappaskin.effects.at_work.hysteresis import hysteresis
+
+        return hysteresis(self.operator(int(np.prod(shape))), shape)
 
 
 # A loop that swings to both sides is 2 a sum p_j r_j wide on the positive one and 2 sum p_j r_j on

@@ -2,40 +2,53 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from kappaskin.effects.effect import Running
-from kappaskin.errors import Refusal
+from kappaskin.effects.effect import ReadingEffect, Running, Size
+from kappaskin.effects.parameters import Within
+from kappaskin.effects.survey import Survey
 
+LARGEST = 6.0
+"""Standard deviations that no reading of many frames is off by: one of 500 million is."""
 
-def _check_rms(rms: float) -> None:
-    if not (math.isfinite(rms) and rms >= 0):
-        raise Refusal(f"expected a noise RMS of at least 0 1/m, got {rms}")
+_RMS = Within(0, unit="1/m")
 
 
 @dataclass(frozen=True)
-class UniformNoise:
+class UniformNoise(ReadingEffect):
     """Noise even between -sqrt(3) rms and sqrt(3) rms, in 1/m (the paper's, section 4)."""
 
-    rms: float
+    name: ClassVar = "uniform-noise"
+    formula: ClassVar = "RMS of the noise over peak curvature"
 
-    def __post_init__(self) -> None:
-        _check_rms(self.rms)
+    rms: Annotated[float, _RMS]
+
+    def size(self, survey: Survey) -> Size:
+        number = self.rms / survey.peak
+        return Size(number, math.sqrt(3) * number)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
-        limit = math.sqrt(3) * self.rms
-        return lambda curvature, _: curvature + rng.uniform(-limit, limit, shape)
+        from kappaskin.effects.at_work.noise import uniform
+
+        return uniform(self.rms, shape, rng)
 
 
 @dataclass(frozen=True)
-class GaussianNoise:
+class GaussianNoise(ReadingEffect):
     """Normal noise of standard deviation `rms`, in 1/m."""
 
-    rms: float
+    name: ClassVar = "gaussian-noise"
+    formula: ClassVar = "RMS of the noise over peak curvature"
 
-    def __post_init__(self) -> None:
-        _check_rms(self.rms)
+    rms: Annotated[float, _RMS]
+
+    def size(self, survey: Survey) -> Size:
+        number = self.rms / survey.peak
+        return Size(number, LARGEST * number)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
-        return lambda curvature, _: curvature + rng.normal(0.0, self.rms, shape)
+        from kappaskin.effects.at_work.noise import gaussian
+
+        return gaussian(self.rms, shape, rng)

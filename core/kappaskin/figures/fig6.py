@@ -44,7 +44,7 @@ def run() -> _Run:
     truth = scene.plate.deflection(scene.loads, reference)
     curvature = (layout.curvature_operator(reference) @ truth.ravel()).reshape(3, -1)
     rng = np.random.default_rng(scene.seed)
-    for effect in scene.effects:
+    for effect in scene.reading_effects:
         curvature = effect.start(curvature.shape, rng)(curvature, 0.0)
     basis, grid = SineBasis(patch, 8, 8), patch.grid(_SIDE, _SIDE)
     c = LeastSquares(basis, layout)(curvature).coefficients

@@ -45,7 +45,7 @@ class _Load:
 def run(applied: float, rng: np.random.Generator) -> _Load:
     """Table 2's strip with a load that moves it by `applied` mm, 8 functions fitted to it."""
     scene = fingertip_scene(applied)
-    patch, layout, (noise,) = scene.plate.patch, scene.layout, scene.effects
+    patch, layout, (noise,) = scene.plate.patch, scene.layout, scene.reading_effects
     truth = scene.plate.deflection(scene.loads, scene.basis).ravel()
     curvature = (layout.curvature_operator(scene.basis) @ truth).reshape(3, -1)
     basis = basis_for(patch, scene.edge, 8, 1)

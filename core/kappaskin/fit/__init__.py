@@ -12,7 +12,6 @@ from kappaskin.fit.estimator import RIM_SD as RIM_SD
 from kappaskin.fit.estimator import Estimator as Estimator
 from kappaskin.fit.fast import Fast as Fast
 from kappaskin.fit.finite_slope import FiniteSlope as FiniteSlope
-from kappaskin.fit.finite_slope import NormalCurvature as NormalCurvature
 from kappaskin.fit.fit import Fit as Fit
 from kappaskin.fit.least_squares import LeastSquares as LeastSquares
 from kappaskin.fit.robust import WHY as WHY

@@ -223,9 +223,10 @@ class Fast(Estimator):
                 f"expected at most {m} x {n} functions for the fast transforms of {layout}, got "
                 f"{sines.Ni} x {sines.Nj}; use fewer, or least-squares"
             )
-        self._exact = Transforms(sines, m, n)
+        length = layout.gage_length
+        self._exact = Transforms(sines, m, n, gage_length=length)
         exactly = self.dtype == np.float64
-        self._transforms = self._exact if exactly else Transforms(sines, m, n, self.dtype)
+        self._transforms = self._exact if exactly else Transforms(sines, m, n, self.dtype, length)
         self._least = math.sqrt(np.finfo(self.dtype).eps)  # half of the digits are left
         self._solvers = Remembered[_Solver]()
         self._whole = self._made(self.readable)

@@ -1,49 +1,18 @@
 """Least squares that knows the skin's slopes: gages sense the curvature of the bent surface."""
 
 import numpy as np
-from numpy.typing import DTypeLike
 
-from kappaskin.bases import Basis
-from kappaskin.errors import Refusal
 from kappaskin.fit.estimator import Estimator
 from kappaskin.fit.fit import Fit
 from kappaskin.fit.least_squares import LeastSquares
 from kappaskin.frames import Array, Mask
-from kappaskin.layout import SensorLayout
+from kappaskin.normal_curvature import NormalCurvature
 
 _STEPS = 4  # at most; 2 or 3 do
 _EXACT = 1e-6  # of the readings' RMS: a step that changes them by less is the last one
 _ROUNDINGS = 100  # relative errors that a step may amount to by rounding alone, as in float32
 _CLOSE = 1e-2  # of the readings' RMS: so small must the fourth step be
 _CONTRACTS = 0.7  # a step longer than this share of the one before: it will not get there
-
-
-class NormalCurvature:
-    """Coefficients to the true normal curvature of the deflected surface along the gages.
-
-    With W^2 = 1 + f_x^2 + f_y^2 it is xx: f_xx / (W (1 + f_x^2)), yy: f_yy / (W (1 + f_y^2)),
-    xy: f_xy / (W sqrt((1 + f_x^2) (1 + f_y^2))), of which Eqs. 3-5 are the first order.
-    """
-
-    def __init__(self, basis: Basis, layout: SensorLayout, dtype: DTypeLike = np.float64) -> None:
-        if basis.patch.base_curvature:
-            raise Refusal(
-                f"expected a flat skin for finite slopes, got a {basis.patch.name}: on a bent one "
-                "the tangential displacement matters as much as the slope; use least-squares"
-            )
-        places = layout.positions
-        self._size = basis.size
-        self._second = layout.curvature_operator(basis).T.astype(dtype)
-        self._first = [basis.at(places, *order).T.astype(dtype) for order in ((1, 0), (0, 1))]
-
-    def __call__(self, coefficients: Array) -> Array:
-        """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
-        flat = coefficients.reshape(*coefficients.shape[:-2], self._size)
-        along_x, along_y = (1 + np.dot(flat, slope) ** 2 for slope in self._first)
-        W2 = along_x + along_y - 1
-        inclined = np.stack([along_x**2, along_y**2, along_x * along_y], axis=-2)
-        linear = np.dot(flat, self._second).reshape(inclined.shape)
-        return linear / np.sqrt(W2[..., None, :] * inclined)
 
 
 class FiniteSlope(Estimator):

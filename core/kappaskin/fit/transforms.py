@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from kappaskin.bases import SineBasis
+from kappaskin.bases.gage import multipliers
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
@@ -63,18 +64,28 @@ class _Side:
 class Transforms:
     """M of `basis` on a regular grid of m x n elements, and its transpose, computed in `dtype`.
 
+    Their gages are `gage_length` in m long.
+
     The sampled sines and cosines are orthogonal (DST-II and DCT-II), so that M c is one factor per
     function and channel, `gain` (3, Nj, Ni), and a fast transform per channel. Readings here are
     (..., 3, n, m) and coefficients (..., Nj, Ni): x runs fastest.
     """
 
-    def __init__(self, basis: SineBasis, m: int, n: int, dtype: DTypeLike = np.float64) -> None:
+    def __init__(
+        self,
+        basis: SineBasis,
+        m: int,
+        n: int,
+        dtype: DTypeLike = np.float64,
+        gage_length: float = 0.0,
+    ) -> None:
         self.cells = (n, m)
         self._x = _Side(basis.Ni, m)
         self._y = _Side(basis.Nj, n, constant=basis.patch.strip)
         (ki, kj), (sx, cx), (sy, cy) = basis.wavenumbers, self._x.lengths, self._y.lengths
         xx, yy = np.outer(sy, -(ki**2) * sx), np.outer(-(kj**2) * sy, sx)
-        self.gain = np.stack([xx, yy, np.outer(kj * cy, ki * cx)]).astype(dtype)
+        at_points = np.stack([xx, yy, np.outer(kj * cy, ki * cx)])
+        self.gain = (at_points * multipliers(basis, gage_length).swapaxes(-1, -2)).astype(dtype)
 
     def analysed(self, K: Array, scale: Array) -> Array:
         """M^T K (..., Nj, Ni), each channel times its `scale` (3,); one with none is not read."""

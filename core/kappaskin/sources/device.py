@@ -7,6 +7,7 @@ import tty
 from collections.abc import Callable
 from contextlib import suppress
 
+from kappaskin.effects import CorruptedFrames, DroppedFrames
 from kappaskin.scene import Scene
 from kappaskin.simulate import Simulator
 from kappaskin.sources import information
@@ -71,9 +72,16 @@ class PseudoDevice:
     def _send_samples(self) -> None:
         frame = self._simulator.frame(self.samples, self._clock)
         self.samples += 1
-        self._send(
-            encode_samples(self.spent, frame.device_time, frame.channels, frame.counts, self._width)
+        message = encode_samples(
+            self.spent, frame.device_time, frame.channels, frame.counts, self._width
         )
+        match self._simulator.failure(self.samples - 1):
+            case DroppedFrames.name:
+                self.spent += 1
+            case CorruptedFrames.name:
+                self._send(_corrupted(message))
+            case _:
+                self._send(message)
 
     def _send(self, message: bytes) -> None:
         self.spent += 1
@@ -92,3 +100,11 @@ class PseudoDevice:
         if not self._hung_up():
             time.sleep(_LINGER)  # what is unread when the last holder closes is thrown away
         os.close(self._master)
+
+
+def _corrupted(message: bytes) -> bytes:
+    """The message with a bit in its middle turned over, and its end where it was."""
+    spoilt = bytearray(message)
+    middle = len(spoilt) // 2
+    spoilt[middle] ^= 1 if spoilt[middle] != 1 else 2
+    return bytes(spoilt)

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from operator import index
 from typing import Any, TypeVar, cast
 
@@ -38,6 +38,7 @@ def to_json(sensor: Sensor) -> str:
             **{name: getattr(sensor.plate, name) for name in _OF_THE_PLATE},
             **({} if stiffness is None else {"axial_stiffness": stiffness}),
             **where,
+            "gage_length": layout.gage_length,
             "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
             **asdict(sensor.transduction),
         },
@@ -65,12 +66,13 @@ UNSAID: dict[str, Any] = {
     "fluid": False,
     "poisson": 0.3,
     "rim_stiffness": 2e3,
+    "gage_length": 0.0,
 }
 _KINDS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "a text": (str, ("name", "serial_number", "firmware", "edge")),
     "a number": (
         (int, float),
-        ("rate", "rigidity", "base_curvature", "axial_stiffness", *_OF_THE_PLATE),
+        ("rate", "rigidity", "base_curvature", "axial_stiffness", "gage_length", *_OF_THE_PLATE),
     ),
     "a list": (list, ("size", "grid", "positions", "dead_channels")),
     "an object": (dict, ("bridge", "multiplexer", "amplifier", "converter")),
@@ -149,7 +151,7 @@ def _layout(said: dict[str, Any]) -> SensorLayout:
             "them component by component"
         )
     live = np.isin(channels, np.array(dead, np.intp), invert=True).reshape(3, -1)
-    return SensorLayout(patch, layout.positions, live, layout.shape)
+    return replace(layout, live=live, gage_length=float(said["gage_length"]))
 
 
 def _plate(patch: Patch, said: dict[str, Any]) -> Plate:

@@ -85,8 +85,8 @@ class SimulatedSource:
 
     def wrench(self) -> Wrench:
         """What `base` reads of the contact, at the time of the last frame."""
-        scene = self._simulator.scene
-        return self.base.read(scene.plate.patch, scene.loads_at(self._taken), self._base_noise)
+        patch, loads = self._sensor.layout.patch, self._simulator.loads(self._taken)
+        return self.base.read(patch, loads, self._base_noise)
 
     def read(self, timeout: float) -> list[Frame]:
         now, due = self._clock(), self._start + self._due()
@@ -100,8 +100,10 @@ class SimulatedSource:
         frames: list[Frame] = []
         while (now - self._start - self._due()) * self._rate + _ROUNDING >= 0:
             frames.append(self._next())
-        self._accepted += len(frames)
-        return frames
+        arrived = [frame for frame in frames if not self._simulator.failure(frame.sequence)]
+        self._accepted += len(arrived)
+        self._lost += len(frames) - len(arrived)
+        return arrived
 
     def accounting(self) -> Accounting:
         return Accounting(

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.bases import Basis, SineBasis
-from kappaskin.effects import SECOND_GENERATION_LOOPS, Effect, Running
+from kappaskin.effects import SECOND_GENERATION_LOOPS, ReadingEffect, Running
 from kappaskin.fit import LeastSquares
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
@@ -72,7 +72,7 @@ def _errors(basis: Basis, fit: LeastSquares, truth: Array, readings: Array) -> d
 
 
 def initial_curvature(
-    effect: Effect = SECOND_GENERATION_LOOPS, applied: float = 1.27
+    effect: ReadingEffect = SECOND_GENERATION_LOOPS, applied: float = 1.27
 ) -> list[dict[str, Any]]:
     """Errors by base curvature for readings that `effect` spoils, as rows ready for a figure.
 

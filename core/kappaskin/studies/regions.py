@@ -46,7 +46,8 @@ def scene_of(period: float) -> Scene:
     circle = load_scene("circle")
     orbit = Orbit(0.022, period)
     full_rate = 1 / SECOND_GENERATION.scan_time(3 * len(circle.layout))
-    return replace(circle, transduction=SECOND_GENERATION, motion=orbit, rate=full_rate)
+    moving = circle.touched_by(*circle.loads, motion=orbit)
+    return replace(moving, transduction=SECOND_GENERATION, rate=full_rate)
 
 
 class _Clock:

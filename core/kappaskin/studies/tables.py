@@ -10,12 +10,13 @@ from scipy import special
 from kappaskin.bases import basis_for
 from kappaskin.effects import UniformNoise
 from kappaskin.errors import Refusal
-from kappaskin.fit import METHODS, Estimator, Fit, NormalCurvature, estimator_for
+from kappaskin.fit import METHODS, Estimator, Fit, estimator_for
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate, PointLoad
+from kappaskin.normal_curvature import NormalCurvature
 from kappaskin.patch import Patch
-from kappaskin.scene import Scene, load_scene, scaled_to
+from kappaskin.scene import Scene, Stimulus, load_scene, scaled_to
 
 DRAWS = 200
 RADIUS = 12.9e-3
@@ -102,7 +103,7 @@ class _Case:
     def noisy(self) -> Array:
         """`DRAWS` frames of curvature (T, 3, P) with the scene's noise, seeded."""
         rng = np.random.default_rng(self.scene.seed)
-        (noise,) = self.scene.effects
+        (noise,) = self.scene.reading_effects
         curvature = np.repeat(self.curvature[None], DRAWS, axis=0)
         return noise.start(curvature.shape, rng)(curvature, 0.0)
 
@@ -163,7 +164,7 @@ def fingertip_scene(applied: float, radius: float = RADIUS) -> Scene:
         f"{applied:.2f}",
         plate,
         SensorLayout.regular(patch, 10, 1),
-        (load,),
+        (Stimulus(load),),
         effects=(UniformNoise(4.5),),
         reference=reference,
     )

@@ -112,7 +112,7 @@ class Bench:
 
     def _still(self, time: float) -> Scene:
         """The scene as it is at `time`, without its motion."""
-        return replace(self.scene, motion=None, loads=self.scene.loads_at(time))
+        return self.scene.touched_by(*self.scene.loads_at(time))
 
     @cached_property
     def _points(self) -> Array:

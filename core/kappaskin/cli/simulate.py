@@ -1,0 +1,39 @@
+"""A scene to a file of readings, with the truth beside them."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from kappaskin.errors import Refusal
+from kappaskin.scene import load_scene
+from kappaskin.studies.simulated import simulated
+
+
+def simulate(scene: str = "", *, frames: int, out: Path, seed: int | None = None) -> None:
+    """Simulate a scene into an NPZ file.
+
+    It has `counts` and `curvature` (T, 3, P), the `truth` (T, Ni, Nj) in m, `time` (T,) in s, the
+    `contact` (T, 2) in m, NaN where nothing touches or a frame was lost, and the `plan` as JSON.
+    The same seed gives the same bytes.
+
+    Example: `kappaskin simulate tapping --frames 1000 --out taps.npz`
+
+    Parameters
+    ----------
+    scene
+        The name of a ready scene, or a file that ends in .toml; the default one when left out.
+    frames
+        How many frames.
+    seed
+        The seed of all that is random; the scene's own when left out.
+    out
+        The file to write.
+    """
+    found = simulated(load_scene(scene), frames, seed)
+    try:
+        with out.open("wb") as file:
+            np.savez(file, **found)  # pyright: ignore[reportArgumentType]
+    except OSError as error:
+        raise Refusal(f"{out}: cannot be written ({error}); choose another place") from error
+    print(f"{out}: {frames} frames", file=sys.stderr)

@@ -1,0 +1,20 @@
+"""Skew: the multiplexer reads each channel at a time of its own."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from kappaskin.effects.effect import Effect, Size
+from kappaskin.effects.survey import Survey
+
+
+@dataclass(frozen=True)
+class Skew(Effect):
+    """Channels are read one after the other while the skin moves; `Scan.times` says when."""
+
+    name: ClassVar = "skew"
+    formula: ClassVar = "scan time times rate of curvature over peak curvature"
+
+    def size(self, survey: Survey) -> Size:
+        number = survey.scan_time * survey.rate / survey.peak
+        # However fast it moves, a reading goes from one peak to the opposite one at most.
+        return Size(number, min(number, 2.0))

@@ -1,0 +1,200 @@
+"""Where a rigid object bears on a skin: forces that push and never pull, by active sets.
+
+At n places the forces F in N, the deflection w = G F in m and the object's underside, at e (d - h)
+below the skin at rest when its depth is d, leave a gap g and meet
+
+    F >= 0,    g = G F + t F - e (d - h) >= 0,    F g = 0,
+
+with e = 1 on a flat skin and t in m/N what a thin layer of the skin gives by itself. G alone is
+singular, more places than functions; with t the problem is the least of a strictly convex energy
+F'(G + t)F/2 - F'e(d - h) on F >= 0 and has one answer. With the whole force given, e'F = P, d is
+the multiplier of that constraint.
+
+It is solved as Lawson and Hanson solve non-negative least squares (Solving Least Squares Problems,
+doi:10.1137/1.9781611971217, chapter 23), on the normal equations as Bro and de Jong do
+(doi:10.1002/(SICI)1099-128X(199709/10)11:5<393::AID-CEM483>3.0.CO;2-L), from any forces that may
+stand: the energy falls from one set of bearing places to the next, so no set returns and the
+sets come to an end. To be sooner there, the deepest place of each region of the skin joins at
+once, and all that pull leave at once where that lowers the energy (Bertsekas' projection,
+doi:10.1137/0320018); where it does not, one joins and one leaves, as proven.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Mask
+
+Indices = NDArray[np.intp]
+
+_MOST_PLACES, _MOST_STEPS = 1024, 500  # some seconds
+_ROUNDING = 1e-14  # of what sums to it: a gap is known to that
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """How a skin gives at n `points` (n, 2) in m.
+
+    `felt` are the functions (k, N) at given places, `after` what (k, N) answers to forces there,
+    `deflection` (n,) in m that of coefficients (N,), `soft` (n,) in m/N the layer's compression
+    per force, `own` (n,) in m/N how far a place gives under a force on it alone, `region` (n,) the
+    number of the part of the skin that it is in.
+    """
+
+    points: Array
+    felt: Callable[[Indices], Array]
+    after: Callable[[Array], Array]
+    deflection: Callable[[Array], Array]
+    soft: Array
+    own: Array
+    region: Indices
+
+
+@dataclass(frozen=True, eq=False)
+class Underside:
+    """The object over the n places: `height` h (n,) in m above its lowest point, `slant` e (n,)."""
+
+    height: Array
+    slant: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Bearing:
+    """The answer: `forces` (n,) in N, `gap` (n,) in m, `coefficients` and `modal` (N,), `depth`."""
+
+    forces: Array
+    gap: Array
+    coefficients: Array
+    modal: Array
+    depth: float
+    steps: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """The a places that bear: what they feel, and how each gives under force on the others."""
+
+    at: Indices
+    felt: Array
+    answer: Array
+    gives: Array
+
+    def joined(self, support: Support, more: Indices) -> "_Places":
+        """These and the places `more` (m,)."""
+        other = _places(support, more)
+        between = self.answer @ other.felt.T
+        return _Places(
+            np.concatenate([self.at, more]),
+            np.concatenate([self.felt, other.felt]),
+            np.concatenate([self.answer, other.answer]),
+            np.block([[self.gives, between], [between.T, other.gives]]),
+        )
+
+    def only(self, kept: Mask) -> "_Places":
+        """Those of them that are `kept` (a,)."""
+        return _Places(self.at[kept], self.felt[kept], self.answer[kept], self.gives[kept][:, kept])
+
+
+def _places(support: Support, at: Indices) -> _Places:
+    felt = support.felt(at)
+    answer = support.after(felt)
+    return _Places(at, felt, answer, answer @ felt.T + np.diag(support.soft[at]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What is asked: the object, and its `depth` in m or, where that is None, its `force` in N."""
+
+    support: Support
+    under: Underside
+    depth: float | None
+    force: float
+
+    def balanced(self, places: _Places) -> tuple[Array, float]:
+        """The forces (a,) that leave no gap at any place, pushing or pulling, and the depth."""
+        e = self.under.slant[places.at]
+        if not len(e):
+            return e, cast("float", self.depth)
+        both = np.column_stack([e, e * self.under.height[places.at]])
+        # LAPACK itself: scipy's wrappers take longer than it does for so few places.
+        _, solved, failed = lapack.dposv(places.gives, both, lower=True)
+        if failed:
+            raise Refusal(
+                "the skin gives so unevenly that rounding hides how; press with fewer nodes, or "
+                "with a thicker layer"
+            )
+        per_depth, for_height = solved.T
+        d = self.depth
+        if d is None:
+            d = float((self.force + e @ for_height) / (e @ per_depth))
+        return d * per_depth - for_height, d
+
+    def energy(self, places: _Places, forces: Array) -> float:
+        """What the right forces make least, in J."""
+        above = self.under.height[places.at] - (self.depth or 0.0)
+        return float(forces @ (places.gives @ forces / 2 + self.under.slant[places.at] * above))
+
+    def pushing(self, places: _Places, forces: Array, target: Array) -> tuple[_Places, Array]:
+        """Fewer places, and forces (a,) that only push, from those now towards the `target`."""
+        kept = target > 0
+        fewer, all_kept = places.only(kept), target[kept]
+        if self.depth is None and len(all_kept):
+            all_kept *= self.force / (self.under.slant[fewer.at] @ all_kept)
+        if len(all_kept) and self.energy(fewer, all_kept) < self.energy(places, forces):
+            return fewer, all_kept
+        share = np.full(len(forces), np.inf)
+        share[~kept] = forces[~kept] / (forces[~kept] - target[~kept])
+        kept = share > (step := share.min())
+        return places.only(kept), (forces + step * (target - forces))[kept]
+
+    def bearing(self, places: _Places, forces: Array, depth: float, step: int) -> Bearing:
+        """The answer if only these places bear."""
+        F, soft = np.zeros(len(self.under.slant)), self.support.soft
+        F[places.at] = forces
+        c = forces @ places.answer
+        gap = self.support.deflection(c) + soft * F - self.under.slant * (depth - self.under.height)
+        return Bearing(F, gap, c, forces @ places.felt, depth, step)
+
+    def entered(self, found: Bearing, one: bool) -> Indices:
+        """The places without force that the object enters deepest, of each region or only `one`."""
+        # A place's own give and another's bound what a force on the one does to the other.
+        root = np.sqrt(self.support.own)
+        known = _ROUNDING * (abs(found.depth) + root * (root @ found.forces))
+        gap = np.where(found.forces > 0, np.inf, found.gap + known)
+        inside = np.flatnonzero(gap < 0)
+        inside = inside[np.argsort(gap[inside])]
+        if one:
+            return inside[:1]
+        return inside[np.unique(self.support.region[inside], return_index=True)[1]]
+
+
+def settle(
+    support: Support, under: Underside, start: Array, depth: float | None, force: float
+) -> Bearing:
+    """Forces of an object at `depth` in m, or, where that is None, that bears `force` in N.
+
+    From the forces `start` (n,), none below zero, whose sum along the object is then `force`.
+    """
+    task, places = _Task(support, under, depth, force), _places(support, np.flatnonzero(start))
+    forces, energy = start[places.at], -np.inf  # so that only one joins at first
+    for step in range(1, _MOST_STEPS):
+        target, d = task.balanced(places)
+        if not (target > 0).all():
+            places, forces = task.pushing(places, forces, target)
+            continue
+        found = task.bearing(places, target, d, step)
+        before, energy = energy, task.energy(places, target)
+        if not len(more := task.entered(found, one=energy >= before)):
+            return found
+        if len(places.at) + len(more) > _MOST_PLACES:
+            break
+        places, forces = places.joined(support, more), np.append(target, np.zeros(len(more)))
+    raise Refusal(
+        f"the object bears on more than {_MOST_PLACES} places or takes more than {_MOST_STEPS} "
+        "steps to settle; press less deep, a smaller object, or with fewer nodes"
+    )

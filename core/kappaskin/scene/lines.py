@@ -1,0 +1,46 @@
+"""The text of a TOML file to the line on which each of its keys stands."""
+
+import re
+
+_HEADER = re.compile(r"\s*(\[\[?)\s*([\w.\-\"' ]+?)\s*\]\]?\s*(#.*)?$")
+_KEY = re.compile(r"\s*([\w\-\"'.]+)\s*=")
+
+Place = tuple[str | int, ...]
+"""The way to a value: keys, and numbers from 0 where tables come in arrays."""
+
+
+def _names(dotted: str) -> list[str]:
+    return [name.strip().strip("\"'") for name in dotted.split(".")]
+
+
+class Lines:
+    """Where the keys of a file stand; of what is inside a value, where the value begins."""
+
+    def __init__(self, text: str) -> None:
+        self._lines: dict[Place, int] = {(): 1}
+        within, counts = list[str | int](), dict[str, int]()
+        for number, line in enumerate(text.splitlines(), 1):
+            if header := _HEADER.match(line):
+                if header[1] == "[[":
+                    counts[header[2]] = counts.get(header[2], -1) + 1
+                within = self._counted(_names(header[2]), counts)
+                self._lines[tuple(within)] = number
+            elif key := _KEY.match(line):
+                self._lines.setdefault((*within, *_names(key[1])), number)
+
+    @staticmethod
+    def _counted(names: list[str], counts: dict[str, int]) -> list[str | int]:
+        """The names with the number of the last table after those that are arrays of tables."""
+        place, dotted = list[str | int](), list[str]()
+        for name in names:
+            dotted.append(name)
+            place.append(name)
+            if ".".join(dotted) in counts:
+                place.append(counts[".".join(dotted)])
+        return place
+
+    def of(self, place: Place) -> int:
+        """The line of what is at `place`, or of the nearest thing around it."""
+        while place not in self._lines:
+            place = place[:-1]
+        return self._lines[place]

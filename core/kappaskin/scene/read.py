@@ -1,0 +1,332 @@
+"""The text of a scene file to the scene: strict, and every refusal names its line."""
+
+import math
+import tomllib
+from collections.abc import Callable
+from dataclasses import fields, replace
+from functools import partial
+from pathlib import Path as FilePath
+from typing import Any, cast, get_type_hints
+
+import numpy as np
+
+from kappaskin.bases import EDGES, basis_for
+from kappaskin.calibration import Presentation, schedule
+from kappaskin.effects import (
+    EFFECTS,
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION_LOOPS,
+    Effect,
+    StrainLimit,
+)
+from kappaskin.errors import Refusal
+from kappaskin.layout import SensorLayout
+from kappaskin.mechanics import (
+    Block,
+    Cylinder,
+    DiscLoad,
+    GaussianLoad,
+    HeightMap,
+    LineLoad,
+    Load,
+    Mesh,
+    Plate,
+    PointLoad,
+    Punch,
+    RectangleLoad,
+    RigidObject,
+    Sphere,
+    Wedge,
+)
+from kappaskin.patch import Disk, Patch, Polygon
+from kappaskin.scene.choice import LINEAR, Choice
+from kappaskin.scene.lines import Lines
+from kappaskin.scene.motion import (
+    Hold,
+    Motion,
+    Orbit,
+    Path,
+    Press,
+    Recorded,
+    Release,
+    Slide,
+    Step,
+    Tap,
+    Turn,
+)
+from kappaskin.scene.scene import Scene, scaled_to
+from kappaskin.scene.stimulus import Indenter, Stimulus
+from kappaskin.scene.table import Table
+from kappaskin.transduction import FIRST_GENERATION, SECOND_GENERATION, Transduction
+
+FORMAT = 1
+_LARGEST = 2**24  # bytes
+
+_STEPS: dict[str, type[Step]] = {
+    "press": Press,
+    "hold": Hold,
+    "release": Release,
+    "slide": Slide,
+    "roll": Slide,
+    "turn": Turn,
+    "tap": Tap,
+}
+_LOADS: dict[str, type[Load]] = {
+    "point": PointLoad,
+    "line": LineLoad,
+    "disc": DiscLoad,
+    "rectangle": RectangleLoad,
+    "gaussian": GaussianLoad,
+}
+_OBJECTS: dict[str, type[RigidObject]] = {
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "wedge": Wedge,
+    "punch": Punch,
+    "block": Block,
+    "heights": HeightMap,
+    "mesh": Mesh,
+}
+_ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
+_ELSEWHERE = {
+    "tension": "[skin] has the tension",
+    "foam": "[skin] has the foundation",
+    "fluid": "[skin] has the fluid",
+    "dead": "[elements] has those that are dead",
+    "gage-length": "[elements] has the gage_length",
+    "finite-slope": "it has no numbers: name it in choose, on or off",
+    "skew": "the converter's times make it",
+    "saturation": "the amplifier and the converter make it",
+    "quantisation": "the converter makes it",
+}
+"""Effects that follow from what a scene says elsewhere."""
+
+_LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
+
+
+def read_scene(text: str, name: str, folder: FilePath) -> Scene:
+    """The scene that `text` describes, called `name`; files it names are in `folder`."""
+    try:
+        said = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise Refusal(f"{name}: expected a scene in TOML, got a mistake in it: {error}") from error
+    top = Table(said, Lines(text), name)
+    if (version := top.get("format", int)) != FORMAT:
+        raise top.refusal(
+            f"expected a scene of format {FORMAT}, got {version}; get a newer kappaskin"
+            if version > FORMAT
+            else f"expected format = {FORMAT}, got {version}",
+            "format",
+        )
+    plate, edge = _skin(top.table("skin"))
+    reference = top.get("reference", tuple[int, int], (15, 1 if plate.patch.strip else 15))
+    basis = partial(basis_for, plate.patch, edge, *reference)
+    with top.blamed("reference"):
+        basis()
+    stimuli = tuple(
+        _stimulus(table, lambda load, by: scaled_to(plate, load, by, basis()), folder)
+        for table in top.tables("touch")
+    )
+    electronics = _electronics(top.table("electronics"))
+    choice, effects = _effects(top, electronics)
+    with top.blamed():
+        scene = Scene(
+            name,
+            plate,
+            _elements(top.table("elements"), plate.patch),
+            stimuli,
+            effects,
+            electronics,
+            top.get("rate", float, 500.0),
+            top.get("seed", int, 0),
+            reference,
+            edge,
+            choice=choice,
+            title=top.get("title", str, name),
+            text=top.get("text", str, ""),
+        )
+        scene.sensor()
+        if "cylinders" in top:
+            scene = scene.laid_on(_cylinders(top.table("cylinders"), scene))
+    top.done()
+    return scene
+
+
+def _skin(table: Table) -> tuple[Plate, str]:
+    shapes: dict[str, Callable[[], Patch]] = {
+        "rectangle": lambda: _rectangle(table, strip=False),
+        "strip": lambda: _rectangle(table, strip=True),
+        "disk": lambda: Disk(table.get("rim_radius", float)),
+        "polygon": lambda: Polygon(table.get("outline", tuple[tuple[float, float], ...])),
+    }
+    make = table.choose("shape", shapes, "rectangle")
+    with table.blamed():
+        patch = make()
+    plate = table.make(Plate, patch=patch)
+    edge = table.choose("edge", {edge: edge for edge in EDGES}, "hinged")
+    table.done()
+    return plate, edge
+
+
+def _rectangle(table: Table, strip: bool) -> Patch:
+    a, b = table.get("size", tuple[float, float])
+    return Patch(a, b, table.get("radius", float, math.inf), strip)
+
+
+def _elements(table: Table, patch: Patch) -> SensorLayout:
+    with table.blamed():
+        if "positions" in table:
+            layout = SensorLayout.scattered(
+                patch, table.get("positions", tuple[tuple[float, float], ...])
+            )
+        else:
+            layout = SensorLayout.regular(patch, *table.get("grid", tuple[int, int], (10, 10)))
+        layout = layout.without(table.get("dead", tuple[int, ...], ()))
+        layout = replace(layout, gage_length=table.get("gage_length", float, 0.0))
+    table.done()
+    return layout
+
+
+def _electronics(table: Table) -> Transduction:
+    chain = table.choose("like", _ELECTRONICS, "modern")
+    parts = {
+        name: _changed(table.table(name), getattr(chain, name))
+        for name in ("bridge", "multiplexer", "amplifier", "converter")
+    }
+    table.done()
+    with table.blamed():
+        return replace(chain, **parts)
+
+
+def _changed(table: Table, part: Any) -> Any:
+    """The `part` of the electronics with what the table says of it."""
+    hints = get_type_hints(cast("type[Any]", type(part)))
+    said = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
+    table.done()
+    with table.blamed():
+        return replace(part, **said)
+
+
+def _stimulus(table: Table, moved: Callable[[Load, float], Load], folder: FilePath) -> Stimulus:
+    what: Load | Indenter
+    if (name := table.choose("what", {name: name for name in (*_LOADS, *_OBJECTS)})) in _OBJECTS:
+        what = table.make(Indenter, rigid=_object(table, _OBJECTS[name], folder))
+    else:
+        what = table.make(_LOADS[name])
+        if "displacement" in table:
+            if "force" in table:
+                raise table.refusal("expected a force or a displacement, got both", "displacement")
+            with table.blamed("displacement"):
+                what = moved(what, table.get("displacement", float))
+    motion = _motion(table, folder)
+    table.done()
+    with table.blamed():
+        return Stimulus(what, motion)
+
+
+def _object(table: Table, kind: type[RigidObject], folder: FilePath) -> RigidObject:
+    """The rigid object that the table describes, read from a file in `folder` if it has one."""
+    with table.blamed():
+        if kind is Mesh:
+            return Mesh.read(folder / table.get("file", str), table.get("unit", float, 1.0))
+        if kind is HeightMap:
+            sizes = (table.get(key, float) for key in ("length", "width", "relief"))
+            return HeightMap.read(folder / table.get("file", str), *sizes)
+        return table.make(kind)
+
+
+def _motion(table: Table, folder: FilePath) -> Motion | None:
+    given = [key for key in ("path", "orbit", "recorded") if key in table]
+    if len(given) > 1:
+        raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
+    if "orbit" in table:
+        orbit = table.table("orbit")
+        made = orbit.make(Orbit)
+        orbit.done()
+        return made
+    if "recorded" in table:
+        with table.blamed("recorded"):
+            return _recorded(folder / table.get("recorded", str))
+    steps = [_step(step) for step in table.tables("path")]
+    with table.blamed("path"):
+        return Path(tuple(steps)) if "path" in table else None
+
+
+def _step(table: Table) -> Step:
+    made = table.make(table.choose("step", _STEPS))
+    table.done()
+    return made
+
+
+def _recorded(file: FilePath) -> Recorded:
+    """A motion from a CSV file with the columns time, dx, dy and amount."""
+    try:
+        with file.open(encoding="utf-8") as lines:
+            heading = next(lines, "").strip().replace(" ", "")
+            if heading != "time,dx,dy,amount":
+                raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r}")
+            rows = np.loadtxt(lines, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise Refusal(
+            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
+        ) from error
+    if rows.shape[1:] != (4,):
+        raise Refusal(f"{file}: expected four numbers a line, got {rows.shape[1]}")
+    return Recorded(rows[:, 0], rows[:, 1:])
+
+
+def _cylinders(table: Table, scene: Scene) -> Presentation:
+    hold = table.get("hold", float, 0.0)
+    radii = table.get("radii", tuple[float, ...], ())
+    with table.blamed():
+        strip = scene.plate.patch.strip
+        steps = schedule(radii, hold, strip) if radii else schedule(hold=hold, strip=strip)
+        made = Presentation(steps, table.get("dwell", float, 1.0))
+    table.done()
+    return made
+
+
+def _effects(top: Table, electronics: Transduction) -> tuple[Choice, tuple[Effect, ...]]:
+    """Which effects the file chooses, and those that it says the parameters of."""
+    table = top.table("effects")
+    found = list[Effect]()
+    for name, kind in EFFECTS.items():
+        if name in table:
+            said = table.table(name)
+            if name in _ELSEWHERE:
+                raise said.refusal(f"expected no such table; {_ELSEWHERE[name]}")
+            if name == "hysteresis" and "like" in said:
+                found.append(said.choose("like", _LOOPS))
+            elif kind is StrainLimit:
+                found.append(said.make(kind, transduction=electronics))
+            else:
+                found.append(said.make(kind))
+            said.done()
+    accuracy = top.get("accuracy", float, 0.01)
+    with table.blamed("choose"):
+        choice = _choice(table, accuracy)
+    table.done(*EFFECTS)
+    return choice, tuple(found)
+
+
+def _choice(table: Table, accuracy: float) -> Choice:
+    """`choose` is auto, all, linear or a list of names; `on` and `off` force some."""
+    on, off = (frozenset(table.get(key, tuple[str, ...], ())) for key in ("on", "off"))
+    if not isinstance(named := table.get("choose", str | tuple[str, ...], "auto"), str):
+        return Choice(False, accuracy, frozenset(), frozenset(EFFECTS) - frozenset(named))
+    choices = {"auto": Choice(auto=True), "all": Choice(), "linear": LINEAR}
+    if named not in choices:
+        raise Refusal(f"expected auto, all, linear or a list of effects, got {named!r}")
+    chosen = choices[named]
+    return Choice(chosen.auto, accuracy, on, (chosen.off - on) | off)
+
+
+def read_scene_file(file: FilePath) -> Scene:
+    """The scene in `file`."""
+    try:
+        if file.stat().st_size > _LARGEST:
+            raise Refusal(f"{file}: expected a scene of at most {_LARGEST} bytes, got more")
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
+    return read_scene(text, file.stem, file.parent)

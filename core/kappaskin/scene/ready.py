@@ -1,0 +1,38 @@
+"""Scenes by name: those that are ready, one file each, and files of one's own."""
+
+import math
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from kappaskin.errors import Refusal
+from kappaskin.scene.read import read_scene_file
+from kappaskin.scene.scene import Scene
+
+TABLE_1_NOISE = 0.40 / math.sqrt(3)
+"""RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
+
+DEFAULT_SCENE = "circle"
+
+_FOLDER = files("kappaskin_resources") / "scenes"
+_ENDING = ".toml"
+
+SCENES = tuple(
+    sorted(
+        file.name.removesuffix(_ENDING) for file in _FOLDER.iterdir() if file.name.endswith(_ENDING)
+    )
+)
+"""Names of the ready scenes."""
+
+
+def load_scene(name: str = "") -> Scene:
+    """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
+    if name.endswith(_ENDING):
+        return read_scene_file(Path(name))
+    name = name or DEFAULT_SCENE
+    if name not in SCENES:
+        raise Refusal(
+            f"expected a scene among {', '.join(SCENES)}, or a file that ends in {_ENDING}; got "
+            f"{name!r}"
+        )
+    with as_file(_FOLDER / f"{name}{_ENDING}") as file:
+        return read_scene_file(file)

@@ -1,0 +1,44 @@
+"""A scene to what it does to its skin, before anything spoils the readings."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kappaskin.effects import Survey
+from kappaskin.scene.pressing import Pressing
+from kappaskin.scene.scene import Scene
+
+_MOMENTS = 48  # evenly over the scene, besides those at which a motion changes
+_LONGEST = 60.0  # s of a scene that nothing repeats in: what drifts has this long to do so
+_STEP = 1e-3  # s over which a rate is told
+
+
+def survey(scene: Scene) -> Survey:
+    """Look at `scene` at some fifty moments of one repetition."""
+    basis, duration = scene.basis, scene.duration
+    layout = replace(scene.layout, gage_length=0.0)
+    times = np.unique([*np.arange(_MOMENTS) * duration / _MOMENTS, *scene.moments])
+    M = layout.curvature_operator(basis)
+    compliance = scene.plate.compliance(basis)
+    pressing = Pressing(scene, scene.plate)
+    pairs = [(pressing(t), pressing(t + _STEP) if scene.moves else None) for t in times.tolist()]
+    forces = np.array([now.force.ravel() for now, _ in pairs])
+    later = np.array([(then or now).force.ravel() for now, then in pairs])
+    c = compliance.after(forces)
+    curvature = (c @ M.T).reshape(len(times), 3, len(layout))
+    if scene.laid is not None:
+        laid = [np.repeat(scene.laid.curvature(t), len(layout)) for t in times.tolist()]
+        curvature = np.reshape(laid, curvature.shape)
+    return Survey(
+        scene.plate,
+        basis,
+        layout,
+        scene.transduction,
+        times,
+        forces,
+        c,
+        curvature,
+        float(np.abs(compliance.after(later - forces) @ M.T).max(initial=0.0)) / _STEP,
+        duration if scene.moves or scene.laid else _LONGEST,
+        scene.sensor().scan().duration,
+    )

@@ -1,0 +1,101 @@
+"""Effects at work on 300 channels, each against a bare copy and sum of 300 numbers."""
+
+import numpy as np
+import pytest
+
+from kappaskin import (
+    SECOND_GENERATION_LOOPS,
+    Amplifier,
+    Creep,
+    GaussianNoise,
+    HalfBridge,
+    Patch,
+    SensorLayout,
+    SineBasis,
+    Tolerance,
+    Transduction,
+    UniformNoise,
+)
+from kappaskin.effects import (
+    CrossTalk,
+    DroppedFrames,
+    FiniteSlope,
+    FlickerNoise,
+    IntermittentElements,
+    MainsHum,
+    Quantisation,
+    Saturation,
+    StrainLimit,
+    StuckElements,
+    Temperature,
+)
+
+CHANNELS = 300
+EFFECTS = [
+    StrainLimit(Transduction(HalfBridge(substrate_thickness=1e-3)), 0.2),
+    SECOND_GENERATION_LOOPS,
+    Creep(0.03, 20.0),
+    Temperature(15.0, 0.5, 0.3, spread=0.2, gain=2e-4),
+    Tolerance(0.05, 3.0),
+    IntermittentElements((0, 12, 77), on=0.2, off=0.1),
+    MainsHum(0.3),
+    CrossTalk(0.02),
+    FlickerNoise(0.3),
+    GaussianNoise(0.3),
+    UniformNoise(0.3),
+    Saturation(Transduction(amplifier=Amplifier(gain=400.0))),
+    Quantisation(Transduction()),
+    StuckElements((1, 40), since=0.3),
+]
+X = np.random.default_rng(0).normal(0, 30, CHANNELS)
+Y = X[::-1].copy()
+
+
+def bare():
+    return X.copy() + Y
+
+
+def ticking(running):
+    """The effect at work on a frame every 2 ms."""
+    frames = iter(range(10**9))
+    return lambda: running(X, next(frames) / 500)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_an_effect_takes_a_few_microseconds_a_frame(effect, medians, figure) -> None:
+    work = ticking(effect.start((CHANNELS,), np.random.default_rng(0)))
+
+    ours, baseline = medians(work, bare, turns=60, calls=100)
+
+    figure(
+        f"{effect.name} on {CHANNELS} channels: {ours * 1e6:.1f} us, {ours / baseline:.1f} times a "
+        f"bare copy and sum ({baseline * 1e6:.2f} us)"
+    )
+    assert ours < 60 * baseline
+
+
+def test_finite_slopes_take_a_few_times_the_operator(medians, figure) -> None:
+    patch = Patch(0.1, 0.1)
+    basis, layout = SineBasis(patch, 15, 15), SensorLayout.regular(patch, 10, 10)
+    c = np.random.default_rng(0).normal(0, 1e-4, (15, 15))
+    M, sensed = layout.curvature_operator(basis), FiniteSlope().sensed(basis, layout)
+
+    ours, baseline = medians(lambda: sensed(c), lambda: M @ c.ravel(), turns=60, calls=100)
+
+    figure(
+        f"finite-slope, 15 x 15 functions to 300 channels: {ours * 1e6:.1f} us, "
+        f"{ours / baseline:.1f} times the bare operator ({baseline * 1e6:.1f} us)"
+    )
+    assert ours < 10 * baseline
+
+
+def test_a_link_tells_of_a_frame_in_a_few_microseconds(medians, figure) -> None:
+    hit, frames = DroppedFrames(0.1).start(np.random.default_rng(0)), iter(range(10**9))
+
+    ours, baseline = medians(lambda: hit(next(frames)), bare, turns=60, calls=100)
+
+    figure(
+        f"dropped-frames: {ours * 1e6:.1f} us a frame, {ours / baseline:.1f} times a bare copy and "
+        f"sum of {CHANNELS} numbers"
+    )
+    assert ours < 60 * baseline

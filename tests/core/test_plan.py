@@ -1,0 +1,153 @@
+"""Which effects a scene calls for: what is left out changes nothing that counts."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kappaskin import SCENES, Simulator, load_scene
+from kappaskin.effects import EFFECTS
+from kappaskin.scene import Choice, effects_of, kept_of, plan
+from kappaskin.scene.survey import survey
+
+RANDOM = {"gaussian-noise", "uniform-noise", "flicker-noise", "mains-hum", "tolerance"}
+READY = pytest.mark.parametrize("name", SCENES)
+
+
+def readings(scene, times):
+    simulator, scan = Simulator(scene), scene.sensor().scan()
+    return np.array([simulator.reading(scan, time)[1] for time in times])
+
+
+def moments(scene, count=25):
+    """Times all over the scene, none of them one of those that it was surveyed at."""
+    return (np.arange(count) + 0.37) * scene.duration / count
+
+
+@READY
+def test_every_known_effect_is_in_the_plan_with_its_size_and_why(name):
+    entries = plan(load_scene(name)).entries
+
+    assert [entry.name for entry in entries] == list(EFFECTS)
+    assert all(entry.why for entry in entries)
+    assert all(entry.size.error >= 0 and entry.size.number >= 0 for entry in entries)
+    json.dumps([entry.to_json() for entry in entries], allow_nan=False)
+
+
+@READY
+@pytest.mark.parametrize("accuracy", [0.01, 0.1])
+def test_what_is_left_out_changes_no_reading_by_more_than_the_accuracy(name, accuracy):
+    scene = load_scene(name)
+    # Random effects draw from streams of their own: those kept are the same in both.
+    auto = replace(scene, choice=Choice(auto=True, accuracy=accuracy, on=frozenset(RANDOM)))
+    every = replace(scene, choice=Choice())
+    times = moments(scene)
+
+    change = np.abs(readings(auto, times) - readings(every, times)).max() / survey(scene).peak
+
+    assert change <= accuracy
+    assert plan(auto).left_out <= accuracy
+
+
+@READY
+def test_noise_that_is_left_out_is_as_small_as_the_accuracy(name):
+    scene = replace(load_scene(name), choice=Choice(auto=True, accuracy=0.2))
+    out = {entry.name: entry for entry in plan(scene) if not entry.kept and entry.effect}
+    for effect in out.keys() & RANDOM:
+        alone = replace(scene, choice=Choice(off=frozenset(EFFECTS) - {effect}))
+        bare = replace(scene, choice=Choice(off=frozenset(EFFECTS)))
+        times = moments(scene)
+        change = readings(alone, times) - readings(bare, times)
+        assert np.abs(change).max() / survey(scene).peak <= out[effect].size.error
+
+
+def test_the_random_stream_of_an_effect_is_its_own():
+    scene = load_scene("tapping")
+    both = replace(scene, choice=Choice())
+    without = replace(scene, choice=Choice(off=frozenset({"skew", "finite-slope", "quantisation"})))
+    silent = replace(scene, choice=Choice(off=frozenset({"gaussian-noise", "quantisation"})))
+    bare = replace(silent, choice=Choice(off=silent.choice.off | without.choice.off))
+    times = moments(scene)
+
+    noise = readings(without, times) - readings(bare, times)
+    other = readings(replace(both, choice=Choice(off=frozenset({"quantisation"}))), times)
+
+    np.testing.assert_allclose(other - readings(silent, times), noise, atol=1e-9)
+
+
+def test_effects_can_be_forced_on_and_off():
+    scene = load_scene("tapping")
+    forced = replace(
+        scene, choice=Choice(True, 0.01, frozenset({"quantisation"}), frozenset({"gaussian-noise"}))
+    )
+    kept = {effect.name for effect in kept_of(forced)}
+    assert "quantisation" in kept
+    assert "gaussian-noise" not in kept
+
+
+def test_failures_are_kept_whatever_the_accuracy():
+    scene = load_scene("failing-elements")
+    kept = kept_of(replace(scene, choice=Choice(auto=True, accuracy=0.9)))
+    assert {"dead", "stuck", "intermittent"} <= {effect.name for effect in kept}
+
+
+@READY
+def test_what_is_kept_without_a_look_is_what_the_plan_keeps(name):
+    scene = replace(load_scene(name), choice=Choice(off=frozenset({"finite-slope"})))
+    assert kept_of(scene) == plan(scene).kept
+    assert all(effects_of(scene)[effect.name] is not None for effect in plan(scene).kept)
+
+
+def test_what_is_left_out_is_not_imported():
+    code = """
+import sys
+from kappaskin import Simulator, load_scene
+scene = load_scene("hot-room")
+scan = scene.sensor().scan()
+Simulator(scene).reading(scan, 0.0)
+room = "kappaskin.effects.at_work."
+print(sorted(name.removeprefix(room) for name in sys.modules if name.startswith(room)))
+"""
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == "['noise', 'temperature']"
+
+
+def test_the_command_tells_the_plan(run):
+    code, out, err = run("plan", "tapping", "--json")
+    rows = json.loads(out)["effects"]
+    assert (code, err) == (0, "")
+    assert [row["effect"] for row in rows] == list(EFFECTS)
+    there = {row["effect"]: row for row in rows if row["microseconds"] is not None}
+    assert there["skew"]["kept"]
+    assert not there["quantisation"]["kept"]
+    code, out, _ = run("plan", "tapping")
+    assert code == 0
+    assert "scan time times rate of curvature" in out
+
+
+def test_the_command_simulates_the_same_bytes_for_the_same_seed(run, tmp_path):
+    files = [tmp_path / f"{n}.npz" for n in range(3)]
+    for file, seed in zip(files, (1, 1, 2), strict=True):
+        code, *_ = run("simulate", "tapping", "--frames", 60, "--seed", seed, "--out", file)
+        assert code == 0
+    first, second, third = (file.read_bytes() for file in files)
+    assert first == second
+    assert first != third
+    with np.load(files[0]) as found:
+        assert found["counts"].shape == found["curvature"].shape == (60, 3, 100)
+        assert found["truth"].shape == (60, 15, 15)
+        assert found["time"].shape == (60,)
+        assert found["contact"].shape == (60, 2)
+        assert len(json.loads(str(found["plan"]))) == len(EFFECTS)
+    code, *_ = run("reconstruct", files[0], "--out", tmp_path / "shapes.npz")
+    assert code == 0
+
+
+@pytest.mark.parametrize("frames", [0, -1, 10**9])
+def test_so_many_frames_are_refused(run, tmp_path, frames):
+    code, _, err = run("simulate", "--frames", frames, "--out", tmp_path / "x.npz")
+    assert code == 2
+    assert "expected 1 to" in err
