@@ -35,7 +35,7 @@ class Simulator:
         self._still: Truth | None = None
         self._kept = kept_of(scene)
         self._take_skin()
-        self._pressing = Pressing(scene, self._plate)
+        self._take_stimuli()
         self._start_effects()
 
     def change(self, scene: Scene) -> None:
@@ -50,11 +50,16 @@ class Simulator:
         same_skin = skin == (was.plate, was.edge, was.reference, was.layout.gage_length)
         if not (same_elements and same_skin and _of_skin(before) == _of_skin(self._kept)):
             self._take_skin()
-        self._pressing = Pressing(scene, self._plate)
+        self._take_stimuli()
         same_size = len(scene.layout) == len(was.layout)
         reading = scene.seed, _of_readings(self._kept)
         if not same_size or reading != (was.seed, _of_readings(before)):
             self._start_effects()
+
+    def _take_stimuli(self) -> None:
+        """Compute what depends on what touches the skin, and which channels are dead."""
+        self._pressing, live = Pressing(self.scene, self._plate), self.scene.layout.live.ravel()
+        self._dead = None if live.all() else np.flatnonzero(~live)
 
     def _start_effects(self) -> None:
         shape = (3 * len(self.scene.layout),)
@@ -126,7 +131,8 @@ class Simulator:
         truth, curvature = self._true(scan, time)
         for effect in self._effects:
             curvature = effect(curvature, time)
-        curvature[~self.scene.layout.live.ravel()] = 0.0
+        if self._dead is not None:
+            curvature[self._dead] = 0.0
         return truth, curvature
 
     def failure(self, n: int) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Estimate, Frame, Refusal, Region, Simulator, load_scene
+from kappaskin.effects import CorruptedFrames, DroppedFrames
 from kappaskin.engine import Engine
 from kappaskin.live import LOST, STREAMING
 from kappaskin.scene import Orbit
@@ -111,6 +112,26 @@ def test_every_number_spent_is_received() -> None:
     # A second of frames, its first and last included, and an introduction every half of it.
     assert device.spent == seen.span == seen.accepted == 501 + 3
     assert (seen.bytes_discarded, seen.buffered, device.unsent, device.samples) == (0, 0, 0, 501)
+
+
+def test_a_link_that_fails_spoils_messages_which_the_receiver_tells() -> None:
+    clock = Clock()
+    device = PseudoDevice(replace(SCENE, effects=(DroppedFrames(0.1), CorruptedFrames(0.2))), clock)
+    listener = Listener(device.port)
+    with serving(device):
+        listener.reads(2)
+        for _ in range(16):
+            clock.now += 1 / 16
+            listener.reads(listener.decoder.sequence.span + 31, within=0.1)
+    listener.close()
+
+    seen = listener.decoder.accounting()
+    spoilt = sum(count for reason, count in seen.discarded if count)
+    assert device.spent == 504
+    assert seen.accepted + seen.lost == seen.span
+    assert 0.2 < seen.lost / seen.span < 0.36
+    assert spoilt > 0
+    assert seen.bytes_in == seen.bytes_good + seen.bytes_discarded + seen.buffered
 
 
 def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost() -> None:

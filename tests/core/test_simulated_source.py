@@ -21,6 +21,7 @@ from kappaskin import (
     Transduction,
     load_scene,
 )
+from kappaskin.effects import CorruptedFrames, DroppedFrames
 from kappaskin.sources import SimulatedSource, open_source
 
 
@@ -292,3 +293,18 @@ def test_the_balance_holds_while_rates_change(steps: list[tuple[float, float]]) 
     assert seen.span == seen.accepted + seen.lost
     assert got == [] or seen.span == got[-1].sequence + 1
     assert all(b.device_time > a.device_time for a, b in pairwise(got))
+
+
+@pytest.mark.parametrize("failure", [DroppedFrames, CorruptedFrames])
+def test_frames_that_the_link_spoils_are_counted_as_lost(failure) -> None:
+    clock = Clock()
+    source = source_of("centre", clock, effects=(failure(0.2),))
+    frames = read_until(source, clock, clock.now + 2.0)
+    counted = source.accounting()
+    assert counted.span == counted.accepted + counted.lost
+    assert counted.accepted == len(frames)
+    assert 0.15 < counted.lost / counted.span < 0.25
+    again = source_of("centre", (other := Clock()), effects=(failure(0.2),))
+    assert [f.sequence for f in read_until(again, other, other.now + 2.0)] == [
+        f.sequence for f in frames
+    ]

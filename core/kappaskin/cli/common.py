@@ -1,9 +1,13 @@
-"""What the commands share: their exit codes, and how they read pairs and print JSON."""
+"""What commands share: exit codes, and how they read pairs, print JSON and write files."""
 
 import json
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
+from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
 
@@ -32,3 +36,12 @@ def pair(text: str, what: str) -> tuple[int, int]:
 def print_json(value: Any) -> None:
     """Print one JSON value on a line."""
     print(json.dumps(value, allow_nan=False))
+
+
+def save_arrays(out: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write an NPZ; raises a `Refusal` where that cannot be."""
+    try:
+        with out.open("wb") as file:
+            np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]
+    except OSError as error:
+        raise Refusal(f"{out}: cannot be written ({error}); choose another place") from error

@@ -3,10 +3,7 @@
 import sys
 from pathlib import Path
 
-import numpy as np
-
-from kappaskin.cli.common import Pair, Switch, pair
-from kappaskin.errors import Refusal
+from kappaskin.cli.common import Pair, Switch, pair, save_arrays
 from kappaskin.fit import METHODS
 from kappaskin.reconstruct import reconstruct as reconstructed
 
@@ -55,9 +52,5 @@ def reconstruct(
     points = pair(grid, "a grid") if grid else None
     functions = pair(basis, "a basis")
     found = reconstructed(readings, functions, points, edge, method, contact, objects)
-    try:
-        with out.open("wb") as file:
-            np.savez(file, **found)  # pyright: ignore[reportArgumentType]
-    except OSError as error:
-        raise Refusal(f"{out}: cannot be written ({error}); choose another place") from error
+    save_arrays(out, found)
     print(f"{out}: {len(found['coefficients'])} shapes", file=sys.stderr)

@@ -3,9 +3,7 @@
 import sys
 from pathlib import Path
 
-import numpy as np
-
-from kappaskin.errors import Refusal
+from kappaskin.cli.common import save_arrays
 from kappaskin.scene import load_scene
 from kappaskin.studies.simulated import simulated
 
@@ -31,9 +29,5 @@ def simulate(scene: str = "", *, frames: int, out: Path, seed: int | None = None
         The file to write.
     """
     found = simulated(load_scene(scene), frames, seed)
-    try:
-        with out.open("wb") as file:
-            np.savez(file, **found)  # pyright: ignore[reportArgumentType]
-    except OSError as error:
-        raise Refusal(f"{out}: cannot be written ({error}); choose another place") from error
+    save_arrays(out, found)
     print(f"{out}: {frames} frames", file=sys.stderr)

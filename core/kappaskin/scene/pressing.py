@@ -39,7 +39,8 @@ class Pressing:
         stimulus = self._scene.indenter
         if stimulus is None or self._press is None or not isinstance(stimulus.what, Indenter):
             loads = self._scene.loads_at(time)
-            force = sum((load.modal(self._basis) for load in loads), np.zeros(self._basis.shape))
+            forces = [load.modal(self._basis) for load in loads]
+            force = sum(forces[1:], forces[0]) if forces else np.zeros(self._basis.shape)
             return Pressed(force, contact_of(loads), loads)
         pose = stimulus.pose_at(time)
         if not pose.amount:

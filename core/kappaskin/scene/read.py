@@ -8,8 +8,6 @@ from functools import partial
 from pathlib import Path as FilePath
 from typing import Any, cast, get_type_hints
 
-import numpy as np
-
 from kappaskin.bases import EDGES, basis_for
 from kappaskin.calibration import Presentation, schedule
 from kappaskin.effects import (
@@ -22,71 +20,19 @@ from kappaskin.effects import (
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import (
-    Block,
-    Cylinder,
-    DiscLoad,
-    GaussianLoad,
-    HeightMap,
-    LineLoad,
-    Load,
-    Mesh,
     Plate,
-    PointLoad,
-    Punch,
-    RectangleLoad,
-    RigidObject,
-    Sphere,
-    Wedge,
 )
 from kappaskin.patch import Disk, Patch, Polygon
 from kappaskin.scene.choice import LINEAR, Choice
 from kappaskin.scene.lines import Lines
-from kappaskin.scene.motion import (
-    Hold,
-    Motion,
-    Orbit,
-    Path,
-    Press,
-    Recorded,
-    Release,
-    Slide,
-    Step,
-    Tap,
-    Turn,
-)
+from kappaskin.scene.read_stimulus import read_stimulus
 from kappaskin.scene.scene import Scene, scaled_to
-from kappaskin.scene.stimulus import Indenter, Stimulus
 from kappaskin.scene.table import Table
 from kappaskin.transduction import FIRST_GENERATION, SECOND_GENERATION, Transduction
 
 FORMAT = 1
 _LARGEST = 2**24  # bytes
 
-_STEPS: dict[str, type[Step]] = {
-    "press": Press,
-    "hold": Hold,
-    "release": Release,
-    "slide": Slide,
-    "roll": Slide,
-    "turn": Turn,
-    "tap": Tap,
-}
-_LOADS: dict[str, type[Load]] = {
-    "point": PointLoad,
-    "line": LineLoad,
-    "disc": DiscLoad,
-    "rectangle": RectangleLoad,
-    "gaussian": GaussianLoad,
-}
-_OBJECTS: dict[str, type[RigidObject]] = {
-    "sphere": Sphere,
-    "cylinder": Cylinder,
-    "wedge": Wedge,
-    "punch": Punch,
-    "block": Block,
-    "heights": HeightMap,
-    "mesh": Mesh,
-}
 _ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
 _ELSEWHERE = {
     "tension": "[skin] has the tension",
@@ -124,7 +70,7 @@ def read_scene(text: str, name: str, folder: FilePath) -> Scene:
     with top.blamed("reference"):
         basis()
     stimuli = tuple(
-        _stimulus(table, lambda load, by: scaled_to(plate, load, by, basis()), folder)
+        read_stimulus(table, lambda load, by: scaled_to(plate, load, by, basis()), folder)
         for table in top.tables("touch")
     )
     electronics = _electronics(top.table("electronics"))
@@ -205,74 +151,6 @@ def _changed(table: Table, part: Any) -> Any:
     table.done()
     with table.blamed():
         return replace(part, **said)
-
-
-def _stimulus(table: Table, moved: Callable[[Load, float], Load], folder: FilePath) -> Stimulus:
-    what: Load | Indenter
-    if (name := table.choose("what", {name: name for name in (*_LOADS, *_OBJECTS)})) in _OBJECTS:
-        what = table.make(Indenter, rigid=_object(table, _OBJECTS[name], folder))
-    else:
-        what = table.make(_LOADS[name])
-        if "displacement" in table:
-            if "force" in table:
-                raise table.refusal("expected a force or a displacement, got both", "displacement")
-            with table.blamed("displacement"):
-                what = moved(what, table.get("displacement", float))
-    motion = _motion(table, folder)
-    table.done()
-    with table.blamed():
-        return Stimulus(what, motion)
-
-
-def _object(table: Table, kind: type[RigidObject], folder: FilePath) -> RigidObject:
-    """The rigid object that the table describes, read from a file in `folder` if it has one."""
-    with table.blamed():
-        if kind is Mesh:
-            return Mesh.read(folder / table.get("file", str), table.get("unit", float, 1.0))
-        if kind is HeightMap:
-            sizes = (table.get(key, float) for key in ("length", "width", "relief"))
-            return HeightMap.read(folder / table.get("file", str), *sizes)
-        return table.make(kind)
-
-
-def _motion(table: Table, folder: FilePath) -> Motion | None:
-    given = [key for key in ("path", "orbit", "recorded") if key in table]
-    if len(given) > 1:
-        raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
-    if "orbit" in table:
-        orbit = table.table("orbit")
-        made = orbit.make(Orbit)
-        orbit.done()
-        return made
-    if "recorded" in table:
-        with table.blamed("recorded"):
-            return _recorded(folder / table.get("recorded", str))
-    steps = [_step(step) for step in table.tables("path")]
-    with table.blamed("path"):
-        return Path(tuple(steps)) if "path" in table else None
-
-
-def _step(table: Table) -> Step:
-    made = table.make(table.choose("step", _STEPS))
-    table.done()
-    return made
-
-
-def _recorded(file: FilePath) -> Recorded:
-    """A motion from a CSV file with the columns time, dx, dy and amount."""
-    try:
-        with file.open(encoding="utf-8") as lines:
-            heading = next(lines, "").strip().replace(" ", "")
-            if heading != "time,dx,dy,amount":
-                raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r}")
-            rows = np.loadtxt(lines, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise Refusal(
-            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
-        ) from error
-    if rows.shape[1:] != (4,):
-        raise Refusal(f"{file}: expected four numbers a line, got {rows.shape[1]}")
-    return Recorded(rows[:, 0], rows[:, 1:])
 
 
 def _cylinders(table: Table, scene: Scene) -> Presentation:

@@ -123,7 +123,7 @@ class Scene:
         each = (s.motion.moments for s in self.stimuli if s.motion)
         return sorted({time for moments in each for time in moments})
 
-    @property
+    @cached_property
     def moves(self) -> bool:
         """Whether anything that touches the skin moves."""
         return any(stimulus.motion is not None for stimulus in self.stimuli)

@@ -65,12 +65,15 @@ class Stimulus:
         pose = self.pose_at(time)
         if not pose.amount:
             return None
-        return self.what.shifted(pose.dx, pose.dy).scaled(pose.amount)
+        load = self.what.shifted(pose.dx, pose.dy)
+        return load if pose.amount == 1 else load.scaled(pose.amount)
 
 
 def contact_of(loads: tuple[Load, ...]) -> Array:
     """The centre of force (2,) in m of `loads`; NaN when there is none."""
     total = sum(abs(load.force) for load in loads)
+    if len(loads) == 1 and total:
+        return loads[0].centre()
     if not total:
         return np.full(2, np.nan)
     return np.sum([abs(load.force) * load.centre() for load in loads], axis=0) / total

@@ -1,0 +1,134 @@
+"""A table [[touch]] of a scene file to what touches the skin, and how it moves."""
+
+from collections.abc import Callable
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from kappaskin.errors import Refusal
+from kappaskin.mechanics import (
+    Block,
+    Cylinder,
+    DiscLoad,
+    GaussianLoad,
+    HeightMap,
+    LineLoad,
+    Load,
+    Mesh,
+    PointLoad,
+    Punch,
+    RectangleLoad,
+    RigidObject,
+    Sphere,
+    Wedge,
+)
+from kappaskin.scene.motion import (
+    Hold,
+    Motion,
+    Orbit,
+    Path,
+    Press,
+    Recorded,
+    Release,
+    Slide,
+    Step,
+    Tap,
+    Turn,
+)
+from kappaskin.scene.stimulus import Indenter, Stimulus
+from kappaskin.scene.table import Table
+
+_STEPS: dict[str, type[Step]] = {
+    "press": Press,
+    "hold": Hold,
+    "release": Release,
+    "slide": Slide,
+    "roll": Slide,
+    "turn": Turn,
+    "tap": Tap,
+}
+_LOADS: dict[str, type[Load]] = {
+    "point": PointLoad,
+    "line": LineLoad,
+    "disc": DiscLoad,
+    "rectangle": RectangleLoad,
+    "gaussian": GaussianLoad,
+}
+_OBJECTS: dict[str, type[RigidObject]] = {
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "wedge": Wedge,
+    "punch": Punch,
+    "block": Block,
+    "heights": HeightMap,
+    "mesh": Mesh,
+}
+
+
+def read_stimulus(table: Table, moved: Callable[[Load, float], Load], folder: FilePath) -> Stimulus:
+    """What a [[touch]] says; `moved` makes a load as large as moves its place so far in m."""
+    what: Load | Indenter
+    if (name := table.choose("what", {name: name for name in (*_LOADS, *_OBJECTS)})) in _OBJECTS:
+        what = table.make(Indenter, rigid=_object(table, _OBJECTS[name], folder))
+    else:
+        what = table.make(_LOADS[name])
+        if "displacement" in table:
+            if "force" in table:
+                raise table.refusal("expected a force or a displacement, got both", "displacement")
+            with table.blamed("displacement"):
+                what = moved(what, table.get("displacement", float))
+    motion = _motion(table, folder)
+    table.done()
+    with table.blamed():
+        return Stimulus(what, motion)
+
+
+def _object(table: Table, kind: type[RigidObject], folder: FilePath) -> RigidObject:
+    """The rigid object that the table describes, read from a file in `folder` if it has one."""
+    with table.blamed():
+        if kind is Mesh:
+            return Mesh.read(folder / table.get("file", str), table.get("unit", float, 1.0))
+        if kind is HeightMap:
+            sizes = (table.get(key, float) for key in ("length", "width", "relief"))
+            return HeightMap.read(folder / table.get("file", str), *sizes)
+        return table.make(kind)
+
+
+def _motion(table: Table, folder: FilePath) -> Motion | None:
+    given = [key for key in ("path", "orbit", "recorded") if key in table]
+    if len(given) > 1:
+        raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
+    if "orbit" in table:
+        orbit = table.table("orbit")
+        made = orbit.make(Orbit)
+        orbit.done()
+        return made
+    if "recorded" in table:
+        with table.blamed("recorded"):
+            return _recorded(folder / table.get("recorded", str))
+    steps = [_step(step) for step in table.tables("path")]
+    with table.blamed("path"):
+        return Path(tuple(steps)) if "path" in table else None
+
+
+def _step(table: Table) -> Step:
+    made = table.make(table.choose("step", _STEPS))
+    table.done()
+    return made
+
+
+def _recorded(file: FilePath) -> Recorded:
+    """A motion from a CSV file with the columns time, dx, dy and amount."""
+    try:
+        with file.open(encoding="utf-8") as lines:
+            heading = next(lines, "").strip().replace(" ", "")
+            if heading != "time,dx,dy,amount":
+                raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r}")
+            rows = np.loadtxt(lines, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise Refusal(
+            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
+        ) from error
+    if rows.shape[1:] != (4,):
+        raise Refusal(f"{file}: expected four numbers a line, got {rows.shape[1]}")
+    return Recorded(rows[:, 0], rows[:, 1:])
