@@ -582,6 +582,15 @@ def test_what_the_command_cannot_do_is_refused_before_it_measures(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "calibration"])
+def test_what_accuracy_costs_is_told_of_every_ready_scene_that_is_pressed(name) -> None:
+    scene = load_scene(name)
+    (cost,) = costs(scene, [replace(EIGHT, functions=(4, 1 if scene.plate.patch.strip else 4))])
+    assert isinstance(cost, Cost)
+    assert 0 < cost.rms_exact < cost.shape_rms
+    assert math.isfinite(cost.rms)
+
+
 def test_the_skin_of_a_scene_may_be_any() -> None:
     patch = Patch(0.04, 0.03, 12.9e-3)
     layout = SensorLayout.regular(patch, 7, 6)

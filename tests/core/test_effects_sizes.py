@@ -41,7 +41,6 @@ from kappaskin.effects import (
     MainsHum,
     Quantisation,
     Saturation,
-    Size,
     Skew,
     SkinEffect,
     StrainLimit,
@@ -265,11 +264,6 @@ def test_the_wavenumber_of_one_sine_is_its_own():
 def test_long_gages_are_judged_by_points_also_where_the_layout_has_them_already():
     longer = replace(survey(0), layout=GageLength(3e-3).of(survey(0).layout))
     assert GageLength(3e-3).size(longer) == GageLength(3e-3).size(survey(0))
-
-
-def test_a_drum_head_without_rigidity_cannot_do_without_its_tension():
-    s = replace(survey(0), plate=Plate(Patch(0.1, 0.1), 0.0, tension=60.0))
-    assert Tension(60.0).size(s) == Size(math.inf, math.inf)
 
 
 def test_on_a_bent_skin_slopes_are_left_to_first_order():

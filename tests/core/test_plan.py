@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import SCENES, Simulator, load_scene
+from kappaskin import SCENES, GaussianNoise, Refusal, Simulator, load_scene
 from kappaskin.effects import EFFECTS
 from kappaskin.scene import Choice, effects_of, kept_of, plan
 from kappaskin.scene.survey import survey
@@ -151,3 +151,22 @@ def test_so_many_frames_are_refused(run, tmp_path, frames):
     code, _, err = run("simulate", "--frames", frames, "--out", tmp_path / "x.npz")
     assert code == 2
     assert "expected 1 to" in err
+
+
+def test_a_drum_head_is_planned_with_its_tension(run, tmp_path):
+    (tmp_path / "drum.toml").write_text(
+        "format = 1\n[skin]\nsize = [0.1, 0.1]\nrigidity = 0.0\ntension = 50.0\n"
+        '[[touch]]\nwhat = "disc"\nx = 0.05\ny = 0.05\nradius = 0.01\nforce = 0.1\n'
+    )
+    code, out, _ = run("plan", tmp_path / "drum.toml", "--json")
+    assert code == 0
+    (tension,) = (row for row in json.loads(out)["effects"] if row["effect"] == "tension")
+    assert tension["why"] == "not in this scene"  # it is the skin, and cannot be left out
+    assert (
+        run("simulate", tmp_path / "drum.toml", "--frames", 2, "--out", tmp_path / "x.npz")[0] == 0
+    )
+
+
+def test_two_effects_of_one_name_are_refused():
+    with pytest.raises(Refusal, match="each effect once, got gaussian-noise"):
+        replace(load_scene("centre"), effects=(GaussianNoise(0.1), GaussianNoise(0.2)))

@@ -15,7 +15,7 @@ TOUCH = HEAD + '\n[[touch]]\nwhat = "gaussian"\nx = 0.05\ny = 0.05\nsd = 0.005\n
 
 
 def read(text: str, folder: Path = Path()):
-    return read_scene(text, "a.toml", folder)
+    return read_scene(text, folder / "a.toml")
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -122,6 +122,20 @@ WRONG = {
     "an unknown choice": (HEAD + "[effects]\nchoose = 'none'\n", "line 6: effects.choose: .*auto"),
     "an effect of the skin": (HEAD + "[effects.foam]\nx = 1\n", r"\[skin\] has the foundation"),
     "a rate that cannot be": ("rate = 1e6\n" + HEAD, "lower the rate"),
+    "a grid of words": (HEAD + "[elements]\ngrid = ['a', 'b']\n", "line 6: elements.grid: "),
+    "a listed effect that there is not": (
+        HEAD + "[effects]\nchoose = ['mains-hmu']\n",
+        "line 6: effects.choose: expected effects among .*mains-hmu",
+    ),
+    "a list and on": (HEAD + "[effects]\nchoose = []\non = ['quantisation']\n", "got both"),
+    "an effect of nothing": (
+        HEAD + "[effects]\non = ['creep']\n",
+        "line 5: effects: expected effects that there is something of .* got creep",
+    ),
+    "a touch on cylinders": (
+        TOUCH + "[cylinders]\ndwell = 1.0\n",
+        r"^a.toml, line 6: touch\[1\]: .*cylinders",
+    ),
     "an element that is not there": (HEAD + "[elements]\ndead = [100]\n", "line 5: elements: .*99"),
 }
 
@@ -131,6 +145,7 @@ def test_what_is_wrong_is_refused_with_its_line_and_the_remedy(text, said):
     with pytest.raises(Refusal, match=said) as refused:
         read(text)
     assert str(refused.value).startswith("a.toml")
+    assert str(refused.value).count("a.toml") == 1
 
 
 def test_a_key_inside_an_array_of_tables_is_found_in_the_right_one():

@@ -55,10 +55,6 @@ class Tension(_Backing):
     def _number(self, survey: Survey) -> float:
         return _added(self.of(survey.plate), self.off(survey.plate))
 
-    def size(self, survey: Survey) -> Size:
-        # A drum head without rigidity is nothing without its tension.
-        return super().size(survey) if survey.plate.rigidity else Size(np.inf, np.inf)
-
 
 @dataclass(frozen=True)
 class Foam(_Backing):

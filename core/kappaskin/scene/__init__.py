@@ -9,6 +9,7 @@ from kappaskin.scene.plan import Plan as Plan
 from kappaskin.scene.plan import effects_of as effects_of
 from kappaskin.scene.plan import kept_of as kept_of
 from kappaskin.scene.plan import plan as plan
+from kappaskin.scene.pressing import Pressed as Pressed
 from kappaskin.scene.pressing import Pressing as Pressing
 from kappaskin.scene.read import read_scene as read_scene
 from kappaskin.scene.ready import DEFAULT_SCENE as DEFAULT_SCENE
@@ -20,3 +21,4 @@ from kappaskin.scene.scene import scaled_to as scaled_to
 from kappaskin.scene.stimulus import Indenter as Indenter
 from kappaskin.scene.stimulus import Stimulus as Stimulus
 from kappaskin.scene.stimulus import contact_of as contact_of
+from kappaskin.scene.survey import moments_of as moments_of

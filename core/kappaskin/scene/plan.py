@@ -70,7 +70,7 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
     """Everything that there is of `scene` to spoil its readings, by name, as it comes about."""
     plate, layout = scene.plate, scene.layout
     there: list[Effect] = []
-    if plate.tension:
+    if plate.tension and plate.rigidity:  # a drum head is no skin without its tension
         there.append(Tension(plate.tension))
     if plate.foundation:
         there.append(Foam(plate.foundation))

@@ -19,12 +19,11 @@ from kappaskin.effects import (
 )
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
-from kappaskin.mechanics import (
-    Plate,
-)
+from kappaskin.mechanics import Plate
 from kappaskin.patch import Disk, Patch, Polygon
 from kappaskin.scene.choice import LINEAR, Choice
 from kappaskin.scene.lines import Lines
+from kappaskin.scene.plan import effects_of
 from kappaskin.scene.read_stimulus import read_stimulus
 from kappaskin.scene.scene import Scene, scaled_to
 from kappaskin.scene.table import Table
@@ -50,13 +49,14 @@ _ELSEWHERE = {
 _LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 
 
-def read_scene(text: str, name: str, folder: FilePath) -> Scene:
-    """The scene that `text` describes, called `name`; files it names are in `folder`."""
+def read_scene(text: str, file: FilePath) -> Scene:
+    """The scene that `text`, of `file`, describes; files that it names lie beside it."""
+    name, folder = file.stem, file.parent
     try:
         said = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise Refusal(f"{name}: expected a scene in TOML, got a mistake in it: {error}") from error
-    top = Table(said, Lines(text), name)
+        raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
+    top = Table(said, Lines(text), str(file))
     if (version := top.get("format", int)) != FORMAT:
         raise top.refusal(
             f"expected a scene of format {FORMAT}, got {version}; get a newer kappaskin"
@@ -93,8 +93,16 @@ def read_scene(text: str, name: str, folder: FilePath) -> Scene:
         )
         scene.sensor()
         if "cylinders" in top:
+            if stimuli:
+                touch = top.tables("touch")[0]
+                raise touch.refusal("expected none on a skin that lies on cylinders")
             scene = scene.laid_on(_cylinders(top.table("cylinders"), scene))
     top.done()
+    if absent := sorted(_wanted(top.table("effects")) - effects_of(scene).keys()):
+        raise top.table("effects").refusal(
+            f"expected effects that there is something of in this scene, got {', '.join(absent)}; "
+            "say how large they are, or leave them out"
+        )
     return scene
 
 
@@ -191,12 +199,21 @@ def _choice(table: Table, accuracy: float) -> Choice:
     """`choose` is auto, all, linear or a list of names; `on` and `off` force some."""
     on, off = (frozenset(table.get(key, tuple[str, ...], ())) for key in ("on", "off"))
     if not isinstance(named := table.get("choose", str | tuple[str, ...], "auto"), str):
-        return Choice(False, accuracy, frozenset(), frozenset(EFFECTS) - frozenset(named))
+        if on or off:
+            raise Refusal("expected either a list of effects, or some on and off, got both")
+        listed = Choice(False, accuracy, on=frozenset(named))
+        return replace(listed, off=frozenset(EFFECTS) - listed.on)
     choices = {"auto": Choice(auto=True), "all": Choice(), "linear": LINEAR}
     if named not in choices:
         raise Refusal(f"expected auto, all, linear or a list of effects, got {named!r}")
     chosen = choices[named]
     return Choice(chosen.auto, accuracy, on, (chosen.off - on) | off)
+
+
+def _wanted(table: Table) -> set[str]:
+    """The effects that a file asks for by name."""
+    named = table.get("choose", str | tuple[str, ...], "auto")
+    return {*table.get("on", tuple[str, ...], ()), *(() if isinstance(named, str) else named)}
 
 
 def read_scene_file(file: FilePath) -> Scene:
@@ -207,4 +224,4 @@ def read_scene_file(file: FilePath) -> Scene:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
-    return read_scene(text, file.stem, file.parent)
+    return read_scene(text, file)

@@ -1,6 +1,5 @@
 """What is in a scene: a skin, what touches it, and what spoils its readings."""
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -17,9 +16,6 @@ from kappaskin.scene.motion import Motion
 from kappaskin.scene.stimulus import Indenter, Stimulus
 from kappaskin.sensor import Sensor
 from kappaskin.transduction import Transduction
-
-TABLE_1_NOISE = 0.40 / math.sqrt(3)
-"""RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +47,9 @@ class Scene:
     def __post_init__(self) -> None:
         if self.laid and self.stimuli:
             raise Refusal(f"expected no loads on a skin that lies on cylinders, got {self.loads}")
+        names = [effect.name for effect in self.effects]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise Refusal(f"expected each effect once, got {', '.join(twice)} more than once")
         if self.indenter and len(self.stimuli) > 1:
             raise Refusal(
                 f"expected a rigid object to press alone, got {len(self.stimuli)} stimuli; what "

@@ -13,11 +13,19 @@ _LONGEST = 60.0  # s of a scene that nothing repeats in: what drifts has this lo
 _STEP = 1e-3  # s over which a rate is told
 
 
+def moments_of(scene: Scene) -> list[float]:
+    """Times in s, upwards, at which to look at a scene to have seen all of it."""
+    if not (scene.moves or scene.laid):
+        return [0.0]
+    evenly = np.arange(_MOMENTS) * scene.duration / _MOMENTS
+    return np.unique([*evenly, *scene.moments]).tolist()
+
+
 def survey(scene: Scene) -> Survey:
     """Look at `scene` at some fifty moments of one repetition."""
     basis, duration = scene.basis, scene.duration
     layout = replace(scene.layout, gage_length=0.0)
-    times = np.unique([*np.arange(_MOMENTS) * duration / _MOMENTS, *scene.moments])
+    times = np.array(moments_of(scene))
     M = layout.curvature_operator(basis)
     compliance = scene.plate.compliance(basis)
     pressing = Pressing(scene, scene.plate)

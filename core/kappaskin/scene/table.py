@@ -21,6 +21,10 @@ _KINDS: dict[Any, str] = {
 }
 
 
+class _Placed(Refusal):
+    """A refusal that says already where in the file it stands."""
+
+
 class Table:
     """What a file says at one `place`; it is refused where it says what nobody asks for."""
 
@@ -31,13 +35,15 @@ class Table:
     def refusal(self, why: str, key: str = "") -> Refusal:
         """The refusal of what stands at `key`, with its line."""
         place = (*self.place, key) if key else self.place
-        return Refusal(f"{self._name}, line {self._lines.of(place)}: {_dotted(place)}{why}")
+        return _Placed(f"{self._name}, line {self._lines.of(place)}: {_dotted(place)}{why}")
 
     @contextmanager
     def blamed(self, key: str = "") -> Generator[None]:
         """Say of what is refused meanwhile where it stands in the file."""
         try:
             yield
+        except _Placed:
+            raise
         except Refusal as refusal:
             raise self.refusal(str(refusal), key) from refusal
 
@@ -88,11 +94,11 @@ class Table:
             for n, one in enumerate(many)
         ]
 
-    def make(self, kind: Callable[..., _Made], *leave: str, **given: Any) -> _Made:
+    def make(self, kind: Callable[..., _Made], **given: Any) -> _Made:
         """An instance of the dataclass `kind`, its fields as the table says, or as `given`."""
         hints, values = get_type_hints(kind), dict(given)
         for field in fields(cast("Any", kind)):
-            if field.init and field.name not in given and field.name not in leave:
+            if field.init and field.name not in given:
                 required = field.default is MISSING and field.default_factory is MISSING
                 if required or field.name in self:
                     values[field.name] = self.get(field.name, hints[field.name])

@@ -11,12 +11,13 @@ from itertools import cycle
 import numpy as np
 
 from kappaskin.bases import Basis, basis_for
+from kappaskin.effects import EFFECTS
 from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, estimator_for
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
 from kappaskin.scan import Scan
-from kappaskin.scene import Scene, contact_of
+from kappaskin.scene import Choice, Pressed, Pressing, Scene, kept_of, moments_of
 from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
 from kappaskin.studies.cost.setting import SCANS, Cost, Refused, Setting
@@ -90,29 +91,39 @@ def _points_on(scene: Scene) -> Array:
     return points[patch.contains(points)]
 
 
+def _pressed(scene: Scene, times: Array) -> list[Pressed]:
+    """What presses so many `times` in s after the skin is pressed hardest, or always then."""
+    pressing = Pressing(scene, scene.plate)
+    found = {t: pressing(t) for t in moments_of(scene)}
+    hardest = max(found, key=lambda t: sum(abs(load.force) for load in found[t].loads))
+    after = [pressing(t) for t in (hardest + times).tolist()]
+    pressed = all(np.isfinite(one.contact).all() for one in after)
+    return after if pressed else [found[hardest]] * len(times)
+
+
 class Bench:
     """Measures settings on a `scene`; what they share is computed once.
 
-    All are judged on the same frames, begun at the scene's rate. Each shows the skin standing still
-    where it is when the frame begins; noise, loops, creep, tolerances and the converter spoil it as
-    the scene says. Other elements than the scene's own have the same skin, loads and electronics.
+    All are judged on the same frames, begun at the scene's rate from when the skin is pressed
+    hardest; where it is let go meanwhile, they all show that moment. Each shows the skin standing
+    still as it is when the frame begins, spoilt by what the scene calls for. Other elements than
+    the scene's own have the same skin, loads and electronics.
     """
 
     def __init__(self, scene: Scene) -> None:
-        if not scene.loads or not np.isfinite(contact_of(scene.loads)).all():
+        self._times = np.arange(SETTLING + DRAWS) / scene.rate
+        self._pressed = _pressed(scene, self._times)
+        if not np.isfinite([pressed.contact for pressed in self._pressed]).all():
             why = "lies on cylinders" if scene.laid else "is not pressed"
             raise Refusal(
                 f"expected a scene with a load to tell errors by, but the skin of {scene.name} "
                 f"{why}; choose one such as centre"
             )
-        self.scene = scene
-        self._times = np.arange(SETTLING + DRAWS) / scene.rate
+        # Planned once: what stands still calls for no skew, but the whole scene is to be judged.
+        kept = {effect.name for effect in kept_of(scene)}
+        self.scene = replace(scene, choice=Choice(off=frozenset(EFFECTS) - kept))
         self._skins: dict[tuple[int, int] | None, _Skin] = {}
         self._judges: dict[tuple[int, int], _Judge] = {}
-
-    def _still(self, time: float) -> Scene:
-        """The scene as it is at `time`, without its motion."""
-        return self.scene.touched_by(*self.scene.loads_at(time))
 
     @cached_property
     def _points(self) -> Array:
@@ -122,10 +133,8 @@ class Bench:
     def _truth(self) -> _Truth:
         scene, basis = self.scene, self.scene.basis
         compliance = scene.plate.compliance(basis)
-        loads = [scene.loads_at(t) for t in self._times.tolist()]
-        contact = np.array([contact_of(each) for each in loads])
-        forces = [np.sum([load.modal(basis) for load in each], axis=0) for each in loads]
-        shapes = np.array([compliance(force) for force in forces])
+        contact = np.array([pressed.contact for pressed in self._pressed])
+        shapes = np.array([compliance(pressed.force) for pressed in self._pressed])
         c = shapes.reshape(len(shapes), -1)
         at_load = np.vecdot(basis.at(contact), c)
         return _Truth(shapes, c @ basis.at(self._points).T, contact, at_load)
@@ -143,9 +152,8 @@ class Bench:
             scene = replace(scene, layout=layout, rate=min(scene.rate, slowest))
         sensor, simulator = scene.sensor(), Simulator(scene)
         read: list[Array] = []
-        for n, t in enumerate(self._times.tolist()):
-            still = replace(self._still(t), layout=scene.layout, rate=scene.rate)
-            simulator.change(still)
+        for n, (t, pressed) in enumerate(zip(self._times.tolist(), self._pressed, strict=True)):
+            simulator.change(scene.touched_by(*pressed.loads))
             read.append(sensor.nominal(simulator.scanned(sensor.scan(), n, t, lambda: 0.0)))
         operator = scene.layout.curvature_operator(scene.basis)
         exact = self._truth.coefficients.reshape(len(read), -1) @ operator.T
