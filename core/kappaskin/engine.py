@@ -12,11 +12,11 @@ from multiprocessing.process import BaseProcess
 from typing import cast
 
 from kappaskin.frames import Estimate
-from kappaskin.live import LOST, Connect, Disconnect, Loop, Request, Status
+from kappaskin.live import LOST, Connect, Disconnect, Loop, Request, Seek, Status
 from kappaskin.pipeline import Setup
 from kappaskin.region import Region
 from kappaskin.ring import Ring
-from kappaskin.scene import Scene
+from kappaskin.scene import Playing, Scene
 
 _SWITCH = 2e-4  # s that one thread may keep the interpreter from another
 
@@ -113,6 +113,15 @@ class Engine:
     def play(self, scene: Scene) -> None:
         """Let the simulated source, if that is what there is, go on with `scene`."""
         self._send(scene)
+
+    def seek(self, at: float | None = None, speed: float = 1.0) -> None:
+        """Let a simulated scene go on from its time `at` in s, or from where it is.
+
+        It goes `speed` times as fast as the device's clock, at most ten times; at zero it stands
+        still, and goes on being read. Status tells where it is.
+        """
+        Playing(at or 0.0, 0.0, speed)  # or refused here
+        self._send(Seek(at, speed))
 
     def scan(self, region: Region) -> None:
         """Let every frame scan `region`; where it cannot, `status` says why."""

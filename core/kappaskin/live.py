@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal, SourceError
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.region import Region
 from kappaskin.ring import Ring, slot_type
-from kappaskin.scene import Scene
+from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources import SimulatedSource, Source, open_source
 from kappaskin.sources.wire import Accounting
@@ -38,6 +38,7 @@ class Status:
     says why not. `meetings` counts the devices that said what they are, `skipped` the frames that
     came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
     of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
+    `playing` tells where a simulated scene is at a device time.
     """
 
     state: str = OFF
@@ -58,6 +59,7 @@ class Status:
     reader_gap: float = math.nan
     last_frame: float = -math.inf
     reported: float = -math.inf
+    playing: Playing = FROM_THE_BEGINNING
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,15 @@ class Disconnect:
     pass
 
 
-Request = Connect | Disconnect | Setup | Scene | Region
+@dataclass(frozen=True)
+class Seek:
+    """Go on with a simulated scene from its time `at` in s, or from where it is, at a `speed`."""
+
+    at: float | None
+    speed: float
+
+
+Request = Connect | Disconnect | Setup | Scene | Seek | Region
 
 
 class Loop:
@@ -113,6 +123,9 @@ class Loop:
             self._set_up(smaller=False)
         elif isinstance(request, Scene):
             self._play(request)
+        elif isinstance(request, Seek):
+            if isinstance(self._source, SimulatedSource):
+                self._source.seek(request.at, request.speed)
         elif isinstance(request, Region):
             self._status = replace(self._status, region=request)
             self._steer()
@@ -272,6 +285,9 @@ class Loop:
                 rate=len(recent) / min(1.0, max(now - recent[0], 1e-3)) if recent else 0.0,
                 reader_gap=float(np.percentile(gaps, 99)) if len(gaps) else math.nan,
                 last_frame=self._times[-1] if self._times else -math.inf,
+                playing=source.playing
+                if isinstance(source, SimulatedSource)
+                else FROM_THE_BEGINNING,
             )
         self._status = replace(status, reported=now)
         self._ring.write_status(self._status)

@@ -19,7 +19,15 @@ from kappaskin.effects import (
 from kappaskin.frames import Array, Frame, Truth
 from kappaskin.mechanics import Load
 from kappaskin.scan import Scan
-from kappaskin.scene import Pressing, Scene, effects_of, kept_of
+from kappaskin.scene import (
+    FROM_THE_BEGINNING,
+    Playing,
+    Pressed,
+    Pressing,
+    Scene,
+    effects_of,
+    kept_of,
+)
 
 
 class Simulator:
@@ -30,12 +38,11 @@ class Simulator:
     of its start. Every effect draws from a random stream of its own.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, playing: Playing = FROM_THE_BEGINNING) -> None:
+        self.scene, self.playing = scene, playing
         self._still: Truth | None = None
         self._kept = kept_of(scene)
         self._take_skin()
-        self._take_stimuli()
         self._start_effects()
 
     def change(self, scene: Scene) -> None:
@@ -50,15 +57,25 @@ class Simulator:
         same_skin = skin == (was.plate, was.edge, was.reference, was.layout.gage_length)
         if not (same_elements and same_skin and _of_skin(before) == _of_skin(self._kept)):
             self._take_skin()
-        self._take_stimuli()
+        else:
+            self._take_stimuli()
         same_size = len(scene.layout) == len(was.layout)
         reading = scene.seed, _of_readings(self._kept)
         if not same_size or reading != (was.seed, _of_readings(before)):
             self._start_effects()
 
+    def play(self, playing: Playing) -> None:
+        """Go on with the scene from another of its times, or at another speed."""
+        self.playing = playing
+
+    def _pressed(self, time: float) -> Pressed:
+        """What presses at device `time` in s."""
+        return self._pressing(self.playing.time(time))
+
     def _take_stimuli(self) -> None:
         """Compute what depends on what touches the skin, and which channels are dead."""
-        self._pressing, live = Pressing(self.scene, self._plate), self.scene.layout.live.ravel()
+        self._pressing.take(self.scene)
+        live = self.scene.layout.live.ravel()
         self._dead = None if live.all() else np.flatnonzero(~live)
 
     def _start_effects(self) -> None:
@@ -83,7 +100,8 @@ class Simulator:
         if GageLength not in kinds:
             layout = replace(layout, gage_length=0.0)
         self._basis = scene.basis
-        self._plate, self._compliance = plate, plate.compliance(self._basis)
+        self._pressing, self._compliance = Pressing(scene, plate), plate.compliance(self._basis)
+        self._take_stimuli()
         self._skewed = Skew in kinds
         self._scan = scene.sensor().scan()
         sloped = [effect for effect in self._kept if isinstance(effect, FiniteSlope)]
@@ -95,15 +113,15 @@ class Simulator:
     def _truth(self, time: float) -> Truth:
         if self._still is not None:
             return self._still
-        pressed = self._pressing(time)
+        pressed = self._pressed(time)
         truth = Truth(self._compliance(pressed.force), pressed.contact, self.scene.edge)
         if not self.scene.moves:
             self._still = truth
         return truth
 
     def loads(self, time: float) -> tuple[Load, ...]:
-        """What presses at `time` in s; a rigid object as the points that bear it."""
-        return self._pressing(time).loads
+        """What presses at device `time` in s; a rigid object as the points that bear it."""
+        return self._pressed(time).loads
 
     def _read(self, scan: Scan, time: float, truth: Truth) -> Array:
         """Curvature (3 P,) of a scan begun at `time`; channels outside it as at the start."""
@@ -112,7 +130,7 @@ class Simulator:
             return first
         # The parabola through start, middle and end, at the share s of the scan.
         middle, last = (
-            self._sensed(self._compliance(self._pressing(t).force))
+            self._sensed(self._compliance(self._pressed(t).force))
             for t in (time + scan.duration / 2, time + scan.duration)
         )
         s = np.zeros(len(first))
@@ -122,7 +140,8 @@ class Simulator:
     def _true(self, scan: Scan, time: float) -> tuple[Truth | None, Array]:
         """The truth, None where no coefficients can tell it, and curvature (3 P,) in 1/m."""
         if self.scene.laid is not None:
-            return None, np.repeat(self.scene.laid.curvature(time), len(self.scene.layout))
+            laid = self.scene.laid.curvature(self.playing.time(time))
+            return None, np.repeat(laid, len(self.scene.layout))
         truth = self._truth(time)
         return truth, self._read(scan, time, truth)
 

@@ -1,5 +1,6 @@
 """The live process: what it shows, what it survives, and that nothing outlives it."""
 
+import math
 import os
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from kappaskin import (
     Patch,
     Plate,
     PointLoad,
+    Refusal,
     Region,
     Scene,
     SensorLayout,
@@ -178,6 +180,21 @@ def test_another_scene_plays_on_the_same_line(engine) -> None:
     after = wait_for(lambda: next_estimate(engine))
     assert after.generation == before.generation
     assert np.abs(after.touch.position - here).max() < 2e-3
+
+
+def test_a_scene_stands_still_where_it_is_sought_and_the_status_says_so(engine) -> None:
+    engine.connect("sim:circle")
+    next_estimate(engine)
+    (load,) = load_scene("circle").loads_at(1.5)
+    there = pytest.approx(load.centre(), abs=1e-9)
+    engine.seek(1.5, 0.0)
+    assert wait_for(lambda: next_estimate(engine).true_contact == there)
+    assert wait_for(lambda: engine.status().playing.speed == 0)
+    assert engine.status().playing.time(123.0) == 1.5
+    with pytest.raises(Refusal, match="speed of 0 to 10"):
+        engine.seek(0.0, math.inf)
+    engine.seek()
+    assert wait_for(lambda: np.abs(next_estimate(engine).true_contact - load.centre()).max() > 1e-3)
 
 
 def test_another_skin_is_met_as_another_device_is(engine) -> None:

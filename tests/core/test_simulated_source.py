@@ -1,5 +1,6 @@
 """The simulated source keeps a device's pace by any clock, and counts what it leaves out."""
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -18,6 +19,7 @@ from kappaskin import (
     Scanner,
     Scene,
     SensorLayout,
+    Simulator,
     Transduction,
     load_scene,
 )
@@ -308,3 +310,73 @@ def test_frames_that_the_link_spoils_are_counted_as_lost(failure) -> None:
     assert [f.sequence for f in read_until(again, other, other.now + 2.0)] == [
         f.sequence for f in frames
     ]
+
+
+def contacts(frames: list[Frame]) -> list[list[float]]:
+    return [frame.truth.contact.tolist() for frame in frames]
+
+
+def test_a_scene_that_stands_still_goes_on_being_read() -> None:
+    clock = Clock()
+    source = source_of("circle", clock)
+    read_until(source, clock, clock.now + 0.3)
+    source.seek(None, 0.0)
+    stood = source.playing.at
+    frames = read_until(source, clock, clock.now + 0.3)
+    assert len(frames) > 100
+    assert np.ptp(contacts(frames[1:]), axis=0) == pytest.approx(0)
+    assert len(set(map(tuple, counts_of(frames)))) > 100  # the noise goes on
+    assert np.diff([frame.sequence for frame in frames]).tolist() == [1] * (len(frames) - 1)
+    source.seek(None, 1.0)
+    assert source.playing.at == pytest.approx(stood)
+    later = read_until(source, clock, clock.now + 0.3)
+    assert np.ptp(contacts(later), axis=0).max() > 1e-3
+
+
+@pytest.mark.parametrize("speed", [0.25, 1.0, 4.0])
+def test_a_scene_goes_on_from_where_it_is_sought_as_fast_as_asked(speed: float) -> None:
+    clock = Clock()
+    source = source_of("circle", clock)
+    read_until(source, clock, clock.now + 0.5)
+    scene = load_scene("circle")
+    source.seek(1.25, speed)
+    frames = read_until(source, clock, clock.now + 0.1)
+    since = frames[0].device_time
+    for frame in frames:
+        (load,) = scene.loads_at(1.25 + speed * (frame.device_time - since))
+        assert frame.truth.contact == pytest.approx(load.centre(), abs=1e-9)
+
+
+def test_what_was_sought_stays_when_the_skin_becomes_another() -> None:
+    clock = Clock()
+    source = source_of("circle", clock)
+    source.seek(0.7, 0.0)
+    longer = Patch(0.12, 0.1)
+    scene = load_scene("circle")
+    layout = SensorLayout.regular(longer, 9, 9)
+    source.play(replace(scene, plate=replace(scene.plate, patch=longer), layout=layout))
+    (frame, *_) = read_until(source, clock, clock.now + 0.1)
+    (load,) = scene.loads_at(0.7)
+    assert frame.truth.contact == pytest.approx(load.centre(), abs=1e-9)
+
+
+@pytest.mark.parametrize("bad", [(math.nan, 1.0), (math.inf, 1.0), (0.0, -1.0), (0.0, 11.0)])
+def test_no_time_and_no_speed_are_refused(bad) -> None:
+    with pytest.raises(Refusal, match="to play a scene"):
+        source_of("circle").seek(*bad)
+
+
+def test_a_rigid_object_that_is_moved_while_it_is_pressed_reads_as_one_put_there() -> None:
+    sphere = load_scene("sphere")
+    (stimulus,) = sphere.stimuli
+    moved = replace(
+        sphere, stimuli=(replace(stimulus, what=replace(stimulus.what, x=stimulus.what.x + 0.01)),)
+    )
+    going, fresh = Simulator(sphere), Simulator(moved)
+    scan = sphere.sensor().scan()
+    for n in range(30):
+        going.reading(scan, n / 30)
+    going.change(moved)
+    for time in (0.3, 0.6, 0.9):
+        truth, other = (each.reading(scan, time)[0].coefficients for each in (going, fresh))
+        assert truth == pytest.approx(other, abs=1e-7 * np.abs(other).max())

@@ -9,6 +9,9 @@ from kappaskin.scene.plan import Plan as Plan
 from kappaskin.scene.plan import effects_of as effects_of
 from kappaskin.scene.plan import kept_of as kept_of
 from kappaskin.scene.plan import plan as plan
+from kappaskin.scene.plan import planned as planned
+from kappaskin.scene.playing import FROM_THE_BEGINNING as FROM_THE_BEGINNING
+from kappaskin.scene.playing import Playing as Playing
 from kappaskin.scene.pressing import Pressed as Pressed
 from kappaskin.scene.pressing import Pressing as Pressing
 from kappaskin.scene.read import read_scene as read_scene

@@ -1,7 +1,7 @@
 """A scene to the effects that it calls for at the accuracy asked for, and why."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -132,3 +132,10 @@ def kept_of(scene: Scene) -> tuple[Effect, ...]:
         return plan(scene).kept
     there, off = effects_of(scene), scene.choice.off
     return tuple(effect for name, effect in there.items() if effect.authored or name not in off)
+
+
+def planned(scene: Scene) -> Scene:
+    """The scene with the effects that its plan keeps chosen by name: nothing is left to plan."""
+    kept = {effect.name for effect in kept_of(scene)}
+    accuracy = scene.choice.accuracy
+    return replace(scene, choice=Choice(accuracy=accuracy, off=frozenset(EFFECTS) - kept))

@@ -30,9 +30,16 @@ class Pressing:
     """
 
     def __init__(self, scene: Scene, plate: Plate) -> None:
-        self._scene, self._basis = scene, scene.basis
-        self._press = Press(plate, self._basis) if scene.indenter else None
+        self._plate, self._basis = plate, scene.basis
+        self._press: Press | None = None
         self._last: Indentation | None = None
+        self.take(scene)
+
+    def take(self, scene: Scene) -> None:
+        """Go on with what touches the same skin in another `scene`."""
+        self._scene = scene
+        if scene.indenter and self._press is None:
+            self._press = Press(self._plate, self._basis)
 
     def __call__(self, time: float) -> Pressed:
         """What presses at `time` in s."""

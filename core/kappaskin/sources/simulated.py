@@ -8,7 +8,7 @@ import numpy as np
 from kappaskin.frames import Frame
 from kappaskin.intrinsic import ForceTorqueSensor, Wrench
 from kappaskin.region import Scanner
-from kappaskin.scene import Scene
+from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
 from kappaskin.sources.information import to_json
@@ -34,14 +34,14 @@ class SimulatedSource:
     ) -> None:
         self._clock, self._sleep = clock, sleep
         self._start, self._n = clock(), 0
-        self._become(scene, due=0.0)
+        self._become(scene, 0.0, FROM_THE_BEGINNING)
         self._base_noise = np.random.default_rng(scene.seed)
         self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
 
-    def _become(self, scene: Scene, due: float) -> None:
+    def _become(self, scene: Scene, due: float, playing: Playing) -> None:
         """Be the device of `scene`, whose next frame is due at device time `due` in s."""
-        self._simulator, self._sensor = Simulator(scene), scene.sensor()
+        self._simulator, self._sensor = Simulator(scene, playing), scene.sensor()
         # Since frame `_first`, due at device time `_since`, frames come at `_rate`.
         self._first, self._since = self._n, due
         self._rate: float = self._sensor.rate
@@ -60,9 +60,19 @@ class SimulatedSource:
         if to_json(scene.sensor()) == to_json(self._sensor):
             self._simulator.change(scene)
             return
-        self._become(scene, self._due())
+        self._become(scene, self._due(), self.playing)
         # The next frame is due now: making what the skin needs took a while, but nothing is lost.
         self._start = self._clock() - self._since
+
+    @property
+    def playing(self) -> Playing:
+        """Where in its scene it is."""
+        return self._simulator.playing
+
+    def seek(self, at: float | None, speed: float) -> None:
+        """Go on from the scene's time `at` in s, or from where it is, at another `speed`."""
+        due = self._due()
+        self._simulator.play(Playing(self.playing.time(due) if at is None else at, due, speed))
 
     def scan(self, scanner: Scanner | None) -> None:
         """Read what `scanner` chooses from the next frame on; all channels without one."""

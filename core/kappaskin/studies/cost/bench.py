@@ -11,13 +11,12 @@ from itertools import cycle
 import numpy as np
 
 from kappaskin.bases import Basis, basis_for
-from kappaskin.effects import EFFECTS
 from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, estimator_for
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
 from kappaskin.scan import Scan
-from kappaskin.scene import Choice, Pressed, Pressing, Scene, kept_of, moments_of
+from kappaskin.scene import Pressed, Pressing, Scene, moments_of, planned
 from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
 from kappaskin.studies.cost.setting import SCANS, Cost, Refused, Setting
@@ -120,8 +119,7 @@ class Bench:
                 f"{why}; choose one such as centre"
             )
         # Planned once: what stands still calls for no skew, but the whole scene is to be judged.
-        kept = {effect.name for effect in kept_of(scene)}
-        self.scene = replace(scene, choice=Choice(off=frozenset(EFFECTS) - kept))
+        self.scene = planned(scene)
         self._skins: dict[tuple[int, int] | None, _Skin] = {}
         self._judges: dict[tuple[int, int], _Judge] = {}
 
