@@ -86,6 +86,9 @@ from kappaskin.scene import Orbit as Orbit
 from kappaskin.scene import Scene as Scene
 from kappaskin.scene import Stimulus as Stimulus
 from kappaskin.scene import load_scene as load_scene
+from kappaskin.scene import read_scene as read_scene
+from kappaskin.scene import scene_file as scene_file
+from kappaskin.scene import write_scene as write_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
 from kappaskin.studies.cost import Cost as Cost

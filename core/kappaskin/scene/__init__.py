@@ -19,9 +19,11 @@ from kappaskin.scene.ready import DEFAULT_SCENE as DEFAULT_SCENE
 from kappaskin.scene.ready import SCENES as SCENES
 from kappaskin.scene.ready import TABLE_1_NOISE as TABLE_1_NOISE
 from kappaskin.scene.ready import load_scene as load_scene
+from kappaskin.scene.ready import scene_file as scene_file
 from kappaskin.scene.scene import Scene as Scene
 from kappaskin.scene.scene import scaled_to as scaled_to
 from kappaskin.scene.stimulus import Indenter as Indenter
 from kappaskin.scene.stimulus import Stimulus as Stimulus
 from kappaskin.scene.stimulus import contact_of as contact_of
 from kappaskin.scene.survey import moments_of as moments_of
+from kappaskin.scene.write import write_scene as write_scene

@@ -32,8 +32,8 @@ from kappaskin.transduction import FIRST_GENERATION, SECOND_GENERATION, Transduc
 FORMAT = 1
 _LARGEST = 2**24  # bytes
 
-_ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
-_ELSEWHERE = {
+ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
+ELSEWHERE = {
     "tension": "[skin] has the tension",
     "foam": "[skin] has the foundation",
     "fluid": "[skin] has the fluid",
@@ -46,7 +46,7 @@ _ELSEWHERE = {
 }
 """Effects that follow from what a scene says elsewhere."""
 
-_LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
+LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 
 
 def read_scene(text: str, file: FilePath) -> Scene:
@@ -142,7 +142,7 @@ def _elements(table: Table, patch: Patch) -> SensorLayout:
 
 
 def _electronics(table: Table) -> Transduction:
-    chain = table.choose("like", _ELECTRONICS, "modern")
+    chain = table.choose("like", ELECTRONICS, "modern")
     parts = {
         name: _changed(table.table(name), getattr(chain, name))
         for name in ("bridge", "multiplexer", "amplifier", "converter")
@@ -179,10 +179,10 @@ def _effects(top: Table, electronics: Transduction) -> tuple[Choice, tuple[Effec
     for name, kind in EFFECTS.items():
         if name in table:
             said = table.table(name)
-            if name in _ELSEWHERE:
-                raise said.refusal(f"expected no such table; {_ELSEWHERE[name]}")
+            if name in ELSEWHERE:
+                raise said.refusal(f"expected no such table; {ELSEWHERE[name]}")
             if name == "hysteresis" and "like" in said:
-                found.append(said.choose("like", _LOOPS))
+                found.append(said.choose("like", LOOPS))
             elif kind is StrainLimit:
                 found.append(said.make(kind, transduction=electronics))
             else:

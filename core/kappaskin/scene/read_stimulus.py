@@ -38,7 +38,7 @@ from kappaskin.scene.motion import (
 from kappaskin.scene.stimulus import Indenter, Stimulus
 from kappaskin.scene.table import Table
 
-_STEPS: dict[str, type[Step]] = {
+STEPS: dict[str, type[Step]] = {
     "press": Press,
     "hold": Hold,
     "release": Release,
@@ -47,14 +47,14 @@ _STEPS: dict[str, type[Step]] = {
     "turn": Turn,
     "tap": Tap,
 }
-_LOADS: dict[str, type[Load]] = {
+LOADS: dict[str, type[Load]] = {
     "point": PointLoad,
     "line": LineLoad,
     "disc": DiscLoad,
     "rectangle": RectangleLoad,
     "gaussian": GaussianLoad,
 }
-_OBJECTS: dict[str, type[RigidObject]] = {
+OBJECTS: dict[str, type[RigidObject]] = {
     "sphere": Sphere,
     "cylinder": Cylinder,
     "wedge": Wedge,
@@ -68,10 +68,10 @@ _OBJECTS: dict[str, type[RigidObject]] = {
 def read_stimulus(table: Table, moved: Callable[[Load, float], Load], folder: FilePath) -> Stimulus:
     """What a [[touch]] says; `moved` makes a load as large as moves its place so far in m."""
     what: Load | Indenter
-    if (name := table.choose("what", {name: name for name in (*_LOADS, *_OBJECTS)})) in _OBJECTS:
-        what = table.make(Indenter, rigid=_object(table, _OBJECTS[name], folder))
+    if (name := table.choose("what", {name: name for name in (*LOADS, *OBJECTS)})) in OBJECTS:
+        what = table.make(Indenter, rigid=_object(table, OBJECTS[name], folder))
     else:
-        what = table.make(_LOADS[name])
+        what = table.make(LOADS[name])
         if "displacement" in table:
             if "force" in table:
                 raise table.refusal("expected a force or a displacement, got both", "displacement")
@@ -112,7 +112,7 @@ def _motion(table: Table, folder: FilePath) -> Motion | None:
 
 
 def _step(table: Table) -> Step:
-    made = table.make(table.choose("step", _STEPS))
+    made = table.make(table.choose("step", STEPS))
     table.done()
     return made
 

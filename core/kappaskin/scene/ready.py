@@ -1,7 +1,7 @@
 """Scenes by name: those that are ready, one file each, and files of one's own."""
 
 import math
-from importlib.resources import as_file, files
+from importlib.resources import files
 from pathlib import Path
 
 from kappaskin.errors import Refusal
@@ -13,26 +13,26 @@ TABLE_1_NOISE = 0.40 / math.sqrt(3)
 
 DEFAULT_SCENE = "circle"
 
-_FOLDER = files("kappaskin_resources") / "scenes"
+_FOLDER = Path(str(files("kappaskin_resources"))) / "scenes"
 _ENDING = ".toml"
 
-SCENES = tuple(
-    sorted(
-        file.name.removesuffix(_ENDING) for file in _FOLDER.iterdir() if file.name.endswith(_ENDING)
-    )
-)
+SCENES = tuple(sorted(file.stem for file in _FOLDER.iterdir() if file.suffix == _ENDING))
 """Names of the ready scenes."""
 
 
-def load_scene(name: str = "") -> Scene:
-    """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
+def scene_file(name: str = "") -> Path:
+    """The file of the ready scene `name`, of the default one when empty; or the TOML file named."""
     if name.endswith(_ENDING):
-        return read_scene_file(Path(name))
+        return Path(name)
     name = name or DEFAULT_SCENE
     if name not in SCENES:
         raise Refusal(
             f"expected a scene among {', '.join(SCENES)}, or a file that ends in {_ENDING}; got "
             f"{name!r}"
         )
-    with as_file(_FOLDER / f"{name}{_ENDING}") as file:
-        return read_scene_file(file)
+    return _FOLDER / f"{name}{_ENDING}"
+
+
+def load_scene(name: str = "") -> Scene:
+    """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
+    return read_scene_file(scene_file(name))

@@ -1,0 +1,425 @@
+"""Scene files that are written: what is read from them is the scene that was written."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kappaskin import (
+    FIRST_GENERATION,
+    FIRST_GENERATION_LOOPS,
+    SCENES,
+    SECOND_GENERATION,
+    SECOND_GENERATION_LOOPS,
+    Creep,
+    DiscLoad,
+    Disk,
+    GaussianLoad,
+    GaussianNoise,
+    Hysteresis,
+    LineLoad,
+    Orbit,
+    Patch,
+    Plate,
+    PointLoad,
+    Polygon,
+    Presentation,
+    RectangleLoad,
+    Refusal,
+    Scene,
+    SensorLayout,
+    Simulator,
+    Stimulus,
+    Tolerance,
+    Transduction,
+    load_scene,
+    read_scene,
+    scene_file,
+    schedule,
+    write_scene,
+)
+from kappaskin.effects import (
+    EFFECTS,
+    CorruptedFrames,
+    CrossTalk,
+    FlickerNoise,
+    Foam,
+    IntermittentElements,
+    MainsHum,
+    StrainLimit,
+    StuckElements,
+    Temperature,
+)
+from kappaskin.mechanics import Block, Cylinder, HeightMap, Mesh, Punch, Sphere, Wedge
+from kappaskin.scene import LINEAR, Choice, Indenter, effects_of, kept_of, plan
+from kappaskin.scene.motion import Hold, Press, Recorded, Release, Slide, Tap, Turn
+from kappaskin.scene.motion import Path as Way
+from kappaskin.sources import information
+
+SQUARE = Patch(0.1, 0.1)
+BARE = Scene("bare", Plate(SQUARE), SensorLayout.regular(SQUARE, 4, 4))
+PRESSED = BARE.touched_by(PointLoad(0.05, 0.05))
+
+
+def again(scene: Scene) -> Scene:
+    return read_scene(write_scene(scene), Path(f"{scene.name}.toml"))
+
+
+def counts(scene: Scene, frames: int = 4):
+    simulator = Simulator(replace(scene, rate=frames / scene.duration))  # all over the scene
+    return [simulator.frame(n, lambda: 0.0).counts for n in range(frames)]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_ready_scene_is_the_same_once_written_and_read(name):
+    scene = load_scene(name)
+
+    read = again(scene)
+
+    assert information.to_json(read.sensor()) == information.to_json(scene.sensor())
+    assert plan(read).entries == plan(scene).entries
+    np.testing.assert_array_equal(counts(read), counts(scene))
+    assert (read.title, read.text, read.duration) == (scene.title, scene.text, scene.duration)
+    assert write_scene(read) == write_scene(scene)
+
+
+def test_a_scene_is_written_as_a_person_would_write_it():
+    disk = Disk(0.05)
+    scene = Scene(
+        "mine",
+        replace(Plate(disk), tension=20.0),
+        replace(SensorLayout.regular(disk, 6, 5).without([3, 7]), gage_length=2e-5),
+        (
+            Stimulus(
+                GaussianLoad(0.05, 0.05, 0.004, 0.15), Way((Press(1.0, to=2.0), Release(0.5)))
+            ),
+            Stimulus(PointLoad(0.04, 0.05), Orbit(0.01, 4)),
+        ),
+        (Creep(0.1, 8), GaussianNoise(0.1)),
+        replace(SECOND_GENERATION, amplifier=replace(SECOND_GENERATION.amplifier, gain=90.0)),
+        edge="clamped",
+        choice=Choice(auto=True, off=frozenset({"skew"})),
+        title='The "drum"',
+        text='One\n"two" \\ three.\n',
+    )
+
+    assert (
+        write_scene(scene)
+        == '''format = 1
+title = "The \\"drum\\""
+text = """
+One
+"two" \\\\ three.
+"""
+
+[skin]
+shape = "disk"
+rim_radius = 0.05  # m
+tension = 20.0  # N/m
+edge = "clamped"
+
+[elements]
+grid = [6, 5]
+dead = [3, 7]
+gage_length = 2e-5  # m
+
+[electronics]
+like = "second"
+
+[electronics.amplifier]
+gain = 90.0
+
+[effects]
+off = ["skew"]
+
+[effects.creep]
+share = 0.1
+time_constant = 8.0  # s
+
+[effects.gaussian-noise]
+rms = 0.1  # 1/m
+
+[[touch]]
+what = "gaussian"
+x = 0.05
+y = 0.05
+sd = 0.004
+force = 0.15  # N
+path = [
+    { step = "press", to = 2.0, seconds = 1.0 },
+    { step = "release", seconds = 0.5 },
+]
+
+[[touch]]
+what = "point"
+x = 0.04
+y = 0.05
+force = 1.0  # N
+orbit = { radius = 0.01, period = 4.0 }
+'''
+    )
+
+
+# Any scene
+
+numbers = st.floats(1e-3, 1.0)
+shares = st.floats(0.0, 0.9)
+PATCHES = [
+    SQUARE,
+    Patch(0.12, 0.07, strip=True),
+    Patch(0.04, 0.03, 12.9e-3),
+    Disk(0.05),
+    Polygon([(0, 0), (0.1, 0), (0.1, 0.05), (0.05, 0.1), (0, 0.1)]),
+]
+
+
+@st.composite
+def layouts(draw, patch: Patch) -> SensorLayout:
+    if draw(st.booleans()):
+        layout = SensorLayout.regular(patch, *draw(st.tuples(*[st.integers(1, 12)] * 2)))
+    else:
+        places = st.tuples(st.floats(0.2, 0.7), st.floats(0.2, 0.7))
+        shares_of_sides = draw(st.lists(places, min_size=1, max_size=9))
+        layout = SensorLayout.scattered(patch, np.array(shares_of_sides) * (patch.a, patch.b))
+    dead = draw(st.sets(st.integers(0, len(layout) - 1), max_size=len(layout) - 1))
+    longest = float(patch.depth(layout.positions).min())
+    return replace(layout.without(dead), gage_length=draw(st.sampled_from([0.0, longest])))
+
+
+@st.composite
+def motions(draw, patch: Patch):
+    if draw(st.booleans()):
+        return draw(st.none() | st.builds(Orbit, st.floats(0, 0.05 * patch.b), numbers))
+    by = st.floats(-0.01 * patch.b, 0.01 * patch.b)
+    eases = st.sampled_from(["smooth", "linear"])
+    step = st.one_of(
+        st.builds(Press, numbers, eases, shares),
+        st.builds(Hold, numbers, eases),
+        st.builds(Slide, numbers, eases, st.tuples(by, by)),
+        st.builds(Turn, numbers, eases, st.floats(-3, 3)),
+        st.builds(Tap, numbers, eases, st.integers(1, 9)),
+    )
+    return Way((*draw(st.lists(step, max_size=4)), Release(draw(numbers))))
+
+
+@st.composite
+def stimuli(draw, patch: Patch):
+    x, y = 0.4 * patch.a, 0.4 * patch.b
+    size = st.floats(1e-4, 0.03 * patch.b)
+    if draw(st.booleans()):
+        rigid = st.one_of(
+            st.builds(Sphere, size),
+            st.builds(Cylinder, size, size),
+            st.builds(Wedge, st.floats(0.1, 3.0), size, size, st.sampled_from([0.0, 2e-5])),
+            st.builds(Punch, size),
+            st.builds(Block, size, size),
+        )
+        pressed = draw(st.sampled_from(["force", "depth"]))
+        what = Indenter(draw(rigid), x, y, **{pressed: draw(numbers)}, turn=draw(shares))
+        return (Stimulus(what, draw(motions(patch))),)
+    loads = st.one_of(
+        st.builds(PointLoad, st.just(x), st.just(y), numbers),
+        st.builds(LineLoad, st.just(x), st.just(y), st.just(x * 1.1), st.just(y), numbers),
+        st.builds(DiscLoad, st.just(x), st.just(y), size, numbers),
+        st.builds(RectangleLoad, st.just(x), st.just(y), size, size, numbers),
+        st.builds(GaussianLoad, st.just(x), st.just(y), size, numbers),
+    )
+    made = st.builds(Stimulus, loads, motions(patch))
+    return tuple(draw(st.lists(made, max_size=3)))
+
+
+@st.composite
+def electronics(draw) -> Transduction:
+    chain = draw(st.sampled_from([Transduction(), FIRST_GENERATION, SECOND_GENERATION]))
+    amplifier = replace(chain.amplifier, gain=draw(st.sampled_from([100.0, 33.3])))
+    bits = draw(st.sampled_from([chain.converter.bits, 14]))
+    settling = draw(st.sampled_from([0.0, 1e-7]))
+    return replace(
+        chain,
+        amplifier=amplifier,
+        converter=replace(chain.converter, bits=bits),
+        multiplexer=replace(chain.multiplexer, settling_time=settling),
+    )
+
+
+@st.composite
+def effects(draw, chain: Transduction):
+    loops = st.builds(
+        Hysteresis,
+        st.just((1.0, 2.5)),
+        st.tuples(shares, shares).map(lambda p: (p[0] / 2, p[1] / 2)),
+        st.floats(0.5, 2.0),
+    )
+    each = [
+        st.builds(StrainLimit, st.just(chain), shares),
+        st.sampled_from([FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS]) | loops,
+        st.builds(Creep, shares, numbers),
+        st.builds(Temperature, st.floats(-200, 200), numbers, numbers, shares),
+        st.builds(Tolerance, shares, shares, st.integers(0, 2**62)),
+        st.builds(IntermittentElements, st.just((0,)), numbers),
+        st.builds(MainsHum, numbers, st.floats(1, 1000)),
+        st.builds(CrossTalk, st.floats(0, 0.5)),
+        st.builds(FlickerNoise, numbers),
+        st.builds(GaussianNoise, numbers),
+        st.builds(StuckElements, st.just((0,)), numbers),
+        st.builds(CorruptedFrames, shares),
+    ]
+    return tuple(draw(effect) for effect in each if draw(st.booleans()))
+
+
+@st.composite
+def choices(draw, scene: Scene) -> Choice:
+    there = sorted(effects_of(scene))
+    on = frozenset(draw(st.sets(st.sampled_from(there))))
+    if draw(st.booleans()):
+        return Choice(on=on, off=frozenset(EFFECTS) - on)
+    off = frozenset(draw(st.sets(st.sampled_from(sorted(EFFECTS))))) - on
+    return Choice(draw(st.booleans()), draw(st.floats(0.001, 0.5)), on, off)
+
+
+words = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+
+
+@st.composite
+def scenes(draw) -> Scene:
+    patch, chain = draw(st.sampled_from(PATCHES)), draw(electronics())
+    plate = Plate(
+        patch,
+        draw(numbers),
+        tension=draw(st.sampled_from([0.0, 30.0])),
+        foundation=draw(st.sampled_from([0.0, 3e-5, 1e12])),
+        fluid=draw(st.booleans()),
+        axial_stiffness=draw(st.none() | numbers),
+    )
+    scene = Scene(
+        "a scene",
+        plate,
+        draw(layouts(patch)),
+        draw(stimuli(patch)),
+        draw(effects(chain)),
+        chain,
+        draw(st.floats(1.0, 50.0)),
+        draw(st.integers(0, 2**63)),
+        (draw(st.integers(2, 5)), 1 if patch.strip else 3),
+        draw(st.sampled_from(["hinged", "clamped"])),
+        title=draw(words.filter(bool)),
+        text=draw(words),
+    )
+    return replace(scene, choice=draw(choices(scene)))
+
+
+@settings(max_examples=80)
+@given(scenes())
+def test_any_scene_is_the_same_once_written_and_read(scene):
+    read = again(scene)
+
+    said = ("plate", "stimuli", "effects", "transduction", "rate", "seed", "reference", "edge")
+    for name in (*said, "title", "text"):
+        assert getattr(read, name) == getattr(scene, name)
+    assert read.layout.shape == scene.layout.shape
+    assert read.layout.gage_length == scene.layout.gage_length
+    np.testing.assert_array_equal(read.layout.positions, scene.layout.positions)
+    np.testing.assert_array_equal(read.layout.live, scene.layout.live)
+    assert read.choice.accuracy == scene.choice.accuracy
+    if scene.choice.auto:
+        assert read.choice == scene.choice
+    else:
+        assert kept_of(read) == kept_of(scene)
+    assert write_scene(read) == write_scene(scene)
+
+
+@given(st.text(st.sampled_from('"\\\n\r\t\x00\x7f\x85\u2028a[]={}#'), max_size=12))
+def test_any_text_is_the_same_once_written_and_read(text):
+    read = again(replace(BARE, title=text or "a", text=text))
+
+    assert (read.title, read.text) == (text or "a", text)
+
+
+@pytest.mark.parametrize(
+    "laid",
+    [
+        Presentation(schedule(), 1.0),
+        Presentation(schedule(hold=20.0), 2.5),
+        Presentation(schedule((0.1, 0.2, 0.05)), 0.5),
+    ],
+)
+def test_cylinders_are_the_same_once_written_and_read(laid):
+    assert again(BARE.laid_on(laid)).laid == laid
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [LINEAR, Choice(), Choice(auto=True), Choice(off=frozenset(EFFECTS))],
+    ids=["linear", "all", "auto", "none"],
+)
+def test_a_choice_is_the_same_once_written_and_read(choice):
+    assert again(replace(PRESSED, choice=choice)).choice == choice
+
+
+def test_what_is_on_though_there_is_nothing_of_it_is_left_out():
+    scene = replace(BARE, choice=Choice(auto=True, on=frozenset({"creep", "quantisation"})))
+
+    assert 'on = ["quantisation"]' in write_scene(scene)
+    assert plan(again(scene)).entries == plan(scene).entries
+
+
+def test_numbers_of_any_kind_are_written_as_what_they_are():
+    scene = PRESSED.touched_by(PointLoad(np.float64(0.05), 0.05, 1), motion=Orbit(0, 4))
+
+    text = write_scene(replace(scene, rate=100, seed=np.int64(7)))
+
+    assert "rate = 100.0" in text
+    assert "seed = 7" in text
+    assert "x = 0.05\ny = 0.05\nforce = 1.0" in text
+    assert "orbit = { radius = 0.0, period = 4.0 }" in text
+
+
+HALF_DEAD = replace(BARE.layout, live=np.arange(48).reshape(3, 16) != 5)
+ODD_GRID = replace(BARE.layout, positions=BARE.layout.positions + 1e-3)
+RECORD = Recorded(np.array([0.0, 1.0]), np.zeros((2, 3)))
+PYRAMID = Mesh(
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 0.01,
+    np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]),
+)
+
+
+def pressed_by(rigid) -> Scene:
+    return replace(BARE, stimuli=(Stimulus(Indenter(rigid, 0.05, 0.05, force=1.0)),))
+
+
+UNSAID = {
+    "a record": (PRESSED.touched_by(*PRESSED.loads, motion=RECORD), "Recorded motion, .* its file"),
+    "a mesh": (pressed_by(PYRAMID), "a Mesh, which does not tell its file"),
+    "a map": (pressed_by(HeightMap(np.zeros((2, 2)), 0.01, 0.01)), "HeightMap.* its file"),
+    "half an element": (replace(BARE, layout=HALF_DEAD), "some channels are dead"),
+    "an odd grid": (replace(BARE, layout=ODD_GRID), "a grid that is not regular"),
+    "other steps": (BARE.laid_on(Presentation(schedule()[:9], 1.0)), "order of a schedule"),
+    "two cylinders": (BARE.laid_on(Presentation(schedule()[1:3], 1.0)), "order of a schedule"),
+    "another order": (
+        replace(BARE, effects=(GaussianNoise(0.1), Creep(0.1, 1.0))),
+        "of a scene file, creep, gaussian-noise; got gaussian-noise, creep",
+    ),
+    "an effect of the skin": (replace(BARE, effects=(Foam(3e4),)), "has the foundation"),
+    "another's limit": (
+        replace(BARE, effects=(StrainLimit(FIRST_GENERATION, 0.1),)),
+        "the scene's own electronics",
+    ),
+    "a rate that cannot be": (replace(BARE, rate=1e6), "lower the rate"),
+}
+
+
+@pytest.mark.parametrize(("scene", "said"), UNSAID.values(), ids=UNSAID)
+def test_what_no_scene_file_can_say_is_refused(scene, said):
+    with pytest.raises(Refusal, match=said):
+        write_scene(scene)
+
+
+def test_the_file_of_a_ready_scene_or_of_one_s_own_is_found_by_its_name():
+    assert scene_file() == scene_file("circle")
+    assert scene_file("circle").read_text("utf-8").startswith("format = 1")
+    assert scene_file("there/mine.toml") == Path("there/mine.toml")
+    with pytest.raises(Refusal, match=r"expected a scene among .*; got 'moon'"):
+        scene_file("moon")
