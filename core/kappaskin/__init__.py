@@ -82,10 +82,14 @@ from kappaskin.region import bargain as bargain
 from kappaskin.region import contact_bound as contact_bound
 from kappaskin.scan import Scan as Scan
 from kappaskin.scene import SCENES as SCENES
+from kappaskin.scene import Indenter as Indenter
 from kappaskin.scene import Orbit as Orbit
+from kappaskin.scene import Pressed as Pressed
+from kappaskin.scene import Pressing as Pressing
 from kappaskin.scene import Scene as Scene
 from kappaskin.scene import Stimulus as Stimulus
 from kappaskin.scene import load_scene as load_scene
+from kappaskin.scene import moments_of as moments_of
 from kappaskin.scene import read_scene as read_scene
 from kappaskin.scene import scene_file as scene_file
 from kappaskin.scene import write_scene as write_scene
