@@ -1,4 +1,4 @@
-"""A scene to its skin in space as it is when it is pressed hardest; pure arithmetic, for a thread."""
+"""A scene to its skin in space as it is when it is pressed hardest, without Qt."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from kappaskin import Indenter, Patch, Pressed, Pressing, Scene, Stimulus, moments_of
+from kappaskin import Indenter, Pressed, Pressing, Scene, Stimulus, moments_of
 from kappaskin_app.views.drawn import DrawnSkin, Indices
 from kappaskin_app.views.footprint import footprint
 
@@ -35,8 +35,9 @@ class Relief:
     """A skin as it is drawn: `points` (n, 3) in mm, their normals, and `faces` (k, 4) of them.
 
     `share` (n,) is the displacement over the largest one. `elements` are where they sense,
-    `bearing` where a rigid object does; `paths` are the ways of what touches, in pieces wherever it
-    is lifted, `outlines` are round loads that are spread and along what bears at its ends. `arrows` (k, 2, 3) go from tail to tip.
+    `bearing` where a rigid object does. `paths` are the ways of what touches, in pieces wherever it
+    is lifted; `outlines` are those of spread loads, and along an object from end to end. `arrows`
+    (k, 2, 3) in mm go from tail to tip.
     """
 
     points: Array

@@ -76,7 +76,6 @@ class _Track(QAbstractSlider):
         self.frame = min(max(1 / scene.rate, _FRAME), scene.duration)
         self.last = scene.duration - self.frame
         self._profile, self._moments = profile(scene), scene.moments
-        self.setSliderDown(False)
         with QSignalBlocker(self):
             self.setRange(0, round(_MS * scene.duration))
             self.setSingleStep(max(round(_MS * self.frame), 1))
@@ -199,7 +198,6 @@ class _Clock(QWidget):
             self._fit()
         if text != self.text:
             self.text = text
-            self.setAccessibleName(text)
             self.update()
 
     def changeEvent(self, event: QEvent) -> None:
@@ -259,6 +257,7 @@ class Timeline(QWidget):
 
     def show_scene(self, scene: Scene | None) -> None:
         """Show the course of `scene`; nothing of none, or of one in which nothing moves."""
+        self.track.setSliderDown(False)  # the mouse may be let go where this is not seen
         self._scene = scene if scene and (scene.moves or scene.laid is not None) else None
         self.setVisible(self._scene is not None)
         if self._scene is not None:

@@ -1,0 +1,276 @@
+"""The ready scenes as pictures to choose from, each with what there is to see in it."""
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QImage, QKeyEvent, QPixmap, QResizeEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QListView,
+    QListWidget,
+    QListWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin import SCENES, Refusal, Scene, load_scene
+from kappaskin_app.columns import scrolled
+from kappaskin_app.guard import guarded
+from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, in_a_row, sentence, text_label
+from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.views.card import PICTURE, PLAYING, CardPainter, picture_size
+from kappaskin_app.views.relief import Relief, relief
+from kappaskin_app.views.scene_picture import picture
+
+# What is pleasant to watch, then what the paper has, then what one effect does.
+_WATCHED = "sphere pencil tapping two-contacts fingertip circle cylinder edge slipping"
+_PAPER = "centre off-centre line calibration"
+_EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam hot-room hum"
+ORDER = tuple(f"{_WATCHED} {_PAPER} {_EFFECTS}".split())
+
+_POLL = 30  # ms
+_SETTLED = 200  # ms after the last change of size: only then are pictures made anew
+_CARD = 176  # px that a cell is wide, more or less, so that the columns fill the width
+_WORDS = (190, 0.28, 340)  # px of what stands beside the cards: least, share of the width, most
+
+_Look = tuple[Theme, int, int, float]
+
+
+def in_order(names: tuple[str, ...]) -> list[str]:
+    """`names` in the order of `ORDER`; those that it does not have come last."""
+    known = [name for name in ORDER if name in names]
+    return known + [name for name in names if name not in ORDER]
+
+
+def _titled(name: str) -> str:
+    """What a scene is called until its file is read."""
+    return name.replace("-", " ").capitalize()
+
+
+class _Cards(QListWidget):
+    """Cards in as many columns as fit; says that one is to be played, and that they changed size."""
+
+    played = Signal()
+    resized = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.painter = CardPainter()
+        self.setItemDelegate(self.painter)
+        self.setViewMode(QListView.ViewMode.IconMode)
+        self.setMovement(QListView.Movement.Static)
+        self.setResizeMode(QListView.ResizeMode.Adjust)
+        self.setVerticalScrollMode(QListView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setUniformItemSizes(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.viewport().setAutoFillBackground(False)
+        self.setMouseTracking(True)
+        self.setMinimumSize(200, 150)
+        self.setAccessibleName("Scenes")
+        self.itemDoubleClicked.connect(self.played)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        self._fit()
+        super().resizeEvent(event)
+        self.resized.emit()
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self._fit()
+
+    def _fit(self) -> None:
+        """Columns that fill the width, beside the scroll bar whether it is there or not."""
+        width = self.width() - self.verticalScrollBar().sizeHint().width() - 1
+        self.painter.cell = width // max(1, round(width / _CARD))
+        size = self.painter.size(self.fontMetrics().height())
+        self.setGridSize(size)
+        self.verticalScrollBar().setSingleStep(size.height() // 4)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.played.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class GalleryPanel(QWidget):
+    """Cards of the ready scenes; `chosen` names the one to play, `open_wanted` asks for a file."""
+
+    chosen = Signal(str)
+    open_wanted = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.cards = _Cards()
+        self.items = {name: QListWidgetItem(_titled(name)) for name in in_order(SCENES)}
+        for item in self.items.values():
+            self.cards.addItem(item)
+        self.title, self.text, self.file = text_label(), text_label(), text_label()
+        self.play = button(
+            "&Play", "play-scene", "Play this scene on the simulated skin (Enter, or double-click)."
+        )
+        self.open = button(
+            f"&Open file{ELLIPSIS}", "open-scene", "Play a scene from a file of your own."
+        )
+        self._lay_out()
+        self._scenes: dict[str, Scene | str] = {}
+        self._reliefs: dict[str, Relief] = {}
+        self._looks: dict[str, _Look] = {}
+        self._theme, self._playing, self._closed = LIGHT, "", False
+        self._thread = ThreadPoolExecutor(1, "gallery")
+        self._busy: tuple[Future[Any], Callable[[Any], None]] | None = None
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(guarded(self._work))
+        self.cards.resized.connect(guarded(lambda: self._begin(_SETTLED)))
+        self.cards.currentItemChanged.connect(guarded(self._show_words))
+        self.cards.played.connect(guarded(self._play))
+        self.play.clicked.connect(guarded(self._play))
+        self.open.clicked.connect(guarded(lambda *_: self.open_wanted.emit()))
+        self.cards.setCurrentRow(0)
+
+    def _lay_out(self) -> None:
+        for label in (self.title, self.text, self.file):
+            label.setTextFormat(Qt.TextFormat.PlainText)
+        bold = self.title.font()
+        bold.setBold(True)
+        bold.setPointSizeF(1.15 * bold.pointSizeF())
+        self.title.setFont(bold)
+        self._beside = QWidget()
+        column = QVBoxLayout(self._beside)
+        column.setContentsMargins(0, 4, 0, 4)
+        words = scrolled(self.title, self.text, self.file)
+        words.setMinimumWidth(0)
+        column.addWidget(words, 1)
+        column.addLayout(in_a_row(self.play, self.open))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(4, 2, 8, 4)
+        row.addWidget(self.cards, 1)
+        row.addWidget(self._beside)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        least, share, most = _WORDS
+        self._beside.setFixedWidth(min(max(least, round(share * self.width())), most))
+        super().resizeEvent(event)
+
+    # What a person asks.
+
+    @property
+    def selected(self) -> str:
+        """The name of the scene whose card is selected."""
+        row = self.cards.currentRow()
+        return list(self.items)[row] if row >= 0 else ""
+
+    def _play(self, *_: object) -> None:
+        if self.selected:
+            self.chosen.emit(self.selected)
+
+    # What is so.
+
+    def show_playing(self, name: str) -> None:
+        """Mark the ready scene `name` as the one that is played; none for any other name."""
+        if name != self._playing:
+            self._playing = name
+            for other, item in self.items.items():
+                item.setData(PLAYING, other == name)
+            self._show_words()
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = self.cards.painter.theme = theme
+        self.file.setStyleSheet(f"color: {theme.faint};")
+        self.cards.viewport().update()
+        self._begin()
+
+    def _show_words(self, *_: object) -> None:
+        name = self.selected
+        if not name:
+            return
+        scene = self._scenes.get(name)
+        self.title.setText(self.items[name].text())
+        text = scene.text.strip() if isinstance(scene, Scene) else scene or ""
+        self.text.setText(text)
+        playing = ", played now" if name == self._playing else ""
+        self.file.setText(f"{name}.toml{playing}")
+
+    # What is made beside the window.
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._begin()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        self._timer.stop()
+        super().hideEvent(event)
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.DevicePixelRatioChange:
+            self._begin()
+        return super().event(event)
+
+    def close(self) -> bool:
+        """End the thread, at most a picture later, and close."""
+        self._closed = True
+        self._timer.stop()
+        self._thread.shutdown(wait=True, cancel_futures=True)
+        return super().close()
+
+    def _begin(self, after: int = _POLL) -> None:
+        """Make what is missing `after` so many ms, where it is seen."""
+        if self.isVisible() and not self._closed:
+            self._timer.start(after)
+
+    def _work(self) -> None:
+        """Take what was made, and have the next thing made."""
+        self._timer.setInterval(_POLL)
+        if self._busy is not None:
+            future, take = self._busy
+            if not future.done():
+                return
+            self._busy = None
+            take(future.result())
+        if not self._scenes:
+            self._scenes = dict.fromkeys(self.items, "")  # asked for, whatever comes of it
+            self._busy = self._thread.submit(_loaded, list(self.items)), self._take_scenes
+            return
+        size, ratio = picture_size(self.cards.painter.cell), self.devicePixelRatioF()
+        look = self._theme, size.width(), size.height(), ratio
+        for name, scene in self._scenes.items():
+            if isinstance(scene, Scene) and self._looks.get(name) != look:
+                self._looks[name] = look
+                made = self._thread.submit(self._painted, name, scene, look)
+                self._busy = made, self._take_picture
+                return
+        self._timer.stop()
+
+    def _take_scenes(self, scenes: dict[str, Scene | str]) -> None:
+        self._scenes = scenes
+        for name, scene in scenes.items():
+            if isinstance(scene, Scene):
+                self.items[name].setText(scene.title or _titled(name))
+        self._show_words()
+
+    def _painted(self, name: str, scene: Scene, look: _Look) -> tuple[str, QImage]:
+        if name not in self._reliefs:
+            self._reliefs[name] = relief(scene)
+        theme, width, height, ratio = look
+        return name, picture(self._reliefs[name], theme, QSize(width, height), ratio)
+
+    def _take_picture(self, made: tuple[str, QImage]) -> None:
+        name, image = made
+        self.items[name].setData(PICTURE, QPixmap.fromImage(image))
+
+
+def _loaded(names: list[str]) -> dict[str, Scene | str]:
+    """The ready scenes, or in words why one cannot be."""
+
+    def loaded(name: str) -> Scene | str:
+        try:
+            return load_scene(name)
+        except Refusal as refusal:
+            return sentence(str(refusal))
+
+    return {name: loaded(name) for name in names}
