@@ -34,7 +34,7 @@ ORDER = tuple(f"{_WATCHED} {_PAPER} {_EFFECTS}".split())
 _POLL = 30  # ms
 _SETTLED = 200  # ms after the last change of size: only then are pictures made anew
 _CARD = 176  # px that a cell is wide, more or less, so that the columns fill the width
-_WORDS = (190, 0.28, 340)  # px of what stands beside the cards: least, share of the width, most
+_WORDS = (190, 340)  # px of what stands beside the cards at least and at most
 
 _Look = tuple[Theme, int, int, float]
 
@@ -51,7 +51,7 @@ def _titled(name: str) -> str:
 
 
 class _Cards(QListWidget):
-    """Cards in as many columns as fit; says that one is to be played, and that they changed size."""
+    """Cards in as many columns as fit; says that one is to be played, and when they are resized."""
 
     played = Signal()
     resized = Signal()
@@ -140,8 +140,10 @@ class GalleryPanel(QWidget):
         bold.setBold(True)
         bold.setPointSizeF(1.15 * bold.pointSizeF())
         self.title.setFont(bold)
-        self._beside = QWidget()
-        column = QVBoxLayout(self._beside)
+        beside = QWidget()
+        beside.setMinimumWidth(_WORDS[0])
+        beside.setMaximumWidth(_WORDS[1])
+        column = QVBoxLayout(beside)
         column.setContentsMargins(0, 4, 0, 4)
         words = scrolled(self.title, self.text, self.file)
         words.setMinimumWidth(0)
@@ -149,13 +151,8 @@ class GalleryPanel(QWidget):
         column.addLayout(in_a_row(self.play, self.open))
         row = QHBoxLayout(self)
         row.setContentsMargins(4, 2, 8, 4)
-        row.addWidget(self.cards, 1)
-        row.addWidget(self._beside)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        least, share, most = _WORDS
-        self._beside.setFixedWidth(min(max(least, round(share * self.width())), most))
-        super().resizeEvent(event)
+        row.addWidget(self.cards, 7)
+        row.addWidget(beside, 3)
 
     # What a person asks.
 

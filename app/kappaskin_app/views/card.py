@@ -4,7 +4,7 @@ from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRectF, 
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen, QPixmap
 from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import LIGHT
 
 PICTURE, PLAYING = int(Qt.ItemDataRole.UserRole), int(Qt.ItemDataRole.UserRole) + 1
 """Roles of an item: its QPixmap, and whether it is played."""
@@ -78,7 +78,7 @@ class CardPainter(QStyledItemDelegate):
         theme, words = self.theme, "Playing"
         metrics = QFontMetricsF(painter.font())
         height = metrics.height() + 2
-        width = metrics.horizontalAdvance(words) + height + 6
+        width = metrics.horizontalAdvance(words) + 1.5 * height + 4
         pill = QRectF(place.left() + 5, place.top() + 5, width, height)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.accent))

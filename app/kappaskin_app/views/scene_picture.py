@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 
 _FAR = 3.0  # times the skin's extent from its middle to the eye
 _LAMP = (-1.0, 0.4, 0.75)  # as in the view of the skin
-_FINER = 2  # the surface is drawn so many times larger, and shrunk to smooth its edges
+_FINER = 2  # the skin is drawn so many times larger, and shrunk to smooth its edges
+_RIM = 1.2  # px: width of the line along the rim
 _ROUND = 5.0  # px: radius of the picture's corners
 _MARGIN = 0.06  # of the picture's width
 _TOUCH = "#e8543f"  # as in the view of the skin
@@ -27,22 +28,18 @@ def picture(relief: Relief, theme: Theme, size: QSize, ratio: float) -> QImage:
 
     It may be painted in any thread.
     """
-    image = _clear(size, ratio)
-    image.setDevicePixelRatio(ratio)
-    eye = _Eye(relief, size)
-    painter = QPainter(image)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-    _paint_ground(painter, theme, size)
-    painter.drawImage(QRectF(0, 0, size.width(), size.height()), _skin(relief, theme, eye, ratio))
-    _paint_marks(painter, relief, eye)
-    painter.end()
-    return image
-
-
-def _clear(size: QSize, ratio: float) -> QImage:
     image = QImage(size * ratio, QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
+    eye = _Eye(relief, size)
+    skin = _skin(relief, theme, eye, image.width(), image.height())
+    image.setDevicePixelRatio(ratio)
+    skin.setDevicePixelRatio(ratio)
+    painter = QPainter(image)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    _paint_ground(painter, theme, size)
+    painter.drawImage(QPointF(0, 0), skin)
+    _paint_marks(painter, relief, eye)
+    painter.end()
     return image
 
 
@@ -85,31 +82,52 @@ def _points(places: Array) -> list[QPointF]:
     return [QPointF(x, y) for x, y in places.tolist()]
 
 
-def _skin(relief: Relief, theme: Theme, eye: _Eye, ratio: float) -> QImage:
-    """The faces and the rim, those far away first, larger than they are to be.
+def _skin(relief: Relief, theme: Theme, eye: _Eye, width: int, height: int) -> QImage:
+    """The faces and the rim, those far away first, in a picture of so many dots."""
+    finer = _FINER * width / eye.size.width()
+    seen, faces = finer * eye.sees(relief.points), relief.faces
+    away = eye.away(relief.points[faces].mean(axis=1))
+    face, side = np.nonzero(_on_the_rim(relief))
+    rim = _widened(seen[faces[face, side]], seen[faces[face, (side + 1) % 4]], _RIM * finer)
+    rim[side % 2 == 1] = np.roll(rim[side % 2 == 1], 1, axis=1)  # long the way that its face is
+    faint = np.array(QColor(theme.faint).getRgb()[:3], np.uint8)
+    colours = np.concatenate([_colours(relief, eye.towards), np.tile(faint, (len(rim), 1))])
+    order = np.argsort(-np.concatenate([away, away[face]]), kind="stable")
+    corners = np.concatenate([seen[faces], rim])[order]
+    fine = _filled(corners, colours[order], _FINER * width, _FINER * height)
+    total = np.zeros((height, width, 4), np.uint16)
+    for k, m in np.ndindex(_FINER, _FINER):
+        total += fine[k::_FINER, m::_FINER]
+    rgba = (total // _FINER**2).astype(np.uint8).tobytes()
+    form = QImage.Format.Format_RGBA8888_Premultiplied
+    return QImage(rgba, width, height, 4 * width, form).copy()
 
-    Without smooth edges, or the seams between neighbours would show.
+
+def _widened(begin: Array, end: Array, width: float) -> Array:
+    """Corners (k, 4, 2) of lines from `begin` to `end`, (k, 2) each, that are so wide."""
+    along = end - begin
+    length = np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+    aside = width / 2 * np.stack([-along[:, 1], along[:, 0]], axis=1) / length
+    return np.stack([begin - aside, end - aside, end + aside, begin + aside], axis=1)
+
+
+def _filled(corners: Array, colours: Colours, width: int, height: int) -> Colours:
+    """Dots (height, width, 4) of faces with `corners` (k, 4, 2) in `colours` (k, 3).
+
+    Later ones lie over earlier ones. Each is filled by as many samples as the longest ones need:
+    one call of Qt's for each face would take seconds in a thread that has to wait for its turn.
     """
-    finer = _FINER * ratio
-    image = _clear(eye.size, finer)
-    faces = relief.faces
-    order = np.argsort(-eye.away(relief.points[faces].mean(axis=1)))
-    corners = (finer * eye.sees(relief.points))[faces[order]].tolist()
-    colours = _colours(relief, eye.towards)[order].tolist()
-    rims = [np.flatnonzero(rim).tolist() for rim in _on_the_rim(relief)[order]]
-    painter, rim_pen = QPainter(image), QPen(QColor(theme.faint), 1.2 * finer)
-    painter.setPen(Qt.PenStyle.NoPen)
-    for face, rgb, rim in zip(corners, colours, rims, strict=True):
-        places = [QPointF(x, y) for x, y in face]
-        painter.setBrush(QColor(*rgb))
-        painter.drawConvexPolygon(places)
-        if rim:
-            painter.setPen(rim_pen)
-            for side in rim:
-                painter.drawLine(places[side], places[(side + 1) % 4])
-            painter.setPen(Qt.PenStyle.NoPen)
-    painter.end()
-    return image
+    sides = np.hypot(*np.moveaxis(np.roll(corners, -1, axis=1) - corners, -1, 0))
+    across, along = (math.ceil(1.2 * sides[:, k::2].max()) + 1 for k in (0, 1))
+    u, v = np.meshgrid((np.arange(across) + 0.5) / across, (np.arange(along) + 0.5) / along)
+    weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=-1)
+    weights = weights.reshape(-1, 4).astype(np.float32)
+    x, y = (weights @ corners[..., k].T.astype(np.float32) for k in (0, 1))
+    at = np.clip(y, 0, height - 1).astype(np.int32) * width + np.clip(x, 0, width - 1).astype(int)
+    rgba = np.column_stack([colours, np.full(len(colours), 255, np.uint8)]).view(np.uint32)
+    made = np.zeros(height * width, np.uint32)
+    made[at.T] = rgba
+    return made.view(np.uint8).reshape(height, width, 4)
 
 
 def _on_the_rim(relief: Relief) -> NDArray[np.bool_]:
@@ -129,7 +147,7 @@ def _colours(relief: Relief, towards: Array) -> Colours:
     lamp = np.array(_LAMP) / np.linalg.norm(_LAMP)
     light = 0.5 + 0.7 * np.maximum(normals @ lamp, 0) + 0.16 * np.maximum(normals @ towards, 0)
     rgb = SEQUENTIAL[np.rint(255 * share).astype(int)] * light[:, None]
-    return np.clip(rgb, 0, 255).astype(np.uint8)
+    return np.minimum(rgb, 255).astype(np.uint8)
 
 
 def _paint_ground(painter: QPainter, theme: Theme, size: QSize) -> None:
@@ -164,10 +182,9 @@ def _faded(colour: str, share: float) -> QColor:
 
 
 def _paint_dots(painter: QPainter, places: list[QPointF], colour: QColor, radius: float) -> None:
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(colour)
-    for place in places:
-        painter.drawEllipse(place, radius, radius)
+    style, caps = Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap
+    painter.setPen(QPen(colour, 2 * radius, style, caps))
+    painter.drawPoints(QPolygonF(places))
 
 
 def _paint_line(painter: QPainter, places: Array, colour: str) -> None:
