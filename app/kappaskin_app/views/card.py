@@ -98,7 +98,7 @@ class CardPainter(QStyledItemDelegate):
 
     def _paint_title(self, painter: QPainter, place: QRectF, title: str) -> None:
         metrics, flags = QFontMetricsF(painter.font()), Qt.AlignmentFlag
-        how = int(flags.AlignHCenter | flags.AlignTop) | int(Qt.TextFlag.TextWordWrap)
+        how = int(flags.AlignCenter) | int(Qt.TextFlag.TextWordWrap)
         if metrics.boundingRect(place, how, title).height() > _LINES * metrics.height() + 1:
             title = metrics.elidedText(title, Qt.TextElideMode.ElideRight, 1.7 * place.width())
         painter.setPen(QColor(self.theme.text))

@@ -13,7 +13,7 @@ from kappaskin_app.views.footprint import footprint
 Array = NDArray[np.float64]
 
 _POINTS = 49  # of the surface along each side
-_OF_A_STRIP = (129, 7)  # along x and y: nothing changes along y
+_OF_A_STRIP = (97, 25)  # along x and y: nothing changes along y
 _DEPTH = 1.15  # times the root of its displacement, as shares of its size, a skin is drawn deep
 _DEEPEST = 0.4  # of its size
 _LIFT = 0.01  # of its size that dots and lines are drawn above it

@@ -89,10 +89,14 @@ def _skin(relief: Relief, theme: Theme, eye: _Eye, width: int, height: int) -> Q
     away = eye.away(relief.points[faces].mean(axis=1))
     face, side = np.nonzero(_on_the_rim(relief))
     rim = _widened(seen[faces[face, side]], seen[faces[face, (side + 1) % 4]], _RIM * finer)
-    rim[side % 2 == 1] = np.roll(rim[side % 2 == 1], 1, axis=1)  # long the way that its face is
-    faint = np.array(QColor(theme.faint).getRgb()[:3], np.uint8)
+    turned = np.roll(rim, 1, axis=1)
+    rim = np.where((side % 2 == 1)[:, None, None], turned, rim)  # long the way that its face is
+    ink = QColor(theme.faint)
+    faint = np.array([ink.red(), ink.green(), ink.blue()], np.uint8)
     colours = np.concatenate([_colours(relief, eye.towards), np.tile(faint, (len(rim), 1))])
-    order = np.argsort(-np.concatenate([away, away[face]]), kind="stable")
+    # A face nearer, or its neighbours would lie over half of it.
+    nearer = np.linalg.norm(np.ptp(relief.points[faces[face]], axis=1), axis=1)
+    order = np.argsort(-np.concatenate([away, away[face] - nearer]), kind="stable")
     corners = np.concatenate([seen[faces], rim])[order]
     fine = _filled(corners, colours[order], _FINER * width, _FINER * height)
     total = np.zeros((height, width, 4), np.uint16)
