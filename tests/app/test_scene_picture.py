@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QSize
 
-from kappaskin import SCENES, Disk, Plate, PointLoad, Polygon, SensorLayout, load_scene
+from kappaskin import SCENES, Disk, PointLoad, Polygon, SensorLayout, load_scene
 from kappaskin_app.theme import DARK, LIGHT
 from kappaskin_app.views.relief import relief
 from kappaskin_app.views.scene_picture import picture
@@ -89,14 +89,16 @@ def test_dead_elements_are_left_out(reliefs):
 def test_a_skin_ends_at_its_outline(patch):
     scene = load_scene("centre")
     middle = (0.05, 0.05) if isinstance(patch, Disk) else (0.03, 0.03)
-    layout = SensorLayout(patch, np.array([middle]))
+    layout = SensorLayout.scattered(patch, [middle])
     load = PointLoad(*middle, 0.1)
-    scene = replace(scene, plate=replace(scene.plate, patch=patch), layout=layout, reference=(6, 6))
+    scene = replace(
+        scene.touched_by(), plate=replace(scene.plate, patch=patch), layout=layout, reference=(6, 6)
+    )
     made = relief(scene.touched_by(load))
     used = np.unique(made.faces)
     assert patch.contains(made.points[used, :2] / 1e3).mean() > 0.99
-    assert isinstance(scene.plate, Plate)
-    assert not picture(made, LIGHT, SIZE, 1.0).isNull()
+    drawn = picture(made, LIGHT, SIZE, 1.0)
+    assert not drawn.isNull()
 
 
 def test_a_skin_that_nothing_touches_is_flat():

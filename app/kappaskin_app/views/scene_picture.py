@@ -126,11 +126,11 @@ def _filled(corners: Array, colours: Colours, width: int, height: int) -> Colour
     u, v = np.meshgrid((np.arange(across) + 0.5) / across, (np.arange(along) + 0.5) / along)
     weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=-1)
     weights = weights.reshape(-1, 4).astype(np.float32)
-    x, y = (weights @ corners[..., k].T.astype(np.float32) for k in (0, 1))
+    x, y = (corners[..., k].astype(np.float32) @ weights.T for k in (0, 1))
     at = np.clip(y, 0, height - 1).astype(np.int32) * width + np.clip(x, 0, width - 1).astype(int)
     rgba = np.column_stack([colours, np.full(len(colours), 255, np.uint8)]).view(np.uint32)
     made = np.zeros(height * width, np.uint32)
-    made[at.T] = rgba
+    made[at.ravel()] = np.repeat(rgba, at.shape[1])  # in order, so that the last one is seen
     return made.view(np.uint8).reshape(height, width, 4)
 
 
