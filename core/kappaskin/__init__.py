@@ -22,6 +22,7 @@ from kappaskin.calibration import radii_for as radii_for
 from kappaskin.calibration import save_calibration as save_calibration
 from kappaskin.calibration import schedule as schedule
 from kappaskin.doctor import serial_ports as serial_ports
+from kappaskin.effects import EFFECTS as EFFECTS
 from kappaskin.effects import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
 from kappaskin.effects import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS
 from kappaskin.effects import Creep as Creep
@@ -29,6 +30,7 @@ from kappaskin.effects import GaussianNoise as GaussianNoise
 from kappaskin.effects import Hysteresis as Hysteresis
 from kappaskin.effects import Tolerance as Tolerance
 from kappaskin.effects import UniformNoise as UniformNoise
+from kappaskin.effects import parameters as parameters
 from kappaskin.engine import Engine as Engine
 from kappaskin.errors import RankDeficient as RankDeficient
 from kappaskin.errors import Refusal as Refusal

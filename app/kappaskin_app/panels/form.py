@@ -1,5 +1,6 @@
 """Editors for settings, made from what `settings` says of each."""
 
+import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
@@ -27,18 +28,18 @@ from kappaskin_app.settings import Choice, Range, Settings, Switch, ask_of
 _LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
 
 
-class _WholeBox(QSpinBox):
+class WholeBox(QSpinBox):
     """Takes any digits and goes to the nearest number allowed, instead of dropping digits."""
 
     def validate(self, text: str, position: int) -> object:
         return _typing(self, text.removesuffix(self.suffix())), text, position
 
     def fixup(self, text: str) -> str:
-        typed = float(text.removesuffix(self.suffix()) or self.value())
+        typed = _typed(text.removesuffix(self.suffix()), self.value())
         return str(int(min(max(typed, self.minimum()), self.maximum())))
 
 
-class _RealBox(QDoubleSpinBox):
+class RealBox(QDoubleSpinBox):
     """The same for numbers with decimals, and a comma is a point."""
 
     def validate(self, text: str, position: int) -> object:
@@ -46,11 +47,11 @@ class _RealBox(QDoubleSpinBox):
         return _typing(self, text.removesuffix(self.suffix())), text, position
 
     def fixup(self, text: str) -> str:
-        typed = float(text.removesuffix(self.suffix()) or self.value())
+        typed = _typed(text.removesuffix(self.suffix()), self.value())
         return self.textFromValue(min(max(typed, self.minimum()), self.maximum()))
 
 
-class _ChoiceBox(QComboBox):
+class ChoiceBox(QComboBox):
     """Where there is no room for all of the words, dots say so."""
 
     def words_shown(self) -> str:
@@ -68,6 +69,15 @@ class _ChoiceBox(QComboBox):
         option.currentText = self.words_shown()  # pyright: ignore[reportAttributeAccessIssue]
         painter.drawComplexControl(QStyle.ComplexControl.CC_ComboBox, option)
         painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
+
+
+def _typed(text: str, before: float) -> float:
+    """The number typed, or that `before` where none is yet: an error here would end the app."""
+    try:
+        value = float(text)
+    except ValueError:
+        return before
+    return value if math.isfinite(value) else before
 
 
 def _typing(box: QSpinBox | QDoubleSpinBox, text: str) -> QValidator.State:
@@ -98,7 +108,7 @@ class _Manners(QObject):
         return False
 
 
-def _well_behaved(editor: QWidget) -> None:
+def well_behaved(editor: QWidget) -> None:
     manners = _Manners(editor)
     editor.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
     for widget in (editor, *editor.findChildren(QLineEdit)):
@@ -114,7 +124,7 @@ class _Editor:
 
 
 def _whole(how: Range, said: Callable[[Any], None]) -> _Editor:
-    box = _WholeBox()
+    box = WholeBox()
     box.setRange(int(how.least), int(how.most))
     box.setSingleStep(int(how.step))
     box.valueChanged.connect(said)
@@ -124,7 +134,7 @@ def _whole(how: Range, said: Callable[[Any], None]) -> _Editor:
 def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
     if not how.decimals and how.scale == 1:
         return _whole(how, said)
-    box = _RealBox()
+    box = RealBox()
     box.setLocale(QLocale.c())
     box.setDecimals(how.decimals)
     box.setRange(how.least * how.scale, how.most * how.scale)
@@ -148,7 +158,7 @@ def _tip_of(how: Range, most: float) -> str:
 
 
 def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:
-    box = _ChoiceBox()
+    box = ChoiceBox()
     for value, words in how.options:
         box.addItem(words, value)
     if max(len(words) for _, words in how.options) > _LONG:
@@ -193,7 +203,7 @@ class Form(Panel):
         if not isinstance(how, Range):
             editor.widget.setToolTip(how.tip)
         editor.widget.setObjectName(name)
-        _well_behaved(editor.widget)
+        well_behaved(editor.widget)
         self._editors[name] = editor
         label = QLabel("" if isinstance(how, Switch) else how.label)
         label.setBuddy(editor.widget)
