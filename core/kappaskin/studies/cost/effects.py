@@ -97,7 +97,7 @@ def _without(scene: Scene, effect: Effect) -> Scene:
     if isinstance(effect, DeadElements):
         live = np.array(scene.layout.live)
         # Of a strip, only what bends is there to be read.
-        live[np.ix_(live.any(axis=1), list(effect.elements))] = True
+        live[np.ix_(np.flatnonzero(live.any(axis=1)), np.array(effect.elements))] = True
         return replace(scene, layout=replace(scene.layout, live=live))
     if effect.authored:
         others = tuple(one for one in scene.effects if one.name != effect.name)
