@@ -25,7 +25,7 @@ from kappaskin_app.views.line import Line
 from kappaskin_app.views.log_axis import LogAxis
 
 _STEPS = 200  # of the slider
-_WORDS, _EFFECTS = 380, 330  # px wide
+_WORDS, _EFFECTS = 350, 376  # px wide
 
 
 class CostPanel(QWidget):
@@ -60,6 +60,8 @@ class CostPanel(QWidget):
         self.bar.setToolTip("Settings that are measured.")
         self.count, self.message = QLabel(), text_label()
         self.effects, self.no_effects = EffectsTable(), text_label()
+        self.no_effects.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.no_effects.hide()
         self._lay_out()
         self._costing: Costing | None = None
         self._accuracy = math.nan
@@ -147,7 +149,7 @@ class CostPanel(QWidget):
         inside.setSpacing(4)
         inside.addWidget(title)
         inside.addWidget(self.effects, 1)
-        inside.addWidget(self.no_effects)
+        inside.addWidget(self.no_effects, 1)
         beside.setFixedWidth(_EFFECTS)
         return beside
 

@@ -17,7 +17,7 @@ _COLUMNS = {
     "Without": "RMS error of the shape without the effect, everything else as it is; bold where "
     "that is what is simulated.",
 }
-_PADDING = 3  # px above and below a line
+_PADDING = 3  # px that a row is higher than its line
 
 
 class EffectsTable(QTableWidget):

@@ -4,6 +4,7 @@ import multiprocessing
 import signal
 from collections.abc import Generator, Sequence
 from contextlib import suppress
+from itertools import islice
 from multiprocessing.connection import Connection
 from typing import cast
 
@@ -36,9 +37,12 @@ def _measure(
     """What the child process does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
     with suppress(OSError):  # who asked has gone
+        found = costs(scene, settings)
+        for cost in islice(found, 1):  # the setting that is most waited for
+            pipe.send(cost)
         if effects_with is not None:
             pipe.send((effects_with, _effects(scene, effects_with)))
-        for cost in costs(scene, settings):
+        for cost in found:
             pipe.send(cost)
         pipe.send(None)
 
@@ -46,9 +50,9 @@ def _measure(
 class Measuring:
     """Measures `settings` on a `scene` in a process of one thread; no call here but `wait` waits.
 
-    What the scene's effects cost with the setting `effects_with` comes first, and is in `effects`,
-    by setting, once it is known. Refuses a scene that `Bench` refuses. It ends when it is done,
-    when `close` is called, or when the process that started it is gone.
+    What the scene's effects cost with the setting `effects_with` comes after the first cost, and is
+    in `effects`, by setting, once it is known. Refuses a scene that `Bench` refuses. It ends when
+    it is done, when `close` is called, or when the process that started it is gone.
     """
 
     def __init__(
