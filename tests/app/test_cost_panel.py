@@ -57,7 +57,10 @@ def measured(shared: MainWindow, until) -> Iterator[MainWindow]:
         shared.cost.again.click()
     until(lambda: _all_measured(shared), 60.0)
     until(lambda: shared.cost.plot.frontier == shared.costing.frontier())
+    setting = Setting("least-squares", (8, 8), (10, 10))
+    until(lambda: shared.costing.present == setting)  # the engine takes it up in its own time
     until(lambda: isinstance(shared.costing.predicted(), Cost))
+    until(lambda: shared.cost.setting.text() == in_words(setting))
     yield shared
     shared.hide()
 
@@ -290,10 +293,10 @@ def test_effects_are_judged_with_the_setting_in_use(measured: MainWindow, until)
     )
     # Four functions cannot follow the load, noise or not.
     assert noise.rms_without > 3 * before.rms_without
-    until(lambda: _rows(measured)["uniform-noise"][3] == length(noise.rms_without))
+    until(lambda: _rows(measured).get("uniform-noise", [])[3:] == [length(noise.rms_without)])
     measured.history.stack.undo()
     until(lambda: measured.costing.spoiling() == was)
-    until(lambda: "0.0" in _rows(measured)["uniform-noise"][2])
+    until(lambda: _rows(measured)["uniform-noise"][3] == length(before.rms_without))
 
 
 def test_a_setting_that_cannot_judge_effects_says_why(
