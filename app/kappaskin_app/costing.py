@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, Signal
 from kappaskin import (
     METHODS,
     Cost,
+    Effects,
     Estimate,
     Measuring,
     Refusal,
@@ -35,6 +36,7 @@ _MOST_FUNCTIONS = 400  # of a setting that is measured because it is the present
 _SHOWN = 0.2  # s between two looks: faster cannot be read
 _SMOOTHED = 0.5  # s that the measured error and time of the present frame are taken over
 _WHOLE = "Predicted is what scans of all elements give, without the region."
+_SPOILT = "What spoils the readings of a sensor is in them already: nothing can be left out."
 _NOISIER = 1.5  # times more or less noise is other noise
 
 
@@ -66,8 +68,9 @@ class Frontier:
 class Costing(QObject):
     """Measures settings while somebody looks; `changed` tells when there is something to show.
 
-    `scene` is what is measured on and `costs` what came of it, by setting; `refusal` says why
-    nothing can be measured, and `about` on what a real sensor's costs rest.
+    `scene` is what is measured on and `costs` what came of it, by setting, as `effects` is of what
+    spoils its readings; `refusal` says why nothing can be measured, and `about` on what a real
+    sensor's costs rest.
     """
 
     changed = Signal()
@@ -79,6 +82,7 @@ class Costing(QObject):
         self._history, self._session, self._wishes = history, session, wishes
         self.scene: Scene | None = None
         self.costs: dict[Setting, Cost | Refused] = {}
+        self.effects: dict[Setting, Effects] = {}
         self.refusal = self.about = ""
         self._of: tuple[bool, int, float] = (False, 0, 0.0)
         self._tried: tuple[Setting, ...] = ()
@@ -100,6 +104,7 @@ class Costing(QObject):
         """Measure everything, on the skin as it is now."""
         self._stop()
         self.scene, self.costs, self._tried, self.refusal = None, {}, (), ""
+        self.effects = {}
         self._next = 0.0
         self._go_on()
         self.changed.emit()
@@ -166,6 +171,18 @@ class Costing(QObject):
         present = self.present
         return None if present is None else self.costs.get(present)
 
+    def spoiling(self) -> Effects | None:
+        """What the effects of the scene cost with the setting in use, None while not known."""
+        setting = self._with()
+        return None if setting is None else self.effects.get(setting)
+
+    def why_none(self) -> str:
+        """Why no effect is told of, or nothing."""
+        if self.scene is not None and not self._of[0]:
+            return _SPOILT
+        found = self.spoiling()
+        return found.reason if isinstance(found, Refused) else ""
+
     def measured(self) -> tuple[float, float]:
         """Error in m and time in s of the present frames; NaN where they are not known."""
         lately = time.monotonic() - 2 * _SMOOTHED
@@ -209,8 +226,7 @@ class Costing(QObject):
         present = self.present
         if present is None or present in self._tried or self.unlike() or not self._tried:
             return self._tried
-        small = present.functions[0] * present.functions[1] <= _MOST_FUNCTIONS
-        return (*self._tried, present) if small else self._tried
+        return (*self._tried, present) if _measurable(present) else self._tried
 
     def _go_on(self) -> None:
         try:
@@ -218,10 +234,22 @@ class Costing(QObject):
                 self._look()
             missing = [setting for setting in self._asked() if setting not in self.costs]
             missing.sort(key=lambda setting: setting != self.present)
-            if self.scene is not None and missing:
-                self._measuring = Measuring(self.scene, missing)
+            effects_with = self._with()
+            if effects_with in self.effects or self.unlike():
+                effects_with = None
+            if self.scene is not None and (missing or effects_with):
+                self._measuring = Measuring(self.scene, missing, effects_with)
         except Refusal as refusal:
             self.refusal = str(refusal)
+
+    def _with(self) -> Setting | None:
+        """The setting to judge effects with; None where there are none to be judged."""
+        present = self.present
+        if present is None or not self._tried or not self._of[0] or not _measurable(present):
+            return None
+        # As they are, with all that a tiling of as many knows nothing of.
+        own = present.elements == self._tried[0].elements
+        return replace(present, elements=None) if own else present
 
     def _look(self) -> None:
         """Take the skin as it is now to measure on, if there is one and its noise is known."""
@@ -261,6 +289,7 @@ class Costing(QObject):
         try:
             for cost in self._measuring.poll():
                 self.costs[cost.setting] = cost
+            self.effects |= self._measuring.effects
         except Refusal as refusal:
             self.refusal = str(refusal)
         if self._measuring.done:
@@ -270,6 +299,11 @@ class Costing(QObject):
         if self._measuring is not None:
             self._measuring.close()
             self._measuring = None
+
+
+def _measurable(setting: Setting) -> bool:
+    """Whether measuring a setting, because it is in use, takes no ages."""
+    return setting.functions[0] * setting.functions[1] <= _MOST_FUNCTIONS
 
 
 def _unlike(was: Scene, now: Scene) -> str:

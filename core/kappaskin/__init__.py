@@ -98,11 +98,14 @@ from kappaskin.scene import write_scene as write_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
 from kappaskin.studies.cost import Cost as Cost
+from kappaskin.studies.cost import EffectCost as EffectCost
+from kappaskin.studies.cost import Effects as Effects
 from kappaskin.studies.cost import Measuring as Measuring
 from kappaskin.studies.cost import Refused as Refused
 from kappaskin.studies.cost import Setting as Setting
 from kappaskin.studies.cost import cheapest as cheapest
 from kappaskin.studies.cost import costs as costs
+from kappaskin.studies.cost import effect_costs as effect_costs
 from kappaskin.studies.cost import frontier as frontier
 from kappaskin.studies.cost import settings_to_try as settings_to_try
 from kappaskin.touch import NO_OBJECT as NO_OBJECT

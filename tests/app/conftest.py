@@ -37,7 +37,7 @@ def no_window_and_no_failure_left(
 Wait = Callable[[Callable[[], bool]], None]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def until(qapp: QApplication) -> Wait:
     """Let the window live until something holds; fail after a while."""
 

@@ -20,14 +20,19 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.theme import LIGHT, Theme, slider_style
 from kappaskin_app.views.cost_plot import CostPlot
+from kappaskin_app.views.effects import EffectsTable
 from kappaskin_app.views.line import Line
 from kappaskin_app.views.log_axis import LogAxis
 
 _STEPS = 200  # of the slider
+_WORDS, _EFFECTS = 350, 376  # px wide
 
 
 class CostPanel(QWidget):
-    """The plot, the setting in use in figures, and a slider that chooses the cheapest one."""
+    """The plot, the setting in use in figures, and a slider that chooses the cheapest one.
+
+    Beside them is what each effect of the scene costs with the setting in use.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -54,6 +59,9 @@ class CostPanel(QWidget):
         self.bar.setFixedHeight(8)
         self.bar.setToolTip("Settings that are measured.")
         self.count, self.message = QLabel(), text_label()
+        self.effects, self.no_effects = EffectsTable(), text_label()
+        self.no_effects.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.no_effects.hide()
         self._lay_out()
         self._costing: Costing | None = None
         self._accuracy = math.nan
@@ -117,11 +125,33 @@ class CostPanel(QWidget):
         words = QWidget()
         words.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
-        words.setFixedWidth(380)
+        words.setFixedWidth(_WORDS)
         around = QHBoxLayout(self)
         around.setContentsMargins(8, 4, 8, 6)
+        around.setSpacing(12)
         around.addWidget(self.plot, 1)
         around.addWidget(words)
+        around.addWidget(self._beside())
+
+    def _beside(self) -> QWidget:
+        """The table of effects, with its title."""
+        title = QLabel("What each effect costs")
+        bold = title.font()
+        bold.setBold(True)
+        title.setFont(bold)
+        title.setToolTip(
+            "What spoils the readings of the scene: what it takes to simulate, and the RMS error "
+            "of the shape with it and without it, with the setting in use, all over the scene."
+        )
+        beside = QWidget()
+        inside = QVBoxLayout(beside)
+        inside.setContentsMargins(0, 0, 0, 0)
+        inside.setSpacing(4)
+        inside.addWidget(title)
+        inside.addWidget(self.effects, 1)
+        inside.addWidget(self.no_effects, 1)
+        beside.setFixedWidth(_EFFECTS)
+        return beside
 
     def attend(self, costing: Costing) -> None:
         """Show what `costing` measures, and tell it what a person wishes."""
@@ -132,6 +162,8 @@ class CostPanel(QWidget):
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
         self.plot.show_theme(theme)
+        self.effects.show_theme(theme)
+        self.no_effects.setStyleSheet(f"color: {theme.faint};")
         self.wanted.setStyleSheet(slider_style(theme))
         self._hint = None
 
@@ -172,6 +204,16 @@ class CostPanel(QWidget):
         self.bar.setVisible(now.running)
         self.count.setText(f"{done} of {asked}" if asked else "")
         self._show_message(now, self._why(now))
+        self._show_effects(now)
+
+    def _show_effects(self, now: Costing) -> None:
+        found, why = now.spoiling(), sentence(now.why_none())
+        known = isinstance(found, tuple)
+        self.effects.show_effects(found if known else ())
+        self.effects.setVisible(not why)
+        if self.no_effects.text() != why:
+            self.no_effects.setText(why)
+        self.no_effects.setVisible(bool(why))
 
     def _why(self, now: Costing) -> str:
         """What must be known of the points, or why there are none."""

@@ -18,7 +18,8 @@ _LEFT, _BOTTOM, _TOP = 76.0, 34.0, 10.0
 _LEGEND = 196.0  # px right of the plot
 _SIZE = 4.0  # px from a point's middle to its rim
 _NEAR = 10.0  # px from the mouse to the point that it means
-_TICK = 74  # px that a written time needs
+_APART = 10.0  # px between two written times
+_AXES = "RMS error (up), arithmetic in a frame"
 _ROWS = len(METHOD_SHORT) + 5  # of the legend
 
 Point = tuple[float, float]
@@ -133,19 +134,20 @@ class CostPlot(QWidget):
     def _paint_axes(self, painter: QPainter, area: QRectF) -> None:
         theme, flags = self._theme, Qt.AlignmentFlag
         line = painter.fontMetrics().height()
-        free = area.left() - _TICK
+        free = area.left()
         for value, written in self._x.ticks():
             x = self.at(1.0, value).x()
             painter.setPen(QPen(QColor(theme.line), 1))
             painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
-            if written and x - free >= 0.8 * _TICK:
-                free = x
+            words = _tick(value, duration)
+            width = painter.fontMetrics().horizontalAdvance(words) + 2.0
+            left = max(min(x - width / 2, area.right() - width + 4), area.left())
+            if written and left >= free:
+                free = left + width + _APART
                 painter.setPen(QColor(theme.faint))
-                words = _tick(value, duration)
-                width = painter.fontMetrics().horizontalAdvance(words) + 2.0
-                left = min(x - width / 2, area.right() - width + 4)
-                box = QRectF(max(left, area.left()), area.bottom() + 1, width, line)
-                painter.drawText(box, flags.AlignCenter, words)
+                painter.drawText(
+                    QRectF(left, area.bottom() + 1, width, line), flags.AlignCenter, words
+                )
         free = math.inf
         for value, written in self._y.ticks():
             y = self.at(value, 1.0).y()
@@ -159,9 +161,7 @@ class CostPlot(QWidget):
                 painter.drawText(box, flags.AlignRight | flags.AlignVCenter, _tick(value, length))
         painter.setPen(QColor(theme.faint))
         below = QRectF(area.left(), self.height() - line - 1, area.width(), line)
-        painter.drawText(
-            below, flags.AlignCenter, "RMS error of the shape (up) over arithmetic in a frame"
-        )
+        painter.drawText(below, flags.AlignCenter, _AXES)
         painter.setPen(QPen(QColor(theme.line), 1))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRect(area)

@@ -26,4 +26,5 @@ from kappaskin.scene.stimulus import Indenter as Indenter
 from kappaskin.scene.stimulus import Stimulus as Stimulus
 from kappaskin.scene.stimulus import contact_of as contact_of
 from kappaskin.scene.survey import moments_of as moments_of
+from kappaskin.scene.survey import time_to_watch as time_to_watch
 from kappaskin.scene.write import write_scene as write_scene

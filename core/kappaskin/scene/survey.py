@@ -21,9 +21,14 @@ def moments_of(scene: Scene) -> list[float]:
     return np.unique([*evenly, *scene.moments]).tolist()
 
 
+def time_to_watch(scene: Scene) -> float:
+    """Seconds after which nothing new is to be seen of a scene, or all that counts has drifted."""
+    return scene.duration if scene.moves or scene.laid else _LONGEST
+
+
 def survey(scene: Scene) -> Survey:
     """Look at `scene` at some fifty moments of one repetition."""
-    basis, duration = scene.basis, scene.duration
+    basis = scene.basis
     layout = replace(scene.layout, gage_length=0.0)
     times = np.array(moments_of(scene))
     M = layout.curvature_operator(basis)
@@ -47,6 +52,6 @@ def survey(scene: Scene) -> Survey:
         c,
         curvature,
         float(np.abs(compliance.after(later - forces) @ M.T).max(initial=0.0)) / _STEP,
-        duration if scene.moves or scene.laid else _LONGEST,
+        time_to_watch(scene),
         scene.sensor().scan().duration,
     )

@@ -82,12 +82,21 @@ class _Truth:
     at_load: Array
 
 
-def _points_on(scene: Scene) -> Array:
+def points_on(scene: Scene) -> Array:
     """The points (G, 2) of the skin over which errors are averaged."""
     patch = scene.plate.patch
     x, y = patch.grid(_POINTS, 2 if patch.strip else _POINTS)
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     return points[patch.contains(points)]
+
+
+def with_elements(scene: Scene, elements: tuple[int, int] | None) -> Scene:
+    """The scene with m x n `elements`, at a rate that they can keep; with its own when None."""
+    if elements in (None, scene.layout.shape):
+        return scene
+    layout = SensorLayout.regular(scene.plate.patch, *elements)
+    slowest = 1 / scene.transduction.scan_time(3 * len(layout))
+    return replace(scene, layout=layout, rate=min(scene.rate, slowest))
 
 
 def _pressed(scene: Scene, times: Array) -> list[Pressed]:
@@ -123,9 +132,14 @@ class Bench:
         self._skins: dict[tuple[int, int] | None, _Skin] = {}
         self._judges: dict[tuple[int, int], _Judge] = {}
 
+    @property
+    def contact(self) -> Array:
+        """Where the skin is pressed (2,) in m, in the middle of the frames."""
+        return self._pressed[len(self._times) // 2].contact
+
     @cached_property
     def _points(self) -> Array:
-        return _points_on(self.scene)
+        return points_on(self.scene)
 
     @cached_property
     def _truth(self) -> _Truth:
@@ -143,11 +157,7 @@ class Bench:
         return self._skins[elements]
 
     def _read_by(self, elements: tuple[int, int] | None) -> _Skin:
-        scene = self.scene
-        if elements not in (None, scene.layout.shape):
-            layout = SensorLayout.regular(scene.plate.patch, *elements)
-            slowest = 1 / scene.transduction.scan_time(3 * len(layout))
-            scene = replace(scene, layout=layout, rate=min(scene.rate, slowest))
+        scene = with_elements(self.scene, elements)
         sensor, simulator = scene.sensor(), Simulator(scene)
         read: list[Array] = []
         for n, (t, pressed) in enumerate(zip(self._times.tolist(), self._pressed, strict=True)):
@@ -174,8 +184,7 @@ class Bench:
 
     def _scanned(self, setting: Setting, skin: _Skin) -> tuple[SensorLayout, Scan]:
         """The skin's layout with the channels outside the scan dead, and the scan."""
-        contact = self._truth.contact[len(self._times) // 2]
-        elements = SCANS[setting.scanned](skin.layout, contact)
+        elements = SCANS[setting.scanned](skin.layout, self.contact)
         layout = replace(skin.layout, live=skin.layout.live & elements)
         return layout, skin.sensor.scan(np.flatnonzero(np.tile(elements, 3)))
 

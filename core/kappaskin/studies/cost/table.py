@@ -8,7 +8,8 @@ from typing import Any
 from kappaskin.scene import Scene
 from kappaskin.studies.cost.bench import DRAWS
 from kappaskin.studies.cost.choice import ALIKE, frontier
-from kappaskin.studies.cost.setting import ALL, PRECISIONS, Cost, Refused, own_elements
+from kappaskin.studies.cost.effects import FRAMES, EffectCost
+from kappaskin.studies.cost.setting import ALL, PRECISIONS, Cost, Refused, Setting, own_elements
 
 _HEAD = (
     f"   {'method':<14}{'basis':<6}{'elements':<9}{'bits':>4}{'channels':>12}{'set-up':>8}"
@@ -17,16 +18,19 @@ _HEAD = (
 )
 
 
-def row(cost: Cost | Refused) -> dict[str, Any]:
-    """One of `rows`, without its place among the others."""
-    s = cost.setting
-    told: dict[str, Any] = {
+def _setting(s: Setting) -> dict[str, Any]:
+    return {
         "method": s.method,
         "functions": list(s.functions),
         "elements": list(s.elements) if s.elements else None,
         "precision": s.precision,
         "scanned": s.scanned,
     }
+
+
+def row(cost: Cost | Refused) -> dict[str, Any]:
+    """One of `rows`, without its place among the others."""
+    told = _setting(cost.setting)
     if isinstance(cost, Refused):
         return told | dict.fromkeys(_FIGURES) | {"refused": cost.reason}
     return told | {name: figure(cost) for name, figure in _FIGURES.items()} | {"refused": None}
@@ -65,6 +69,46 @@ def rows(scene: Scene, costs: Sequence[Cost | Refused]) -> list[dict[str, Any]]:
         | {"frontier": cost in by_frame, "frontier_total": cost in by_total}
         for cost in costs
     ]
+
+
+def effect_rows(
+    scene: Scene, setting: Setting, found: Sequence[EffectCost]
+) -> list[dict[str, Any]]:
+    """What was `found` of effects, with `setting`, as JSON values; `error` is the bound."""
+    return [
+        {"scene": scene.name, "effect": cost.name, "kept": cost.kept}
+        | _setting(setting)
+        | {
+            "microseconds": 1e6 * cost.time_per_frame,
+            "error": cost.bound,
+            "rms_with_mm": None if cost.rms_with is None else 1e3 * cost.rms_with,
+            "rms_without_mm": None if cost.rms_without is None else 1e3 * cost.rms_without,
+        }
+        for cost in found
+    ]
+
+
+def effects_text(scene: Scene, setting: Setting, found: Sequence[EffectCost]) -> str:
+    """What was `found` of effects, with `setting`, for people."""
+    said = setting.method, "{} x {} functions".format(*setting.functions)
+    lines = [
+        f"What each effect costs in the scene {scene.name}, with {', '.join(said)}",
+        "us      what it adds to simulating a frame",
+        "bound   by how much leaving it out changes a reading at most, as a share of the peak",
+        f"RMS     error over the skin, mean of {FRAMES} frames all over the scene",
+        "",
+        f"{'effect':<18}{'kept':<5}{'us':>8}{'bound':>10}{'RMS with':>12}{'without it':>12}",
+        f"{'':<41}{'mm':>12}{'mm':>12}",
+    ]
+    for cost in found:
+        rms = (cost.rms_with, cost.rms_without)
+        bound = "-" if cost.bound is None else f"{cost.bound:.2g}"
+        with_it, without = ("-" if each is None else f"{1e3 * each:.3g}" for each in rms)
+        lines.append(
+            f"{cost.name:<18}{'yes' if cost.kept else 'no':<5}{1e6 * cost.time_per_frame:>8.1f}"
+            f"{bound:>10}{with_it:>12}{without:>12}"
+        )
+    return "\n".join(lines)
 
 
 def costs_text(scene: Scene, costs: Sequence[Cost | Refused]) -> str:
