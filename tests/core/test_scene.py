@@ -76,7 +76,7 @@ def test_without_a_name_the_default_scene_is_loaded():
 
 def test_an_unknown_scene_is_refused_with_those_there_are():
     with pytest.raises(
-        Refusal, match=r"among calibration, centre, .*, or a file that ends in .toml; got 'moon'"
+        Refusal, match=r"among bolt, calibration, centre, .*, or a file that ends in .toml; got 'moon'"
     ):
         load_scene("moon")
 
