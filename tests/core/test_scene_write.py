@@ -219,7 +219,9 @@ def stimuli(draw, patch: Patch):
             st.builds(Block, size, size),
         )
         pressed = draw(st.sampled_from(["force", "depth"]))
-        what = Indenter(draw(rigid), x, y, **{pressed: draw(numbers)}, turn=draw(shares))
+        what = Indenter(
+            draw(rigid), x, y, **{pressed: draw(st.floats(1e-4, 0.02))}, turn=draw(shares)
+        )
         return (Stimulus(what, draw(motions(patch))),)
     loads = st.one_of(
         st.builds(PointLoad, st.just(x), st.just(y), numbers),
