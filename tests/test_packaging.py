@@ -41,10 +41,15 @@ def test_the_wheel_holds_the_three_packages_and_nothing_else(tmp_path):
 
     (wheel,) = tmp_path.iterdir()
     with zipfile.ZipFile(wheel) as archive:
-        tops = {name.split("/")[0] for name in archive.namelist()}
+        names = set(archive.namelist())
 
     information = f"kappaskin-{PROJECT['project']['version']}.dist-info"
+    tops = {name.split("/")[0] for name in names}
     assert tops == {"kappaskin", "kappaskin_app", "kappaskin_resources", information}
+    assert {
+        file.relative_to(ROOT / "resources").as_posix()
+        for file in (ROOT / "resources" / "kappaskin_resources" / "scenes").iterdir()
+    } <= names
 
 
 def test_constraints_are_pins_without_an_address():

@@ -1,6 +1,7 @@
 """Scene files: what they may say, and that everything else is refused with its line."""
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -93,7 +94,10 @@ WRONG = {
         '{step="release", seconds=1}]\n',
         "a load on the patch",
     ),
-    "a step of no time": (TOUCH + 'path = [{step="press", seconds=0}]\n', "more than 0 s"),
+    "a step of no time": (
+        TOUCH + 'path = [{step="press", seconds=0}]\n',
+        "a step that takes 1e-06 to 1e.09 s, got 0 s",
+    ),
     "an unknown step": (TOUCH + 'path = [{step="pres", seconds=1}]\n', "line 12: .*'press'"),
     "a jump": (
         TOUCH + 'path = [{step="press", seconds=1}, {step="slide", by=[0.01, 0], seconds=1}]\n',
@@ -115,7 +119,7 @@ WRONG = {
     ),
     "no such file": (
         HEAD + '[[touch]]\nwhat="mesh"\nfile="none.stl"\nx=0.05\ny=0.05\nforce=1\n',
-        r"line 5: touch\[1\]: .*none.stl",
+        r"line 7: touch\[1\].file: .*none.stl",
     ),
     "an accuracy of all": ("accuracy = 1.0\n" + HEAD, "an accuracy between 0 and 1"),
     "on and off": (HEAD + "[effects]\non=['skew']\noff=['skew']\n", "skew as both"),
@@ -135,6 +139,94 @@ WRONG = {
     "a touch on cylinders": (
         TOUCH + "[cylinders]\ndwell = 1.0\n",
         r"^a.toml, line 6: touch\[1\]: .*cylinders",
+    ),
+    "lengths in mm": (
+        "format = 1\n[skin]\nsize = [100, 100]\n",
+        "line 2: skin: expected sides of 0.0001 to 10 m, got 100 x 100 m; lengths are in metres",
+    ),
+    "a place in mm": (
+        TOUCH.replace("x = 0.05", "x = 50"),
+        r"line 6: touch\[1\]: expected a load on .*positions are in metres",
+    ),
+    "a vast grid": (HEAD + "[elements]\ngrid = [5000, 5000]\n", "line 5: .*at most 21845 elements"),
+    "a grid beyond counting": (HEAD + f"[elements]\ngrid = [{10**30}, 1]\n", "at most 21845"),
+    "a vast reference": (
+        "reference = [500, 500]\n" + HEAD,
+        "line 1: reference: expected at most 4096 functions .* got 500 x 500; take fewer",
+    ),
+    "a vast reference on a disk": (
+        "format = 1\nreference = [32, 32]\n[skin]\nshape = 'disk'\nrim_radius = 0.05\n",
+        "line 2: reference: expected at most 400 functions",
+    ),
+    "many functions at many elements": (
+        "format = 1\nrate = 1\nreference = [64, 64]\n[skin]\nsize = [1, 1]\n"
+        "[elements]\ngrid = [100, 100]\n",
+        "line 3: reference: expected at most 1118 functions .* with 10000 elements",
+    ),
+    "a negative seed": ("seed = -1\n" + HEAD, "line 1: seed: expected at least 0|0 to .*got -1"),
+    "no rate": ("rate = 0\n" + HEAD, "line 1: rate: expected 0.001 to 1e.06 frames/s, got 0"),
+    "too soft a skin": (
+        HEAD + "rigidity = 1e-300\n",
+        "line 5: skin.rigidity: .*1e-12 to 1e.06 N m",
+    ),
+    "too taut a skin": (HEAD + "tension = 1e7\n", "line 5: skin.tension: expected .* N/m, got"),
+    "too hard a push": (
+        TOUCH.replace("force = 0.2", "force = 1e300"),
+        r"line 11: touch\[1\].force: expected a force of -1e.06 to 1e.06 N",
+    ),
+    "an endless number": ("seed = " + "9" * 5000 + "\n" + HEAD, "a mistake in it: .*digits"),
+    "lists in lists": ("a = " + "[" * 9999 + "]" * 9999 + HEAD, "nested too deep"),
+    "keys in keys": ("a" + ".a" * 99999 + " = 1\n" + HEAD, "nested too deep"),
+    "many steps": (
+        TOUCH + "path = [" + '{step="tap", seconds=1},' * 2000 + "]\n",
+        "line 12: .* 1000 at most, got 2000",
+    ),
+    "an orbit in no time": (
+        TOUCH + "orbit = {radius=0.01, period=1e-308}\n",
+        "line 12: .*1e-06 to",
+    ),
+    "an object beside the skin": (
+        HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=0.5\ny=0.05\ndepth=1e-3\n',
+        r"line 5: touch\[1\]: expected an object over .* which misses it",
+    ),
+    "an object that leaves": (
+        HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=0.05\ny=0.05\nforce=1\n'
+        'path = [{step="press", seconds=1}, {step="slide", by=[0.2, 0], seconds=1},'
+        '{step="release", seconds=1}]\n',
+        r"line 5: touch\[1\]: expected an object over .*\(0.25, 0.05\) m, which misses it",
+    ),
+    "an object nowhere": (
+        HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=nan\ny=0.05\nforce=1\n',
+        r"line 5: touch\[1\]: expected a finite place",
+    ),
+    "an object pressed through": (
+        HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=0.05\ny=0.05\ndepth=1\n',
+        "line 5: .*a depth of at most 0.1 m, .* depths are in metres",
+    ),
+    "a ball as large as the sky": (
+        HEAD + '[[touch]]\nwhat="sphere"\nradius=1e300\nx=0.05\ny=0.05\nforce=1\n',
+        "line 5: .*sizes above zero in metres, 1000 at most",
+    ),
+    "noise without end": (
+        HEAD + "[effects.uniform-noise]\nrms = 1e308\n",
+        "line 5: effects.uniform-noise: .*rms of 0 to 10000 1/m",
+    ),
+    "loops without end": (
+        HEAD + f"[effects.hysteresis]\nthresholds = {list(range(1, 200))}\n"
+        f"weights = {[1e-6] * 199}\n",
+        "line 5: .*at most 100 thresholds, got 199",
+    ),
+    "a stuck element that is not there": (
+        HEAD + "[effects.stuck]\nelements = [500]\n",
+        "line 6: effects.stuck.elements: .*from 0 to 99, got",
+    ),
+    "a cylinder of no size": (
+        HEAD + "[cylinders]\nradii = [0.1, 1e-310, 0.2]\n",
+        "line 6: cylinders.radii: expected 0.0001 to 1000 m",
+    ),
+    "a name that no file has": (
+        HEAD + '[[touch]]\nwhat="mesh"\nfile="a\\u0000.stl"\nx=0.05\ny=0.05\nforce=1\n',
+        r"line 7: touch\[1\].file: ",
     ),
     "an element that is not there": (HEAD + "[elements]\ndead = [100]\n", "line 5: elements: .*99"),
 }
@@ -169,3 +261,57 @@ def test_infinite_numbers_are_refused():
     with pytest.raises(Refusal):
         read(HEAD + "radius = nan\n")
     assert np.isfinite(read(HEAD).plate.rigidity)
+
+
+def test_lines_are_counted_past_a_text_that_looks_like_tables():
+    said = 'title = "a\\u2028b"\ntext = """\n[skin]\nedge = 3\n"""\n' + HEAD
+    with pytest.raises(Refusal, match=r"line 10: skin.edge: expected a text, got 4"):
+        read(said + "edge = 4\n")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.parametrize("says", ['what = "mesh"\nfile', 'what = "point"\nrecorded'])
+def test_a_pipe_in_place_of_a_file_is_refused_not_waited_for(tmp_path, says):
+    for name in ("way.stl", "way.toml"):
+        os.mkfifo(tmp_path / name)
+
+    with pytest.raises(Refusal, match="expected the name of a file beside that of the scene"):
+        read(HEAD + f'[[touch]]\nx = 0.05\ny = 0.05\nforce = 1\n{says} = "way.stl"\n', tmp_path)
+    with pytest.raises(Refusal, match="expected a file with a scene"):
+        load_scene(str(tmp_path / "way.toml"))
+
+
+RECORDS = {
+    "another heading": (b"t,x,y,a\n0,0,0,0\n", "a first line time,dx,dy,amount, got"),
+    "nothing": (b"", "a first line time,dx,dy,amount, got"),
+    "a heading alone": (b"time,dx,dy,amount\n", "lines of four numbers"),
+    "ragged lines": (b"time,dx,dy,amount\n0,0,0,0\n1,0\n", "a CSV of numbers"),
+    "binary": (bytes(range(256)), "a CSV of numbers"),
+    "no number": (b"time,dx,dy,amount\n0,0,0,0\n1,nan,0,0\n", "finite poses"),
+    "a jump back": (b"time,dx,dy,amount\n0,0,0,0\n1,0,0,0\n0.5,0,0,0\n", "and rise"),
+    "too hard": (b"time,dx,dy,amount\n0,0,0,0\n1,0,0,1e300\n", "amounts of 0 to 1000"),
+    "off the skin": (b"time,dx,dy,amount\n0,0,0,0\n1,1,0,1\n2,0,0,0\n", "a load on the patch"),
+    "too many": (
+        b"time,dx,dy,amount\n" + b"".join(b"%d,0,0,1\n" % n for n in range(20001)),
+        "at most 20000 poses",
+    ),
+    "too large": (b"time,dx,dy,amount\n" + b"0,0,0,0\n" * 2**20, "thin it out"),
+}
+
+
+@pytest.mark.parametrize(("record", "said"), RECORDS.values(), ids=RECORDS)
+def test_a_record_that_cannot_be_is_refused(tmp_path, record, said):
+    (tmp_path / "way.csv").write_bytes(record)
+
+    with pytest.raises(Refusal, match=rf"line \d+: touch\[1\].*{said}"):
+        read(TOUCH + 'recorded = "way.csv"\n', tmp_path)
+
+
+@pytest.mark.parametrize("prefix", [b"", b"\xef\xbb\xbf"], ids=["plain", "BOM"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"], ids=["LF", "CRLF", "CR"])
+def test_files_are_read_however_their_lines_end(tmp_path, prefix, end):
+    record = "time,dx,dy,amount\n0,0,0,0\n1,0.01,0,1\n2,0,0,0\n\n"
+    for name, text in (("way.csv", record), ("a.toml", TOUCH + 'recorded = "way.csv"\n')):
+        (tmp_path / name).write_bytes(prefix + text.replace("\n", end).encode())
+
+    assert load_scene(str(tmp_path / "a.toml")).duration == 2.0

@@ -64,6 +64,9 @@ def main(arguments: list[str] | None = None) -> int:
     except CycloptsError as error:
         print(f"kappaskin: {error} See `kappaskin --help`.", file=sys.stderr)
         return REFUSED
+    except MemoryError as error:
+        print(f"kappaskin: {error}; ask for less of it, or of finer things", file=sys.stderr)
+        return REFUSED
     except BrokenPipeError:
         # Whoever read our output has gone; what is still buffered must have somewhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

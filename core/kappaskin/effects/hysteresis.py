@@ -10,6 +10,8 @@ from kappaskin.effects.survey import Survey
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
+_MOST = 100  # plays: each costs time in every frame
+
 
 @dataclass(frozen=True, eq=False)
 class PrandtlIshlinskii:
@@ -116,6 +118,8 @@ class Hysteresis(ReadingEffect):
                 "expected one weight of at least 0 for each threshold, got "
                 f"{len(self.weights)} for {len(self.thresholds)}, {self.weights}"
             )
+        if len(self.weights) > _MOST:
+            raise Refusal(f"expected at most {_MOST} thresholds, got {len(self.weights)}")
         if not sum(self.weights) < 1:
             raise Refusal(f"expected weights whose sum is below 1, got {sum(self.weights):g}")
         self.operator(1)

@@ -13,7 +13,7 @@ from kappaskin.effects.survey import Survey
 LARGEST = 6.0
 """Standard deviations that no reading of many frames is off by: one of 500 million is."""
 
-_RMS = Within(0, unit="1/m")
+_RMS = Within(0, 1e4, "1/m")
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ class Tolerance(ReadingEffect):
     name: ClassVar = "tolerance"
     formula: ClassVar = "spread of the gains, plus that of the offsets over peak curvature"
 
-    gain_sd: Annotated[float, Within(0)]
-    offset_sd: Annotated[float, Within(0, unit="1/m")]
+    gain_sd: Annotated[float, Within(0, 10)]
+    offset_sd: Annotated[float, Within(0, 1e4, "1/m")]
     seed: Annotated[int, Within(0, 2**63 - 1, whole=True)] = 0
 
     def errors(self, shape: tuple[int, ...]) -> tuple[Array, Array]:

@@ -19,7 +19,12 @@ class Lines:
     def __init__(self, text: str) -> None:
         self._lines: dict[Place, int] = {(): 1}
         within, counts = list[str | int](), dict[str, int]()
-        for number, line in enumerate(text.splitlines(), 1):
+        in_text = False  # of several lines
+        for number, line in enumerate(text.split("\n"), 1):
+            was_in_text, quotes = in_text, line.count('"""') + line.count("'''")
+            in_text ^= quotes % 2 == 1
+            if was_in_text:
+                continue
             if header := _HEADER.match(line):
                 if header[1] == "[[":
                     counts[header[2]] = counts.get(header[2], -1) + 1

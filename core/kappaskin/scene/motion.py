@@ -11,8 +11,14 @@ from typing import Protocol
 
 import numpy as np
 
+from kappaskin.effects import Within
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+
+_SECONDS = Within(1e-6, 1e9, "s")
+_AMOUNT = Within(0, 1000)
+_MOST_STEPS = 1000
+_MOST_POSES = 20_000  # a minute at some 300 a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +60,8 @@ class Orbit:
     period: float
 
     def __post_init__(self) -> None:
-        if not (0 <= self.radius < math.inf and 0 < self.period < math.inf):
-            raise Refusal(f"expected a radius >= 0 m and a period > 0 s, got {self}")
+        if not (0 <= self.radius < math.inf and self.period in _SECONDS):
+            raise Refusal(f"expected a radius >= 0 m and a period of {_SECONDS}, got {self}")
 
     @property
     def duration(self) -> float:
@@ -86,8 +92,8 @@ class Step(ABC):
     ease: str = "smooth"
 
     def __post_init__(self) -> None:
-        if not 0 < self.seconds < math.inf:
-            raise Refusal(f"expected a step that takes more than 0 s, got {self.seconds:g} s")
+        if self.seconds not in _SECONDS:
+            raise Refusal(f"expected a step that takes {_SECONDS}, got {self.seconds:g} s")
         if self.ease not in EASES:
             raise Refusal(f"expected an ease among {', '.join(EASES)}, got {self.ease!r}")
 
@@ -114,8 +120,8 @@ class Press(Step):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not 0 <= self.to < math.inf:
-            raise Refusal(f"expected a share of at least 0 to press to, got {self.to:g}")
+        if self.to not in _AMOUNT:
+            raise Refusal(f"expected a share of {_AMOUNT} to press to, got {self.to:g}")
 
     def end(self, pose: Pose) -> Pose:
         return replace(pose, amount=self.to)
@@ -197,8 +203,11 @@ class Path:
     steps: tuple[Step, ...]
 
     def __post_init__(self) -> None:
-        if not self.steps:
-            raise Refusal("expected at least one step in a path, got none")
+        if not 1 <= len(self.steps) <= _MOST_STEPS:
+            raise Refusal(
+                f"expected a path of at least one step and {_MOST_STEPS} at most, got "
+                f"{len(self.steps) or 'none'}; more are a recorded motion's"
+            )
         first, last = self._poses[0], self._poses[-1]
         if last.amount and last != first:
             raise Refusal(
@@ -248,10 +257,17 @@ class Recorded:
             raise Refusal(
                 f"expected at least two times (T,) and poses (T, 3), got {t.shape}, {poses.shape}"
             )
+        if len(t) > _MOST_POSES:
+            raise Refusal(f"expected at most {_MOST_POSES} poses, got {len(t)}; thin them out")
         if not (np.isfinite(poses).all() and t[0] == 0 and (np.diff(t) > 0).all()):
             raise Refusal("expected finite poses at times in s that begin with 0 and rise")
-        if not (poses[:, 2] >= 0).all():
-            raise Refusal("expected amounts of at least 0, got one below")
+        if self.duration not in _SECONDS:
+            raise Refusal(f"expected a record of {_SECONDS}, got {self.duration:g} s")
+        if not (0 <= poses[:, 2].min() <= poses[:, 2].max() <= _AMOUNT.most):
+            raise Refusal(
+                f"expected amounts of {_AMOUNT}, got {poses[:, 2].min():g} to "
+                f"{poses[:, 2].max():g}; they are shares of the force or depth"
+            )
 
     @property
     def duration(self) -> float:

@@ -1,6 +1,7 @@
 """The text of a scene file to the scene: strict, and every refusal names its line."""
 
 import math
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -15,13 +16,26 @@ from kappaskin.effects import (
     FIRST_GENERATION_LOOPS,
     SECOND_GENERATION_LOOPS,
     Effect,
+    IntermittentElements,
     StrainLimit,
+    StuckElements,
 )
 from kappaskin.errors import Refusal
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
 from kappaskin.patch import Disk, Patch, Polygon
 from kappaskin.scene.choice import LINEAR, Choice
+from kappaskin.scene.limits import (
+    DWELL,
+    HOLD,
+    RADII,
+    RATE,
+    SEED,
+    SKIN,
+    check_elements,
+    check_functions,
+    check_sides,
+)
 from kappaskin.scene.lines import Lines
 from kappaskin.scene.plan import effects_of
 from kappaskin.scene.read_stimulus import read_stimulus
@@ -31,6 +45,7 @@ from kappaskin.transduction import FIRST_GENERATION, SECOND_GENERATION, Transduc
 
 FORMAT = 1
 _LARGEST = 2**24  # bytes
+_DEEP = re.compile(r"(?:\.[\w\"'-]+){64}")  # tables in tables, which take long to read
 
 ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
 ELSEWHERE = {
@@ -53,9 +68,13 @@ def read_scene(text: str, file: FilePath) -> Scene:
     """The scene that `text`, of `file`, describes; files that it names lie beside it."""
     name, folder = file.stem, file.parent
     try:
+        if _DEEP.search(text):
+            raise RecursionError
         said = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # a whole number of thousands of digits is one of these, too
         raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
+    except RecursionError as error:
+        raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
     top = Table(said, Lines(text), str(file))
     if (version := top.get("format", int)) != FORMAT:
         raise top.refusal(
@@ -65,33 +84,37 @@ def read_scene(text: str, file: FilePath) -> Scene:
             "format",
         )
     plate, edge = _skin(top.table("skin"))
+    layout = _elements(top.table("elements"), plate.patch)
     reference = top.get("reference", tuple[int, int], (15, 1 if plate.patch.strip else 15))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
+        check_functions(plate.patch, edge, reference, len(layout))
         basis()
     stimuli = tuple(
-        read_stimulus(table, lambda load, by: scaled_to(plate, load, by, basis()), folder)
+        read_stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), folder)
         for table in top.tables("touch")
     )
     electronics = _electronics(top.table("electronics"))
-    choice, effects = _effects(top, electronics)
+    choice, effects = _effects(top, electronics, layout)
+    rate, seed = top.get("rate", float, 500.0, RATE), top.get("seed", int, 0, SEED)
     with top.blamed():
         scene = Scene(
             name,
             plate,
-            _elements(top.table("elements"), plate.patch),
+            layout,
             stimuli,
             effects,
             electronics,
-            top.get("rate", float, 500.0),
-            top.get("seed", int, 0),
+            rate,
+            seed,
             reference,
             edge,
             choice=choice,
             title=top.get("title", str, name),
             text=top.get("text", str, ""),
         )
-        scene.sensor()
+        with top.blamed("rate"):
+            scene.sensor()
         if "cylinders" in top:
             if stimuli:
                 touch = top.tables("touch")[0]
@@ -116,6 +139,10 @@ def _skin(table: Table) -> tuple[Plate, str]:
     make = table.choose("shape", shapes, "rectangle")
     with table.blamed():
         patch = make()
+        check_sides(patch)
+    for name, within in SKIN.items():
+        if table.get(name, float, 0.0):  # with no tension at all, say, it is none
+            table.get(name, float, within=within)
     plate = table.make(Plate, patch=patch)
     edge = table.choose("edge", {edge: edge for edge in EDGES}, "hinged")
     table.done()
@@ -134,7 +161,10 @@ def _elements(table: Table, patch: Patch) -> SensorLayout:
                 patch, table.get("positions", tuple[tuple[float, float], ...])
             )
         else:
-            layout = SensorLayout.regular(patch, *table.get("grid", tuple[int, int], (10, 10)))
+            grid = table.get("grid", tuple[int, int], (10, 10))
+            check_elements(*grid)
+            layout = SensorLayout.regular(patch, *grid)
+        check_elements(len(layout))
         layout = layout.without(table.get("dead", tuple[int, ...], ()))
         layout = replace(layout, gage_length=table.get("gage_length", float, 0.0))
     table.done()
@@ -162,17 +192,19 @@ def _changed(table: Table, part: Any) -> Any:
 
 
 def _cylinders(table: Table, scene: Scene) -> Presentation:
-    hold = table.get("hold", float, 0.0)
-    radii = table.get("radii", tuple[float, ...], ())
+    hold = table.get("hold", float, 0.0, HOLD)
+    radii = table.get("radii", tuple[float, ...], (), RADII)
     with table.blamed():
         strip = scene.plate.patch.strip
         steps = schedule(radii, hold, strip) if radii else schedule(hold=hold, strip=strip)
-        made = Presentation(steps, table.get("dwell", float, 1.0))
+        made = Presentation(steps, table.get("dwell", float, 1.0, DWELL))
     table.done()
     return made
 
 
-def _effects(top: Table, electronics: Transduction) -> tuple[Choice, tuple[Effect, ...]]:
+def _effects(
+    top: Table, electronics: Transduction, layout: SensorLayout
+) -> tuple[Choice, tuple[Effect, ...]]:
     """Which effects the file chooses, and those that it says the parameters of."""
     table = top.table("effects")
     found = list[Effect]()
@@ -188,7 +220,12 @@ def _effects(top: Table, electronics: Transduction) -> tuple[Choice, tuple[Effec
             else:
                 found.append(said.make(kind))
             said.done()
+            if isinstance(effect := found[-1], StuckElements | IntermittentElements):
+                with said.blamed("elements"):
+                    effect.channels((3 * len(layout),))
     accuracy = top.get("accuracy", float, 0.01)
+    with top.blamed("accuracy"):
+        Choice(accuracy=accuracy)
     with table.blamed("choose"):
         choice = _choice(table, accuracy)
     table.done(*EFFECTS)
@@ -219,9 +256,13 @@ def _wanted(table: Table) -> set[str]:
 def read_scene_file(file: FilePath) -> Scene:
     """The scene in `file`."""
     try:
+        if file.exists() and not file.is_file():
+            raise Refusal(f"{file}: expected a file with a scene, got a folder or a device")
         if file.stat().st_size > _LARGEST:
             raise Refusal(f"{file}: expected a scene of at most {_LARGEST} bytes, got more")
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:  # undecodable, or a name that no file has
+        if isinstance(error, Refusal):
+            raise
         raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
     return read_scene(text, file)

@@ -47,6 +47,8 @@ class Scene:
     def __post_init__(self) -> None:
         if self.laid and self.stimuli:
             raise Refusal(f"expected no loads on a skin that lies on cylinders, got {self.loads}")
+        if self.seed < 0:
+            raise Refusal(f"expected a seed of at least 0, got {self.seed}")
         names = [effect.name for effect in self.effects]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise Refusal(f"expected each effect once, got {', '.join(twice)} more than once")
@@ -56,11 +58,7 @@ class Scene:
                 "else presses would bend the skin below it: take loads, or one object"
             )
         for stimulus in self.stimuli:
-            if not isinstance(stimulus.what, Indenter):
-                self.plate.check(stimulus.what)
-            for time in stimulus.motion.moments if stimulus.motion else ():
-                if load := stimulus.load_at(time):
-                    self.plate.check(load)
+            stimulus.check(self.plate)
 
     @cached_property
     def basis(self) -> Basis:

@@ -7,7 +7,8 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.mechanics import Indentation, Load, Press, RigidObject
+from kappaskin.mechanics import Indentation, Load, Plate, Press, RigidObject
+from kappaskin.patch import Patch
 from kappaskin.scene.motion import Motion, Pose
 
 
@@ -34,6 +35,26 @@ class Indenter:
         for value, what in ((self.force, "a force in N"), (self.depth, "a depth in m")):
             if value is not None and not 0 < value < math.inf:
                 raise Refusal(f"expected {what} above zero to press an object by, got {value}")
+        if not all(map(math.isfinite, (self.x, self.y, self.turn))):
+            raise Refusal(
+                f"expected a finite place in m and turn in rad, got ({self.x}, {self.y}) and "
+                f"{self.turn}"
+            )
+
+    def check(self, patch: Patch, pose: Pose) -> None:
+        """Refuse an object that, standing as `pose` says, is beside the skin or all through it."""
+        reach, x, y = math.hypot(*self.rigid.extent), self.x + pose.dx, self.y + pose.dy
+        if not (-reach <= x <= patch.a + reach and -reach <= y <= patch.b + reach):
+            raise Refusal(
+                f"expected an object over the {patch.name}, got {self.rigid} at ({x:g}, {y:g}) m, "
+                "which misses it; positions are in metres from the corner x = y = 0"
+            )
+        deepest = min(patch.a, patch.b)
+        if (depth := (self.depth or 0.0) * pose.amount) > deepest:
+            raise Refusal(
+                f"expected a depth of at most {deepest:g} m, the skin's shorter side, got "
+                f"{depth:g}; depths are in metres"
+            )
 
     def into(self, press: Press, pose: Pose, after: Indentation | None) -> Indentation:
         """What it does to the skin when it stands as `pose` says; `after` starts the search."""
@@ -58,15 +79,29 @@ class Stimulus:
     def pose_at(self, time: float) -> Pose:
         return Pose() if self.motion is None else self.motion.at(time)
 
+    def check(self, plate: Plate) -> None:
+        """Refuse what does not touch `plate`, at rest or wherever it presses while it moves."""
+        poses = [self.motion.at(time) for time in self.motion.moments] if self.motion else []
+        if isinstance(self.what, Indenter):
+            for pose in (Pose(), *(pose for pose in poses if pose.amount)):
+                self.what.check(plate.patch, pose)
+            return
+        plate.check(self.what)
+        for pose in poses:
+            if pose.amount:
+                plate.check(self._posed(self.what, pose))
+
+    @staticmethod
+    def _posed(load: Load, pose: Pose) -> Load:
+        moved = load.shifted(pose.dx, pose.dy)
+        return moved if pose.amount == 1 else moved.scaled(pose.amount)
+
     def load_at(self, time: float) -> Load | None:
         """The load at `time` in s; None when it is lifted, or no load."""
         if isinstance(self.what, Indenter):
             return None
         pose = self.pose_at(time)
-        if not pose.amount:
-            return None
-        load = self.what.shifted(pose.dx, pose.dy)
-        return load if pose.amount == 1 else load.scaled(pose.amount)
+        return self._posed(self.what, pose) if pose.amount else None
 
 
 def contact_of(loads: tuple[Load, ...]) -> Array:

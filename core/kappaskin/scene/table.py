@@ -7,6 +7,7 @@ from dataclasses import MISSING, fields
 from types import UnionType
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
+from kappaskin.effects import Within
 from kappaskin.errors import Refusal
 from kappaskin.scene.lines import Lines, Place
 
@@ -50,11 +51,19 @@ class Table:
     def __contains__(self, key: str) -> bool:
         return key in self._said
 
-    def get(self, key: str, kind: Any, default: Any = _REQUIRED) -> Any:
-        """The value at `key`, of `kind`: float, int, bool, str, or a tuple of them."""
+    def get(
+        self, key: str, kind: Any, default: Any = _REQUIRED, within: Within | None = None
+    ) -> Any:
+        """The value at `key`, of `kind`: float, int, bool, str, or a tuple of them.
+
+        Its numbers must be `within` a range, if one is given.
+        """
         self._asked.add(key)
         if key in self._said:
-            return self._as(self._said[key], kind, key)
+            value: Any = self._as(self._said[key], kind, key)
+            if within is not None and not _all_within(value, within):
+                raise self.refusal(f"expected {within}, got {self._said[key]!r:.60}", key)
+            return value
         if default is _REQUIRED:
             raise self.refusal(f"expected {key} = {_expected(kind)}, got none")
         return default
@@ -123,6 +132,11 @@ class Table:
                 )
                 known = near or f"; known are {', '.join(sorted(self._asked))}"
                 raise self.refusal(f"expected no such key{known}", key)
+
+
+def _all_within(value: Any, within: Within) -> bool:
+    each = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else (value,)
+    return all(one in within for one in each)
 
 
 def _nearest(name: str, known: list[str]) -> list[str]:

@@ -11,6 +11,7 @@ from kappaskin.frames import Array, Mask
 
 _SIDE = np.linspace(-1.0, 1.0, 17)
 _RIM = 64
+_LARGEST = 1000.0  # m
 _ON = 1 + 1e-9  # of a size: a point of the keel on the rim, as computed, is on the object
 
 
@@ -36,8 +37,10 @@ class RigidObject(Protocol):
 
 def check_sizes(what: object, *sizes: float) -> None:
     """Refuse a `what` with a size that is not a number above zero."""
-    if not all(0 < size < math.inf for size in sizes):
-        raise Refusal(f"expected an object with sizes above zero in metres, got {what}")
+    if not all(0 < size <= _LARGEST for size in sizes):
+        raise Refusal(
+            f"expected an object with sizes above zero in metres, {_LARGEST:g} at most, got {what}"
+        )
 
 
 def _above(height: Array, on: Mask) -> Array:

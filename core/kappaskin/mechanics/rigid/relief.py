@@ -15,6 +15,7 @@ from kappaskin.frames import Array
 from kappaskin.mechanics.rigid.objects import check_sizes
 
 _MOST = 2**24  # pixels
+_HIGHEST = 1.0  # m
 _BLOCKS = 8  # along each side, each with its lowest pixel on the keel
 
 
@@ -57,8 +58,10 @@ class HeightMap:
         pixels = reader(Path(path))
         if not np.isfinite(pixels).all():
             raise Refusal(f"expected finite pixels, got NaN or infinity in {path}; fill them in")
-        if not 0 <= relief < np.inf:
-            raise Refusal(f"expected a relief of at least zero in m, got {relief}")
+        if not 0 <= relief <= _HIGHEST:
+            raise Refusal(
+                f"expected a relief of at least zero in m, {_HIGHEST:g} at most, got {relief}"
+            )
         low, high = float(pixels.min()), float(pixels.max())
         if low == high and relief:
             raise Refusal(f"{path} has no relief: all its pixels are {low:g}; give 0 m for a flat")
