@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QVBoxLayout, QWidget
 
-_LOWEST, _SHARE = 240, 0.28  # px, and of the window's height, of what is below the skin
+_LOWEST = 240  # px of what is below the skin
 
 
 def column(*widgets: QWidget) -> QWidget:
@@ -35,9 +35,9 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
     return area
 
 
-def heighten(window: QMainWindow, dock: QDockWidget) -> None:
-    """Give a `dock` below the skin its share of the height of the `window`."""
-    height = max(_LOWEST, round(_SHARE * window.height()))
+def heighten(window: QMainWindow, dock: QDockWidget, share: float) -> None:
+    """Give a `dock` below the skin its `share` of the height of the `window`."""
+    height = max(_LOWEST, round(share * window.height()))
     window.resizeDocks([dock], [height], Qt.Orientation.Vertical)
 
 

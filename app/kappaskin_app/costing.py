@@ -210,7 +210,7 @@ class Costing(QObject):
         if self.scene is None:
             return ""
         simulated, meetings, noise = self._of
-        if simulated != self._session.simulating:
+        if simulated != self._session.inside:
             return "on another skin"
         if simulated:
             return _unlike(self.scene, self._session.scene)
@@ -256,13 +256,13 @@ class Costing(QObject):
         session, status, noise = self._session, self._session.status, self._noise()
         if status.sensor is None or status.state != "streaming":
             return
-        if session.simulating:
+        if session.inside:
             self.scene, self.about = session.scene, ""
         elif np.isfinite(noise):
             self.scene = scene_of_sensor(status.sensor, noise)
             self.about = f"With a point load in the middle and the noise of now, {noise:.2g} 1/m."
         if self.scene is not None:
-            self._of = session.simulating, status.meetings, noise
+            self._of = session.inside, status.meetings, noise
             self._tried = self._to_try(self.scene)
 
     def _to_try(self, scene: Scene) -> tuple[Setting, ...]:
@@ -315,6 +315,8 @@ def _unlike(was: Scene, now: Scene) -> str:
         return "with other electronics"
     if was.effects != now.effects:
         return "with other noise"
+    if was.choice != now.choice:
+        return "with other effects"
     if dead != dead_now:
         return "with other elements dead"
     if was.stimuli != now.stimuli:

@@ -10,6 +10,7 @@ from kappaskin_app.scale import Ranges, locked_at
 from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings
 from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, PULLED, SEQUENTIAL, Colours, Theme
+from kappaskin_app.touching import touches_at
 from kappaskin_app.views.badge import LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.views.colour_bar import SkinScale
 from kappaskin_app.views.heatmap import Array, Heatmap, Mask
@@ -120,7 +121,7 @@ class Display:
             heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
 
     def _warn(self, estimate: Estimate | None) -> None:
-        there = self._session.simulating and estimate is not None and self._session.scene.loads
+        there = self._session.inside and estimate is not None and self._session.scene.stimuli
         self.notice.show_hint(_HINT if there else _NO_LOAD_HINT)
         if estimate is None:
             self.notice.show_warning("")
@@ -186,6 +187,7 @@ class Display:
             self.membrane.show_colours(colours, DARK_INK if colours is DIVERGING else LIGHT_INK)
 
     def _show_loads(self, estimate: Estimate) -> None:
-        scene = self._session.scene
-        loads = scene.loads if self._session.simulating else ()
-        self.membrane.show_loads(loads, estimate.true_contact if scene.moves else None)
+        session = self._session
+        time = session.status.playing.time(estimate.device_time)
+        touches = touches_at(session.scene, time) if session.inside else ()
+        self.membrane.show_loads([touch.load for touch in touches])

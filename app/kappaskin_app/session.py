@@ -18,6 +18,7 @@ from kappaskin import (
     Presentation,
     Refusal,
     Region,
+    Scene,
     Sensor,
     Setup,
     Status,
@@ -28,14 +29,15 @@ from kappaskin import (
 from kappaskin_app.ahead import Ahead
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
-from kappaskin_app.settings import READY_CASES, Scanning, SceneSettings, Settings, part
-from kappaskin_app.simulation import region_of, scene_of
+from kappaskin_app.settings import Scanning, SceneSettings, Settings, Written, part
+from kappaskin_app.simulation import named, played, region_of, scene_of
 from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE, WAITING
 
 Array = NDArray[np.float64]
 
 STALE_AFTER = 0.5  # s without a frame
 _TICK = 4  # ms between two looks for a new estimate
+_ARRIVES = 0.3  # s after which what was asked of the engine shows in its status
 _STATUS = 0.05  # s between two looks at the status
 
 
@@ -53,12 +55,14 @@ def _setup_of(settings: Settings, sensor: Sensor | None = None) -> Setup:
 class Session(QObject):
     """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick.
 
-    `scene` is the one that is simulated; `refused` says why it is not the one the settings describe
-    now, with nothing to say when it is; `preparing` whether that takes a while to be computed.
+    `scene` is the one that is simulated, `running` whether it goes on; `playing` says when it
+    becomes another one, `refused` why it is not the one the settings describe now, with nothing to
+    say when it is, and `preparing` whether that takes a while to be computed.
     """
 
     refused = Signal(str)
     preparing = Signal(bool)
+    playing = Signal(Scene)
     estimated = Signal(Estimate)
     reported = Signal(Status)
 
@@ -67,7 +71,10 @@ class Session(QObject):
         self._history = history
         self._settings = history.settings
         self.engine = engine
-        self.scene = scene_of(history.settings)
+        self.scene = scene_of(replace(history.settings, written=None))
+        self._anew, self.running = False, True
+        self._sought: float | None = None
+        self._sought_at = 0.0
         self._ahead = Ahead()
         self._asked = _setup_of(history.settings)
         engine.set_up(self._asked)
@@ -85,24 +92,35 @@ class Session(QObject):
         self._timer.start()
 
     @property
+    def inside(self) -> bool:
+        """Whether the simulation inside the app is what is read."""
+        return self.source.startswith("sim:")
+
+    @property
     def simulating(self) -> bool:
-        """Whether the loads and the noise are ours to choose: not in a scene that has its own."""
-        kind, _, scene = self.source.partition(":")
-        return kind == "sim" and (not scene or scene in READY_CASES)
+        """Whether the loads and the noise are the panels' to choose: not in a written scene."""
+        return self.inside and self._history.settings.written is None
 
     def connect_to(self, source: str, already: bool = False) -> None:
         """Take frames from `source`, unless the engine does `already`.
 
-        A scene named there becomes the load case.
+        A scene named there becomes the load case, or the one that is written.
         """
         self.source, self.estimate = source.strip(), None
         if not already:
             self.engine.connect(self.source)
-        scene = self.source.removeprefix("sim:")
-        if self.simulating and scene:
-            self._history.change("Load case", load_case=scene)
-        if self.simulating:
+        if self.inside:
+            self._anew = True
+            self._history.change("Simulated skin", -1, **named(self.source))
             self._play()
+
+    def begin(self, written: Written) -> None:
+        """Play a scene that is written from its beginning, whatever was read before."""
+        if not self.inside:
+            self.connect_to("sim:")
+        self._anew = True
+        self._history.change(f"Play {written.file.stem}", -1, written=written)
+        self._play()
 
     def disconnect_from(self) -> None:
         self.engine.disconnect()
@@ -112,7 +130,7 @@ class Session(QObject):
         self._set_up()
         if part(settings, Scanning) != part(was, Scanning):
             self._scan()
-        if self.simulating and part(settings, SceneSettings) != part(was, SceneSettings):
+        if self.inside and part(settings, SceneSettings) != part(was, SceneSettings):
             self._play()
 
     def _set_up(self) -> None:
@@ -121,10 +139,10 @@ class Session(QObject):
         if self._laid is not None:
             setup = replace(setup, calibration=None)
         if setup != self._asked:
-            if self.simulating and setup.calibration and not self._asked.calibration:
+            if self.inside and setup.calibration and not self._asked.calibration:
                 # A calibration follows the loops of a skin from rest on: these effects start anew.
                 self.engine.play(replace(self.scene, effects=()))
-                self.engine.play(self.scene)
+                self.engine.play(played(self.scene))
             self._asked = setup
             self.engine.set_up(setup)
 
@@ -142,23 +160,55 @@ class Session(QObject):
         self._set_up()
         if begins_or_ends:
             self._scan()
-        if self.simulating:
+        if self.inside:
             self._play()
+
+    def run(self, running: bool) -> None:
+        """Let the scene go on, or stand still."""
+        self.running = running
+        self.engine.seek(None, float(running))
+
+    def seek(self, at: float, held: bool = False) -> None:
+        """Go to the scene's time `at` in s, and stand there while it is `held`."""
+        self._sought, self._sought_at = at, time.monotonic()
+        self.engine.seek(at, float(self.running and not held))
+
+    @property
+    def time(self) -> float:
+        """The time in s at which the scene is, as the newest estimate shows it, or will be."""
+        if self._sought is not None:
+            return self._sought
+        device_time = self.estimate.device_time if self.estimate else 0.0
+        return self.status.playing.time(device_time)
+
+    def move(self, scene: Scene) -> None:
+        """Play `scene`, in which a touch is elsewhere, for as long as it is dragged.
+
+        Its plan stays: what a scene calls for is told once the touch is let go.
+        """
+        self.scene = scene
+        known = played(scene_of(self._history.settings))
+        self.engine.play(replace(known, stimuli=scene.stimuli))
 
     def _play(self) -> None:
         """Simulate what the settings describe, or go on as before and say why."""
-        if not self._ahead.ready(self._history.settings):
+        settings = self._history.settings
+        if not self._ahead.ready(settings):
             self.refused.emit("")
             self.preparing.emit(True)
             return
         why = ""
         try:
-            scene = scene_of(self._history.settings)
+            scene = scene_of(settings)
             laid = self._laid and Presentation((self._laid,), 1.0)
             self.scene = scene.laid_on(laid) if laid else scene
         except Refusal as refusal:
             why = str(refusal)
-        self.engine.play(self.scene)
+        self.engine.play(played(self.scene))
+        if self._anew and not why:
+            self._anew, self.running = False, True
+            self.engine.seek(0.0)
+        self.playing.emit(self.scene)
         self.refused.emit(why)
         self.preparing.emit(False)
 
@@ -191,6 +241,8 @@ class Session(QObject):
             if self.status.meetings != was.meetings:
                 self.estimate = None  # what the last sensor showed is not this one's
                 self._set_up()
+            if self._sought == self.status.playing.at or now > self._sought_at + _ARRIVES:
+                self._sought = None
             self.reported.emit(self.status)
         estimate = self.engine.latest(self.status)
         if estimate is not None and (estimate.generation, estimate.sequence) != self._shown:

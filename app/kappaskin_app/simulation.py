@@ -3,6 +3,8 @@
 import math
 from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from kappaskin import (
@@ -26,9 +28,13 @@ from kappaskin import (
     Transduction,
     UniformNoise,
     edges_of,
+    planned,
+    read_scene,
+    scene_file,
+    write_scene,
 )
 from kappaskin_app.pressing import compliance_of, free_loads, ready, reference_on, whole_on
-from kappaskin_app.settings import FREE_CASES, READY_CASES, Settings
+from kappaskin_app.settings import FREE_CASES, READY_CASES, Settings, Written
 from kappaskin_app.skins import SHAPES
 
 _PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")
@@ -46,6 +52,10 @@ _LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 _LEAST_SCANNED = 0.05  # of the channels, where they are scanned as they tell most
 _CREEPING = 5.0  # s, the time constant of the creep
 _OFFSET = 10.0  # 1/m of offset for a gain that is off by 1
+
+OWN = Path("own.toml")
+"""What a scene is called that was begun from the panels' own."""
+_REMEMBERED = 64  # scenes, so that undoing is quick
 
 _Effect = UniformNoise | GaussianNoise | Hysteresis | Creep | Tolerance
 
@@ -105,7 +115,9 @@ def is_table_1(settings: Settings) -> bool:
 
 
 def scene_of(settings: Settings) -> Scene:
-    """The scene that `settings` describe; raises `Refusal` for a skin that cannot be."""
+    """The scene that `settings` describe; raises `Refusal` for one that cannot be."""
+    if settings.written is not None:
+        return _read(settings.written)
     plate = plate_of(settings)
     layout = SensorLayout.regular(plate.patch, *elements_of(settings))
     layout = layout.without(settings.dead_elements)
@@ -129,6 +141,30 @@ def scene_of(settings: Settings) -> Scene:
     )
     fastest = math.floor(1 / scene.transduction.scan_time(3 * len(layout)))
     return replace(scene, rate=min(SHAPES[settings.shape].rate, fastest))
+
+
+def _read(written: Written) -> Scene:
+    """The scene that is written, read and planned once."""
+    scene = _scene_or_why(written)
+    if isinstance(scene, str):
+        raise Refusal(scene)
+    return scene
+
+
+@lru_cache(_REMEMBERED)
+def _scene_or_why(written: Written) -> Scene | str:
+    try:
+        scene = read_scene(written.text, written.file)
+        played(scene)
+    except Refusal as refusal:
+        return str(refusal).replace(str(written.file), written.file.name)
+    return scene
+
+
+@lru_cache(_REMEMBERED)
+def played(scene: Scene) -> Scene:
+    """The scene as it is played: what its effects are is decided, here and not in the engine."""
+    return planned(scene)
 
 
 def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
@@ -159,11 +195,37 @@ def _check_on(loads: tuple[Load, ...], plate: Plate) -> None:
         ) from refusal
 
 
+def named(source: str) -> dict[str, Any]:
+    """The settings that change when the simulation called `source` is to be played.
+
+    One of the panels' load cases is chosen; any other scene is played as it is written. One that
+    there is not changes nothing: the engine says so.
+    """
+    name = source.removeprefix("sim:")
+    if not name or name in READY_CASES:
+        return {"written": None} | ({"load_case": name} if name else {})
+    try:
+        return {"written": written(scene_file(name))}
+    except Refusal:
+        return {"written": None}
+
+
+def written(file: Path) -> Written:
+    """The scene in `file`, as it is written there; raises `Refusal` for one that is no text."""
+    try:
+        return Written(file.read_text(encoding="utf-8"), file)
+    except (OSError, UnicodeDecodeError) as error:
+        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
+
+
+def text_of(settings: Settings) -> str:
+    """The scene that is written, or that of the panels as one would write it."""
+    return settings.written.text if settings.written else write_scene(scene_of(settings))
+
+
 def settings_for(source: str) -> Settings:
-    """The settings to begin with on `source`: a simulated scene's load case, else as they are."""
-    case = source.removeprefix("sim:")
-    ready = source.startswith("sim:") and case in READY_CASES
-    return Settings(load_case=case) if ready else Settings()
+    """The settings to begin with on `source`."""
+    return replace(Settings(), **named(source)) if source.startswith("sim:") else Settings()
 
 
 def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -10,14 +11,25 @@ from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
+    QFileDialog,
     QHBoxLayout,
     QMainWindow,
     QMessageBox,
     QToolBar,
+    QVBoxLayout,
     QWidget,
 )
 
-from kappaskin import FIGURES, Engine, Status, serial_ports
+from kappaskin import (
+    FIGURES,
+    Engine,
+    Refusal,
+    Scene,
+    Status,
+    scene_file,
+    serial_ports,
+    write_scene,
+)
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
@@ -30,17 +42,24 @@ from kappaskin_app.history import History
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.panels import Panels
+from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
+from kappaskin_app.planning import Planning
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
-from kappaskin_app.simulation import settings_for
+from kappaskin_app.simulation import OWN, settings_for, text_of, written
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
+from kappaskin_app.views.timeline import Timeline
 from kappaskin_app.wishes import Wishes
 
 _WORDS = 0.5  # s between two looks at what touches the skin: as fast as one can read
+_HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
+_HEIGHTS = {"scene": 0.38}
+_FILES = "Scene (*.toml)"
+_PLANNING = "Each effect is sized and timed\N{HORIZONTAL ELLIPSIS}"
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -58,7 +77,9 @@ class MainWindow(QMainWindow):
         self.seeing = Seeing(self.history, self)
         self.costing = Costing(self.history, self.session, self.wishes, self)
         self.panels, self.display = Panels(), Display(self.session)
-        self.cost, self.stability = CostPanel(), StabilityPanel()
+        self.planning = Planning(self.session, self)
+        self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
+        self.timeline = Timeline()
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
@@ -85,8 +106,10 @@ class MainWindow(QMainWindow):
             self._dock("curvature", "Curvature, by element", maps, right),
             self._dock("cost", "Cost of accuracy", self.cost, below),
             self._dock("stability", "Stability", self.stability, below),
+            self._dock("scene", "Scene", self.scene, below),
         ]
-        self.tabifyDockWidget(*self._docks[2:])
+        for first, second in pairwise(self._docks[2:]):
+            self.tabifyDockWidget(first, second)
         for dock in self._docks[2:]:
             dock.setAllowedAreas(area.TopDockWidgetArea | below)  # wider than a column beside it
             dock.hide()  # so that a small window is left to the skin until they are asked for
@@ -103,11 +126,14 @@ class MainWindow(QMainWindow):
 
     def _centre(self) -> QWidget:
         centre = QWidget()
-        beside = QHBoxLayout(centre)
-        beside.setContentsMargins(0, 0, 0, 0)
-        beside.setSpacing(0)
+        beside, above = QHBoxLayout(), QVBoxLayout(centre)
+        above.setContentsMargins(0, 0, 0, 0)
+        for layout in (beside, above):
+            layout.setSpacing(0)
         beside.addWidget(self.membrane, 1)
         beside.addWidget(self.display.scale)
+        above.addLayout(beside, 1)
+        above.addWidget(self.timeline)
         return centre
 
     def _make_header(self) -> None:
@@ -131,6 +157,14 @@ class MainWindow(QMainWindow):
         add, stack, wishes = self.actions_by_name.add, self.history.stack, self.wishes
         file, edit, source, view, help_ = "&File", "&Edit", "&Source", "&View", "&Help"
         figures = "Fi&gures"
+        add("open-scene", file, "&Open scene\N{HORIZONTAL ELLIPSIS}", self._open_scene, "Ctrl+O")
+        add(
+            "save-scene",
+            file,
+            "Save scene &as\N{HORIZONTAL ELLIPSIS}",
+            self._save_scene,
+            "Ctrl+Shift+S",
+        )
         add("picture", file, "Save &picture", self._save_picture, "Ctrl+S")
         add("quit", file, "&Quit", self.close, "Ctrl+Q")
         undo, redo = stack.createUndoAction(self), stack.createRedoAction(self)
@@ -158,13 +192,14 @@ class MainWindow(QMainWindow):
         for key, direction in (("F6", ABOVE), ("F7", FRONT), ("F8", SIDE)):
             words = f"Look {direction.words}"
             add(words.lower().replace(" ", "-"), view, words, self._look(direction), key)
+        add("pause", view, "&Pause or go on", self._pause, "Ctrl+P")
         add("theme", view, "Light or &dark", wishes.switch_theme, "Ctrl+T")
         add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
         for dock in self._docks[:2]:
             name = f"dock-{dock.objectName()}"
             self.actions_by_name.register(name, view, dock.toggleViewAction())
-        for dock, key in zip(self._docks[2:], ("F9", "F10"), strict=True):
+        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2"), strict=True):
             name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
             action = add(name, view, dock.windowTitle(), turn, key)
             action.setCheckable(True)
@@ -180,7 +215,7 @@ class MainWindow(QMainWindow):
             return
         dock.show()
         if not dock.isFloating():
-            heighten(self, dock)
+            heighten(self, dock, _HEIGHTS.get(dock.objectName(), _HEIGHT))
         dock.raise_()
 
     def _wire(self) -> None:
@@ -205,6 +240,7 @@ class MainWindow(QMainWindow):
         session.reported.connect(guarded(self.seeing.follow))
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
+        self._wire_scene()
         session.reported.connect(guarded(wishes.follow))
         self.stability.back.connect(guarded(self.history.stack.undo))
         self.stability.shown.connect(guarded(self._show_shape))
@@ -225,6 +261,22 @@ class MainWindow(QMainWindow):
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
         guard.on_failure(self._tell)
+
+    def _wire_scene(self) -> None:
+        session, scene, planning, wishes = self.session, self.scene, self.planning, self.wishes
+        scene.gallery.chosen.connect(guarded(lambda name: self._play_file(scene_file(name))))
+        scene.gallery.open_wanted.connect(guarded(self._open_scene))
+        scene.editor.edited.connect(guarded(wishes.write))
+        scene.editor.save_wanted.connect(guarded(self._save_scene))
+        scene.effects.forced.connect(guarded(wishes.force))
+        scene.seen.connect(guarded(planning.watch))
+        session.playing.connect(guarded(self._show_scene))
+        session.refused.connect(guarded(scene.editor.show_refusal))
+        session.reported.connect(guarded(planning.follow))
+        planning.changed.connect(guarded(self._show_plan))
+        self.timeline.play_wanted.connect(guarded(session.run))
+        self.timeline.sought.connect(guarded(self._seek))
+        self.timeline.track.sliderReleased.connect(guarded(lambda: session.run(session.running)))
 
     # Wishes that are no settings, or need what is shown.
 
@@ -247,10 +299,41 @@ class MainWindow(QMainWindow):
         limit = self.display.limit_shown() if locked else 0.0
         self.wishes.wish(f"range_{self.history.settings.colour_by}", limit)
 
+    def _open_scene(self) -> None:
+        file, _ = QFileDialog.getOpenFileName(self, "Open a scene", "", _FILES)
+        if file:
+            self._play_file(Path(file))
+
+    def _play_file(self, file: Path) -> None:
+        try:
+            self.wishes.play(written(file))
+        except Refusal as refusal:
+            self._tell(str(refusal))
+
+    def _save_scene(self) -> None:
+        settings = self.history.settings
+        name = settings.written.file.name if settings.written else OWN.name
+        file, _ = QFileDialog.getSaveFileName(self, "Save the scene", name, _FILES)
+        if file:
+            path = Path(file).with_suffix(".toml")
+            try:
+                path.write_text(text_of(settings), encoding="utf-8")
+                self._tell(f"Saved {path}")
+            except (OSError, Refusal) as error:
+                self._tell(f"Could not write {path}: {error}")
+
+    def _seek(self, at: float) -> None:
+        self.session.seek(at, self.timeline.track.isSliderDown())
+
+    def _pause(self) -> None:
+        self.session.run(not self.session.running)
+
     # News: settings and status on their way to panels and views.
 
     def _follow(self, settings: Settings) -> None:
         self.panels.show_settings(settings)
+        if settings.written is not None:
+            self._show_text(settings)
         self.display.show_settings(settings)
         theme = THEMES[settings.theme]
         application = QApplication.instance()
@@ -258,9 +341,32 @@ class MainWindow(QMainWindow):
             application.setPalette(palette(theme))
         self.panels.show_theme(theme)
         self.cost.show_theme(theme)
+        self.scene.show_theme(theme)
+        self.timeline.show_theme(theme)
         self.stability.show_settings(settings)
         self.stability.show_theme(theme)
         self.display.show_theme(theme)
+
+    def _show_scene(self, scene: Scene) -> None:
+        """Show the scene that is played now where it is chosen, edited and scrubbed."""
+        self.timeline.show_scene(scene)
+        settings = self.history.settings
+        self.scene.gallery.show_playing(settings.written.file.stem if settings.written else "")
+        self._show_text(settings)
+
+    def _show_text(self, settings: Settings) -> None:
+        written = settings.written
+        if written is not None:
+            self.scene.editor.show_scene(written.text, written.file.name)
+        elif self.session.inside:
+            self.scene.editor.show_scene(write_scene(self.session.scene), "The panels' skin")
+
+    def _show_plan(self) -> None:
+        planning, effects = self.planning, self.scene.effects
+        if planning.rows and planning.scene is not None and not planning.waiting:
+            effects.show_plan(planning.rows, planning.scene.choice)
+        elif planning.refusal or planning.waiting:
+            effects.show_waiting(planning.refusal or _PLANNING)
 
     def _show_shape(self) -> None:
         """Draw the shape that is looked at on the skin, while somebody looks and wants it."""
@@ -285,7 +391,14 @@ class MainWindow(QMainWindow):
             self._next_bargain = now + _BARGAIN
             self.panels.region.show_bargain(self.session.bargain())
         self.panels.show_status(status, simulating)
-        self.stability.show_status(status, self.session.simulating)
+        self.stability.show_status(status, self.session.inside)
+        self._show_time()
+
+    def _show_time(self) -> None:
+        if not self.session.inside:
+            self.timeline.show_scene(None)
+            return
+        self.timeline.show_time(self.session.time, self.session.running)
 
     # Small things.
 
@@ -322,6 +435,8 @@ class MainWindow(QMainWindow):
         if not self.session.closed:
             guard.forget(self._tell)
             self.costing.close()
+            self.planning.close()
+            self.scene.gallery.close()
             self.seeing.close()
             self.session.close()
             self.naming.close()

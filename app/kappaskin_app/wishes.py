@@ -1,15 +1,25 @@
 """What a person wants, as undoable changes of the settings."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from kappaskin import Setting, Status
 from kappaskin_app.demonstrations import Demonstration
 from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
+from kappaskin_app.scene_text import forced, shifted
 from kappaskin_app.session import Session
-from kappaskin_app.settings import Settings, ask_of
-from kappaskin_app.simulation import NO_ELEMENTS, elements_of, patch_of, with_consequences
+from kappaskin_app.settings import Settings, Written, ask_of
+from kappaskin_app.simulation import (
+    NO_ELEMENTS,
+    OWN,
+    elements_of,
+    patch_of,
+    text_of,
+    with_consequences,
+)
+from kappaskin_app.touching import Held
 
 
 class Wishes:
@@ -18,6 +28,7 @@ class Wishes:
     def __init__(self, history: History, session: Session) -> None:
         self._history, self._session = history, session
         self._gesture, self._grabbed_end = -1, False
+        self._held: Held | None = None
         self._begun: tuple[Demonstration, int, Settings] | None = None
 
     def wish(self, name: str, value: Any) -> None:
@@ -77,22 +88,54 @@ class Wishes:
         kept = self._history.settings.calibration  # minutes of work, and no matter of taste
         self._history.change("Reset settings", -1, **vars(Settings(calibration=kept)))
 
+    # Scenes as they are written.
+
+    def play(self, written: Written) -> None:
+        """Play a scene that is written, from its beginning."""
+        self._session.begin(written)
+
+    def write(self, text: str) -> None:
+        """Play what was written instead of the scene so far; a row of keys is one step to undo."""
+        now = self._history.settings.written
+        if now is None or text != now.text:
+            file = OWN if now is None else now.file
+            self._history.wish("written", "the scene", written=Written(text, file))
+
+    def force(self, effect: str, how: str) -> None:
+        """Force an effect on or off, or leave it to the plan."""
+        self.write(forced(text_of(self._history.settings), effect, how))
+
+    # Loads that are dragged.
+
     def grab(self, x: float, y: float) -> None:
         """Take hold of the load at (x, y) in m: what is dragged until it is let go is one step."""
-        settings = self._history.settings
+        settings, session = self._history.settings, self._session
         second = math.dist((x, y), (settings.x_end, settings.y_end))
         self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
         self._gesture = self._history.new_gesture()
+        self._held = (
+            None if settings.written is None else Held.at_place(session.scene, session.time, x, y)
+        )
 
     def drag(self, x: float, y: float) -> None:
         settings, scene = self._history.settings, self._session.scene
-        moved = dragged(settings, scene, x, y, self._grabbed_end)
-        self._history.change("Drag the load", self._gesture, **moved)
+        if self._held is not None:
+            self._session.move(self._held.moved_to(x, y))
+        elif settings.written is None:
+            moved = dragged(settings, scene, x, y, self._grabbed_end)
+            self._history.change("Drag the load", self._gesture, **moved)
 
     def release(self) -> None:
-        self._gesture = -1
+        held, written = self._held, self._history.settings.written
+        if held is not None and written is not None and held.moved:
+            text = shifted(written.text, held.number, *held.by)
+            self._history.change("Drag the load", -1, written=replace(written, text=text))
+        self._gesture, self._held = -1, None
 
     def give_up(self) -> None:
         """Put the load back to where it was grabbed."""
-        self._history.cancel(self._gesture)
-        self.release()
+        if self._held is not None:
+            self._session.move(self._held.scene)
+        else:
+            self._history.cancel(self._gesture)
+        self._gesture, self._held = -1, None

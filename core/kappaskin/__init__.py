@@ -84,6 +84,7 @@ from kappaskin.region import bargain as bargain
 from kappaskin.region import contact_bound as contact_bound
 from kappaskin.scan import Scan as Scan
 from kappaskin.scene import SCENES as SCENES
+from kappaskin.scene import Choice as Choice
 from kappaskin.scene import Indenter as Indenter
 from kappaskin.scene import Orbit as Orbit
 from kappaskin.scene import Pressed as Pressed
@@ -92,11 +93,14 @@ from kappaskin.scene import Scene as Scene
 from kappaskin.scene import Stimulus as Stimulus
 from kappaskin.scene import load_scene as load_scene
 from kappaskin.scene import moments_of as moments_of
+from kappaskin.scene import plan as plan
+from kappaskin.scene import planned as planned
 from kappaskin.scene import read_scene as read_scene
 from kappaskin.scene import scene_file as scene_file
 from kappaskin.scene import write_scene as write_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
+from kappaskin.studies.beside import Beside as Beside
 from kappaskin.studies.cost import Cost as Cost
 from kappaskin.studies.cost import EffectCost as EffectCost
 from kappaskin.studies.cost import Effects as Effects
@@ -108,6 +112,7 @@ from kappaskin.studies.cost import costs as costs
 from kappaskin.studies.cost import effect_costs as effect_costs
 from kappaskin.studies.cost import frontier as frontier
 from kappaskin.studies.cost import settings_to_try as settings_to_try
+from kappaskin.studies.plan import plan_rows as plan_rows
 from kappaskin.touch import NO_OBJECT as NO_OBJECT
 from kappaskin.touch import ContactObject as ContactObject
 from kappaskin.touch import ObjectFinder as ObjectFinder

@@ -227,7 +227,7 @@ class Loop:
     def _read(self, source: Source) -> None:
         try:
             frames = source.read(_READ)
-        except SourceError as error:
+        except (SourceError, Refusal) as error:  # a device gone, or a scene that leaves its skin
             accounting, last = source.accounting(), self._status.last_frame
             self._close()
             self._status = replace(

@@ -15,7 +15,7 @@ from kappaskin_app.settings import (
 )
 from kappaskin_app.simulation import is_table_1
 
-_REAL = "Only for the simulation inside the app (Ctrl+M)."
+_OTHER = "Only for the simulated skin of these panels (Ctrl+M)."
 
 
 class SimulationForm(Form):
@@ -27,7 +27,7 @@ class SimulationForm(Form):
         if simulating:
             self.show_message(self.alarm(status))
         else:
-            self.show_message(_REAL, hint=True)
+            self.show_message(_OTHER, hint=True)
 
     def alarm(self, status: Status) -> str:
         """What is wrong with what is asked for here, while it is simulated."""

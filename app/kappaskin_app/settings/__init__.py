@@ -16,6 +16,8 @@ from kappaskin_app.settings.load import SPREAD_CASES as SPREAD_CASES
 from kappaskin_app.settings.load import TABLE_1_CASES as TABLE_1_CASES
 from kappaskin_app.settings.load import TWO_ENDED as TWO_ENDED
 from kappaskin_app.settings.load import Load, Noise
+from kappaskin_app.settings.scene import Own
+from kappaskin_app.settings.scene import Written as Written
 from kappaskin_app.settings.sensor import Electronics as Electronics
 from kappaskin_app.settings.sensor import Scanning as Scanning
 from kappaskin_app.settings.sensor import Spoils as Spoils
@@ -28,7 +30,7 @@ from kappaskin_app.settings.skin import Skin
 
 
 @dataclass(frozen=True)
-class SceneSettings(Skin, Load, Noise, Electronics, Spoils):
+class SceneSettings(Skin, Load, Noise, Electronics, Spoils, Own):
     """Those that make the simulated scene."""
 
 

@@ -23,6 +23,7 @@ from kappaskin_app.views.footprint import footprint
 Array = NDArray[np.float64]
 
 _LIFT = 0.006  # of the skin's size above the surface, or half of a line drowns in it
+_LOADS = 4  # that are drawn at once
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
@@ -78,7 +79,7 @@ class MembraneView(QWidget):
         arrow = pv.Arrow(start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35)
         self._arrows = [
             plotter.add_mesh(arrow, color="#e8543f", reset_camera=False, render=False)
-            for _ in range(2)
+            for _ in range(_LOADS)
         ]
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
@@ -267,11 +268,10 @@ class MembraneView(QWidget):
             actor.position = tuple(points[0])
             actor.orientation = (0.0, np.degrees(np.arctan2(out[0, 0], out[0, 2])), 0.0)
 
-    def show_loads(self, loads: Sequence[Load], moving_to: Array | None) -> None:
-        """Draw the simulated loads, none for a real sensor; a moving one where it is now."""
+    def show_loads(self, loads: Sequence[Load]) -> None:
+        """Draw the simulated loads where they are now, none for a real sensor."""
         loads = [load for load in loads if load.force]
-        moving = moving_to is not None and bool(np.isfinite(moving_to).all())
-        centres = [moving_to] if moving and loads else [load.centre() for load in loads]
+        centres = [load.centre() for load in loads]
         self.drag.handles = np.array(centres).reshape(-1, 2)
         size = self.skin.size
         for number, arrow in enumerate(self._arrows):
@@ -322,7 +322,7 @@ class MembraneView(QWidget):
         if self._surface_actor is None or lost == self._lost:
             return
         if lost:
-            self.show_loads((), None)
+            self.show_loads(())
         self._lost = lost
         self._surface_actor.mapper.scalar_visibility = not lost
         self._contact.visibility = not lost

@@ -2,7 +2,6 @@
 
 from kappaskin.cli.common import Switch, print_json
 from kappaskin.scene import load_scene
-from kappaskin.scene import plan as planned
 from kappaskin.studies.plan import plan_rows, plan_text
 
 
@@ -19,7 +18,7 @@ def plan(scene: str = "", *, json: Switch = False) -> None:
         Print one JSON object, with an entry for every known effect, instead of a table.
     """
     on = load_scene(scene)
-    rows = plan_rows(on, planned(on))
+    rows = plan_rows(on)
     if json:
         print_json({"scene": on.name, "accuracy": on.choice.accuracy, "effects": rows})
     else:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.effects import EFFECTS, ReadingEffect
-from kappaskin.scene import Choice, Plan, Scene
+from kappaskin.scene import Choice, Plan, Scene, plan
 from kappaskin.simulate import Simulator
 
 _TURNS, _FRAMES = 7, 40
@@ -56,15 +56,16 @@ def costs_of(scene: Scene, plan: Plan) -> dict[str, float]:
     return {name: own if name in alone else max(own - bare, 0.0) for name, own in median.items()}
 
 
-def plan_rows(scene: Scene, plan: Plan) -> list[dict[str, Any]]:
+def plan_rows(scene: Scene) -> list[dict[str, Any]]:
     """One row for every known effect: its entry in the plan, and `microseconds` per frame.
 
     That is None for an effect that there is nothing of in the scene.
     """
-    costs = costs_of(scene, plan)
+    made = plan(scene)
+    costs = costs_of(scene, made)
     return [
         entry.to_json() | {"microseconds": 1e6 * costs[entry.name] if entry.name in costs else None}
-        for entry in plan
+        for entry in made
     ]
 
 

@@ -1,0 +1,70 @@
+"""The plan of the scene that is played, measured beside the window while somebody looks."""
+
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from kappaskin import Beside, Refusal, Scene, Status, plan_rows
+from kappaskin_app.session import Session
+
+
+class Planning(QObject):
+    """Has every effect of the scene sized and timed; `changed` tells when there is news.
+
+    `rows` are what `plan_rows` tells of `scene`, none before it is known, and `refusal` says why it
+    cannot be.
+    """
+
+    changed = Signal()
+
+    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self.scene: Scene | None = None
+        self.rows: list[dict[str, Any]] = []
+        self.refusal = ""
+        self._measuring: Beside[dict[str, Any]] | None = None
+        self._coming: list[dict[str, Any]] = []
+        self._watched = False
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the rows are not yet those of the scene that is played."""
+        return self._measuring is not None
+
+    def watch(self, watched: bool) -> None:
+        """Plan while somebody looks, and only then."""
+        self._watched = watched
+        if watched:
+            self.follow(self._session.status)
+        elif self._measuring is not None:
+            self._end(self._measuring)
+            self.scene = None  # to be begun anew
+
+    def follow(self, _: Status) -> None:
+        """Take up what was measured meanwhile; begin anew when another scene is played."""
+        if not self._watched:
+            return
+        if self._measuring is not None:
+            self._take_up(self._measuring)
+        elif self._session.inside and self._session.scene is not self.scene:
+            self.scene, self.refusal, self._coming = self._session.scene, "", []
+            self._measuring = Beside("kappaskin-plan", plan_rows, self.scene)
+            self.changed.emit()
+
+    def close(self) -> None:
+        self.watch(False)
+
+    def _take_up(self, measuring: Beside[dict[str, Any]]) -> None:
+        try:
+            self._coming += measuring.poll()
+        except Refusal as refusal:
+            self.refusal = str(refusal)
+        if measuring.done:
+            self.rows = [] if self.refusal else self._coming
+            self._end(measuring)
+
+    def _end(self, measuring: Beside[dict[str, Any]]) -> None:
+        measuring.close()
+        self._measuring = None
+        self.changed.emit()

@@ -1,0 +1,258 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QComboBox, QFileDialog
+
+from kappaskin import EFFECTS, read_scene, scene_file
+from kappaskin_app.settings import Settings
+from kappaskin_app.window import MainWindow
+
+GALLERY, EDIT, EFFECTS_PAGE = range(3)
+
+
+@pytest.fixture
+def panel(window: MainWindow, until):
+    """The scene panel of a window, seen."""
+    window.actions_by_name["dock-scene"].trigger()
+    until(lambda: not window.scene.visibleRegion().isEmpty())
+    return window.scene
+
+
+def plays(window: MainWindow, name: str) -> bool:
+    scene, sensor = window.session.scene, window.session.status.sensor
+    there = sensor is not None and sensor.layout.positions.shape == scene.layout.positions.shape
+    return scene.name == name and there and window.session.estimate is not None
+
+
+def test_a_scene_of_the_gallery_plays_from_its_beginning_until_it_is_undone(
+    window, panel, until, qtbot
+) -> None:
+    qtbot.keyClick(window, Qt.Key.Key_F2)
+    assert not panel.isVisible()
+    qtbot.keyClick(window, Qt.Key.Key_F2)
+    assert panel.isVisible()
+    panel.gallery.chosen.emit("fingertip")
+    until(lambda: plays(window, "fingertip"))
+    until(lambda: window.session.status.sensor.layout.patch.strip)
+    assert not window.panels.load.editor("load_case").isEnabled()
+    assert window.badge.text() == "SIM"
+    window.history.stack.undo()
+    until(lambda: plays(window, "circle"))
+    until(lambda: not window.session.status.sensor.layout.patch.strip)
+    until(lambda: window.panels.load.editor("load_case").isEnabled())
+
+
+def test_the_simulated_skin_comes_back_to_the_panels(window, panel, until, qtbot) -> None:
+    panel.gallery.chosen.emit("hum")
+    until(lambda: plays(window, "hum"))
+    qtbot.keyClick(window, Qt.Key.Key_M, Qt.KeyboardModifier.ControlModifier)
+    until(lambda: plays(window, "circle"))
+    assert window.history.settings.written is None
+
+
+@pytest.mark.parametrize("name", ["sphere", "fingertip", "calibration"])
+def test_a_scene_named_as_the_source_is_played_as_it_is_written(opened, until, name) -> None:
+    window = opened(f"sim:{name}")
+    until(lambda: plays(window, name))
+    assert window.history.settings.written.text == scene_file(name).read_text()
+
+
+def test_a_scene_that_there_is_not_is_said(opened, until) -> None:
+    window = opened("sim:sphear")
+    until(lambda: "sphear" in window.panels.connection.message.text())
+    assert window.history.settings == Settings()
+
+
+def test_text_and_forms_change_the_scene_and_each_other_while_it_plays(
+    window, panel, until, qtbot
+) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    panel.setCurrentIndex(EDIT)
+    text = panel.editor.text
+    assert text.toPlainText() == scene_file("tapping").read_text()
+    meetings = window.session.status.meetings
+    text.setPlainText(text.toPlainText().replace("force = 0.15", "force = 0.3"))
+    until(lambda: window.session.scene.stimuli[0].what.force == 0.3)
+    assert window.session.status.meetings == meetings  # the same skin goes on
+    panel.editor.form.edited.emit(text.toPlainText().replace("x = 0.06", "x = 0.04"))
+    until(lambda: window.session.scene.stimuli[0].what.x == 0.04)
+    assert "x = 0.04" in text.toPlainText()
+    while window.history.settings.written.text != scene_file("tapping").read_text():
+        window.history.stack.undo()
+    until(lambda: window.session.scene.stimuli[0].what.force == 0.15)
+    assert text.toPlainText() == scene_file("tapping").read_text()
+
+
+def test_text_that_is_no_scene_leaves_the_last_one_and_says_where(window, panel, until) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    panel.setCurrentIndex(EDIT)
+    scene, text = window.session.scene, panel.editor.text
+    good = text.toPlainText()
+    for bad, said in (
+        (good.replace("sd =", "sds ="), "expected sd = a number"),
+        (good.replace("sd = 0.006", "sd = 0.006 0.1"), "a mistake in it"),
+    ):
+        text.setPlainText(bad)
+        until(lambda said=said: said in panel.editor.message.text())
+        assert window.session.scene is scene
+        (mark,) = panel.editor.text.extraSelections()
+        marked = mark.cursor.blockNumber() + 1
+        assert f"line {marked}" in panel.editor.message.text()
+        assert str(scene_file("tapping").parent) not in panel.editor.message.text()
+        assert panel.editor.message.isVisible()
+    text.setPlainText(good)
+    until(lambda: not panel.editor.message.isVisible())
+    assert not panel.editor.text.extraSelections()
+
+
+def test_the_keys_of_undo_in_the_text_undo_what_the_window_did(window, panel, until, qtbot) -> None:
+    panel.gallery.chosen.emit("hum")
+    until(lambda: plays(window, "hum"))
+    panel.setCurrentIndex(EDIT)
+    text = panel.editor.text
+    text.setFocus()
+    before = text.toPlainText()
+    qtbot.keyClicks(text, "# words")
+    qtbot.keyClick(text, Qt.Key.Key_Return)
+    assert text.toPlainText() != before
+    qtbot.keyClick(text, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    until(lambda: text.toPlainText() == before)
+    assert window.history.settings.written.text == before
+
+
+def test_the_first_change_of_the_panels_own_scene_makes_it_a_written_one(
+    window, panel, until
+) -> None:
+    panel.setCurrentIndex(EDIT)
+    text = panel.editor.text.toPlainText()
+    assert "orbit" in text
+    own = read_scene(text, Path("own.toml"))
+    assert own.stimuli == window.session.scene.stimuli
+    panel.editor.text.setPlainText(text.replace("period = 4.0", "period = 2.0"))
+    until(lambda: window.session.scene.duration == 2.0)
+    assert window.session.scene.name == "own"
+    assert window.session.status.sensor.layout.shape == (10, 10)
+
+
+def force(panel, name: str, how: str) -> None:
+    box: QComboBox = panel.effects.forces[name]
+    box.setCurrentIndex(box.findData(how))
+    box.activated.emit(box.currentIndex())
+
+
+def row_of(panel, name: str) -> list[str]:
+    number = list(panel.effects.forces).index(name)
+    return [panel.effects.table.item(number, column).text() for column in (2, 3, 4, 5, 6)]
+
+
+def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, until) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    assert not window.planning.waiting  # nobody looks
+    panel.setCurrentIndex(EFFECTS_PAGE)
+    until(lambda: bool(window.planning.rows) and not window.planning.waiting, 60.0)
+    assert sorted(panel.effects.forces) == sorted(EFFECTS)
+    kept, size, error, took, why = row_of(panel, "gaussian-noise")
+    assert kept == "kept"
+    assert error.endswith("%")
+    assert took.endswith("s")
+    assert size
+    assert why
+    assert row_of(panel, "creep")[0] == ""
+    assert not panel.effects.forces["creep"].isEnabled()
+    meetings = window.session.status.meetings
+    force(panel, "gaussian-noise", "off")
+    until(lambda: window.session.scene.choice.off == {"gaussian-noise"})
+    until(lambda: row_of(panel, "gaussian-noise")[0] == "left out", 60.0)
+    assert 'off = ["gaussian-noise"]' in panel.editor.text.toPlainText()
+    assert window.session.status.meetings == meetings
+    force(panel, "gaussian-noise", "planned")
+    until(lambda: not window.session.scene.choice.off)
+    until(lambda: row_of(panel, "gaussian-noise")[0] == "kept", 60.0)
+
+
+def test_the_timeline_stops_seeks_and_goes_on(window, panel, until, qtbot) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    assert window.timeline.isVisible()
+    qtbot.keyClick(window, Qt.Key.Key_P, Qt.KeyboardModifier.ControlModifier)
+    until(lambda: window.session.status.playing.speed == 0)
+    window.timeline.sought.emit(0.05)
+    until(lambda: window.session.time == pytest.approx(0.05))
+    first = window.session.estimate.sequence
+    until(lambda: window.session.estimate.sequence > first + 50)
+    assert window.session.time == pytest.approx(0.05)
+    depth = window.session.estimate.surface.copy()
+    window.timeline.sought.emit(0.75)
+    until(lambda: np.abs(window.session.estimate.surface).max() < 0.2 * np.abs(depth).max())
+    window.timeline.play_wanted.emit(True)
+    until(lambda: window.session.status.playing.speed == 1)
+
+
+def test_where_nothing_moves_there_is_no_timeline(window, panel, until) -> None:
+    panel.gallery.chosen.emit("fingertip")
+    until(lambda: plays(window, "fingertip"))
+    until(lambda: not window.timeline.isVisible())
+
+
+def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
+    window, panel, until
+) -> None:
+    panel.gallery.chosen.emit("sphere")
+    until(lambda: plays(window, "sphere"))
+    window.session.run(False)
+    window.session.seek(1.5)
+    until(lambda: len(window.membrane.drag.handles) == 1)
+    x, y = window.membrane.drag.handles[0].tolist()
+    scene = window.session.scene
+    drag = window.membrane.drag
+    drag.grabbed.emit(x, y)
+    for step in range(1, 11):
+        drag.dragged.emit(x + 1e-3 * step, y)
+    there = np.array([x + 0.01, y])
+    until(lambda: np.abs(window.session.estimate.true_contact - there).max() < 2e-3)
+    drag.given_up.emit()
+    until(lambda: window.session.scene.stimuli == scene.stimuli)
+    drag.grabbed.emit(x, y)
+    drag.dragged.emit(x + 0.01, y)
+    drag.released.emit()
+    until(lambda: f"x = {x + 0.01:g}" in window.history.settings.written.text)
+    until(lambda: np.abs(window.session.estimate.true_contact - there).max() < 2e-3)
+    window.history.stack.undo()
+    until(lambda: window.session.scene.stimuli[0].what.x == pytest.approx(x))
+
+
+def test_scenes_are_opened_from_files_and_saved_into_them(
+    window, panel, until, tmp_path, monkeypatch
+) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text(scene_file("hum").read_text())
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(mine), ""))
+    window.actions_by_name["open-scene"].trigger()
+    until(lambda: plays(window, "mine"))
+    out = tmp_path / "out"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(out), ""))
+    window.actions_by_name["save-scene"].trigger()
+    assert (tmp_path / "out.toml").read_text() == mine.read_text()
+    nothing = tmp_path / "nothing.toml"
+    nothing.write_bytes(b"\xff\xfe\x00")
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(nothing), ""))
+    said = []
+    window.statusBar().messageChanged.connect(said.append)
+    window.actions_by_name["open-scene"].trigger()
+    until(lambda: any("cannot be read" in words for words in said))
+    assert plays(window, "mine")
+
+
+def test_the_pages_have_their_keys_and_nothing_is_clipped(window, panel, until) -> None:
+    window.resize(1280, 800)
+    for index in range(panel.count()):
+        panel.setCurrentIndex(index)
+        until(lambda: panel.currentWidget().isVisible())
+        page = panel.currentWidget()
+        assert page.minimumSizeHint().width() <= panel.width()
+        assert panel.mapTo(window, QPoint(0, 0)).x() + panel.width() <= window.width()

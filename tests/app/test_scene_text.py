@@ -1,0 +1,118 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kappaskin import SCENES, load_scene, planned, read_scene, scene_file
+from kappaskin_app.scene_text import OFF, ON, PLANNED, forced, shifted
+from kappaskin_app.touching import Held, touches_at
+
+READY = [name for name in SCENES if load_scene(name).stimuli]
+
+
+def text_of(name: str) -> str:
+    return scene_file(name).read_text(encoding="utf-8")
+
+
+def read(text: str, name: str):
+    return read_scene(text, scene_file(name))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_an_effect_forced_on_or_off_is_and_the_rest_of_the_scene_stays(name) -> None:
+    scene, text = load_scene(name), text_of(name)
+    for how, kept in ((ON, True), (OFF, False)):
+        changed = read(forced(text, "quantisation", how), name)
+        assert ("quantisation" not in planned(changed).choice.off) == kept
+        assert changed.effects == scene.effects
+        for time in (0.0, 0.7):
+            assert _drawn(changed, time) == _drawn(scene, time)
+        assert changed.choice.accuracy == scene.choice.accuracy
+
+
+def test_an_effect_left_to_the_plan_again_is_forced_no_more() -> None:
+    text = text_of("pencil")
+    on = forced(text, "quantisation", ON)
+    assert read(on, "pencil").choice.on == {"quantisation"}
+    off = forced(on, "quantisation", OFF)
+    assert (read(off, "pencil").choice.on, read(off, "pencil").choice.off) == (
+        frozenset(),
+        {"quantisation"},
+    )
+    again = read(forced(off, "quantisation", PLANNED), "pencil").choice
+    assert not again.on | again.off
+    assert again.auto
+
+
+def test_in_a_list_of_effects_one_is_forced_by_being_in_it() -> None:
+    listed = text_of("centre").replace('choose = "linear"', 'choose = ["uniform-noise"]')
+    on = read(forced(listed, "quantisation", ON), "centre").choice
+    assert on.on == {"uniform-noise", "quantisation"}
+    for how in (OFF, PLANNED):
+        assert "uniform-noise" not in read(forced(listed, "uniform-noise", how), "centre").choice.on
+
+
+def test_comments_and_order_stay() -> None:
+    text = text_of("pencil")
+    changed = forced(shifted(text, 0, 0.001, -0.002), "saturation", OFF)
+    assert "# frames/s: a rigid object takes milliseconds to find its place" in changed
+    there = [line for line in text.splitlines() if not line.startswith(("x =", "y ="))]
+    left = iter(changed.splitlines())
+    assert all(line in left for line in there)
+
+
+@pytest.mark.parametrize("name", READY)
+def test_a_touch_that_is_shifted_in_the_text_is_where_it_was_dragged_to(name) -> None:
+    scene = load_scene(name)
+    start = touches_at(scene, _pressed_at(scene))[0]
+    x, y = start.load.centre().tolist()
+    held = Held.at_place(scene, _pressed_at(scene), x, y)
+    assert held is not None
+    moved = held.moved_to(x + 1e-3, y)
+    assert held.moved
+    text = shifted(text_of(name), held.number, *held.by)
+    written = read(text, name)
+    for time in (0.0, 0.3, _pressed_at(scene)):
+        there = [touch.load.centre() for touch in touches_at(written, time)]
+        expected = [touch.load.centre() for touch in touches_at(moved, time)]
+        assert np.allclose(there, expected, atol=1e-6)
+
+
+def _drawn(scene, time: float) -> list[object]:
+    return [touch.load for touch in touches_at(scene, time)]
+
+
+def _pressed_at(scene) -> float:
+    """A time in s at which something presses."""
+    times = np.linspace(0, scene.duration, 50, endpoint=False).tolist()
+    return next(time for time in times if touches_at(scene, time))
+
+
+def test_a_touch_stops_at_the_rim() -> None:
+    for name in ("sphere", "line", "two-contacts"):
+        scene = load_scene(name)
+        time = _pressed_at(scene)
+        held = Held.at_place(scene, time, 0.05, 0.05)
+        assert held is not None
+        before = held.moved_to(0.055, 0.05)
+        assert held.moved_to(5.0, 0.05).stimuli == before.stimuli
+
+
+def test_of_two_touches_the_nearer_one_is_held() -> None:
+    scene = load_scene("two-contacts")
+    time = _pressed_at(scene)
+    for touch in touches_at(scene, time):
+        held = Held.at_place(scene, time, *touch.load.centre().tolist())
+        assert held is not None
+        assert held.number == touch.number
+
+
+def test_what_lies_on_cylinders_has_nothing_to_hold() -> None:
+    assert Held.at_place(load_scene("calibration"), 0.0, 0.05, 0.05) is None
+
+
+def test_own_scenes_need_no_file(tmp_path: Path) -> None:
+    scene = read_scene(forced(text_of("centre"), "saturation", OFF), tmp_path / "own.toml")
+    assert scene.name == "own"
+    assert replace(scene, name="centre").choice.off == {"saturation", "finite-slope"}
