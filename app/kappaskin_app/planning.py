@@ -4,15 +4,15 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Beside, Refusal, Scene, Status, plan_rows
+from kappaskin import Beside, Refusal, Scene, Status, plan_told
 from kappaskin_app.session import Session
 
 
 class Planning(QObject):
     """Has every effect of the scene sized and timed; `changed` tells when there is news.
 
-    `rows` are what `plan_rows` tells of `scene`, none before it is known, and `refusal` says why it
-    cannot be.
+    `rows` are what `plan_told` told last, of `scene` or, while `waiting`, of the one before it;
+    `refusal` says why there are none.
     """
 
     changed = Signal()
@@ -23,13 +23,12 @@ class Planning(QObject):
         self.scene: Scene | None = None
         self.rows: list[dict[str, Any]] = []
         self.refusal = ""
-        self._measuring: Beside[dict[str, Any]] | None = None
-        self._coming: list[dict[str, Any]] = []
+        self._measuring: Beside[list[dict[str, Any]]] | None = None
         self._watched = False
 
     @property
     def waiting(self) -> bool:
-        """Whether the rows are not yet those of the scene that is played."""
+        """Whether not everything is known yet of the scene that is played."""
         return self._measuring is not None
 
     def watch(self, watched: bool) -> None:
@@ -48,23 +47,24 @@ class Planning(QObject):
         if self._measuring is not None:
             self._take_up(self._measuring)
         elif self._session.inside and self._session.scene is not self.scene:
-            self.scene, self.refusal, self._coming = self._session.scene, "", []
-            self._measuring = Beside("kappaskin-plan", plan_rows, self.scene)
+            self.scene, self.refusal = self._session.scene, ""
+            self._measuring = Beside("kappaskin-plan", plan_told, self.scene)
             self.changed.emit()
 
     def close(self) -> None:
         self.watch(False)
 
-    def _take_up(self, measuring: Beside[dict[str, Any]]) -> None:
+    def _take_up(self, measuring: Beside[list[dict[str, Any]]]) -> None:
         try:
-            self._coming += measuring.poll()
+            for rows in measuring.poll():
+                self.rows = rows
+                self.changed.emit()
         except Refusal as refusal:
-            self.refusal = str(refusal)
+            self.rows, self.refusal = [], str(refusal)
         if measuring.done:
-            self.rows = [] if self.refusal else self._coming
             self._end(measuring)
 
-    def _end(self, measuring: Beside[dict[str, Any]]) -> None:
+    def _end(self, measuring: Beside[list[dict[str, Any]]]) -> None:
         measuring.close()
         self._measuring = None
         self.changed.emit()

@@ -363,9 +363,9 @@ class MainWindow(QMainWindow):
 
     def _show_plan(self) -> None:
         planning, effects = self.planning, self.scene.effects
-        if planning.rows and planning.scene is not None and not planning.waiting:
+        if planning.rows and planning.scene is not None:
             effects.show_plan(planning.rows, planning.scene.choice)
-        elif planning.refusal or planning.waiting:
+        if planning.refusal or planning.waiting:
             effects.show_waiting(planning.refusal or _PLANNING)
 
     def _show_shape(self) -> None:

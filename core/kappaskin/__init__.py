@@ -112,7 +112,7 @@ from kappaskin.studies.cost import costs as costs
 from kappaskin.studies.cost import effect_costs as effect_costs
 from kappaskin.studies.cost import frontier as frontier
 from kappaskin.studies.cost import settings_to_try as settings_to_try
-from kappaskin.studies.plan import plan_rows as plan_rows
+from kappaskin.studies.plan import plan_told as plan_told
 from kappaskin.touch import NO_OBJECT as NO_OBJECT
 from kappaskin.touch import ContactObject as ContactObject
 from kappaskin.touch import ObjectFinder as ObjectFinder

@@ -40,7 +40,7 @@ class SceneEditor(QWidget):
         above.addWidget(self.save)
         right = QWidget()
         stack = QVBoxLayout(right)
-        stack.setContentsMargins(0, 0, 0, 0)
+        stack.setContentsMargins(6, 0, 0, 0)
         stack.addLayout(above)
         stack.addWidget(self.text, 1)
         stack.addWidget(self.message)

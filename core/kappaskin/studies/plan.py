@@ -1,19 +1,22 @@
 """What each effect of a scene costs per frame, measured here, beside its place in the plan."""
 
+import math
 import statistics
 import textwrap
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from kappaskin.effects import EFFECTS, ReadingEffect
+from kappaskin.frames import Array
 from kappaskin.scene import Choice, Plan, Scene, plan
 from kappaskin.simulate import Simulator
 
-_TURNS, _FRAMES = 7, 40
+_TURNS, _FRAMES, _LEAST = 7, 40, 4  # turns, and frames of each: usually, and at least
+_TURN = 0.02  # s that the frames of one turn may take
 
 
 def _only(scene: Scene, *names: str) -> Scene:
@@ -26,47 +29,68 @@ def _frame(scene: Scene, *names: str) -> Callable[[float], object]:
     return lambda moment: simulator.reading(scan, moment)
 
 
-def _running(scene: Scene, effect: ReadingEffect) -> Callable[[float], object]:
-    """The effect at work on the readings of the scene as it begins."""
-    bare = Simulator(_only(scene))
-    _, curvature = bare.reading(scene.sensor().scan(), 0.0)
+def _running(curvature: Array, effect: ReadingEffect) -> Callable[[float], object]:
+    """The effect at work on readings `curvature` (3 P,) in 1/m."""
     running = effect.start(curvature.shape, np.random.default_rng(0))
     return lambda moment: running(curvature, moment)
 
 
+def _seconds(run: Callable[[float], object], moments: list[float]) -> float:
+    """Seconds that a call took, on average over `moments`."""
+    start = time.perf_counter()
+    for moment in moments:
+        run(moment)
+    return (time.perf_counter() - start) / len(moments)
+
+
 def costs_of(scene: Scene, plan: Plan) -> dict[str, float]:
-    """Seconds per frame that each effect there is adds to the bare plate: medians, in turn."""
+    """Seconds per frame that each effect there is adds to the bare plate: medians, in turn.
+
+    Frames follow one another, or where so few can be afforded, lie evenly over the scene.
+    """
+    bare = Simulator(_only(scene))
+    _, curvature = bare.reading(scene.sensor().scan(), 0.0)
     runs = {"": _frame(scene)}
     for entry in plan:
         if isinstance(entry.effect, ReadingEffect):
-            runs[entry.name] = _running(scene, entry.effect)
+            runs[entry.name] = _running(curvature, entry.effect)
         elif entry.effect is not None:
             runs[entry.name] = _frame(scene, entry.name)
+    once = _seconds(runs[""], [scene.duration * n / _LEAST for n in range(_LEAST)])
+    frames = min(max(int(_TURN / once), _LEAST), _FRAMES)
+    step = max(1 / scene.rate, scene.duration / (_TURNS * frames) if frames < _FRAMES else 0.0)
     taken = {name: list[float]() for name in runs}
     for turn in range(_TURNS):
-        moments = [(turn * _FRAMES + n) / scene.rate for n in range(_FRAMES)]
+        moments = [(turn * frames + n) * step for n in range(frames)]
         for name, run in runs.items():
-            start = time.perf_counter()
-            for moment in moments:
-                run(moment)
-            taken[name].append((time.perf_counter() - start) / _FRAMES)
+            taken[name].append(_seconds(run, moments))
     median = {name: statistics.median(times) for name, times in taken.items()}
-    bare = median.pop("")
     alone = {e.name for e in plan if isinstance(e.effect, ReadingEffect)}
-    return {name: own if name in alone else max(own - bare, 0.0) for name, own in median.items()}
+    whole = median.pop("")
+    return {name: own if name in alone else max(own - whole, 0.0) for name, own in median.items()}
+
+
+def plan_told(scene: Scene) -> Generator[list[dict[str, Any]]]:
+    """One row for every known effect: its entry in the plan, and `microseconds` per frame.
+
+    That is None for an effect that there is nothing of in the scene. The rows come twice: at once,
+    with NaN for times that are not known yet, and then with all.
+    """
+    made = plan(scene)
+    there = [entry.name for entry in made if entry.effect is not None]
+    for seconds in (lambda: dict.fromkeys(there, math.nan), lambda: costs_of(scene, made)):
+        costs = seconds()
+        yield [
+            entry.to_json()
+            | {"microseconds": 1e6 * costs[entry.name] if entry.name in costs else None}
+            for entry in made
+        ]
 
 
 def plan_rows(scene: Scene) -> list[dict[str, Any]]:
-    """One row for every known effect: its entry in the plan, and `microseconds` per frame.
-
-    That is None for an effect that there is nothing of in the scene.
-    """
-    made = plan(scene)
-    costs = costs_of(scene, made)
-    return [
-        entry.to_json() | {"microseconds": 1e6 * costs[entry.name] if entry.name in costs else None}
-        for entry in made
-    ]
+    """The rows of `plan_told` with all times."""
+    *_, rows = plan_told(scene)
+    return rows
 
 
 def plan_text(scene: Scene, rows: list[dict[str, Any]]) -> str:
