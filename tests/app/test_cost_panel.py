@@ -138,8 +138,8 @@ def test_a_click_on_a_point_switches_to_it_and_is_one_step_to_undo(
     s = measured.history.settings
     asked = (s.method, s.functions_x, s.functions_y, s.elements_x, s.elements_y)
     assert Setting(asked[0], asked[1:3], asked[3:]) == cost.setting
+    until(lambda: measured.costing.present == cost.setting)
     until(lambda: measured.costing.predicted() in plot.frontier.costs)
-    assert measured.costing.present == Setting(asked[0], asked[1:3], asked[3:])
     measured.history.stack.undo()
     assert measured.history.settings == was
 
