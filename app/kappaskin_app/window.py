@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -28,7 +29,6 @@ from kappaskin import (
     Status,
     scene_file,
     serial_ports,
-    write_scene,
 )
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
@@ -359,7 +359,8 @@ class MainWindow(QMainWindow):
         if written is not None:
             self.scene.editor.show_scene(written.text, written.file.name)
         elif self.session.inside:
-            self.scene.editor.show_scene(write_scene(self.session.scene), "The panels' skin")
+            with suppress(Refusal):  # no such skin: what is shown is the last one's
+                self.scene.editor.show_scene(text_of(settings), "The panels' skin")
 
     def _show_plan(self) -> None:
         planning, effects = self.planning, self.scene.effects

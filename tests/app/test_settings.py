@@ -166,7 +166,7 @@ def test_a_skin_that_cannot_be_is_explained_until_it_can(panels: Panels) -> None
     shape.show_status(status, simulating=True)
     assert shape.message.text() == "The last skin stays: too small a radius."
     shape.show_status(status, simulating=False)
-    assert "Only for the simulation" in shape.message.text()
+    assert "Only for the simulated skin" in shape.message.text()
     shape.show_refusal("")
     shape.show_status(status, simulating=True)
     assert shape.message.text() == ""

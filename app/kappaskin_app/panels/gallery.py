@@ -26,7 +26,9 @@ from kappaskin_app.views.relief import Relief, relief
 from kappaskin_app.views.scene_picture import picture
 
 # What is pleasant to watch, then what the paper has, then what one effect does.
-_WATCHED = "sphere pencil tapping two-contacts fingertip circle cylinder edge slipping"
+_WATCHED = (
+    "sphere pencil coin bolt tapping two-contacts fingertip circle exploring cylinder edge slipping"
+)
 _PAPER = "centre off-centre line calibration"
 _EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam hot-room hum"
 ORDER = tuple(f"{_WATCHED} {_PAPER} {_EFFECTS}".split())

@@ -15,6 +15,7 @@ class Skew(Effect):
     formula: ClassVar = "scan time times rate of curvature over peak curvature"
 
     def size(self, survey: Survey) -> Size:
-        number = survey.scan_time * survey.rate / survey.peak
+        number = survey.read_after.max() * survey.rates.max() / survey.peak
+        change = float((survey.read_after * survey.rates).max()) / survey.peak
         # However fast it moves, a reading goes from one peak to the opposite one at most.
-        return Size(number, min(number, 2.0))
+        return Size(float(number), min(change, 2.0))

@@ -18,8 +18,8 @@ class Survey:
 
     `coefficients` (S, N) in m at `times` (S,) in s are of `basis`; `forces` (S, N) in N the modal
     forces that make them, all zero where the skin lies on a cylinder; `curvature` (S, 3, P) in 1/m
-    is what point-like elements of `layout` would read; `rate` in 1/m/s is the fastest that one of
-    them changes. A scan takes `scan_time` s.
+    is what point-like elements of `layout` would read; `rates` (3 P,) in 1/m/s is the fastest that
+    each of them changes, and `read_after` (3 P,) in s when in a scan it is read.
     """
 
     plate: Plate
@@ -30,9 +30,9 @@ class Survey:
     forces: Array
     coefficients: Array
     curvature: Array
-    rate: float
+    rates: Array
     duration: float
-    scan_time: float
+    read_after: Array
 
     @cached_property
     def peak(self) -> float:

@@ -37,13 +37,13 @@ class Pressing:
 
     def take(self, scene: Scene) -> None:
         """Go on with what touches the same skin in another `scene`."""
-        self._scene = scene
-        if scene.indenter and self._press is None:
+        self._scene, self._indenter = scene, scene.indenter
+        if self._indenter and self._press is None:
             self._press = Press(self._plate, self._basis)
 
     def __call__(self, time: float) -> Pressed:
         """What presses at `time` in s."""
-        stimulus = self._scene.indenter
+        stimulus = self._indenter
         if stimulus is None or self._press is None or not isinstance(stimulus.what, Indenter):
             loads = self._scene.loads_at(time)
             forces = [load.modal(self._basis) for load in loads]

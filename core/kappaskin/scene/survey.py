@@ -42,6 +42,8 @@ def survey(scene: Scene) -> Survey:
     if scene.laid is not None:
         laid = [np.repeat(scene.laid.curvature(t), len(layout)) for t in times.tolist()]
         curvature = np.reshape(laid, curvature.shape)
+    scan, read_after = scene.sensor().scan(), np.zeros(3 * len(layout))
+    read_after[scan.channels] = scan.times
     return Survey(
         scene.plate,
         basis,
@@ -51,7 +53,7 @@ def survey(scene: Scene) -> Survey:
         forces,
         c,
         curvature,
-        float(np.abs(compliance.after(later - forces) @ M.T).max(initial=0.0)) / _STEP,
+        np.abs(compliance.after(later - forces) @ M.T).max(axis=0) / _STEP,
         time_to_watch(scene),
-        scene.sensor().scan().duration,
+        read_after,
     )

@@ -75,7 +75,9 @@ class SectionBox(QGroupBox):
             self._add_across(self._steps(steps))
         if section.adding:
             self.grid.addWidget(
-                self._menu_button(f"+ {section.adding}", section.tip, section.more),
+                self._menu_button(
+                    f"+ {section.adding}", section.tip or section.adding, section.more
+                ),
                 *(self.grid.rowCount(), 0, 1, 2),
                 Qt.AlignmentFlag.AlignLeft,
             )
