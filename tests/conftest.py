@@ -45,11 +45,17 @@ def _children() -> set[int]:
     return {int(pid) for pid in found.split()}
 
 
+_NO_WINDOW = ("drawn", "footprint", "history", "scale", "scene_picture", "scene_text", "simulation")
+"""Of the app's tests, files that open no window."""
+
+
 class ByFile(LoadFileScheduling):
     """Keeps a file's tests in one process, and all windows in one: they share a keyboard."""
 
     def _split_scope(self, nodeid: str) -> str:
-        return "windows" if nodeid.startswith("tests/app/") else super()._split_scope(nodeid)
+        file = super()._split_scope(nodeid)
+        bare = file in [f"tests/app/test_{name}.py" for name in _NO_WINDOW]
+        return "windows" if file.startswith("tests/app/") and not bare else file
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:
