@@ -3,6 +3,7 @@
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
@@ -85,6 +86,11 @@ class HeightMap:
         return height
 
     def keel(self) -> Array:
+        return self._lowest
+
+    @cached_property
+    def _lowest(self) -> Array:
+        """The lowest pixel (k, 2) in m of each block."""
         places: list[tuple[float, float]] = []
         ny, nx = self.heights.shape
         for top, below in _blocks(ny):
