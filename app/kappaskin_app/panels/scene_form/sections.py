@@ -5,10 +5,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from kappaskin_app.effects import called, explained
 from kappaskin_app.panels.scene_form import changes
 from kappaskin_app.panels.scene_form.changes import Place
 from kappaskin_app.panels.scene_form.parts import instead_of, kinds, known, needed, optional
-from kappaskin_app.panels.scene_form.words import How, explained, how_of, named, words_of
+from kappaskin_app.panels.scene_form.words import How, how_of, named, words_of
 
 MOST_WHOLE = 2**31 - 1  # that a box for whole numbers can hold
 MOST = 1e12  # of any number shown in a box
@@ -193,14 +194,14 @@ def _effects(said: Said) -> Section:
     there = [name for name, table in said.items() if isinstance(table, Mapping)]
     blocks = tuple(
         _section(
-            *(named(name), "effects", name, said[name], ("effects", name)),
+            *(called(name), "effects", name, said[name], ("effects", name)),
             removable=True,
             tip=explained(name),
         )
         for name in there
     )
     more = tuple(
-        Offer(named(name), explained(name), _adding_effect(name))
+        Offer(called(name), explained(name), _adding_effect(name))
         for name in kinds("effects")
         if name not in there
     )
