@@ -102,7 +102,7 @@ class Wishes:
             self._history.wish("written", "the scene", written=Written(text, file))
 
     def force(self, effect: str, how: str) -> None:
-        """Force an effect on or off, or leave it to the plan."""
+        """Force an effect on or off, or leave it to the plan; refused where the text is no TOML."""
         self.write(forced(text_of(self._history.settings), effect, how))
 
     # Loads that are dragged.
@@ -127,10 +127,10 @@ class Wishes:
 
     def release(self) -> None:
         held, written = self._held, self._history.settings.written
+        self._gesture, self._held = -1, None
         if held is not None and written is not None and held.moved:
             text = shifted(written.text, held.number, *held.by)
             self._history.change("Drag the load", -1, written=replace(written, text=text))
-        self._gesture, self._held = -1, None
 
     def give_up(self) -> None:
         """Put the load back to where it was grabbed."""

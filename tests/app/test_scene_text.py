@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin import SCENES, load_scene, planned, read_scene, scene_file
+from kappaskin import SCENES, Refusal, load_scene, planned, read_scene, scene_file
 from kappaskin_app.scene_text import OFF, ON, PLANNED, forced, shifted
 from kappaskin_app.touching import Held, touches_at
 
@@ -116,3 +116,20 @@ def test_own_scenes_need_no_file(tmp_path: Path) -> None:
     scene = read_scene(forced(text_of("centre"), "saturation", OFF), tmp_path / "own.toml")
     assert scene.name == "own"
     assert replace(scene, name="centre").choice.off == {"saturation", "finite-slope"}
+
+
+def test_a_touch_that_is_a_table_by_itself_is_shifted_too() -> None:
+    alone = text_of("centre").replace("[[touch]]", "[touch]")
+    moved = read(shifted(alone, 0, 1e-3, 0.0), "centre").loads[0].centre()
+    assert np.allclose(moved - read(alone, "centre").loads[0].centre(), (1e-3, 0.0))
+
+
+def test_a_text_that_cannot_be_changed_is_refused() -> None:
+    with pytest.raises(Refusal, match="expected a scene in TOML"):
+        forced("format =", "saturation", OFF)
+    with pytest.raises(Refusal, match="expected a scene in TOML"):
+        shifted("format = 1\nformat = 1", 0, 0.0, 0.0)
+    with pytest.raises(Refusal, match="expected a touch 3 to move, got a text with 2"):
+        shifted(text_of("two-contacts"), 2, 0.0, 0.0)
+    with pytest.raises(Refusal, match="expected a touch 1 to move, got a text with 0"):
+        shifted("format = 1", 0, 0.0, 0.0)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from kappaskin_app.effects import called, explained
-from kappaskin_app.panels.scene_form import changes
-from kappaskin_app.panels.scene_form.changes import Place
-from kappaskin_app.panels.scene_form.parts import instead_of, kinds, known, needed, optional
 from kappaskin_app.panels.scene_form.words import How, how_of, named, words_of
+from kappaskin_app.scene_text import changes
+from kappaskin_app.scene_text.changes import Place
+from kappaskin_app.scene_text.parts import instead_of, kinds, known, needed, optional
 
 MOST_WHOLE = 2**31 - 1  # that a box for whole numbers can hold
 MOST = 1e12  # of any number shown in a box
