@@ -30,6 +30,7 @@ from kappaskin import (
     edges_of,
     planned,
     read_scene,
+    read_scene_text,
     scene_file,
     write_scene,
 )
@@ -211,11 +212,8 @@ def named(source: str) -> dict[str, Any]:
 
 
 def written(file: Path) -> Written:
-    """The scene in `file`, as it is written there; raises `Refusal` for one that is no text."""
-    try:
-        return Written(file.read_text(encoding="utf-8"), file)
-    except (OSError, UnicodeDecodeError) as error:
-        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
+    """The scene in `file`, as it is written there; raises `Refusal` for a file of no scene."""
+    return Written(read_scene_text(file), file)
 
 
 def text_of(settings: Settings) -> str:
