@@ -9,7 +9,8 @@ from PySide6.QtGui import QImage
 
 from kappaskin import load_scene
 from kappaskin_app.theme import DARK, LIGHT
-from kappaskin_app.views.timeline import Timeline, profile
+from kappaskin_app.views.timeline import Timeline
+from kappaskin_app.views.track import profile
 
 LEFT = Qt.MouseButton.LeftButton
 
