@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.scene_form.editors import Editor, editor_for
-from kappaskin_app.panels.scene_form.sections import Change, Offer, Row, Section
+from kappaskin_app.panels.scene_form.section import Change, Offer, Row, Section
 from kappaskin_app.scene_text import changes
 from kappaskin_app.scene_text.changes import Place
 
