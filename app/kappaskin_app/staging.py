@@ -6,7 +6,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import Refusal, Scene, Status, scene_file
+from kappaskin import SCENES, Refusal, Scene, Status, scene_file
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.panels.scene import ScenePanel
@@ -110,7 +110,7 @@ class Staging(QObject):
     def _show_scene(self, scene: Scene) -> None:
         self._timeline.show_scene(scene)
         settings = self._history.settings
-        self._panel.gallery.show_playing(settings.written.file.stem if settings.written else "")
+        self._panel.gallery.show_playing(_ready_name(settings))
         self._show_text(settings)
 
     def _show_text(self, settings: Settings) -> None:
@@ -133,3 +133,9 @@ class Staging(QObject):
             self._timeline.show_scene(None)
             return
         self._timeline.show_time(self._session.time, self._session.running)
+
+
+def _ready_name(settings: Settings) -> str:
+    """The name of the ready scene that is written; none for a file of one's own of that name."""
+    file = settings.written.file if settings.written else OWN
+    return file.stem if file.stem in SCENES and file == scene_file(file.stem) else ""

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
-from kappaskin_app.panels.calibration.parts import button, sentence, text_label
+from kappaskin_app.panels.calibration.parts import button, text_label
 from kappaskin_app.panels.effects import EffectsPanel
 from kappaskin_app.panels.gallery import GalleryPanel
 from kappaskin_app.panels.scene_form import SceneForm
@@ -69,7 +69,7 @@ class SceneEditor(QWidget):
         """Say why what is written cannot be played, and mark its line; or nothing when it can."""
         line = _LINE.search(why)
         self.text.show_wrong(int(line[1]) if line else 0)
-        self.message.setText(f"The last scene stays. {sentence(why)}" if why else "")
+        self.message.setText(f"The last scene stays: {why}" if why else "")
         self.message.setVisible(bool(why))
 
     def show_theme(self, theme: Theme) -> None:
