@@ -35,7 +35,8 @@ def _list(table: Any, key: str, name: str, there: bool) -> None:
 def shifted(text: str, touch: int, dx: float, dy: float) -> str:
     """The scene with a touch, counted from zero, moved by (dx, dy) in m."""
     document: Any = tomlkit.parse(text)
-    table = document["touch"][touch]
+    touches = document["touch"]
+    table = touches[touch] if isinstance(touches, list) else touches  # one may be no array
     for key, by in (("x", dx), ("y", dy), ("x0", dx), ("y0", dy), ("x1", dx), ("y1", dy)):
         if key in table:
             table[key] = round(float(table[key]) + by, 6)  # to a micrometre

@@ -79,6 +79,11 @@ def test_a_touch_that_is_shifted_in_the_text_is_where_it_was_dragged_to(name) ->
         assert np.allclose(there, expected, atol=1e-6)
 
 
+def test_the_only_touch_is_shifted_where_it_is_no_array_as_well() -> None:
+    text = text_of("tapping").replace("[[touch]]", "[touch]")
+    assert read(shifted(text, 0, 0.001, 0.0), "tapping").stimuli[0].what.x == 0.061
+
+
 def _drawn(scene, time: float) -> list[object]:
     return [touch.load for touch in touches_at(scene, time)]
 
