@@ -260,3 +260,20 @@ def test_the_pages_have_their_keys_and_nothing_is_clipped(window, panel, until) 
         page = panel.currentWidget()
         assert page.minimumSizeHint().width() <= panel.width()
         assert panel.mapTo(window, QPoint(0, 0)).x() + panel.width() <= window.width()
+
+
+def test_a_scene_that_is_chosen_while_one_types_is_played_as_it_is_written(
+    window, panel, until
+) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    panel.setCurrentIndex(EDIT)
+    panel.editor.text.setPlainText(panel.editor.text.toPlainText() + "# typed\n")
+    panel.gallery.chosen.emit("hum")
+    until(lambda: plays(window, "hum"))
+    assert panel.editor.text.toPlainText() == scene_file("hum").read_text()
+    panel.editor.text.setFocus()
+    panel.editor.text.setPlainText(panel.editor.text.toPlainText() + "# typed\n")
+    panel.setCurrentIndex(GALLERY)  # which takes the focus: what was typed counts at once
+    assert window.history.settings.written.text.endswith("# typed\n")
+    assert window.history.settings.written.file == scene_file("hum")
