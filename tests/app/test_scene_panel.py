@@ -277,3 +277,20 @@ def test_a_scene_that_is_chosen_while_one_types_is_played_as_it_is_written(
     panel.setCurrentIndex(GALLERY)  # which takes the focus: what was typed counts at once
     assert window.history.settings.written.text.endswith("# typed\n")
     assert window.history.settings.written.file == scene_file("hum")
+
+
+def test_every_touch_is_drawn_however_many_there_are(window, panel, until) -> None:
+    head = scene_file("tapping").read_text().split("[[touch]]")[0]
+    places = [(0.02 + 0.02 * (n % 4), 0.02 + 0.02 * (n // 4)) for n in range(12)]
+    touch = '[[touch]]\nwhat = "disc"\nx = {}\ny = {}\nradius = 0.005\nforce = 0.02\n'
+    panel.editor.edited.emit(head + "".join(touch.format(*place) for place in places))
+    until(lambda: len(window.membrane.drag.handles) == len(places))
+    red = [actor for actor in window.membrane.plotter.renderer.GetActors() if _is_red(actor)]
+    arrows = [actor for actor in red if actor.visibility and any(actor.position)]
+    assert len(arrows) == len(places)
+    (circles,) = [actor for actor in red if actor not in arrows and actor.visibility]
+    assert circles.mapper.dataset.n_lines == len(places)
+
+
+def _is_red(actor) -> bool:
+    return getattr(actor, "prop", None) is not None and actor.prop.color == "#e8543f"
