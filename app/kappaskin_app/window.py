@@ -271,7 +271,7 @@ class MainWindow(QMainWindow):
         scene.effects.forced.connect(guarded(wishes.force))
         scene.seen.connect(guarded(planning.watch))
         session.playing.connect(guarded(self._show_scene))
-        session.refused.connect(guarded(scene.editor.show_refusal))
+        session.refused.connect(guarded(scene.show_refusal))
         session.reported.connect(guarded(planning.follow))
         planning.changed.connect(guarded(self._show_plan))
         self.timeline.play_wanted.connect(guarded(session.run))

@@ -294,3 +294,29 @@ def test_every_touch_is_drawn_however_many_there_are(window, panel, until) -> No
 
 def _is_red(actor) -> bool:
     return getattr(actor, "prop", None) is not None and actor.prop.color == "#e8543f"
+
+
+def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene(
+    window, panel, until
+) -> None:
+    panel.gallery.chosen.emit("sphere")
+    until(lambda: plays(window, "sphere"))
+    panel.setCurrentIndex(EFFECTS_PAGE)
+    window.session.run(False)
+    window.session.seek(1.5)
+    until(lambda: len(window.membrane.drag.handles) == 1)
+    scene, good = window.session.scene, window.history.settings.written.text
+    bad = good.replace("[skin]", "[skin")
+    panel.editor.edited.emit(bad)
+    until(lambda: panel.tabText(EDIT) == "&Edit (not played)")
+    assert not panel.effects.table.isEnabled()
+    x, y = window.membrane.drag.handles[0].tolist()
+    drag = window.membrane.drag
+    drag.grabbed.emit(x, y)
+    drag.dragged.emit(x + 0.01, y)
+    drag.released.emit()
+    assert window.history.settings.written.text == bad
+    assert window.session.scene is scene
+    panel.editor.edited.emit(good)
+    until(lambda: panel.tabText(EDIT) == "&Edit")
+    assert panel.effects.table.isEnabled()
