@@ -56,8 +56,8 @@ class Session(QObject):
     """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick.
 
     `scene` is the one that is simulated, `running` whether it goes on; `playing` says when it
-    becomes another one, `refused` and `refusal` why it is not the one the settings describe now, with nothing to
-    say when it is, and `preparing` whether that takes a while to be computed.
+    becomes another one, `refused` and `refusal` why it is not the one the settings describe now,
+    with nothing to say when it is, and `preparing` whether that takes a while to be computed.
     """
 
     refused = Signal(str)
@@ -105,7 +105,8 @@ class Session(QObject):
     def connect_to(self, source: str, already: bool = False) -> None:
         """Take frames from `source`, unless the engine does `already`.
 
-        A scene named there becomes the load case, or the one that is written.
+        A scene named there becomes the load case, or the one that is written; without a name, what
+        was simulated last is simulated again.
         """
         self.source, self.estimate = source.strip(), None
         if not already:
@@ -117,7 +118,7 @@ class Session(QObject):
 
     def begin(self, written: Written) -> None:
         """Play a scene that is written from its beginning, whatever was read before."""
-        if not self.inside:
+        if not self.inside or self.status.state in ("off", "lost"):
             self.connect_to("sim:")
         self._anew = True
         self._history.change(f"Play {written.file.stem}", -1, written=written)

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin import (
     FIGURES,
+    SCENES,
     Engine,
     Refusal,
     Scene,
@@ -173,7 +174,7 @@ class MainWindow(QMainWindow):
         self.actions_by_name.register("undo", edit, undo)
         self.actions_by_name.register("redo", edit, redo)
         add("reset", edit, "&Reset settings", wishes.reset)
-        add("simulate", source, "&Simulated skin", lambda: self._connect("sim:"), "Ctrl+M")
+        add("simulate", source, "&Simulated skin", self._simulate, "Ctrl+M")
         add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
         add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
         add("ports", source, "&Look for ports", self._find_ports, "F5")
@@ -284,6 +285,11 @@ class MainWindow(QMainWindow):
         self.panels.connection.show_source(source)
         self.session.connect_to(source)
 
+    def _simulate(self) -> None:
+        """Simulate the panels' skin, whatever was read or written."""
+        self.history.change("Simulated skin", -1, written=None)
+        self._connect("sim:")
+
     def _connect_chosen(self) -> None:
         self._connect(self.panels.connection.source())
 
@@ -307,6 +313,7 @@ class MainWindow(QMainWindow):
     def _play_file(self, file: Path) -> None:
         try:
             self.wishes.play(written(file))
+            self.panels.connection.show_source(self.session.source)
         except Refusal as refusal:
             self._tell(str(refusal))
 
@@ -350,9 +357,15 @@ class MainWindow(QMainWindow):
     def _show_scene(self, scene: Scene) -> None:
         """Show the scene that is played now where it is chosen, edited and scrubbed."""
         self.timeline.show_scene(scene)
-        settings = self.history.settings
-        self.scene.gallery.show_playing(settings.written.file.stem if settings.written else "")
-        self._show_text(settings)
+        self._show_card()
+        self._show_text(self.history.settings)
+
+    def _show_card(self) -> None:
+        """Mark the ready scene that is played, if it is one."""
+        written, inside = self.history.settings.written, self.session.inside
+        name = written.file.stem if written and inside else ""
+        ready = written and name in SCENES and written.file == scene_file(name)
+        self.scene.gallery.show_playing(name if ready else "")
 
     def _show_text(self, settings: Settings) -> None:
         written = settings.written
@@ -392,6 +405,8 @@ class MainWindow(QMainWindow):
             self.panels.region.show_bargain(self.session.bargain())
         self.panels.show_status(status, simulating)
         self.stability.show_status(status, self.session.inside)
+        self.scene.show_simulated(self.session.inside)
+        self._show_card()
         self._show_time()
 
     def _show_time(self) -> None:

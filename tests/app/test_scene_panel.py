@@ -1,3 +1,5 @@
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +10,7 @@ from PySide6.QtWidgets import QComboBox, QFileDialog
 from kappaskin import EFFECTS, read_scene, scene_file
 from kappaskin.sources import information
 from kappaskin_app.settings import Settings
+from kappaskin_app.views.card import PLAYING
 from kappaskin_app.window import MainWindow
 
 GALLERY, EDIT, EFFECTS_PAGE = range(3)
@@ -320,3 +323,35 @@ def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene
     panel.editor.edited.emit(good)
     until(lambda: panel.tabText(EDIT) == "&Edit")
     assert panel.effects.table.isEnabled()
+
+
+def test_connecting_again_goes_on_with_the_scene_that_was_played(window, panel, until) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    os.kill(window.session.engine.pid, signal.SIGTERM)
+    until(lambda: window.badge.text() == "LOST")
+    window.actions_by_name["connect"].trigger()
+    until(lambda: window.badge.text() == "SIM" and plays(window, "tapping"))
+    assert window.history.settings.written.file == scene_file("tapping")
+    window.actions_by_name["disconnect"].trigger()
+    until(lambda: window.badge.text() == "OFF")
+    panel.gallery.chosen.emit("hum")  # which is to play it
+    until(lambda: window.badge.text() == "SIM" and plays(window, "hum"))
+
+
+def test_on_another_source_only_the_gallery_leads_back(window, panel, until) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    until(lambda: panel.gallery.items["tapping"].data(PLAYING))
+    panel.setCurrentIndex(EFFECTS_PAGE)
+    window.panels.connection.connect_wanted.emit("socket://127.0.0.1:9")
+    until(lambda: panel.currentIndex() == GALLERY)
+    assert not panel.isTabEnabled(EDIT)
+    assert not panel.isTabEnabled(EFFECTS_PAGE)
+    assert not panel.gallery.items["tapping"].data(PLAYING)
+    panel.gallery.chosen.emit("hum")
+    until(lambda: plays(window, "hum"))
+    assert window.panels.connection.source() == "sim:"
+    until(lambda: panel.isTabEnabled(EDIT) and panel.isTabEnabled(EFFECTS_PAGE))
+    window.history.stack.undo()
+    until(lambda: plays(window, "tapping"))
