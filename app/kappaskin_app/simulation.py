@@ -200,11 +200,13 @@ def named(source: str) -> dict[str, Any]:
     """The settings that change when the simulation called `source` is to be played.
 
     One of the panels' load cases is chosen; any other scene is played as it is written. One that
-    there is not changes nothing: the engine says so.
+    there is not is not played: the engine says so. None named is the one that was played last.
     """
     name = source.removeprefix("sim:")
-    if not name or name in READY_CASES:
-        return {"written": None} | ({"load_case": name} if name else {})
+    if not name:
+        return {}
+    if name in READY_CASES:
+        return {"written": None, "load_case": name}
     try:
         return {"written": written(scene_file(name))}
     except Refusal:

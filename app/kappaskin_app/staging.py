@@ -22,9 +22,13 @@ _PLANNING = "Each effect is sized and timed\N{HORIZONTAL ELLIPSIS}"
 
 
 class Staging(QObject):
-    """Shows in `panel`, `timeline` and plan what is played; `told` says what came of a wish."""
+    """Shows in `panel`, `timeline` and plan what is played; `told` says what came of a wish.
+
+    `played` names the source when a scene in a file is played.
+    """
 
     told = Signal(str)
+    played = Signal(str)
 
     def __init__(
         self,
@@ -51,9 +55,9 @@ class Staging(QObject):
         panel.effects.forced.connect(guarded(self._force))
         panel.seen.connect(guarded(planning.watch))
         session.playing.connect(guarded(self._show_scene))
-        session.refused.connect(guarded(panel.editor.show_refusal))
+        session.refused.connect(guarded(panel.show_refusal))
         session.reported.connect(guarded(planning.follow))
-        session.reported.connect(guarded(self._show_time))
+        session.reported.connect(guarded(self._show_status))
         planning.changed.connect(guarded(self._show_plan))
         self._timeline.play_wanted.connect(guarded(session.run))
         self._timeline.sought.connect(guarded(self._seek))
@@ -87,6 +91,7 @@ class Staging(QObject):
     def _play(self, file: Path) -> None:
         try:
             self._wishes.play(written(file))
+            self.played.emit(self._session.source)
         except Refusal as refusal:
             self.told.emit(str(refusal))
 
@@ -109,9 +114,15 @@ class Staging(QObject):
 
     def _show_scene(self, scene: Scene) -> None:
         self._timeline.show_scene(scene)
-        settings = self._history.settings
-        self._panel.gallery.show_playing(_ready_name(settings))
-        self._show_text(settings)
+        self._show_card()
+        self._show_text(self._history.settings)
+
+    def _show_card(self) -> None:
+        """Mark the ready scene that is played: none for a file of one's own of its name."""
+        written = self._history.settings.written
+        file = written.file if written else OWN
+        ready = file.stem in SCENES and file == scene_file(file.stem)
+        self._panel.gallery.show_playing(file.stem if ready and self._session.inside else "")
 
     def _show_text(self, settings: Settings) -> None:
         editor, written = self._panel.editor, settings.written
@@ -128,14 +139,10 @@ class Staging(QObject):
         if planning.refusal or planning.waiting:
             effects.show_waiting(planning.refusal or _PLANNING)
 
-    def _show_time(self, _: Status) -> None:
+    def _show_status(self, _: Status) -> None:
+        self._panel.show_simulated(self._session.inside)
+        self._show_card()
         if not self._session.inside:
             self._timeline.show_scene(None)
             return
         self._timeline.show_time(self._session.time, self._session.running)
-
-
-def _ready_name(settings: Settings) -> str:
-    """The name of the ready scene that is written; none for a file of one's own of that name."""
-    file = settings.written.file if settings.written else OWN
-    return file.stem if file.stem in SCENES and file == scene_file(file.stem) else ""

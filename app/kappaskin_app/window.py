@@ -166,7 +166,7 @@ class MainWindow(QMainWindow):
         self.actions_by_name.register("undo", edit, undo)
         self.actions_by_name.register("redo", edit, redo)
         add("reset", edit, "&Reset settings", wishes.reset)
-        add("simulate", source, "&Simulated skin", lambda: self._connect("sim:"), "Ctrl+M")
+        add("simulate", source, "&Simulated skin", self._simulate, "Ctrl+M")
         add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
         add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
         add("ports", source, "&Look for ports", self._find_ports, "F5")
@@ -234,6 +234,7 @@ class MainWindow(QMainWindow):
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
         self.staging.told.connect(guarded(self._tell))
+        self.staging.played.connect(guarded(panels.connection.show_source))
         session.reported.connect(guarded(wishes.follow))
         self.stability.back.connect(guarded(self.history.stack.undo))
         self.stability.shown.connect(guarded(self._show_shape))
@@ -260,6 +261,11 @@ class MainWindow(QMainWindow):
     def _connect(self, source: str) -> None:
         self.panels.connection.show_source(source)
         self.session.connect_to(source)
+
+    def _simulate(self) -> None:
+        """Simulate the panels' skin, whatever was read or written."""
+        self.history.change("Simulated skin", -1, written=None)
+        self._connect("sim:")
 
     def _connect_chosen(self) -> None:
         self._connect(self.panels.connection.source())

@@ -113,9 +113,8 @@ class Wishes:
         second = math.dist((x, y), (settings.x_end, settings.y_end))
         self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
         self._gesture = self._history.new_gesture()
-        self._held = (
-            None if settings.written is None else Held.at_place(session.scene, session.time, x, y)
-        )
+        writes = settings.written is not None and not session.refusal  # what is seen is in it
+        self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
 
     def drag(self, x: float, y: float) -> None:
         settings, scene = self._history.settings, self._session.scene

@@ -175,6 +175,12 @@ def test_any_setting_in_use_is_read_whole(measured: MainWindow, method: str) -> 
     assert line.whole
 
 
+def test_how_many_elements_there_are_is_told_once_it_is_known() -> None:
+    setting = Setting("bayes", (8, 8), None)
+    assert in_words(setting).endswith("functions")
+    assert in_words(setting, 92).endswith("functions, 92 elements")
+
+
 def test_every_line_of_the_legend_has_room(measured: MainWindow, until) -> None:
     plot, dock = measured.cost.plot, measured.cost.parent()
     was = dock.height()

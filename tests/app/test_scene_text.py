@@ -79,6 +79,11 @@ def test_a_touch_that_is_shifted_in_the_text_is_where_it_was_dragged_to(name) ->
         assert np.allclose(there, expected, atol=1e-6)
 
 
+def test_the_only_touch_is_shifted_where_it_is_no_array_as_well() -> None:
+    text = text_of("tapping").replace("[[touch]]", "[touch]")
+    assert read(shifted(text, 0, 0.001, 0.0), "tapping").stimuli[0].what.x == 0.061
+
+
 def _drawn(scene, time: float) -> list[object]:
     return [touch.load for touch in touches_at(scene, time)]
 
@@ -116,12 +121,6 @@ def test_own_scenes_need_no_file(tmp_path: Path) -> None:
     scene = read_scene(forced(text_of("centre"), "saturation", OFF), tmp_path / "own.toml")
     assert scene.name == "own"
     assert replace(scene, name="centre").choice.off == {"saturation", "finite-slope"}
-
-
-def test_a_touch_that_is_a_table_by_itself_is_shifted_too() -> None:
-    alone = text_of("centre").replace("[[touch]]", "[touch]")
-    moved = read(shifted(alone, 0, 1e-3, 0.0), "centre").loads[0].centre()
-    assert np.allclose(moved - read(alone, "centre").loads[0].centre(), (1e-3, 0.0))
 
 
 def test_a_text_that_cannot_be_changed_is_refused() -> None:

@@ -88,7 +88,8 @@ class Timeline(QWidget):
     def show_scene(self, scene: Scene | None) -> None:
         """Show the course of `scene`; nothing of none, or of one in which nothing moves."""
         self.track.setSliderDown(False)  # the mouse may be let go where this is not seen
-        self._scene = scene if scene and (scene.moves or scene.laid is not None) else None
+        goes = scene is not None and (len(scene.laid.steps) > 1 if scene.laid else scene.moves)
+        self._scene = scene if goes else None
         self.setVisible(self._scene is not None)
         if self._scene is not None:
             self.track.show_scene(self._scene)
