@@ -4,11 +4,14 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+
+from kappaskin import doctor
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
@@ -25,6 +28,21 @@ def requirements():
 def pins():
     lines = [line for line in CONSTRAINTS.splitlines() if not line.startswith("#")]
     return {canonicalize_name(name): version for name, version in (i.split("==") for i in lines)}
+
+
+def imported_by(file):
+    """Top-level names of all that a file imports; a dot for what lies beside it."""
+    return {
+        name.split(".")[0]
+        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        for name in (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module or "."]
+            if isinstance(node, ast.ImportFrom)
+            else []
+        )
+    }
 
 
 def references_gained(value, calls, change):
@@ -71,21 +89,31 @@ def test_pins_avoid_what_is_known_to_break():
 
 
 def test_start_needs_the_standard_library_alone():
-    tree = ast.parse((ROOT / "packaging" / "start.py").read_text("utf-8"))
-    imported = {
-        name.split(".")[0]
-        for node in ast.walk(tree)
-        for name in (
-            [alias.name for alias in node.names]
-            if isinstance(node, ast.Import)
-            else [node.module or "."]
-            if isinstance(node, ast.ImportFrom)
-            else []
-        )
-    }
+    imported = imported_by(ROOT / "packaging" / "start.py")
 
     assert "subprocess" in imported
     assert imported <= sys.stdlib_module_names
+
+
+@pytest.mark.parametrize(("source", "extra"), [("core", "plots"), ("app", "app")])
+def test_what_is_imported_is_declared(source, extra):
+    project, wheels = PROJECT["project"], metadata.packages_distributions()
+    asked = [*project["dependencies"], *project["optional-dependencies"][extra]]
+    declared = {canonicalize_name(Requirement(text).name) for text in asked}
+    own = {".", "kappaskin", "kappaskin_app"}
+
+    imported = {name for file in (ROOT / source).rglob("*.py") for name in imported_by(file)}
+
+    assert "numpy" in imported
+    for name in imported - sys.stdlib_module_names - own:
+        assert declared & {canonicalize_name(wheel) for wheel in wheels[name]}, name
+
+
+def test_the_doctor_looks_for_all_that_the_library_and_the_app_need():
+    project = PROJECT["project"]
+    needed = [*project["dependencies"], *project["optional-dependencies"]["app"]]
+
+    assert {Requirement(text).name for text in needed} <= set(doctor.PACKAGES)
 
 
 def test_packaging_is_a_folder_not_a_package():

@@ -56,8 +56,8 @@ class Session(QObject):
     """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick.
 
     `scene` is the one that is simulated, `running` whether it goes on; `playing` says when it
-    becomes another one, `refused` why it is not the one the settings describe now, with nothing to
-    say when it is, and `preparing` whether that takes a while to be computed.
+    becomes another one, `refused` and `refusal` why it is not the one the settings describe now,
+    with nothing to say when it is, and `preparing` whether that takes a while to be computed.
     """
 
     refused = Signal(str)
@@ -71,7 +71,8 @@ class Session(QObject):
         self._history = history
         self._settings = history.settings
         self.engine = engine
-        self.scene = scene_of(replace(history.settings, written=None))
+        self.scene = self._planned = scene_of(replace(history.settings, written=None))
+        self.refusal = ""
         self._anew, self.running = False, True
         self._sought: float | None = None
         self._sought_at = 0.0
@@ -104,7 +105,8 @@ class Session(QObject):
     def connect_to(self, source: str, already: bool = False) -> None:
         """Take frames from `source`, unless the engine does `already`.
 
-        A scene named there becomes the load case, or the one that is written.
+        A scene named there becomes the load case, or the one that is written; without a name, what
+        was simulated last is simulated again.
         """
         self.source, self.estimate = source.strip(), None
         if not already:
@@ -116,7 +118,7 @@ class Session(QObject):
 
     def begin(self, written: Written) -> None:
         """Play a scene that is written from its beginning, whatever was read before."""
-        if not self.inside:
+        if not self.inside or self.status.state in ("off", "lost"):
             self.connect_to("sim:")
         self._anew = True
         self._history.change(f"Play {written.file.stem}", -1, written=written)
@@ -187,8 +189,7 @@ class Session(QObject):
         Its plan stays: what a scene calls for is told once the touch is let go.
         """
         self.scene = scene
-        known = played(scene_of(self._history.settings))
-        self.engine.play(replace(known, stimuli=scene.stimuli))
+        self.engine.play(replace(self._planned, stimuli=scene.stimuli))
 
     def _play(self) -> None:
         """Simulate what the settings describe, or go on as before and say why."""
@@ -204,7 +205,8 @@ class Session(QObject):
             self.scene = scene.laid_on(laid) if laid else scene
         except Refusal as refusal:
             why = str(refusal)
-        self.engine.play(played(self.scene))
+        self._planned, self.refusal = played(self.scene), why
+        self.engine.play(self._planned)
         if self._anew and not why:
             self._anew, self.running = False, True
             self.engine.seek(0.0)

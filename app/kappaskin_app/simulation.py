@@ -30,6 +30,7 @@ from kappaskin import (
     edges_of,
     planned,
     read_scene,
+    read_scene_text,
     scene_file,
     write_scene,
 )
@@ -199,11 +200,13 @@ def named(source: str) -> dict[str, Any]:
     """The settings that change when the simulation called `source` is to be played.
 
     One of the panels' load cases is chosen; any other scene is played as it is written. One that
-    there is not changes nothing: the engine says so.
+    there is not is not played: the engine says so. None named is the one that was played last.
     """
     name = source.removeprefix("sim:")
-    if not name or name in READY_CASES:
-        return {"written": None} | ({"load_case": name} if name else {})
+    if not name:
+        return {}
+    if name in READY_CASES:
+        return {"written": None, "load_case": name}
     try:
         return {"written": written(scene_file(name))}
     except Refusal:
@@ -211,11 +214,8 @@ def named(source: str) -> dict[str, Any]:
 
 
 def written(file: Path) -> Written:
-    """The scene in `file`, as it is written there; raises `Refusal` for one that is no text."""
-    try:
-        return Written(file.read_text(encoding="utf-8"), file)
-    except (OSError, UnicodeDecodeError) as error:
-        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
+    """The scene in `file`, as it is written there; raises `Refusal` for a file of no scene."""
+    return Written(read_scene_text(file), file)
 
 
 def text_of(settings: Settings) -> str:

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +11,6 @@ from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
-    QFileDialog,
     QHBoxLayout,
     QMainWindow,
     QMessageBox,
@@ -21,15 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import (
-    FIGURES,
-    Engine,
-    Refusal,
-    Scene,
-    Status,
-    scene_file,
-    serial_ports,
-)
+from kappaskin import FIGURES, Engine, Status, serial_ports
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
@@ -48,7 +38,8 @@ from kappaskin_app.planning import Planning
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
-from kappaskin_app.simulation import OWN, settings_for, text_of, written
+from kappaskin_app.simulation import settings_for
+from kappaskin_app.staging import Staging
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
@@ -58,8 +49,6 @@ from kappaskin_app.wishes import Wishes
 _WORDS = 0.5  # s between two looks at what touches the skin: as fast as one can read
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38}
-_FILES = "Scene (*.toml)"
-_PLANNING = "Each effect is sized and timed\N{HORIZONTAL ELLIPSIS}"
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -80,6 +69,10 @@ class MainWindow(QMainWindow):
         self.planning = Planning(self.session, self)
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
         self.timeline = Timeline()
+        self.staging = Staging(
+            *(self.history, self.session, self.wishes, self.planning),
+            *(self.scene, self.timeline, self),
+        )
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
@@ -157,12 +150,12 @@ class MainWindow(QMainWindow):
         add, stack, wishes = self.actions_by_name.add, self.history.stack, self.wishes
         file, edit, source, view, help_ = "&File", "&Edit", "&Source", "&View", "&Help"
         figures = "Fi&gures"
-        add("open-scene", file, "&Open scene\N{HORIZONTAL ELLIPSIS}", self._open_scene, "Ctrl+O")
+        add("open-scene", file, "&Open scene\N{HORIZONTAL ELLIPSIS}", self.staging.open, "Ctrl+O")
         add(
             "save-scene",
             file,
             "Save scene &as\N{HORIZONTAL ELLIPSIS}",
-            self._save_scene,
+            self.staging.save,
             "Ctrl+Shift+S",
         )
         add("picture", file, "Save &picture", self._save_picture, "Ctrl+S")
@@ -173,7 +166,7 @@ class MainWindow(QMainWindow):
         self.actions_by_name.register("undo", edit, undo)
         self.actions_by_name.register("redo", edit, redo)
         add("reset", edit, "&Reset settings", wishes.reset)
-        add("simulate", source, "&Simulated skin", lambda: self._connect("sim:"), "Ctrl+M")
+        add("simulate", source, "&Simulated skin", self._simulate, "Ctrl+M")
         add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
         add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
         add("ports", source, "&Look for ports", self._find_ports, "F5")
@@ -192,7 +185,7 @@ class MainWindow(QMainWindow):
         for key, direction in (("F6", ABOVE), ("F7", FRONT), ("F8", SIDE)):
             words = f"Look {direction.words}"
             add(words.lower().replace(" ", "-"), view, words, self._look(direction), key)
-        add("pause", view, "&Pause or go on", self._pause, "Ctrl+P")
+        add("pause", view, "&Pause or go on", self.staging.pause, "Ctrl+P")
         add("theme", view, "Light or &dark", wishes.switch_theme, "Ctrl+T")
         add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
@@ -240,7 +233,8 @@ class MainWindow(QMainWindow):
         session.reported.connect(guarded(self.seeing.follow))
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
-        self._wire_scene()
+        self.staging.told.connect(guarded(self._tell))
+        self.staging.played.connect(guarded(panels.connection.show_source))
         session.reported.connect(guarded(wishes.follow))
         self.stability.back.connect(guarded(self.history.stack.undo))
         self.stability.shown.connect(guarded(self._show_shape))
@@ -262,27 +256,16 @@ class MainWindow(QMainWindow):
         self.display.scale.lock_wanted.connect(guarded(self._lock))
         guard.on_failure(self._tell)
 
-    def _wire_scene(self) -> None:
-        session, scene, planning, wishes = self.session, self.scene, self.planning, self.wishes
-        scene.gallery.chosen.connect(guarded(lambda name: self._play_file(scene_file(name))))
-        scene.gallery.open_wanted.connect(guarded(self._open_scene))
-        scene.editor.edited.connect(guarded(wishes.write))
-        scene.editor.save_wanted.connect(guarded(self._save_scene))
-        scene.effects.forced.connect(guarded(wishes.force))
-        scene.seen.connect(guarded(planning.watch))
-        session.playing.connect(guarded(self._show_scene))
-        session.refused.connect(guarded(scene.editor.show_refusal))
-        session.reported.connect(guarded(planning.follow))
-        planning.changed.connect(guarded(self._show_plan))
-        self.timeline.play_wanted.connect(guarded(session.run))
-        self.timeline.sought.connect(guarded(self._seek))
-        self.timeline.track.sliderReleased.connect(guarded(lambda: session.run(session.running)))
-
     # Wishes that are no settings, or need what is shown.
 
     def _connect(self, source: str) -> None:
         self.panels.connection.show_source(source)
         self.session.connect_to(source)
+
+    def _simulate(self) -> None:
+        """Simulate the panels' skin, whatever was read or written."""
+        self.history.change("Simulated skin", -1, written=None)
+        self._connect("sim:")
 
     def _connect_chosen(self) -> None:
         self._connect(self.panels.connection.source())
@@ -299,41 +282,11 @@ class MainWindow(QMainWindow):
         limit = self.display.limit_shown() if locked else 0.0
         self.wishes.wish(f"range_{self.history.settings.colour_by}", limit)
 
-    def _open_scene(self) -> None:
-        file, _ = QFileDialog.getOpenFileName(self, "Open a scene", "", _FILES)
-        if file:
-            self._play_file(Path(file))
-
-    def _play_file(self, file: Path) -> None:
-        try:
-            self.wishes.play(written(file))
-        except Refusal as refusal:
-            self._tell(str(refusal))
-
-    def _save_scene(self) -> None:
-        settings = self.history.settings
-        name = settings.written.file.name if settings.written else OWN.name
-        file, _ = QFileDialog.getSaveFileName(self, "Save the scene", name, _FILES)
-        if file:
-            path = Path(file).with_suffix(".toml")
-            try:
-                path.write_text(text_of(settings), encoding="utf-8")
-                self._tell(f"Saved {path}")
-            except (OSError, Refusal) as error:
-                self._tell(f"Could not write {path}: {error}")
-
-    def _seek(self, at: float) -> None:
-        self.session.seek(at, self.timeline.track.isSliderDown())
-
-    def _pause(self) -> None:
-        self.session.run(not self.session.running)
-
     # News: settings and status on their way to panels and views.
 
     def _follow(self, settings: Settings) -> None:
         self.panels.show_settings(settings)
-        if settings.written is not None:
-            self._show_text(settings)
+        self.staging.show_settings(settings)
         self.display.show_settings(settings)
         theme = THEMES[settings.theme]
         application = QApplication.instance()
@@ -346,28 +299,6 @@ class MainWindow(QMainWindow):
         self.stability.show_settings(settings)
         self.stability.show_theme(theme)
         self.display.show_theme(theme)
-
-    def _show_scene(self, scene: Scene) -> None:
-        """Show the scene that is played now where it is chosen, edited and scrubbed."""
-        self.timeline.show_scene(scene)
-        settings = self.history.settings
-        self.scene.gallery.show_playing(settings.written.file.stem if settings.written else "")
-        self._show_text(settings)
-
-    def _show_text(self, settings: Settings) -> None:
-        written = settings.written
-        if written is not None:
-            self.scene.editor.show_scene(written.text, written.file.name)
-        elif self.session.inside:
-            with suppress(Refusal):  # no such skin: what is shown is the last one's
-                self.scene.editor.show_scene(text_of(settings), "The panels' skin")
-
-    def _show_plan(self) -> None:
-        planning, effects = self.planning, self.scene.effects
-        if planning.rows and planning.scene is not None:
-            effects.show_plan(planning.rows, planning.scene.choice)
-        if planning.refusal or planning.waiting:
-            effects.show_waiting(planning.refusal or _PLANNING)
 
     def _show_shape(self) -> None:
         """Draw the shape that is looked at on the skin, while somebody looks and wants it."""
@@ -393,13 +324,6 @@ class MainWindow(QMainWindow):
             self.panels.region.show_bargain(self.session.bargain())
         self.panels.show_status(status, simulating)
         self.stability.show_status(status, self.session.inside)
-        self._show_time()
-
-    def _show_time(self) -> None:
-        if not self.session.inside:
-            self.timeline.show_scene(None)
-            return
-        self.timeline.show_time(self.session.time, self.session.running)
 
     # Small things.
 

@@ -102,7 +102,7 @@ class Wishes:
             self._history.wish("written", "the scene", written=Written(text, file))
 
     def force(self, effect: str, how: str) -> None:
-        """Force an effect on or off, or leave it to the plan."""
+        """Force an effect on or off, or leave it to the plan; refused where the text is no TOML."""
         self.write(forced(text_of(self._history.settings), effect, how))
 
     # Loads that are dragged.
@@ -113,9 +113,8 @@ class Wishes:
         second = math.dist((x, y), (settings.x_end, settings.y_end))
         self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
         self._gesture = self._history.new_gesture()
-        self._held = (
-            None if settings.written is None else Held.at_place(session.scene, session.time, x, y)
-        )
+        writes = settings.written is not None and not session.refusal  # what is seen is in it
+        self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
 
     def drag(self, x: float, y: float) -> None:
         settings, scene = self._history.settings, self._session.scene
@@ -127,10 +126,10 @@ class Wishes:
 
     def release(self) -> None:
         held, written = self._held, self._history.settings.written
+        self._gesture, self._held = -1, None
         if held is not None and written is not None and held.moved:
             text = shifted(written.text, held.number, *held.by)
             self._history.change("Drag the load", -1, written=replace(written, text=text))
-        self._gesture, self._held = -1, None
 
     def give_up(self) -> None:
         """Put the load back to where it was grabbed."""

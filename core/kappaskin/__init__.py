@@ -96,6 +96,7 @@ from kappaskin.scene import moments_of as moments_of
 from kappaskin.scene import plan as plan
 from kappaskin.scene import planned as planned
 from kappaskin.scene import read_scene as read_scene
+from kappaskin.scene import read_scene_text as read_scene_text
 from kappaskin.scene import scene_file as scene_file
 from kappaskin.scene import write_scene as write_scene
 from kappaskin.sensor import Sensor as Sensor

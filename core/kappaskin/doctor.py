@@ -21,6 +21,7 @@ PACKAGES = (
     "pyvista",
     "pyvistaqt",
     "vtk",
+    "tomlkit",
 )
 
 # What Qt and VTK load at run time that no wheel carries: library, and Debian's package of it.

@@ -11,6 +11,7 @@ from kappaskin import Cost, EffectCost, Refused, Setting
 from kappaskin_app import costing
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.costing import Frontier, in_words
+from kappaskin_app.effects import called
 from kappaskin_app.settings import METHOD_NAMES, Settings
 from kappaskin_app.simulation import scene_of, scene_of_sensor
 from kappaskin_app.views.cost_plot import CostPlot
@@ -174,6 +175,12 @@ def test_any_setting_in_use_is_read_whole(measured: MainWindow, method: str) -> 
     assert line.whole
 
 
+def test_how_many_elements_there_are_is_told_once_it_is_known() -> None:
+    setting = Setting("bayes", (8, 8), None)
+    assert in_words(setting).endswith("functions")
+    assert in_words(setting, 92).endswith("functions, 92 elements")
+
+
 def test_every_line_of_the_legend_has_room(measured: MainWindow, until) -> None:
     plot, dock = measured.cost.plot, measured.cost.parent()
     was = dock.height()
@@ -257,8 +264,8 @@ def _rows(window: MainWindow) -> dict[str, list[str]]:
 
 
 def test_each_effect_of_the_scene_is_told_with_and_without_it(measured: MainWindow, until) -> None:
-    until(lambda: "uniform-noise" in _rows(measured))
-    found = {cost.name: cost for cost in measured.costing.spoiling()}
+    until(lambda: "Uniform noise" in _rows(measured))
+    found = {called(cost.name): cost for cost in measured.costing.spoiling()}
     rows = _rows(measured)
     assert list(rows) == list(found)
     for name, (kept, time, with_it, without) in rows.items():
@@ -266,13 +273,13 @@ def test_each_effect_of_the_scene_is_told_with_and_without_it(measured: MainWind
         assert kept == ("yes" if cost.kept else "no")
         assert time == duration(cost.time_per_frame)
         assert (with_it, without) == (length(cost.rms_with), length(cost.rms_without))
-    assert rows["finite-slope"][0] == "no"
-    assert found["uniform-noise"].rms_without < 0.5 * found["uniform-noise"].rms_with
+    assert rows["Finite slope"][0] == "no"
+    assert found["Uniform noise"].rms_without < 0.5 * found["Uniform noise"].rms_with
     assert not measured.cost.no_effects.isVisible()
 
 
 def test_the_error_that_is_had_now_is_bold(measured: MainWindow, until) -> None:
-    until(lambda: "uniform-noise" in _rows(measured))
+    until(lambda: "Uniform noise" in _rows(measured))
     table = measured.cost.effects
     for row in range(table.rowCount()):
         kept = table.item(row, 1).text() == "yes"
@@ -292,10 +299,10 @@ def test_effects_are_judged_with_the_setting_in_use(measured: MainWindow, until)
     )
     # Four functions cannot follow the load, noise or not.
     assert noise.rms_without > 3 * before.rms_without
-    until(lambda: _rows(measured).get("uniform-noise", [])[3:] == [length(noise.rms_without)])
+    until(lambda: _rows(measured).get("Uniform noise", [])[3:] == [length(noise.rms_without)])
     measured.history.stack.undo()
     until(lambda: measured.costing.spoiling() == was)
-    until(lambda: _rows(measured)["uniform-noise"][3] == length(before.rms_without))
+    until(lambda: _rows(measured)["Uniform noise"][3] == length(before.rms_without))
 
 
 def test_a_setting_that_cannot_judge_effects_says_why(
@@ -327,12 +334,12 @@ def test_effects_have_room_in_a_small_window(measured: MainWindow, until, monkey
 
 
 def test_every_row_and_column_of_effects_explains_itself(measured: MainWindow, until) -> None:
-    until(lambda: "finite-slope" in _rows(measured))
+    until(lambda: "Finite slope" in _rows(measured))
     table = measured.cost.effects
     for column in range(table.columnCount()):
         assert table.horizontalHeaderItem(column).toolTip()
     tips = {table.item(row, 0).text(): table.item(row, 0).toolTip() for row in range(3)}
-    assert "% of the peak. It is left out." in tips["finite-slope"]
+    assert "% of the peak. It is left out." in tips["Finite slope"]
 
 
 def test_measuring_anew_forgets_what_was_wanted_of_the_skin_before(

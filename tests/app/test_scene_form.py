@@ -23,9 +23,11 @@ from PySide6.QtWidgets import (
 
 from kappaskin import EFFECTS, SCENES
 from kappaskin.scene import read_scene
-from kappaskin_app.panels.scene_form import SceneForm, changes, parts
-from kappaskin_app.panels.scene_form.sections import Offer, Section, sections_of
+from kappaskin_app.panels.scene_form import SceneForm
+from kappaskin_app.panels.scene_form.section import Offer, Section
+from kappaskin_app.panels.scene_form.sections import sections_of
 from kappaskin_app.panels.scene_form.words import How
+from kappaskin_app.scene_text import changes, parts
 
 _FOLDER = files("kappaskin_resources") / "scenes"
 _TEXTS = {name: (_FOLDER / f"{name}.toml").read_text(encoding="utf-8") for name in SCENES}

@@ -1,3 +1,5 @@
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +10,7 @@ from PySide6.QtWidgets import QComboBox, QFileDialog
 from kappaskin import EFFECTS, read_scene, scene_file
 from kappaskin.sources import information
 from kappaskin_app.settings import Settings
+from kappaskin_app.views.card import PLAYING
 from kappaskin_app.window import MainWindow
 
 GALLERY, EDIT, EFFECTS_PAGE = range(3)
@@ -260,3 +263,95 @@ def test_the_pages_have_their_keys_and_nothing_is_clipped(window, panel, until) 
         page = panel.currentWidget()
         assert page.minimumSizeHint().width() <= panel.width()
         assert panel.mapTo(window, QPoint(0, 0)).x() + panel.width() <= window.width()
+
+
+def test_a_scene_that_is_chosen_while_one_types_is_played_as_it_is_written(
+    window, panel, until
+) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    panel.setCurrentIndex(EDIT)
+    panel.editor.text.setPlainText(panel.editor.text.toPlainText() + "# typed\n")
+    panel.gallery.chosen.emit("hum")
+    until(lambda: plays(window, "hum"))
+    assert panel.editor.text.toPlainText() == scene_file("hum").read_text()
+    panel.editor.text.setFocus()
+    panel.editor.text.setPlainText(panel.editor.text.toPlainText() + "# typed\n")
+    panel.setCurrentIndex(GALLERY)  # which takes the focus: what was typed counts at once
+    assert window.history.settings.written.text.endswith("# typed\n")
+    assert window.history.settings.written.file == scene_file("hum")
+
+
+def test_every_touch_is_drawn_however_many_there_are(window, panel, until) -> None:
+    head = scene_file("tapping").read_text().split("[[touch]]")[0]
+    places = [(0.02 + 0.02 * (n % 4), 0.02 + 0.02 * (n // 4)) for n in range(12)]
+    touch = '[[touch]]\nwhat = "disc"\nx = {}\ny = {}\nradius = 0.005\nforce = 0.02\n'
+    panel.editor.edited.emit(head + "".join(touch.format(*place) for place in places))
+    until(lambda: len(window.membrane.drag.handles) == len(places))
+    red = [actor for actor in window.membrane.plotter.renderer.GetActors() if _is_red(actor)]
+    arrows = [actor for actor in red if actor.visibility and any(actor.position)]
+    assert len(arrows) == len(places)
+    (circles,) = [actor for actor in red if actor not in arrows and actor.visibility]
+    assert circles.mapper.dataset.n_lines == len(places)
+
+
+def _is_red(actor) -> bool:
+    return getattr(actor, "prop", None) is not None and actor.prop.color == "#e8543f"
+
+
+def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene(
+    window, panel, until
+) -> None:
+    panel.gallery.chosen.emit("sphere")
+    until(lambda: plays(window, "sphere"))
+    panel.setCurrentIndex(EFFECTS_PAGE)
+    window.session.run(False)
+    window.session.seek(1.5)
+    until(lambda: len(window.membrane.drag.handles) == 1)
+    scene, good = window.session.scene, window.history.settings.written.text
+    bad = good.replace("[skin]", "[skin")
+    panel.editor.edited.emit(bad)
+    until(lambda: panel.tabText(EDIT) == "&Edit (not played)")
+    assert not panel.effects.table.isEnabled()
+    x, y = window.membrane.drag.handles[0].tolist()
+    drag = window.membrane.drag
+    drag.grabbed.emit(x, y)
+    drag.dragged.emit(x + 0.01, y)
+    drag.released.emit()
+    assert window.history.settings.written.text == bad
+    assert window.session.scene is scene
+    panel.editor.edited.emit(good)
+    until(lambda: panel.tabText(EDIT) == "&Edit")
+    assert panel.effects.table.isEnabled()
+
+
+def test_connecting_again_goes_on_with_the_scene_that_was_played(window, panel, until) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    os.kill(window.session.engine.pid, signal.SIGTERM)
+    until(lambda: window.badge.text() == "LOST")
+    window.actions_by_name["connect"].trigger()
+    until(lambda: window.badge.text() == "SIM" and plays(window, "tapping"))
+    assert window.history.settings.written.file == scene_file("tapping")
+    window.actions_by_name["disconnect"].trigger()
+    until(lambda: window.badge.text() == "OFF")
+    panel.gallery.chosen.emit("hum")  # which is to play it
+    until(lambda: window.badge.text() == "SIM" and plays(window, "hum"))
+
+
+def test_on_another_source_only_the_gallery_leads_back(window, panel, until) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    until(lambda: panel.gallery.items["tapping"].data(PLAYING))
+    panel.setCurrentIndex(EFFECTS_PAGE)
+    window.panels.connection.connect_wanted.emit("socket://127.0.0.1:9")
+    until(lambda: panel.currentIndex() == GALLERY)
+    assert not panel.isTabEnabled(EDIT)
+    assert not panel.isTabEnabled(EFFECTS_PAGE)
+    assert not panel.gallery.items["tapping"].data(PLAYING)
+    panel.gallery.chosen.emit("hum")
+    until(lambda: plays(window, "hum"))
+    assert window.panels.connection.source() == "sim:"
+    until(lambda: panel.isTabEnabled(EDIT) and panel.isTabEnabled(EFFECTS_PAGE))
+    window.history.stack.undo()
+    until(lambda: plays(window, "tapping"))

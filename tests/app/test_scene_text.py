@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin import SCENES, load_scene, planned, read_scene, scene_file
+from kappaskin import SCENES, Refusal, load_scene, planned, read_scene, scene_file
 from kappaskin_app.scene_text import OFF, ON, PLANNED, forced, shifted
 from kappaskin_app.touching import Held, touches_at
 
@@ -79,6 +79,11 @@ def test_a_touch_that_is_shifted_in_the_text_is_where_it_was_dragged_to(name) ->
         assert np.allclose(there, expected, atol=1e-6)
 
 
+def test_the_only_touch_is_shifted_where_it_is_no_array_as_well() -> None:
+    text = text_of("tapping").replace("[[touch]]", "[touch]")
+    assert read(shifted(text, 0, 0.001, 0.0), "tapping").stimuli[0].what.x == 0.061
+
+
 def _drawn(scene, time: float) -> list[object]:
     return [touch.load for touch in touches_at(scene, time)]
 
@@ -116,3 +121,14 @@ def test_own_scenes_need_no_file(tmp_path: Path) -> None:
     scene = read_scene(forced(text_of("centre"), "saturation", OFF), tmp_path / "own.toml")
     assert scene.name == "own"
     assert replace(scene, name="centre").choice.off == {"saturation", "finite-slope"}
+
+
+def test_a_text_that_cannot_be_changed_is_refused() -> None:
+    with pytest.raises(Refusal, match="expected a scene in TOML"):
+        forced("format =", "saturation", OFF)
+    with pytest.raises(Refusal, match="expected a scene in TOML"):
+        shifted("format = 1\nformat = 1", 0, 0.0, 0.0)
+    with pytest.raises(Refusal, match="expected a touch 3 to move, got a text with 2"):
+        shifted(text_of("two-contacts"), 2, 0.0, 0.0)
+    with pytest.raises(Refusal, match="expected a touch 1 to move, got a text with 0"):
+        shifted("format = 1", 0, 0.0, 0.0)

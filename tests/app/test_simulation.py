@@ -1,4 +1,5 @@
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,10 +17,11 @@ from kappaskin import (
     Refusal,
     Simulator,
     load_scene,
+    scene_file,
 )
 from kappaskin_app.pressing import dragged
 from kappaskin_app.settings import LOAD_CASES, SPREAD_CASES, Settings
-from kappaskin_app.simulation import is_table_1, plate_of, scene_of, with_consequences
+from kappaskin_app.simulation import is_table_1, plate_of, scene_of, with_consequences, written
 from kappaskin_app.skins import SHAPES
 
 CASES = [case for case, _ in LOAD_CASES]
@@ -298,3 +300,17 @@ def test_a_small_spread_load_presses_as_a_point_does() -> None:
 def test_every_edge_can_be_simulated_on_the_first_skin() -> None:
     for edge in EDGES:
         assert scene_of(Settings(edge=edge)).edge == edge
+
+
+def test_a_file_is_opened_in_the_app_as_the_library_reads_it(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + scene_file("centre").read_bytes())  # as some editors save it
+    scene = scene_of(Settings(written=written(file)))
+    assert scene.stimuli == load_scene(str(file)).stimuli
+    with pytest.raises(Refusal, match="expected a file with a scene, got a folder"):
+        written(tmp_path)
+    with pytest.raises(Refusal, match="cannot be read as a scene"):
+        written(tmp_path / "none.toml")
+    file.write_bytes(b"\xff\xfe")
+    with pytest.raises(Refusal, match="cannot be read as a scene"):
+        written(file)

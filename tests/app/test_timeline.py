@@ -7,9 +7,10 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 
-from kappaskin import load_scene
+from kappaskin import Presentation, load_scene
 from kappaskin_app.theme import DARK, LIGHT
-from kappaskin_app.views.timeline import Timeline, profile
+from kappaskin_app.views.timeline import Timeline
+from kappaskin_app.views.track import profile
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -40,6 +41,12 @@ def test_a_scene_in_which_nothing_moves_has_no_timeline(row, name):
     row.show_scene(load_scene("calibration"))
     assert row.isVisible()
     row.show_scene(None)
+    assert not row.isVisible()
+
+
+def test_a_skin_that_waits_on_one_cylinder_has_no_timeline(row):
+    scene = load_scene("calibration")
+    row.show_scene(replace(scene, laid=Presentation(scene.laid.steps[:1], 1.0)))
     assert not row.isVisible()
 
 

@@ -69,17 +69,16 @@ def edit(path, was, becomes):
 def sealed(path, **changes):
     """Rewrite the file with other values and the right hash: as a foreign program might."""
     from kappaskin.calibration.calibration import digest
-    from kappaskin.calibration.file import _value
+    from kappaskin.toml import table
 
     said = tomllib.loads(path.read_text())
     for name, value in changes.items():
         heading, _, key = name.partition("__")
         said[heading] = {**said[heading], key: value}
     content = {k: v for k, v in said.items() if isinstance(v, dict)}
-    lines = [f"format = {said['format']}", f'sha256 = "{digest(content)}"']
-    for heading, values in content.items():
-        lines += [f"[{heading}]", *(f"{k} = {_value(v)}" for k, v in values.items())]
-    path.write_text("\n".join(lines))
+    tables = [table("", {"format": said["format"], "sha256": digest(content)})]
+    tables += [table(f"[{heading}]", values) for heading, values in content.items()]
+    path.write_text("\n".join(tables))
 
 
 def test_what_was_written_comes_back_to_the_last_digit(path):

@@ -1,6 +1,5 @@
 """What the plan says of every effect, and which are forced on or off."""
 
-import inspect
 from typing import Any
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
@@ -18,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin import EFFECTS, Choice
 from kappaskin_app.amounts import duration
-from kappaskin_app.panels.calibration.parts import sentence
+from kappaskin_app.effects import called, explained
 from kappaskin_app.scene_text import OFF, ON, PLANNED
 from kappaskin_app.theme import LIGHT, Theme
 
@@ -35,11 +34,6 @@ _TIPS = (
 )
 _HOWS = ((PLANNED, "As planned"), (ON, "On"), (OFF, "Off"))
 _EFFECT, _FORCE, _KEPT, _SIZE, _ERROR, _TIME, _WHY = range(len(_COLUMNS))
-
-
-def in_words(effect: str) -> str:
-    words = effect.replace("-", " ")
-    return words[:1].upper() + words[1:]
 
 
 class EffectsPanel(QWidget):
@@ -109,7 +103,7 @@ class EffectsPanel(QWidget):
                 self.table.setItem(number, column, item)
             box = QComboBox()
             box.setObjectName(f"force-{name}")
-            box.setAccessibleName(f"{in_words(name)}, simulated")
+            box.setAccessibleName(f"{called(name)}, simulated")
             for value, words in _HOWS:
                 box.addItem(words, value)
             box.activated.connect(lambda _, name=name: self._force(name))
@@ -122,10 +116,9 @@ class EffectsPanel(QWidget):
     def _fill(self, number: int, row: dict[str, Any]) -> None:
         name, there = row["effect"], row["microseconds"] is not None
         self._show_force(name, there)
-        about = sentence(inspect.getdoc(EFFECTS[name]) or "")
         size = f"Size: {row['formula']}."
         cells = {
-            _EFFECT: (in_words(name), about),
+            _EFFECT: (called(name), explained(name)),
             _KEPT: ("kept" if row["kept"] else "left out" if there else "", ""),
             _SIZE: (f"{row['size']:.2g}" if there else "", size),
             _ERROR: (_share(row["error"]) if there else "", _TIPS[_ERROR]),

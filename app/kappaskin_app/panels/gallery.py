@@ -1,10 +1,6 @@
 """The ready scenes as pictures to choose from, each with what there is to see in it."""
 
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
-
-from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QHideEvent, QImage, QKeyEvent, QPixmap, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QFrame,
@@ -16,14 +12,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import SCENES, Refusal, Scene, load_scene
+from kappaskin import SCENES, Scene
 from kappaskin_app.columns import scrolled
 from kappaskin_app.guard import guarded
-from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, in_a_row, sentence, text_label
+from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, in_a_row, text_label
+from kappaskin_app.picturing import Look, Picturing
 from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.views.card import PICTURE, PLAYING, CardPainter, picture_size
-from kappaskin_app.views.relief import Relief, relief
-from kappaskin_app.views.scene_picture import picture
 
 # What is pleasant to watch, then what the paper has, then what one effect does.
 _WATCHED = (
@@ -33,12 +28,9 @@ _PAPER = "centre off-centre line calibration"
 _EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam hot-room hum"
 ORDER = tuple(f"{_WATCHED} {_PAPER} {_EFFECTS}".split())
 
-_POLL = 30  # ms
 _SETTLED = 200  # ms after the last change of size: only then are pictures made anew
 _CARD = 176  # px that a cell is wide, more or less, so that the columns fill the width
 _WORDS = (190, 340)  # px of what stands beside the cards at least and at most
-
-_Look = tuple[Theme, int, int, float]
 
 
 def in_order(names: tuple[str, ...]) -> list[str]:
@@ -121,13 +113,10 @@ class GalleryPanel(QWidget):
         )
         self._lay_out()
         self._scenes: dict[str, Scene | str] = {}
-        self._reliefs: dict[str, Relief] = {}
-        self._looks: dict[str, _Look] = {}
-        self._theme, self._playing, self._closed = LIGHT, "", False
-        self._thread = ThreadPoolExecutor(1, "gallery")
-        self._busy: tuple[Future[Any], Callable[[Any], None]] | None = None
-        self._timer = QTimer(self)
-        self._timer.timeout.connect(guarded(self._work))
+        self._theme, self._playing = LIGHT, ""
+        self._picturing = Picturing(list(self.items), self)
+        self._picturing.read.connect(guarded(self._take_scenes))
+        self._picturing.painted.connect(guarded(self._take_picture))
         self.cards.resized.connect(guarded(lambda: self._begin(_SETTLED)))
         self.cards.currentItemChanged.connect(guarded(self._show_words))
         self.cards.played.connect(guarded(self._play))
@@ -202,7 +191,7 @@ class GalleryPanel(QWidget):
         self._begin()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        self._timer.stop()
+        self._picturing.rest()
         super().hideEvent(event)
 
     def event(self, event: QEvent) -> bool:
@@ -211,39 +200,16 @@ class GalleryPanel(QWidget):
         return super().event(event)
 
     def close(self) -> bool:
-        """End the thread, at most a picture later, and close."""
-        self._closed = True
-        self._timer.stop()
-        self._thread.shutdown(wait=True, cancel_futures=True)
+        """End what makes the pictures, at most a picture later, and close."""
+        self._picturing.close()
         return super().close()
 
-    def _begin(self, after: int = _POLL) -> None:
-        """Make what is missing `after` so many ms, where it is seen."""
-        if self.isVisible() and not self._closed:
-            self._timer.start(after)
-
-    def _work(self) -> None:
-        """Take what was made, and have the next thing made."""
-        self._timer.setInterval(_POLL)
-        if self._busy is not None:
-            future, take = self._busy
-            if not future.done():
-                return
-            self._busy = None
-            take(future.result())
-        if not self._scenes:
-            self._scenes = dict.fromkeys(self.items, "")  # asked for, whatever comes of it
-            self._busy = self._thread.submit(_loaded, list(self.items)), self._take_scenes
-            return
-        size, ratio = picture_size(self.cards.painter.cell), self.devicePixelRatioF()
-        look = self._theme, size.width(), size.height(), ratio
-        for name, scene in self._scenes.items():
-            if isinstance(scene, Scene) and self._looks.get(name) != look:
-                self._looks[name] = look
-                made = self._thread.submit(self._painted, name, scene, look)
-                self._busy = made, self._take_picture
-                return
-        self._timer.stop()
+    def _begin(self, after: int = 0) -> None:
+        """Have what is missing made where it is seen, beginning `after` so many ms."""
+        if self.isVisible():
+            size, ratio = picture_size(self.cards.painter.cell), self.devicePixelRatioF()
+            look = Look(self._theme, size.width(), size.height(), ratio)
+            self._picturing.paint(look, after)
 
     def _take_scenes(self, scenes: dict[str, Scene | str]) -> None:
         self._scenes = scenes
@@ -252,24 +218,5 @@ class GalleryPanel(QWidget):
                 self.items[name].setText(scene.title or _titled(name))
         self._show_words()
 
-    def _painted(self, name: str, scene: Scene, look: _Look) -> tuple[str, QImage]:
-        if name not in self._reliefs:
-            self._reliefs[name] = relief(scene)
-        theme, width, height, ratio = look
-        return name, picture(self._reliefs[name], theme, QSize(width, height), ratio)
-
-    def _take_picture(self, made: tuple[str, QImage]) -> None:
-        name, image = made
+    def _take_picture(self, name: str, image: QImage) -> None:
         self.items[name].setData(PICTURE, QPixmap.fromImage(image))
-
-
-def _loaded(names: list[str]) -> dict[str, Scene | str]:
-    """The ready scenes, or in words why one cannot be."""
-
-    def loaded(name: str) -> Scene | str:
-        try:
-            return load_scene(name)
-        except Refusal as refusal:
-            return sentence(str(refusal))
-
-    return {name: loaded(name) for name in names}

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
-from kappaskin_app.panels.calibration.parts import button, sentence, text_label
+from kappaskin_app.panels.calibration.parts import button, text_label
 from kappaskin_app.panels.effects import EffectsPanel
 from kappaskin_app.panels.gallery import GalleryPanel
 from kappaskin_app.panels.scene_form import SceneForm
@@ -15,6 +15,7 @@ from kappaskin_app.theme import LIGHT, Theme
 
 _LINE = re.compile(r"\bline (\d+)")
 _FORM = 420  # px: the forms, at least
+_EDIT, _EFFECTS = 1, 2  # the pages
 _SHARES = (5, 6)  # of the width: the forms, and the text
 
 
@@ -69,7 +70,7 @@ class SceneEditor(QWidget):
         """Say why what is written cannot be played, and mark its line; or nothing when it can."""
         line = _LINE.search(why)
         self.text.show_wrong(int(line[1]) if line else 0)
-        self.message.setText(f"The last scene stays. {sentence(why)}" if why else "")
+        self.message.setText(f"The last scene stays: {why}" if why else "")
         self.message.setVisible(bool(why))
 
     def show_theme(self, theme: Theme) -> None:
@@ -104,6 +105,21 @@ class ScenePanel(QTabWidget):
 
     def _tell_seen(self) -> None:
         self.seen.emit(self.isVisible() and self.currentWidget() is self.effects)
+
+    def show_refusal(self, why: str) -> None:
+        """Say why what is written is not what is played; then nothing of it can be forced."""
+        self.editor.show_refusal(why)
+        self.setTabText(_EDIT, "&Edit (not played)" if why else "&Edit")
+        self.effects.table.setEnabled(not why)
+
+    def show_simulated(self, simulated: bool) -> None:
+        """Leave but the gallery, which leads back, where the readings are no simulation's."""
+        if simulated == self.isTabEnabled(_EDIT):
+            return
+        why = "" if simulated else "No scene is played: choose one, or press Ctrl+M."
+        for page in (_EDIT, _EFFECTS):
+            self.setTabEnabled(page, simulated)
+            self.setTabToolTip(page, why)
 
     def show_theme(self, theme: Theme) -> None:
         self.gallery.show_theme(theme)

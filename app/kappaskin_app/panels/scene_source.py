@@ -3,6 +3,7 @@
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
+    QFocusEvent,
     QFontDatabase,
     QKeyEvent,
     QKeySequence,
@@ -49,7 +50,7 @@ class SceneText(QPlainTextEdit):
         self.setUndoRedoEnabled(False)
         self.setTabChangesFocus(True)
         self._numbers, self._theme, self._wrong = _Numbers(self), LIGHT, 0
-        self._showing = False
+        self._showing, self._known = False, ""
         self._pause = QTimer(self, singleShot=True, interval=_PAUSE)  # pyright: ignore[reportCallIssue]
         self._pause.timeout.connect(guarded(self.tell))
         self.textChanged.connect(guarded(self._typed))
@@ -58,8 +59,15 @@ class SceneText(QPlainTextEdit):
         self._make_room()
 
     def show_text(self, text: str) -> None:
-        """Show a text that came from elsewhere; the place that is worked at stays in sight."""
-        if text == self.toPlainText() or self._pause.isActive():
+        """Show a text that came from elsewhere; the place that is worked at stays in sight.
+
+        What is being typed stays over the text that it is typed into, and goes with another one.
+        """
+        if self._pause.isActive() and text == self._known:
+            return
+        self._pause.stop()
+        self._known = text
+        if text == self.toPlainText():
             return
         place, bars = (
             self.textCursor().position(),
@@ -78,7 +86,8 @@ class SceneText(QPlainTextEdit):
     def tell(self) -> None:
         """Bring what was typed, without waiting for the pause to be over."""
         self._pause.stop()
-        self.edited.emit(self.toPlainText())
+        self._known = self.toPlainText()
+        self.edited.emit(self._known)
 
     def show_wrong(self, line: int) -> None:
         """Mark a line, counted from one, as the one where the scene cannot be; none with 0."""
@@ -121,6 +130,11 @@ class SceneText(QPlainTextEdit):
             event.ignore()
             return True
         return super().event(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if self._pause.isActive():
+            self.tell()  # or what is changed elsewhere would be changed in the text before
 
     # The numbers.
 

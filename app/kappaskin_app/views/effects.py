@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTab
 
 from kappaskin import EffectCost
 from kappaskin_app.amounts import NONE, duration, length
+from kappaskin_app.effects import called
 from kappaskin_app.theme import LIGHT, Theme
 
 _COLUMNS = {
@@ -61,7 +62,7 @@ class EffectsTable(QTableWidget):
         self.setRowCount(len(self._shown))
         for row, cost in enumerate(self._shown):
             errors = ((cost.rms_with, cost.kept), (cost.rms_without, not cost.kept))
-            texts = [cost.name, "yes" if cost.kept else "no", duration(cost.time_per_frame)]
+            texts = [called(cost.name), "yes" if cost.kept else "no", duration(cost.time_per_frame)]
             texts += [NONE if rms is None else length(rms) for rms, _ in errors]
             for column, text in enumerate(texts):
                 item = _cell(text, column)

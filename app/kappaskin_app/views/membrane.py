@@ -23,7 +23,6 @@ from kappaskin_app.views.footprint import footprint
 Array = NDArray[np.float64]
 
 _LIFT = 0.006  # of the skin's size above the surface, or half of a line drowns in it
-_LOADS = 4  # that are drawn at once
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
@@ -76,11 +75,10 @@ class MembraneView(QWidget):
         )
         self._line_actor = plotter.add_mesh(self._line, line_width=5, color="#e8543f", **unlit)
         # Sized for a skin of size 1; `show_skin` scales them to the one there is.
-        arrow = pv.Arrow(start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35)
-        self._arrows = [
-            plotter.add_mesh(arrow, color="#e8543f", reset_camera=False, render=False)
-            for _ in range(_LOADS)
-        ]
+        self._arrow = pv.Arrow(
+            start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35
+        )
+        self._arrows: list[pv.Actor] = []
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
@@ -274,6 +272,12 @@ class MembraneView(QWidget):
         centres = [load.centre() for load in loads]
         self.drag.handles = np.array(centres).reshape(-1, 2)
         size = self.skin.size
+        while len(self._arrows) < len(centres):
+            self._arrows.append(
+                self.plotter.add_mesh(
+                    self._arrow, color="#e8543f", reset_camera=False, render=False
+                )
+            )
         for number, arrow in enumerate(self._arrows):
             there = number < len(centres)
             # Inwards for a push; for a pull outwards, from the surface.
@@ -283,11 +287,12 @@ class MembraneView(QWidget):
             self._place(arrow, place, ARROW * size if pulls else 0.0)
         lines = [line for line in map(footprint, loads) if line is not None]
         self._line_actor.visibility = bool(lines)
-        for line in lines[:1]:
-            points, _ = self.skin.place(line, self._lift)
+        if lines:
+            points, _ = self.skin.place(np.concatenate(lines), self._lift)
             if len(points) != self._line.n_points:
+                each = np.arange(len(points)).reshape(len(lines), -1)
                 self._line.points = points
-                self._line.lines = [len(points), *range(len(points))]
+                self._line.lines = np.insert(each, 0, each.shape[1], axis=1).ravel()
             self._line.points[:] = points
 
     # How it is shown.

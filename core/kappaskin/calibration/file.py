@@ -13,6 +13,7 @@ from kappaskin.effects import PrandtlIshlinskii, StandardLinearSolid
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.sensor import Sensor
+from kappaskin.toml import table
 
 FORMAT = 1
 OLDEST = timedelta(days=180)
@@ -29,30 +30,11 @@ _KEYS = {
 _OPTIONAL = {"hysteresis", "creep"}
 
 
-def _text(value: str) -> str:
-    escaped = "".join(f"\\u{ord(c):04X}" if c < " " or c in '"\\\x7f' else c for c in value)
-    return f'"{escaped}"'
-
-
-def _value(value: Any) -> str:
-    """A value in TOML; long lists a line for each six numbers."""
-    if isinstance(value, str):
-        return _text(value)
-    if isinstance(value, datetime):
-        return value.isoformat()
-    if isinstance(value, list):
-        parts = [_value(part) for part in cast("list[Any]", value)]
-        lines = (", ".join(parts[k : k + 6]) for k in range(0, len(parts), 6))
-        return "[\n    " + ",\n    ".join(lines) + ",\n]"
-    return repr(value)
-
-
 def to_toml(calibration: Calibration) -> str:
     """The text of the file."""
-    lines = [f"format = {FORMAT}", f'sha256 = "{calibration.digest}"']
-    for heading, said in calibration.content.items():
-        lines += ["", f"[{heading}]", *(f"{key} = {_value(value)}" for key, value in said.items())]
-    return "\n".join(lines) + "\n"
+    tables = [table("", {"format": FORMAT, "sha256": calibration.digest})]
+    tables += [table(f"[{heading}]", said) for heading, said in calibration.content.items()]
+    return "\n".join(tables)
 
 
 def check_place(path: Path) -> None:

@@ -253,16 +253,15 @@ def _wanted(table: Table) -> set[str]:
     return {*table.get("on", tuple[str, ...], ()), *(() if isinstance(named, str) else named)}
 
 
-def read_scene_file(file: FilePath) -> Scene:
-    """The scene in `file`."""
+def read_scene_text(file: FilePath) -> str:
+    """The text in `file`; raises `Refusal` for a file that cannot be read, or is no scene's."""
     try:
         if file.exists() and not file.is_file():
             raise Refusal(f"{file}: expected a file with a scene, got a folder or a device")
         if file.stat().st_size > _LARGEST:
             raise Refusal(f"{file}: expected a scene of at most {_LARGEST} bytes, got more")
-        text = file.read_text(encoding="utf-8-sig")
+        return file.read_text(encoding="utf-8-sig")
+    except Refusal:
+        raise
     except (OSError, ValueError) as error:  # undecodable, or a name that no file has
-        if isinstance(error, Refusal):
-            raise
         raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
-    return read_scene(text, file)

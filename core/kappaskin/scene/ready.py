@@ -5,7 +5,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from kappaskin.errors import Refusal
-from kappaskin.scene.read import read_scene_file
+from kappaskin.scene.read import read_scene, read_scene_text
 from kappaskin.scene.scene import Scene
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
@@ -35,4 +35,5 @@ def scene_file(name: str = "") -> Path:
 
 def load_scene(name: str = "") -> Scene:
     """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
-    return read_scene_file(scene_file(name))
+    file = scene_file(name)
+    return read_scene(read_scene_text(file), file)

@@ -15,9 +15,10 @@ from kappaskin.layout import SensorLayout
 from kappaskin.patch import Disk, Patch, Polygon
 from kappaskin.scene.plan import effects_of
 from kappaskin.scene.read import ELECTRONICS, ELSEWHERE, FORMAT, LOOPS
+from kappaskin.scene.said import said_of
 from kappaskin.scene.scene import Scene
-from kappaskin.scene.toml import said_of, table
 from kappaskin.scene.write_stimulus import TOUCH_UNITS, touch_of
+from kappaskin.toml import table
 from kappaskin.transduction import Transduction
 
 _METRES = ("size", "rim_radius", "outline", "radius", "positions", "gage_length", "radii")
@@ -125,7 +126,7 @@ def _electronics(electronics: Transduction) -> list[str]:
     """The tables of what differs from the chain that the electronics are most like."""
     each = {name: _changes(electronics, chain) for name, chain in ELECTRONICS.items()}
     like = min(each, key=lambda name: sum(map(len, each[name].values())))
-    told = [] if like == "modern" else [table("[electronics]", {"like": like}, {})]
+    told = [] if like == "modern" else [table("[electronics]", {"like": like})]
     parts = {name: said for name, said in each[like].items() if said}
     return told + [table(f"[electronics.{name}]", parts[name], _UNITS) for name in parts]
 
@@ -159,7 +160,7 @@ def _effects(scene: Scene) -> list[str]:
             f"scene file, {', '.join(ordered)}; got {', '.join(names)}"
         )
     choice = _choice(scene)
-    told = [table("[effects]", choice, {})] if choice else []
+    told = [table("[effects]", choice)] if choice else []
     return told + [
         table(f"[effects.{effect.name}]", _effect(effect, scene), _units(effect))
         for effect in scene.effects

@@ -6,8 +6,8 @@ from kappaskin.errors import Refusal
 from kappaskin.mechanics import Load, RigidObject
 from kappaskin.scene.motion import Motion, Orbit, Path, Step
 from kappaskin.scene.read_stimulus import LOADS, OBJECTS, STEPS
+from kappaskin.scene.said import said_of
 from kappaskin.scene.stimulus import Indenter, Stimulus
-from kappaskin.scene.toml import said_of
 
 TOUCH_UNITS = {"angle": "rad", "force": "N", "depth": "m", "turn": "rad"}
 

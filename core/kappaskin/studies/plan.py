@@ -77,14 +77,16 @@ def plan_told(scene: Scene) -> Generator[list[dict[str, Any]]]:
     with NaN for times that are not known yet, and then with all.
     """
     made = plan(scene)
-    there = [entry.name for entry in made if entry.effect is not None]
-    for seconds in (lambda: dict.fromkeys(there, math.nan), lambda: costs_of(scene, made)):
-        costs = seconds()
-        yield [
-            entry.to_json()
-            | {"microseconds": 1e6 * costs[entry.name] if entry.name in costs else None}
-            for entry in made
-        ]
+    yield _rows(made, {entry.name: math.nan for entry in made if entry.effect is not None})
+    yield _rows(made, costs_of(scene, made))
+
+
+def _rows(plan: Plan, costs: dict[str, float]) -> list[dict[str, Any]]:
+    """The entries of a plan with what their effects cost, in s per frame, where they are there."""
+    return [
+        entry.to_json() | {"microseconds": 1e6 * costs[entry.name] if entry.name in costs else None}
+        for entry in plan
+    ]
 
 
 def plan_rows(scene: Scene) -> list[dict[str, Any]]:

@@ -16,10 +16,10 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.panels.scene_form import changes
-from kappaskin_app.panels.scene_form.changes import Place
 from kappaskin_app.panels.scene_form.editors import Editor, editor_for
-from kappaskin_app.panels.scene_form.sections import Change, Offer, Row, Section
+from kappaskin_app.panels.scene_form.section import Change, Offer, Row, Section
+from kappaskin_app.scene_text import changes
+from kappaskin_app.scene_text.changes import Place
 
 _BUTTON, _EDGE = 20, 9  # px: the size of a small button, and how far in the last one stands
 _NO_ARROW = "QToolButton::menu-indicator { image: none; }"

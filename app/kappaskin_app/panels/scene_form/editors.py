@@ -26,7 +26,7 @@ from kappaskin_app.panels.scene_form.numbers import (
     read_numbers,
     shown,
 )
-from kappaskin_app.panels.scene_form.sections import Row
+from kappaskin_app.panels.scene_form.section import Row
 from kappaskin_app.panels.scene_form.words import DEGREE, How
 
 _WIDEST = 300  # px of an editor that is no line of text

@@ -7,8 +7,9 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QApplication, QFrame, QScrollArea, QVBoxLayout, QWidget
 
 from kappaskin_app.panels.scene_form.box import SectionBox
-from kappaskin_app.panels.scene_form.changes import Place
-from kappaskin_app.panels.scene_form.sections import Change, Section, sections_of
+from kappaskin_app.panels.scene_form.section import Change, Section
+from kappaskin_app.panels.scene_form.sections import sections_of
+from kappaskin_app.scene_text.changes import Place
 
 _LABEL = 14  # digits that a label has room for at least
 

@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import QLocale
 
 from kappaskin_app.panels.form import RealBox, WholeBox
-from kappaskin_app.panels.scene_form.sections import MOST, MOST_WHOLE
+from kappaskin_app.panels.scene_form.kinds import MOST, MOST_WHOLE
 from kappaskin_app.panels.scene_form.words import How
 
 _DIGITS = 6  # of a number that are shown

@@ -1,88 +1,20 @@
 """What the text of a scene says to what its forms show: parts with rows, and what may be added."""
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
-from kappaskin_app.panels.scene_form import changes
-from kappaskin_app.panels.scene_form.changes import Place
-from kappaskin_app.panels.scene_form.parts import instead_of, kinds, known, needed, optional
-from kappaskin_app.panels.scene_form.words import How, explained, how_of, named, words_of
+from kappaskin_app.effects import called, explained
+from kappaskin_app.panels.scene_form.kinds import kind_of
+from kappaskin_app.panels.scene_form.section import Change, Offer, Row, Section
+from kappaskin_app.panels.scene_form.words import how_of, named, words_of
+from kappaskin_app.scene_text import changes
+from kappaskin_app.scene_text.changes import Place
+from kappaskin_app.scene_text.parts import instead_of, kinds, known, needed, optional
 
-MOST_WHOLE = 2**31 - 1  # that a box for whole numbers can hold
-MOST = 1e12  # of any number shown in a box
 _ELECTRONICS = ("bridge", "multiplexer", "amplifier", "converter")
 _ORDER = ("step", "seconds", "by", "to", "times", "ease")
 
 Said = Mapping[str, Any]
-Change = Callable[[str], str]
-"""A text to a text."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One value at a `place`; `kind` says by what it is edited, `usual` how large it often is.
-
-    The value of one of a `part` says of which kind that part is.
-    """
-
-    place: Place
-    kind: str
-    how: How
-    value: Any
-    usual: Any = None
-    part: str = ""
-
-    def changed(self, text: str, value: Any) -> str:
-        """The text with another value here."""
-        if self.part:
-            return changes.change_kind(text, self.place, self.part, value)
-        return changes.put(text, self.place, value)
-
-
-@dataclass(frozen=True)
-class Offer:
-    """Something that may be put in, in words; or others `inside`."""
-
-    words: str
-    tip: str
-    change: Change = str
-    inside: "tuple[Offer, ...]" = ()
-
-
-@dataclass(frozen=True)
-class Section:
-    """A titled part of a scene: rows, then parts of its own, and what may be added or removed.
-
-    `offers` are further rows, `more` further parts, which a button called `adding` offers. A step
-    is shown in one line.
-    """
-
-    title: str
-    place: Place
-    rows: tuple[Row, ...] = ()
-    sections: "tuple[Section, ...]" = ()
-    offers: tuple[Offer, ...] = ()
-    adding: str = ""
-    more: tuple[Offer, ...] = ()
-    removable: bool = False
-    step: bool = False
-    tip: str = ""
-
-    @property
-    def structure(self) -> tuple[Any, ...]:
-        """All but the values: what its editors are made from."""
-        return (
-            *(self.title, self.place, self.adding),
-            tuple((row.place, row.kind, row.how) for row in self.rows),
-            tuple(section.structure for section in self.sections),
-            tuple(offer.words for offer in (*self.offers, *self.more)),
-        )
-
-    def all_rows(self) -> tuple[Row, ...]:
-        """Its own rows, then those of its parts."""
-        return (*self.rows, *(row for section in self.sections for row in section.all_rows()))
 
 
 def sections_of(said: Said) -> tuple[Section, ...]:
@@ -193,14 +125,14 @@ def _effects(said: Said) -> Section:
     there = [name for name, table in said.items() if isinstance(table, Mapping)]
     blocks = tuple(
         _section(
-            *(named(name), "effects", name, said[name], ("effects", name)),
+            *(called(name), "effects", name, said[name], ("effects", name)),
             removable=True,
             tip=explained(name),
         )
         for name in there
     )
     more = tuple(
-        Offer(named(name), explained(name), _adding_effect(name))
+        Offer(called(name), explained(name), _adding_effect(name))
         for name in kinds("effects")
         if name not in there
     )
@@ -241,7 +173,7 @@ def _rows(part: str, kind: str, said: Said, place: Place) -> tuple[Row, ...]:
             continue
         how, usual = how_of(part, kind, key), may.get(key)
         says = part if (part, key) in _SAYS else ""
-        found.append(Row((*place, key), _kind(value, how, usual), how, value, usual, says))
+        found.append(Row((*place, key), kind_of(value, how, usual), how, value, usual, says))
     return tuple(found)
 
 
@@ -265,39 +197,3 @@ def _offers(part: str, kind: str, said: Said, place: Place) -> tuple[Offer, ...]
 
 def _putting_in(place: Place, key: str, value: Any) -> Change:
     return lambda text: changes.put_in(text, place, key, value)
-
-
-def _kind(value: Any, how: How, usual: Any) -> str:
-    """By what a value is edited."""
-    if isinstance(value, str):
-        plain = "literal" if "\n" in value else "text"
-        return "choice" if how.choices else plain
-    if isinstance(value, bool):
-        return "switch"
-    if isinstance(value, list):
-        return _kind_of_list(value, how, usual)
-    return _kind_of_number(value, usual) if _is_number(value) else "literal"
-
-
-def _is_number(value: Any) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(value)
-
-
-def _kind_of_number(value: float, usual: Any) -> str:
-    if isinstance(value, int) and not isinstance(usual, float):
-        return "whole" if abs(value) <= MOST_WHOLE else "literal"
-    return "number" if abs(value) <= MOST else "literal"
-
-
-def _kind_of_list(value: list[Any], how: How, usual: Any) -> str:
-    """That of its numbers with their count, unless they are many, or their number may change."""
-    if value and all(isinstance(one, list) and all(map(_is_number, one)) for one in value):
-        return "pairs"
-    if not all(map(_is_number, value)):
-        return "literal"
-    first = usual[0] if isinstance(usual, list) and usual else None
-    if how.listed or len(value) not in (2, 3):
-        return "numbers" if isinstance(first, float) else "wholes"
-    each = {_kind_of_number(one, first) for one in value}
-    return f"{len(value)} {each.pop()}" if len(each) == 1 else "numbers"

@@ -1,10 +1,10 @@
 """How each key of a scene is asked for: a label, a tip, the unit it is shown in and its range."""
 
-import inspect
 import math
 from dataclasses import dataclass, replace
 
 from kappaskin import EDGES, EFFECTS, parameters
+from kappaskin_app.effects import explained
 
 MM, UM, DEGREE = ("mm", 1e-3), ("\N{MICRO SIGN}m", 1e-6), ("\N{DEGREE SIGN}", math.pi / 180)
 US = ("\N{MICRO SIGN}s", 1e-6)
@@ -119,6 +119,7 @@ _HOW = {
         second="Second prototype",
         first="First prototype",
     ),
+    "bridge": How("Half-bridge"),
     "gage_factor": _how("Gage factor", "Change of a gage's resistance over its strain."),
     "substrate_thickness": _how("Substrate", "Thickness between the gages.", UM, 0.0),
     "gage_thickness": _how("Gage thickness", "Thickness of a gage.", UM, 0.0),
@@ -234,29 +235,10 @@ _HOW = {
     "share": _how("Share", "Of all frames."),
 }
 
-_PARTS = {
-    "bridge": "Half-bridge",
-    "multiplexer": "Multiplexer",
-    "amplifier": "Amplifier",
-    "converter": "Converter",
-    "stuck": "Stuck elements",
-    "intermittent": "Loose elements",
-    "hysteresis": "Hysteresis",
-    "dropped-frames": "Lost frames",
-}
-
 
 def named(part: str) -> str:
-    """A part of the electronics, a motion or an effect in words."""
-    if part in _HOW:
-        return _HOW[part].label
-    return _PARTS.get(part, part.replace("-", " ").replace("_", " ").capitalize())
-
-
-def explained(effect: str) -> str:
-    """What an effect does."""
-    kind = EFFECTS.get(effect)
-    return " ".join(inspect.cleandoc(kind.__doc__ or "").split()).replace("`", "") if kind else ""
+    """A part of the electronics, a motion or a key in words."""
+    return _HOW[part].label if part in _HOW else part.replace("_", " ").capitalize()
 
 
 def how_of(part: str, kind: str, key: str) -> How:

@@ -80,14 +80,16 @@ def effect_costs(scene: Scene, setting: Setting) -> tuple[EffectCost, ...]:
     seconds, judge = costs_of(scene, planned), _Judge(scene, setting, bench.contact)
     now = judge.answer(scene, kept)
     found: list[EffectCost] = []
-    for name, entry in ((e.name, e) for e in planned if e.effect):
-        effect = entry.effect
+    for entry in planned:
+        name, effect = entry.name, entry.effect
+        if effect is None:
+            continue
         rms: tuple[float, float] | tuple[None, None] = (None, None)
-        if effect and not isinstance(effect, DroppedFrames | CorruptedFrames):
+        if not isinstance(effect, DroppedFrames | CorruptedFrames):
             other = judge.answer(_without(scene, effect), kept ^ {name})
             has, has_not = (now, other) if entry.kept else (other, now)
             rms = judge.rms(has, has), judge.rms(has_not, has)
-        bound = None if effect and effect.authored else entry.size.error
+        bound = None if effect.authored else entry.size.error
         found.append(EffectCost(name, entry.kept, seconds[name], bound, *rms))
     return tuple(found)
 

@@ -1,38 +1,24 @@
-"""What a scene says at one place to the lines of a TOML table, as a person would write them."""
+"""What a file says to the lines of TOML tables, as a person would write them."""
 
 import json
 import textwrap
 from collections.abc import Mapping
-from dataclasses import fields
-from typing import Any, cast, get_args, get_origin, get_type_hints
+from datetime import datetime
+from types import MappingProxyType
+from typing import Any, cast
 
 _WIDTH = 88
 _INDENT = "    "
 
 
-def said_of(owner: object, usual: object = None, without: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The fields of a dataclass that are not as `usual`, their defaults when left out."""
-    hints = get_type_hints(type(owner))
-    said = dict[str, Any]()
-    for field in fields(cast("Any", owner)):
-        value = getattr(owner, field.name)
-        expected = field.default if usual is None else getattr(usual, field.name)
-        if field.init and field.name not in without and value != expected:
-            said[field.name] = plain(value, hints[field.name])
-    return said
+def table(
+    header: str, said: Mapping[str, Any], units: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """The lines of a table below `header`, "[skin]" say, or of the top where that is empty.
 
-
-def plain(value: Any, kind: Any) -> Any:
-    """The `value` as TOML has it: a number where `kind` is float is one, however it came."""
-    if get_origin(kind) is tuple:
-        return [plain(each, get_args(kind)[0]) for each in value]
-    if isinstance(value, bool | str):
-        return value
-    return float(value) if kind is float or float in get_args(kind) else int(value)
-
-
-def table(header: str, said: Mapping[str, Any], units: Mapping[str, str]) -> str:
-    """The lines of `[header]`, or of the top where that is empty; units stand in comments."""
+    It says texts, dates, numbers, switches, and lists or tables of them; `units`, by key, stand in
+    comments.
+    """
     lines = [header] if header else []
     for key, value in said.items():
         unit = f"  # {units[key]}" if units.get(key) else ""
@@ -49,6 +35,8 @@ def _value(value: Any) -> str:
         case dict():
             each = (f"{key} = {_value(one)}" for key, one in cast("dict[str, Any]", value).items())
             return f"{{ {', '.join(each)} }}"
+        case datetime():
+            return value.isoformat()
         case list():
             return _list([_value(each) for each in cast("list[Any]", value)])
         case _:

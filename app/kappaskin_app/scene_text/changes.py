@@ -1,23 +1,28 @@
-"""The text of a scene to the text with one thing changed; all else stays as it is written."""
+"""The text of a scene to the text with one thing changed; all else stays as it is written.
 
-import tomllib
-from collections.abc import Mapping, Sequence
+Each raises `Refusal` for a text that is no TOML, and KeyError or IndexError for a place that there
+is not.
+"""
+
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
 import tomlkit
 from tomlkit.items import AbstractTable, AoT, InlineTable, Table
 
-from kappaskin_app.panels.scene_form.parts import alike, instead_of, known, missing, needed
+from kappaskin_app.scene_text.parsing import parsed
+from kappaskin_app.scene_text.parts import alike, instead_of, known, missing, needed
+from kappaskin_app.scene_text.places import placed
 
 Place = tuple[str | int, ...]
 
-_SIDE = 0.1  # m of the skin that parts.toml has its places on
+ON, OFF, PLANNED = "on", "off", "planned"
 
 
 def put(text: str, place: Place, value: Any) -> str:
     """The text with another value at `place`, where there is one."""
-    document = tomlkit.parse(text)
+    document = parsed(text)
     owner, key = _at(document, place[:-1]), place[-1]
     old = owner[key]
     if old == value:
@@ -33,7 +38,7 @@ def put(text: str, place: Place, value: Any) -> str:
 
 def put_in(text: str, place: Place, key: str, value: Any) -> str:
     """The text with `key` in the table at `place`, which is made when there is none."""
-    document = tomlkit.parse(text)
+    document = parsed(text)
     owner: Any = document
     for name in place:
         if isinstance(name, str) and name not in owner:
@@ -46,7 +51,7 @@ def put_in(text: str, place: Place, key: str, value: Any) -> str:
 
 def remove(text: str, place: Place) -> str:
     """The text without what stands at `place`, nor the array or table that this leaves empty."""
-    document = tomlkit.parse(text)
+    document = parsed(text)
     owner = _at(document, place[:-1])
     del owner[place[-1]]
     if not owner and isinstance(place[-1], int):
@@ -58,7 +63,7 @@ def remove(text: str, place: Place) -> str:
 
 def add_table(text: str, place: Place, said: dict[str, Any]) -> str:
     """The text with the table at `place` that says this."""
-    document = tomlkit.parse(text)
+    document = parsed(text)
     owner: Any = document
     for name in place[:-1]:
         if name not in owner:
@@ -70,8 +75,8 @@ def add_table(text: str, place: Place, said: dict[str, Any]) -> str:
 
 def add_touch(text: str, kind: str) -> str:
     """The text with one more touch of this kind, at a like place of the skin that is there."""
-    sides = _sides(tomllib.loads(text).get("skin"))
-    return _add(text, ("touch",), {"what": kind} | _placed(needed("touch", kind), sides))
+    said = placed(needed("touch", kind), parsed(text).get("skin"))
+    return _add(text, ("touch",), {"what": kind} | said)
 
 
 def add_step(text: str, path: Place, kind: str) -> str:
@@ -79,7 +84,7 @@ def add_step(text: str, path: Place, kind: str) -> str:
 
     It comes before a last release: a path has to end lifted.
     """
-    many = _at(tomllib.loads(text), path)
+    many = _at(parsed(text), path)
     before = isinstance(many, list) and many and _lifts(many[-1]) and not _lifts({"step": kind})
     return _add(
         text, path, {"step": kind} | needed("step", kind), len(many) - 1 if before else None
@@ -95,7 +100,7 @@ def change_kind(text: str, place: Place, part: str, kind: str) -> str:
 
     What that kind does not know goes, what it needs comes, all else is kept.
     """
-    document = tomlkit.parse(text)
+    document = parsed(text)
     at, key = place[:-1], str(place[-1])
     owner = _at(document, at)
     may = known(part, kind)
@@ -104,12 +109,37 @@ def change_kind(text: str, place: Place, part: str, kind: str) -> str:
         for name, value in owner.items()
         if name == key or (name in may and alike(_plain(value), may[name]))
     }
-    sides = _sides(tomllib.loads(text).get("skin"))
-    more = (
-        _placed(missing(part, kind, said), sides) if part == "touch" else missing(part, kind, said)
-    )
+    more = missing(part, kind, said)
+    if part == "touch":
+        more = placed(more, document.get("skin"))
     _set(document, at, said | {key: kind} | more)
     return _tidy(text, document)
+
+
+def forced(text: str, effect: str, how: str) -> str:
+    """The text with an effect forced `ON` or `OFF`, or `PLANNED`: left to the plan.
+
+    Where the text lists the effects that there are, it is in that list or not.
+    """
+    document = parsed(text)
+    if "effects" not in document:
+        document["effects"] = tomlkit.table()
+    table = document["effects"]
+    if isinstance(table.get("choose"), list):
+        _name(table, "choose", effect, how == ON)
+    else:
+        for key in (ON, OFF):
+            _name(table, key, effect, how == key)
+    return tomlkit.dumps(document)
+
+
+def _name(table: Any, key: str, effect: str, there: bool) -> None:
+    """Have the list at `key` name the effect, or not; an empty one goes unless it chooses all."""
+    names = [one for one in table.get(key, ()) if one != effect] + [effect] * there
+    if names or key == "choose":
+        table[key] = names
+    elif key in table:
+        del table[key]
 
 
 def _at(document: Any, place: Place) -> Any:
@@ -138,7 +168,7 @@ def _set(document: Any, place: Place, said: dict[str, Any]) -> None:
 
 def _add(text: str, place: Place, said: dict[str, Any], index: int | None = None) -> str:
     """The text with one more table in the array at `place`, at its end or at `index`."""
-    document = tomlkit.parse(text)
+    document = parsed(text)
     owner = _at(document, place[:-1])
     if place[-1] not in owner:
         owner.append(place[-1], tomlkit.aot())
@@ -199,27 +229,3 @@ def _tidy(text: str, document: Any) -> str:
             continue
         tidy.append(line)
     return "\n".join(tidy) + "\n"
-
-
-def _sides(skin: Any) -> tuple[float, float]:
-    """Lengths of the skin in m along x and y, as far as the text tells them."""
-    said = skin if isinstance(skin, Mapping) else {}
-    corners = said.get("outline")
-    if isinstance(radius := said.get("rim_radius"), int | float):
-        sides: Any = (2 * radius, 2 * radius)
-    elif isinstance(corners, list) and corners and all(isinstance(c, Sequence) for c in corners):
-        sides = [max((c[axis] for c in corners if len(c) == 2), default=0) for axis in (0, 1)]
-    else:
-        sides = said.get("size")
-    usable = isinstance(sides, Sequence) and len(sides) == 2
-    if not (usable and all(isinstance(a, int | float) and 0 < a < 1e3 for a in sides)):
-        return _SIDE, _SIDE
-    return sides[0], sides[1]
-
-
-def _placed(said: dict[str, Any], sides: tuple[float, float]) -> dict[str, Any]:
-    """What is said of a touch, its places moved to where they are on a skin of these sides."""
-    return {
-        key: float(f"{value * sides[key[0] == 'y'] / _SIDE:.4g}") if key[0] in "xy" else value
-        for key, value in said.items()
-    }

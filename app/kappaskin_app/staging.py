@@ -1,0 +1,148 @@
+"""The scene between the session that plays it and where it is chosen, edited, planned, scrubbed."""
+
+from contextlib import suppress
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from kappaskin import SCENES, Refusal, Scene, Status, scene_file
+from kappaskin_app.guard import guarded
+from kappaskin_app.history import History
+from kappaskin_app.panels.scene import ScenePanel
+from kappaskin_app.planning import Planning
+from kappaskin_app.session import Session
+from kappaskin_app.settings import Settings
+from kappaskin_app.simulation import OWN, text_of, written
+from kappaskin_app.views.timeline import Timeline
+from kappaskin_app.wishes import Wishes
+
+_FILES = "Scene (*.toml)"
+_PLANNING = "Each effect is sized and timed\N{HORIZONTAL ELLIPSIS}"
+
+
+class Staging(QObject):
+    """Shows in `panel`, `timeline` and plan what is played; `told` says what came of a wish.
+
+    `played` names the source when a scene in a file is played.
+    """
+
+    told = Signal(str)
+    played = Signal(str)
+
+    def __init__(
+        self,
+        history: History,
+        session: Session,
+        wishes: Wishes,
+        planning: Planning,
+        panel: ScenePanel,
+        timeline: Timeline,
+        window: QWidget,
+    ) -> None:
+        super().__init__(window)
+        self._history, self._session, self._wishes = history, session, wishes
+        self._planning, self._panel, self._timeline = planning, panel, timeline
+        self._window = window
+        self._wire()
+
+    def _wire(self) -> None:
+        panel, session, planning = self._panel, self._session, self._planning
+        panel.gallery.chosen.connect(guarded(lambda name: self._play(scene_file(name))))
+        panel.gallery.open_wanted.connect(guarded(self.open))
+        panel.editor.edited.connect(guarded(self._wishes.write))
+        panel.editor.save_wanted.connect(guarded(self.save))
+        panel.effects.forced.connect(guarded(self._force))
+        panel.seen.connect(guarded(planning.watch))
+        session.playing.connect(guarded(self._show_scene))
+        session.refused.connect(guarded(panel.show_refusal))
+        session.reported.connect(guarded(planning.follow))
+        session.reported.connect(guarded(self._show_status))
+        planning.changed.connect(guarded(self._show_plan))
+        self._timeline.play_wanted.connect(guarded(session.run))
+        self._timeline.sought.connect(guarded(self._seek))
+        self._timeline.track.sliderReleased.connect(guarded(lambda: session.run(session.running)))
+
+    # What a person asks.
+
+    def open(self) -> None:
+        """Ask for a file, and play the scene in it."""
+        file, _ = QFileDialog.getOpenFileName(self._window, "Open a scene", "", _FILES)
+        if file:
+            self._play(Path(file))
+
+    def save(self) -> None:
+        """Ask for a file, and write the scene as it is there."""
+        settings = self._history.settings
+        name = settings.written.file.name if settings.written else OWN.name
+        file, _ = QFileDialog.getSaveFileName(self._window, "Save the scene", name, _FILES)
+        if file:
+            path = Path(file).with_suffix(".toml")
+            try:
+                path.write_text(text_of(settings), encoding="utf-8")
+                self.told.emit(f"Saved {path}")
+            except (OSError, Refusal) as error:
+                self.told.emit(f"Could not write {path}: {error}")
+
+    def pause(self) -> None:
+        """Let the scene stand still, or go on."""
+        self._session.run(not self._session.running)
+
+    def _play(self, file: Path) -> None:
+        try:
+            self._wishes.play(written(file))
+            self.played.emit(self._session.source)
+        except Refusal as refusal:
+            self.told.emit(str(refusal))
+
+    def _force(self, effect: str, how: str) -> None:
+        try:
+            self._wishes.force(effect, how)
+        except Refusal as refusal:
+            self.told.emit(str(refusal))
+            self._show_plan()  # or what was asked would look as if it were so
+
+    def _seek(self, at: float) -> None:
+        self._session.seek(at, self._timeline.track.isSliderDown())
+
+    # What is so.
+
+    def show_settings(self, settings: Settings) -> None:
+        """Show the text of the scene that is written, whether it can be played or not."""
+        if settings.written is not None:
+            self._show_text(settings)
+
+    def _show_scene(self, scene: Scene) -> None:
+        self._timeline.show_scene(scene)
+        self._show_card()
+        self._show_text(self._history.settings)
+
+    def _show_card(self) -> None:
+        """Mark the ready scene that is played: none for a file of one's own of its name."""
+        written = self._history.settings.written
+        file = written.file if written else OWN
+        ready = file.stem in SCENES and file == scene_file(file.stem)
+        self._panel.gallery.show_playing(file.stem if ready and self._session.inside else "")
+
+    def _show_text(self, settings: Settings) -> None:
+        editor, written = self._panel.editor, settings.written
+        if written is not None:
+            editor.show_scene(written.text, written.file.name)
+        elif self._session.inside:
+            with suppress(Refusal):  # no such skin: what is shown is the last one's
+                editor.show_scene(text_of(settings), "The panels' skin")
+
+    def _show_plan(self) -> None:
+        planning, effects = self._planning, self._panel.effects
+        if planning.rows and planning.scene is not None:
+            effects.show_plan(planning.rows, planning.scene.choice)
+        if planning.refusal or planning.waiting:
+            effects.show_waiting(planning.refusal or _PLANNING)
+
+    def _show_status(self, _: Status) -> None:
+        self._panel.show_simulated(self._session.inside)
+        self._show_card()
+        if not self._session.inside:
+            self._timeline.show_scene(None)
+            return
+        self._timeline.show_time(self._session.time, self._session.running)

@@ -1,0 +1,27 @@
+"""What effects are called and what is told of them."""
+
+import pytest
+
+from kappaskin import EFFECTS
+from kappaskin_app.effects import called, explained
+
+
+def test_effects_have_names_of_their_own_in_words() -> None:
+    names = [called(effect) for effect in EFFECTS]
+
+    assert len(set(names)) == len(names)
+    assert all(name[0].isupper() and "-" not in name for name in names)
+    assert {"Finite slope", "Dead elements"} <= set(names)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_each_effect_says_in_sentences_what_it_does(effect: str) -> None:
+    words = explained(effect)
+
+    assert words.endswith(".")
+    assert not set("`\n") & set(words)
+
+
+def test_of_an_effect_that_is_not_known_its_name_is_told_and_no_more() -> None:
+    assert called("un-known") == "Un known"
+    assert explained("un-known") == ""
