@@ -231,6 +231,15 @@ def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
     until(lambda: np.abs(window.session.estimate.true_contact - there).max() < 2e-3)
     window.history.stack.undo()
     until(lambda: window.session.scene.stimuli[0].what.x == pytest.approx(x))
+    drag.grabbed.emit(x, y)
+    drag.dragged.emit(x + 0.01, y)
+    panel.gallery.chosen.emit("hum")  # or undone, with the mouse held
+    until(lambda: plays(window, "hum"))
+    written = window.history.settings.written
+    drag.dragged.emit(x + 0.02, y)
+    drag.released.emit()
+    assert window.session.scene.name == "hum"
+    assert window.history.settings.written == written
 
 
 def test_scenes_are_opened_from_files_and_saved_into_them(
