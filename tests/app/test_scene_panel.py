@@ -115,6 +115,17 @@ def test_text_that_is_no_scene_leaves_the_last_one_and_says_where(window, panel,
     assert not panel.editor.text.extraSelections()
 
 
+def test_a_text_that_was_emptied_is_written_anew(window, panel, until, qtbot) -> None:
+    panel.setCurrentIndex(EDIT)
+    text = panel.editor.text
+    text.setPlainText("")
+    until(lambda: "expected format" in panel.editor.message.text())
+    text.setFocus()
+    qtbot.keyClicks(text, "format = 1")
+    until(lambda: "expected format" not in panel.editor.message.text())
+    assert window.history.settings.written.text == "format = 1"
+
+
 def test_the_keys_of_undo_in_the_text_undo_what_the_window_did(window, panel, until, qtbot) -> None:
     panel.gallery.chosen.emit("hum")
     until(lambda: plays(window, "hum"))
