@@ -272,6 +272,9 @@ def test_scenes_are_opened_from_files_and_saved_into_them(
     window.statusBar().messageChanged.connect(said.append)
     window.actions_by_name["open-scene"].trigger()
     until(lambda: any("cannot be read" in words for words in said))
+    nothing.write_text("#" * 1_000_001)
+    window.actions_by_name["open-scene"].trigger()
+    until(lambda: any("at most 1000000 bytes" in words for words in said))
     assert plays(window, "mine")
 
 
