@@ -12,12 +12,14 @@ from kappaskin import (
     Cost,
     Effects,
     Estimate,
+    GaussianNoise,
     Measuring,
     Refusal,
     Refused,
     Scene,
     Setting,
     Status,
+    UniformNoise,
     frontier,
     settings_to_try,
 )
@@ -307,6 +309,10 @@ def _measurable(setting: Setting) -> bool:
     return setting.functions[0] * setting.functions[1] <= _MOST_FUNCTIONS
 
 
+def _besides_noise(scene: Scene) -> list[object]:
+    return [one for one in scene.effects if not isinstance(one, UniformNoise | GaussianNoise)]
+
+
 def _unlike(was: Scene, now: Scene) -> str:
     """What of a simulated scene is not as it was, besides how many elements it has."""
     dead, dead_now = (np.flatnonzero(~scene.layout.live[0]).tolist() for scene in (was, now))
@@ -314,10 +320,10 @@ def _unlike(was: Scene, now: Scene) -> str:
         return "on another skin"
     if was.transduction != now.transduction:
         return "with other electronics"
+    if (was.choice, *_besides_noise(was)) != (now.choice, *_besides_noise(now)):
+        return "with other effects"
     if was.effects != now.effects:
         return "with other noise"
-    if was.choice != now.choice:
-        return "with other effects"
     if dead != dead_now:
         return "with other elements dead"
     if was.stimuli != now.stimuli:

@@ -56,6 +56,7 @@ _OFFSET = 10.0  # 1/m of offset for a gain that is off by 1
 
 OWN = Path("own.toml")
 """What a scene is called that was begun from the panels' own."""
+_LARGEST = 1_000_000  # bytes of a scene: a longer text would hold up the editor
 _REMEMBERED = 64  # scenes, so that undoing is quick
 
 _Effect = UniformNoise | GaussianNoise | Hysteresis | Creep | Tolerance
@@ -215,6 +216,10 @@ def named(source: str) -> dict[str, Any]:
 
 def written(file: Path) -> Written:
     """The scene in `file`, as it is written there; raises `Refusal` for a file of no scene."""
+    if file.is_file() and (size := file.stat().st_size) > _LARGEST:
+        raise Refusal(
+            f"{file}: expected a scene of at most {_LARGEST} bytes, got {size}; check its name"
+        )
     return Written(read_scene_text(file), file)
 
 

@@ -29,6 +29,7 @@ class Wishes:
         self._history, self._session = history, session
         self._gesture, self._grabbed_end = -1, False
         self._held: Held | None = None
+        self._grabbed_in: Written | None = None
         self._begun: tuple[Demonstration, int, Settings] | None = None
 
     def wish(self, name: str, value: Any) -> None:
@@ -112,12 +113,19 @@ class Wishes:
         settings, session = self._history.settings, self._session
         second = math.dist((x, y), (settings.x_end, settings.y_end))
         self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
-        self._gesture = self._history.new_gesture()
+        self._gesture, self._grabbed_in = self._history.new_gesture(), settings.written
         writes = settings.written is not None and not session.refusal  # what is seen is in it
         self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
 
+    @property
+    def _there(self) -> bool:
+        """Whether what was grabbed still is: it was not undone, nor another scene chosen."""
+        return self._history.settings.written == self._grabbed_in
+
     def drag(self, x: float, y: float) -> None:
         settings, scene = self._history.settings, self._session.scene
+        if not self._there:
+            return
         if self._held is not None:
             self._session.move(self._held.moved_to(x, y))
         elif settings.written is None:
@@ -127,14 +135,14 @@ class Wishes:
     def release(self) -> None:
         held, written = self._held, self._history.settings.written
         self._gesture, self._held = -1, None
-        if held is not None and written is not None and held.moved:
+        if self._there and held is not None and written is not None and held.moved:
             text = shifted(written.text, held.number, *held.by)
             self._history.change("Drag the load", -1, written=replace(written, text=text))
 
     def give_up(self) -> None:
         """Put the load back to where it was grabbed."""
-        if self._held is not None:
+        if self._held is not None and self._there:
             self._session.move(self._held.scene)
-        else:
+        elif self._held is None:
             self._history.cancel(self._gesture)
         self._gesture, self._held = -1, None

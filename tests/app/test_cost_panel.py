@@ -365,6 +365,8 @@ def test_another_basis_is_measured_too_and_another_skin_only_when_asked(
     until(lambda: odd in measured.costing.costs, 60.0)
     measured.history.change("Noise", -1, noise_rms=1.0)
     until(lambda: message.text() == "Measured with other noise: measure again.")
+    measured.history.change("Creep", -1, creep=0.1)
+    until(lambda: message.text() == "Measured with other effects: measure again.")
     was = measured.costing.costs[odd]
     measured.history.change("Edge", -1, edge="clamped")
     until(lambda: "on another skin" in message.text())

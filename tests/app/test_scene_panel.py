@@ -115,6 +115,17 @@ def test_text_that_is_no_scene_leaves_the_last_one_and_says_where(window, panel,
     assert not panel.editor.text.extraSelections()
 
 
+def test_a_text_that_was_emptied_is_written_anew(window, panel, until, qtbot) -> None:
+    panel.setCurrentIndex(EDIT)
+    text = panel.editor.text
+    text.setPlainText("")
+    until(lambda: "expected format" in panel.editor.message.text())
+    text.setFocus()
+    qtbot.keyClicks(text, "format = 1")
+    until(lambda: "expected format" not in panel.editor.message.text())
+    assert window.history.settings.written.text == "format = 1"
+
+
 def test_the_keys_of_undo_in_the_text_undo_what_the_window_did(window, panel, until, qtbot) -> None:
     panel.gallery.chosen.emit("hum")
     until(lambda: plays(window, "hum"))
@@ -231,6 +242,15 @@ def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
     until(lambda: np.abs(window.session.estimate.true_contact - there).max() < 2e-3)
     window.history.stack.undo()
     until(lambda: window.session.scene.stimuli[0].what.x == pytest.approx(x))
+    drag.grabbed.emit(x, y)
+    drag.dragged.emit(x + 0.01, y)
+    panel.gallery.chosen.emit("hum")  # or undone, with the mouse held
+    until(lambda: plays(window, "hum"))
+    written = window.history.settings.written
+    drag.dragged.emit(x + 0.02, y)
+    drag.released.emit()
+    assert window.session.scene.name == "hum"
+    assert window.history.settings.written == written
 
 
 def test_scenes_are_opened_from_files_and_saved_into_them(
@@ -252,6 +272,9 @@ def test_scenes_are_opened_from_files_and_saved_into_them(
     window.statusBar().messageChanged.connect(said.append)
     window.actions_by_name["open-scene"].trigger()
     until(lambda: any("cannot be read" in words for words in said))
+    nothing.write_text("#" * 1_000_001)
+    window.actions_by_name["open-scene"].trigger()
+    until(lambda: any("at most 1000000 bytes" in words for words in said))
     assert plays(window, "mine")
 
 

@@ -8,6 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 
 from kappaskin import Presentation, load_scene
+from kappaskin.scene.motion import Path, Press, Release
 from kappaskin_app.theme import DARK, LIGHT
 from kappaskin_app.views.timeline import Timeline
 from kappaskin_app.views.track import profile
@@ -48,6 +49,14 @@ def test_a_skin_that_waits_on_one_cylinder_has_no_timeline(row):
     scene = load_scene("calibration")
     row.show_scene(replace(scene, laid=Presentation(scene.laid.steps[:1], 1.0)))
     assert not row.isVisible()
+
+
+def test_a_scene_of_years_is_shown_as_well(row):
+    scene = load_scene("slipping")
+    still = replace(scene.stimuli[0], motion=Path((Press(1e9), Release(1e9))))
+    row.show_scene(replace(scene, stimuli=(still,)))
+    row.show_time(1.5e9, True)
+    assert row.track.time == 1.5e9
 
 
 def test_the_time_is_told_and_begins_anew(row):

@@ -63,8 +63,6 @@ class SceneEditor(QWidget):
         self.name.setText(name)
         self.text.show_text(text)
         self.form.show_text(text)
-        for widget in (self.form, self.text, self.save):
-            widget.setEnabled(bool(text))
 
     def show_refusal(self, why: str) -> None:
         """Say why what is written cannot be played, and mark its line; or nothing when it can."""

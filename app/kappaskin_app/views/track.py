@@ -38,6 +38,11 @@ def profile(scene: Scene) -> Array:
     return amount / most if most > 0 else amount
 
 
+def _whole_ms(seconds: float) -> int:
+    """A time in whole ms, as far as a slider can count: 24 days."""
+    return min(round(_MS * seconds), 2**31 - 1)
+
+
 class Track(QAbstractSlider):
     """The handle over the profile; its value is the time in ms, for those who do not see it."""
 
@@ -66,9 +71,9 @@ class Track(QAbstractSlider):
         self.last = scene.duration - self.frame
         self._profile, self._moments = profile(scene), scene.moments
         with QSignalBlocker(self):
-            self.setRange(0, round(_MS * scene.duration))
-            self.setSingleStep(max(round(_MS * self.frame), 1))
-            self.setPageStep(max(round(_MS * scene.duration / 10), 1))
+            self.setRange(0, _whole_ms(scene.duration))
+            self.setSingleStep(max(_whole_ms(self.frame), 1))
+            self.setPageStep(max(_whole_ms(scene.duration / 10), 1))
         self.show_time(0.0)
 
     def show_theme(self, theme: Theme) -> None:
@@ -78,7 +83,7 @@ class Track(QAbstractSlider):
     def show_time(self, seconds: float) -> None:
         self.time = seconds
         with QSignalBlocker(self):
-            self.setValue(round(_MS * seconds))
+            self.setValue(_whole_ms(seconds))
         self.update()
 
     def seek(self, seconds: float) -> None:
