@@ -79,7 +79,7 @@ class Staging(QObject):
         if file:
             path = Path(file).with_suffix(".toml")
             try:
-                path.write_text(text_of(settings), encoding="utf-8")
+                self._wishes.save(path)
                 self.told.emit(f"Saved {path}")
             except (OSError, Refusal) as error:
                 self.told.emit(f"Could not write {path}: {error}")

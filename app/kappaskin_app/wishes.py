@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from kappaskin import Setting, Status
 from kappaskin_app.demonstrations import Demonstration
+from kappaskin_app.effects import called
 from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
 from kappaskin_app.scene_text import forced, shifted
@@ -97,14 +99,28 @@ class Wishes:
 
     def write(self, text: str) -> None:
         """Play what was written instead of the scene so far; a row of keys is one step to undo."""
+        if (written := self._written_anew(text)) is not None:
+            self._history.wish("written", "the scene", written=written)
+
+    def _written_anew(self, text: str) -> Written | None:
+        """The scene with another text; None where it has this one."""
         now = self._history.settings.written
-        if now is None or text != now.text:
-            file = OWN if now is None else now.file
-            self._history.wish("written", "the scene", written=Written(text, file))
+        if now is not None and text == now.text:
+            return None
+        return Written(text, OWN if now is None else now.file)
+
+    def save(self, file: Path) -> None:
+        """Write the scene into a file, beside which it is from now on; an `OSError` may come."""
+        settings = self._history.settings
+        file.write_text(text_of(settings), encoding="utf-8")
+        if settings.written is not None:
+            self._history.change("Save the scene", -1, written=replace(settings.written, file=file))
 
     def force(self, effect: str, how: str) -> None:
         """Force an effect on or off, or leave it to the plan; refused where the text is no TOML."""
-        self.write(forced(text_of(self._history.settings), effect, how))
+        written = self._written_anew(forced(text_of(self._history.settings), effect, how))
+        if written is not None:
+            self._history.change(f"Force {called(effect).lower()}", -1, written=written)
 
     # Loads that are dragged.
 

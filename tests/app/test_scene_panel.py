@@ -187,6 +187,9 @@ def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, unt
     until(lambda: row_of(panel, "gaussian-noise")[0] == "left out", 60.0)
     assert 'off = ["gaussian-noise"]' in panel.editor.text.toPlainText()
     assert window.session.status.meetings == meetings
+    force(panel, "quantisation", "on")
+    assert window.history.stack.undoText() == "force quantisation"
+    window.history.stack.undo()
     force(panel, "gaussian-noise", "planned")
     until(lambda: not window.session.scene.choice.off)
     until(lambda: row_of(panel, "gaussian-noise")[0] == "kept", 60.0)
@@ -265,6 +268,7 @@ def test_scenes_are_opened_from_files_and_saved_into_them(
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(out), ""))
     window.actions_by_name["save-scene"].trigger()
     assert (tmp_path / "out.toml").read_text() == mine.read_text()
+    until(lambda: plays(window, "out"))  # it is that file's from now on
     nothing = tmp_path / "nothing.toml"
     nothing.write_bytes(b"\xff\xfe\x00")
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(nothing), ""))
@@ -275,7 +279,7 @@ def test_scenes_are_opened_from_files_and_saved_into_them(
     nothing.write_text("#" * 1_000_001)
     window.actions_by_name["open-scene"].trigger()
     until(lambda: any("at most 1000000 bytes" in words for words in said))
-    assert plays(window, "mine")
+    assert plays(window, "out")
 
 
 def test_the_pages_have_their_keys_and_nothing_is_clipped(window, panel, until) -> None:
