@@ -119,11 +119,21 @@ def _reasons(
             found[name] = True, "the scene asks for all there are"
         elif spent + error <= choice.accuracy:
             spent += error
-            found[name] = False, f"at most {error:.2g} of the peak, {spent:.2g} with smaller ones"
+            found[name] = (
+                False,
+                f"at most {_percent(error)} of the peak, {_percent(spent)} with smaller ones",
+            )
         else:
             left = choice.accuracy - spent
-            found[name] = True, f"up to {error:.2g} of the peak, where {left:.2g} may be left out"
+            found[name] = (
+                True,
+                f"up to {_percent(error)} of the peak, where {_percent(left)} may be left out",
+            )
     return found
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
 
 
 def kept_of(scene: Scene) -> tuple[Effect, ...]:
