@@ -22,7 +22,7 @@ c = plate.compliance(basis)(force)
 K = layout.curvature_operator(basis) @ c.ravel()
 survey = Survey(
     plate, basis, layout, Transduction(), np.zeros(1), force.reshape(1, -1), c.reshape(1, -1),
-    K.reshape(1, 3, -1), 0.0, 1.0, 1e-3,
+    K.reshape(1, 3, -1), np.zeros(48), 1.0, np.zeros(48),
 )
 every = [
     Tension(5.0), Foam(1e5), Fluid(), FiniteSlope(), GageLength(3e-3), DeadElements((1,)),
