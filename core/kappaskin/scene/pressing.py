@@ -1,6 +1,6 @@
 """A scene and a time to the forces on its skin."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,8 +10,7 @@ from kappaskin.scene.scene import Scene
 from kappaskin.scene.stimulus import Indenter, contact_of
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Pressed:
+class Pressed(NamedTuple):
     """What presses at one moment: modal `force` (Ri, Rj) in N, and the `contact` (2,) in m.
 
     That is the centre of force, NaN where nothing touches. `loads` make the force: those of the
@@ -46,8 +45,9 @@ class Pressing:
         stimulus = self._indenter
         if stimulus is None or self._press is None or not isinstance(stimulus.what, Indenter):
             loads = self._scene.loads_at(time)
-            forces = [load.modal(self._basis) for load in loads]
-            force = sum(forces[1:], forces[0]) if forces else np.zeros(self._basis.shape)
+            force = np.zeros(self._basis.shape) if not loads else loads[0].modal(self._basis)
+            for load in loads[1:]:
+                force = force + load.modal(self._basis)
             return Pressed(force, contact_of(loads), loads)
         pose = stimulus.pose_at(time)
         if not pose.amount:

@@ -99,8 +99,8 @@ class Scene:
 
     def loads_at(self, time: float) -> tuple[Load, ...]:
         """The loads that press, where they are at `time` in s."""
-        there = (stimulus.load_at(time) for stimulus in self.stimuli)
-        return tuple(load for load in there if load is not None)
+        there = [stimulus.load_at(time) for stimulus in self.stimuli]
+        return tuple([load for load in there if load is not None])
 
     @property
     def reading_effects(self) -> tuple[ReadingEffect, ...]:

@@ -106,9 +106,9 @@ class Stimulus:
 
 def contact_of(loads: tuple[Load, ...]) -> Array:
     """The centre of force (2,) in m of `loads`; NaN when there is none."""
-    total = sum(abs(load.force) for load in loads)
-    if len(loads) == 1 and total:
+    if len(loads) == 1 and loads[0].force:
         return loads[0].centre()
+    total = sum(abs(load.force) for load in loads)
     if not total:
         return np.full(2, np.nan)
     return np.sum([abs(load.force) * load.centre() for load in loads], axis=0) / total
