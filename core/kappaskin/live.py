@@ -17,7 +17,7 @@ from kappaskin.ring import Ring, slot_type
 from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources import SimulatedSource, Source, open_source
-from kappaskin.sources.wire import Accounting
+from kappaskin.sources.accounting import Accounting
 from kappaskin.steer import Steering, steered
 
 OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"

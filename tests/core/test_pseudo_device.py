@@ -21,7 +21,8 @@ from kappaskin.engine import Engine
 from kappaskin.live import LOST, STREAMING
 from kappaskin.scene import Orbit
 from kappaskin.sources import SerialSource
-from kappaskin.sources.wire import Decoder, Message
+from kappaskin.sources.decoder import Decoder
+from kappaskin.sources.wire import Message
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice

@@ -1,5 +1,6 @@
 """Frames from a line: a pseudo-terminal, a loop and a socket, and everything that goes wrong."""
 
+import binascii
 import errno
 import json
 import os
@@ -15,7 +16,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import serial
-from cobs import cobs
 
 from kappaskin import Frame, Sensor, SourceError, load_scene
 from kappaskin.sources import SerialSource, information, open_source
@@ -263,9 +263,10 @@ def test_another_protocol_is_told_apart(line, opened, hasty) -> None:
 
 
 def test_another_version_is_told_apart(line, opened, hasty) -> None:
-    body = struct.pack("<BBIQ", 7, 1, 0, 0) + TEXT.encode()
+    head = b"\x4b\xa7" + struct.pack("<BBIIQ", 7, 1, len(TEXT), 0, 0)
+    body = head + struct.pack("<H", binascii.crc_hqx(head, 0)) + TEXT.encode()
     source = opened(line.port)
-    line.write(cobs.encode(body + struct.pack("<I", zlib.crc32(body))) + b"\0")
+    line.write(body + struct.pack("<I", zlib.crc32(body)))
     _, why = read_to_the_end(source)
     assert "speaks wire version 7, this program speaks 1; update the older" in why
 

@@ -6,22 +6,26 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cobs import cobs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin.errors import Refusal
+from kappaskin.sources.accounting import Accounting, Sequence
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
 from kappaskin.sources.wire import (
     LONGEST,
-    Accounting,
-    Decoder,
+    Command,
+    Fault,
     Information,
+    Kind,
     Message,
+    Operation,
+    Reply,
     Samples,
-    Sequence,
-    cobs_decode,
-    cobs_encode,
+    encode,
+    encode_command,
     encode_information,
+    encode_reply,
     encode_samples,
 )
 
@@ -30,11 +34,26 @@ MICROSECONDS = st.integers(0, 2**53)
 
 
 def packed(
-    kind: int = 2, payload: bytes = b"\2\0", sequence: int = 0, time_us: int = 0, version: int = 1
+    kind: int = 2,
+    payload: bytes = b"\2\0",
+    sequence: int = 0,
+    time_us: int = 0,
+    version: int = 1,
+    length: int | None = None,
 ) -> bytes:
-    """A message as the wire format's description has it, made without the code under test."""
-    body = struct.pack("<BBIQ", version, kind, sequence, time_us) + payload
-    return cobs.encode(body + struct.pack("<I", zlib.crc32(body))) + b"\0"
+    """A message as the wire format's page has it, made without the code under test."""
+    said = len(payload) if length is None else length
+    head = b"\x4b\xa7" + struct.pack("<BBIIQ", version, kind, said, sequence, time_us)
+    body = head + struct.pack("<H", crc_16(head)) + payload
+    return body + struct.pack("<I", zlib.crc32(body))
+
+
+def crc_16(data: bytes) -> int:
+    """The header check, bit by bit."""
+    value = 0
+    for bit in (byte >> shift & 1 for byte in data for shift in range(7, -1, -1)):
+        value = (value << 1 ^ (0x1021 if (value >> 15) ^ bit else 0)) & 0xFFFF
+    return value
 
 
 def scan(sequence: int) -> bytes:
@@ -60,40 +79,6 @@ def fed(decoder: Decoder, stream: bytes, cuts: list[int]) -> list[Message]:
         messages += decoder.feed(stream[start:end])
         balanced(decoder)
     return messages
-
-
-# Bytes without zeros
-
-
-# Long runs without a zero are what the blocks of 254 are about, and rare among random bytes.
-BYTES = st.lists(st.one_of(st.binary(max_size=40), st.just(b"x" * 127)), max_size=9).map(b"".join)
-
-
-@given(BYTES)
-def test_the_cobs_package_reads_what_is_written_and_writes_what_is_read(data: bytes) -> None:
-    assert cobs.decode(cobs_encode(data)) == data
-    assert cobs_decode(cobs.encode(data)) == data
-    assert 0 not in cobs_encode(data)
-    assert len(cobs_encode(data)) <= len(data) + len(data) // 254 + 1
-
-
-@pytest.mark.parametrize("length", [0, 1, 253, 254, 255, 507, 508, 509, 762])
-def test_blocks_that_are_just_full_are_read_back(length: int) -> None:
-    for data in (b"x" * length, b"x" * length + b"\0", b"\0" + b"x" * length):
-        assert cobs.decode(cobs_encode(data)) == cobs_decode(cobs_encode(data)) == data
-
-
-@given(st.binary(max_size=600))
-def test_whatever_is_unstuffed_is_what_the_cobs_package_makes_of_it_or_refused(data: bytes) -> None:
-    try:
-        expected = cobs.decode(data)
-    except cobs.DecodeError:
-        expected = None
-    # The package also refuses a zero inside a block; a decoder never sees one.
-    if 0 not in data:
-        assert cobs_decode(data) == expected
-    else:
-        cobs_decode(data)
 
 
 # Messages
@@ -143,9 +128,42 @@ def test_more_runs_of_channels_than_a_byte_counts_are_refused() -> None:
         encode_samples(0, 0.0, channels, np.zeros(256, np.int32), 2)
 
 
+def test_a_payload_that_is_too_long_is_refused() -> None:
+    with pytest.raises(Refusal, match="at most 262144 bytes, got 262145"):
+        encode(Kind.INFORMATION, 0, 0.0, bytes(LONGEST + 1))
+
+
+@given(SEQUENCES, st.sampled_from(Operation), st.binary(max_size=40))
+def test_commands_come_back_as_sent(sequence: int, operation: Operation, arguments: bytes) -> None:
+    message = encode_command(sequence, 2.5, operation, arguments)
+    assert Decoder(FROM_HOST).feed(message) == [Command(sequence, operation, arguments)]
+
+
+@given(SEQUENCES, SEQUENCES, st.binary(max_size=40))
+def test_replies_come_back_as_sent(sequence: int, asked: int, data: bytes) -> None:
+    to = Command(asked, Operation.PING, b"")
+    message = encode_reply(sequence, 2.5, to, data=data)
+    expected = Reply(sequence, 2.5, asked, Operation.PING, Fault.NONE, data)
+    assert Decoder().feed(message) == [expected]
+
+
+def test_a_reason_is_cut_to_its_longest_and_read_as_text() -> None:
+    to = Command(7, Operation.RATE, b"")
+    (got,) = Decoder().feed(encode_reply(0, 0.0, to, Fault.OUT_OF_RANGE, b"far too fast " * 50))
+    assert isinstance(got, Reply)
+    assert (got.fault, got.command, len(got.reason)) == (3, 7, 200)
+    assert got.reason.startswith("far too fast")
+
+
+def test_what_the_other_side_alone_may_say_is_thrown_away() -> None:
+    command = encode_command(0, 0.0, Operation.START)
+    assert Decoder(FROM_DEVICE).feed(command) == []
+    assert Decoder(FROM_HOST).feed(scan(0)) == []
+
+
 def test_the_longest_message_there_can_be_arrives_in_pieces() -> None:
-    channels = np.arange(65535)
-    counts = np.full(65535, 0x01010101, np.int32)  # without a zero byte it is longest
+    channels = np.arange(65534)
+    counts = np.arange(65534, dtype=np.int32) << 8
     message = encode_samples(0, 0.0, channels, counts, 4)
     decoder = Decoder()
 
@@ -197,18 +215,19 @@ def test_every_good_frame_between_spoiled_ones_arrives_unchanged(damages, cuts, 
     for q, (how, where, noise) in enumerate(damages):
         sequence = (first + q) % 2**32
         message = sent[sequence] = scan(sequence)
-        stream += spoiled(message, how, where, noise) + b"\0" if how else message
+        stream += spoiled(message, how, where, noise) if how else message
         intact += [] if how else [sequence]
     decoder = Decoder()
 
-    messages = fed(decoder, stream, cuts)
+    messages = fed(decoder, stream + scan(first + len(damages)), cuts)
+    assert messages.pop().sequence == (first + len(damages)) % 2**32
 
     # A damage may also leave a message whole: garbage put before its first byte, for one.
     assert set(intact) <= {m.sequence for m in messages} <= set(sent)
     assert [m for m in messages if encoded_again(m) != sent[m.sequence]] == []
     seen = decoder.accounting()
-    assert seen.accepted == len(messages)
-    assert seen.span <= len(damages)
+    assert seen.accepted == len(messages) + 1
+    assert seen.span <= len(damages) + 1
     assert seen.buffered == 0
 
 
@@ -225,12 +244,20 @@ def test_a_frame_cut_at_every_byte_is_one_frame() -> None:
         assert decoder.accounting().bytes_good == len(message)
 
 
-def test_a_frame_broken_off_at_every_byte_spoils_only_the_next() -> None:
+def test_a_frame_broken_off_at_every_byte_spoils_nothing_after_it() -> None:
     for end in range(1, len(scan(0))):
         decoder = Decoder()
         messages = fed(decoder, scan(0)[:end] + scan(1) + scan(2), [])
-        assert [m.sequence for m in messages] == [2]
-        assert decoder.accounting().bytes_discarded == end + len(scan(1))
+        assert [m.sequence for m in messages] == [1, 2]
+        assert decoder.accounting().bytes_discarded == end
+
+
+def test_what_is_buffered_when_a_line_ends_is_counted_as_cut_off() -> None:
+    decoder = Decoder()
+    decoder.feed(scan(0) + scan(1)[:17])
+    decoder.line_ended()
+    assert [m.sequence for m in decoder.feed(scan(2))] == [2]
+    assert dict(balanced(decoder).discarded) == {"cut off": 17}
 
 
 def test_every_flipped_bit_is_noticed() -> None:
@@ -239,20 +266,34 @@ def test_every_flipped_bit_is_noticed() -> None:
         data = bytearray(message)
         data[bit // 8] ^= 1 << bit % 8
         decoder = Decoder()
-        assert fed(decoder, bytes(data) + b"\0", []) == []
-        assert decoder.accounting().bytes_discarded == len(message) + 1
+        assert [m.sequence for m in fed(decoder, bytes(data) + scan(901), [])] == [901]
+        assert decoder.accounting().bytes_discarded == len(message)
+
+
+def test_a_message_inside_a_spoilt_one_is_found() -> None:
+    outer = bytearray(packed(kind=1, payload=b"x" * 40 + scan(5) + b"y" * 9))
+    outer[-1] ^= 1
+    decoder = Decoder()
+    assert [m.sequence for m in fed(decoder, bytes(outer) + scan(6), [])] == [5, 6]
+
+
+WRONG_CHECK = bytearray(packed())
+WRONG_CHECK[20] ^= 1
+WRONG_CHECK[-4:] = struct.pack("<I", zlib.crc32(WRONG_CHECK[:-4]))
 
 
 @pytest.mark.parametrize(
     ("message", "reason"),
     [
-        (b"\0", "empty"),
-        (b"\7abc\0", "encoding"),
-        (cobs.encode(b"short") + b"\0", "too short"),
+        (b"\x11" * 30, "garbage"),
+        (bytes(WRONG_CHECK), "garbage"),
+        (packed(length=LONGEST + 1) + bytes(30), "garbage"),
         (scan(1)[:-3] + b"\1\1\0", "checksum"),
         (packed(version=2), "version"),
         (packed(kind=3), "unknown kind"),
+        (packed(kind=0), "unknown kind"),
         (packed(kind=1, payload=b"\xff\xfe"), "content"),
+        (packed(kind=4, payload=b"\0\0\0\0\1"), "content"),
         (packed(payload=b""), "content"),
         (packed(payload=b"\3\0"), "content"),
         (packed(payload=b"\2\1\0"), "content"),
@@ -260,7 +301,7 @@ def test_every_flipped_bit_is_noticed() -> None:
 )
 def test_what_is_thrown_away_is_counted_under_its_reason(message: bytes, reason: str) -> None:
     decoder = Decoder()
-    assert decoder.feed(message) == []
+    assert [m.sequence for m in decoder.feed(message + scan(0))] == [0]
     assert balanced(decoder).discarded == ((reason, len(message)),)
 
 
@@ -301,12 +342,20 @@ def test_channels_beyond_16_bits_do_not_wrap_to_low_ones() -> None:
 
 def test_garbage_without_an_end_is_not_kept() -> None:
     decoder = Decoder()
-    for _ in range(3 * LONGEST // 4096):
+    for _ in range(300):
         decoder.feed(b"\x11" * 4096)
-        assert balanced(decoder).buffered <= LONGEST
+        assert balanced(decoder).buffered < 22
 
     assert [m.sequence for m in decoder.feed(b"\x11\0" + scan(4))] == [4]
-    assert dict(balanced(decoder).discarded) == {"too long": 3 * LONGEST + 2}
+    assert dict(balanced(decoder).discarded) == {"garbage": 300 * 4096 + 2}
+
+
+def test_a_length_that_is_believed_takes_no_more_than_it_says() -> None:
+    decoder = Decoder()
+    decoder.feed(packed(length=LONGEST)[:22])
+    for _ in range(300):
+        decoder.feed(b"\x11" * 4096)
+        assert balanced(decoder).buffered <= LONGEST + 26
 
 
 def test_bytes_never_fed_are_counted_as_overrun() -> None:
@@ -369,6 +418,13 @@ def test_a_restarted_device_loses_nothing() -> None:
     sequence, answers = taken([5000, 5001, 0, 1, 2])
     assert (sequence.accepted, sequence.lost, sequence.restarts) == (5, 0, 1)
     assert all(answers)
+
+
+def test_a_device_that_comes_back_may_begin_with_any_number() -> None:
+    sequence, _ = taken([5000, 5001])
+    sequence.begin_anew()
+    assert sequence.take(5100)
+    assert (sequence.lost, sequence.restarts) == (0, 1)
 
 
 def test_a_frame_too_late_to_tell_from_a_restart_starts_anew() -> None:

@@ -6,9 +6,9 @@ from kappaskin.errors import SourceError
 from kappaskin.frames import Frame
 from kappaskin.scene import load_scene
 from kappaskin.sensor import Sensor
+from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.serial_line import SerialSource as SerialSource
 from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
-from kappaskin.sources.wire import Accounting
 
 SIMULATION = "sim:"
 

@@ -2,20 +2,44 @@
 
 import os
 import select
+import struct
 import time
 import tty
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 
 from kappaskin.effects import CorruptedFrames, DroppedFrames
+from kappaskin.errors import Refusal
 from kappaskin.scene import Scene
 from kappaskin.simulate import Simulator
 from kappaskin.sources import information
-from kappaskin.sources.wire import encode_information, encode_samples
+from kappaskin.sources.decoder import FROM_HOST, Decoder
+from kappaskin.sources.wire import (
+    RATE_UNIT,
+    UNKNOWN_TEMPERATURE,
+    VERSION,
+    Command,
+    Fault,
+    Operation,
+    encode_information,
+    encode_reply,
+    encode_samples,
+    unpack_runs,
+)
 
 _OUTBOX = 2**19  # bytes held before a frame goes unsent: more than a second of a full scan
 _LINGER = 0.3  # s
 _INTRODUCTION = 0.5  # s between two information messages
+
+
+class _Refused(Exception):
+    """A command that is not done: why, by its number, and in words."""
+
+    def __init__(self, fault: Fault, reason: str) -> None:
+        super().__init__(reason)
+        self.fault = fault
 
 
 class PseudoDevice:
@@ -26,17 +50,22 @@ class PseudoDevice:
     """
 
     def __init__(self, scene: Scene, clock: Callable[[], float] = time.monotonic) -> None:
-        self._simulator, self._clock = Simulator(scene), clock
-        self._information = information.to_json(scene.sensor())
+        self._scene, self._simulator, self._clock = scene, Simulator(scene), clock
+        self._sensor = scene.sensor()
+        self._information = information.to_json(self._sensor)
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self.port = os.ttyname(slave)
         # With no other holder of the slave end, a hang-up on the master says nobody listens.
         os.close(slave)
         os.set_blocking(self._master, False)
-        self._width = 2 if scene.transduction.converter.bits <= 16 else 4
-        self._outbox = bytearray()
+        self._decoder = Decoder(FROM_HOST)
+        self._outbox: deque[bytes] = deque()
+        self._held = self._sent = 0  # bytes in the outbox; of its first message, those sent
+        self._running, self._scan = True, self._sensor.scan()
         self.rate = scene.rate
+        self._first, self._since = 0, 0.0  # from frame `_first` on, due then, frames come at `rate`
+        self._start = 0.0
         self.spent = self.unsent = self.samples = 0
 
     def serve(self, stopped: Callable[[], bool]) -> None:
@@ -47,34 +76,46 @@ class PseudoDevice:
                 continue
             self._stream(stopped)
             self._flush()
-            self.unsent += self._outbox.count(0)  # each message ends with its only zero byte
+            self.unsent += len(self._outbox)
             self._outbox.clear()
+            self._held = self._sent = 0
 
     def _hung_up(self) -> bool:
         poll = select.poll()
         poll.register(self._master, select.POLLOUT)
         return any(event & select.POLLHUP for _, event in poll.poll(0))
 
+    def _now(self) -> float:
+        """Device time in s, which stands still while nobody listens."""
+        return self._clock() - self._start
+
+    def _due(self) -> float:
+        """Device time of the next frame."""
+        return self._since + (self.samples - self._first) / self.rate
+
     def _stream(self, stopped: Callable[[], bool]) -> None:
-        rate = self.rate
-        start, introduced = self._clock() - self.samples / rate, -_INTRODUCTION
+        self._start, introduced = self._clock() - self._due(), -_INTRODUCTION
         while not (stopped() or self._hung_up()):
-            now = self._clock() - start
+            now = self._now()
             if now - introduced >= _INTRODUCTION:
                 introduced = now
-                self._send(encode_information(self.spent, now, self._information))
-            while self.samples / rate <= now:
+                self._introduce()
+            self._listen()
+            while self._due() <= now and self._running:
                 self._send_samples()
             self._flush()
-            wait = self.samples / rate - (self._clock() - start)
-            select.select([], [self._master] if self._outbox else [], [], max(0.0, min(wait, 0.05)))
+            wait = self._due() - self._now() if self._running else _INTRODUCTION
+            ready = [self._master] if self._outbox else []
+            select.select([self._master], ready, [], max(0.0, min(wait, 0.05)))
+
+    def _introduce(self) -> None:
+        self._send(encode_information(self.spent, self._now(), self._information))
 
     def _send_samples(self) -> None:
-        frame = self._simulator.frame(self.samples, self._clock)
+        frame = self._simulator.scanned(self._scan, self.samples, self._due(), self._clock)
         self.samples += 1
-        message = encode_samples(
-            self.spent, frame.device_time, frame.channels, frame.counts, self._width
-        )
+        width = 2 if self._scene.transduction.converter.bits <= 16 else 4
+        message = encode_samples(self.spent, frame.device_time, frame.channels, frame.counts, width)
         match self._simulator.failure(self.samples - 1):
             case DroppedFrames.name:
                 self.spent += 1
@@ -85,15 +126,105 @@ class PseudoDevice:
 
     def _send(self, message: bytes) -> None:
         self.spent += 1
-        if len(self._outbox) + len(message) > _OUTBOX:
+        if self._held + len(message) > _OUTBOX:
             self.unsent += 1
         else:
-            self._outbox += message
+            self._outbox.append(message)
+            self._held += len(message)
 
     def _flush(self) -> None:
         with suppress(OSError):  # full, or nobody listens any more: what stays is told as unsent
             while self._outbox:
-                del self._outbox[: os.write(self._master, self._outbox[:4096])]
+                message = self._outbox[0]
+                sent = os.write(self._master, message[self._sent : self._sent + 4096])
+                self._sent, self._held = self._sent + sent, self._held - sent
+                if self._sent == len(message):
+                    self._outbox.popleft()
+                    self._sent = 0
+
+    def _listen(self) -> None:
+        """Do what the host asks for."""
+        with suppress(OSError):  # nothing came, or nobody is there any more
+            for command in self._decoder.feed(os.read(self._master, 4096)):
+                if isinstance(command, Command):
+                    self._answer(command, self._now())
+
+    def _answer(self, command: Command, received: float) -> None:
+        try:
+            data, fault = self._done(command, received), Fault.NONE
+        except _Refused as refused:
+            data, fault = str(refused).encode(), refused.fault
+        self._send(encode_reply(self.spent, self._now(), command, fault, data))
+        if command.operation in (Operation.GAIN, Operation.IDENTIFY) and not fault:
+            self._introduce()
+
+    def _done(self, command: Command, received: float) -> bytes:
+        """What the reply to a command tells, once it is done."""
+        arguments = command.arguments
+        match command.operation:
+            case Operation.HELLO:
+                low, high = _numbers("<BB", arguments)
+                if not low <= VERSION <= high:
+                    raise _Refused(Fault.NO_COMMON_VERSION, f"this device speaks {VERSION}")
+                return bytes([VERSION])
+            case Operation.START | Operation.STOP | Operation.IDENTIFY:
+                _numbers("<", arguments)
+                self._run(command.operation)
+                return b""
+            case Operation.SCAN_LIST:
+                self._take_list(arguments)
+                return b""
+            case Operation.RATE:
+                return self._take_rate(*_numbers("<I", arguments))
+            case Operation.GAIN:
+                return self._take_gain(*_numbers("<I", arguments))
+            case Operation.PING:
+                _numbers("<", arguments)
+                return struct.pack("<Qh", round(received * 1e6), UNKNOWN_TEMPERATURE)
+            case unknown:
+                raise _Refused(Fault.UNKNOWN_OPERATION, f"there is no operation {unknown}")
+
+    def _run(self, operation: int) -> None:
+        if operation == Operation.START and not self._running:
+            self._pace(self.rate)
+            self._running = True
+        elif operation == Operation.STOP:
+            self._running = False
+
+    def _pace(self, rate: float) -> None:
+        """Send frames at `rate` from now on."""
+        due = self._due() if self._running else self._now()
+        self._first, self._since, self.rate = self.samples, due, rate
+
+    def _take_list(self, arguments: bytes) -> None:
+        channels = unpack_runs(arguments)
+        if channels is None:
+            raise _Refused(Fault.WRONG_LENGTH, "expected runs of channels")
+        try:
+            self._scan = self._sensor.scan(channels if len(channels) else None)
+        except Refusal as refusal:
+            raise _Refused(Fault.OUT_OF_RANGE, str(refusal)) from refusal
+        if self._scan.rate < self.rate:
+            self._pace(self._scan.rate)
+
+    def _take_rate(self, asked: int) -> bytes:
+        rate, most = asked / RATE_UNIT, self._scan.rate
+        if not 0 < rate <= most:
+            raise _Refused(Fault.OUT_OF_RANGE, f"expected at most {most:.1f} frames/s, got {rate}")
+        self._pace(rate)
+        return struct.pack("<I", asked)
+
+    def _take_gain(self, asked: int) -> bytes:
+        chain = self._scene.transduction
+        try:
+            amplifier = replace(chain.amplifier, gain=asked / 1000)
+            scene = replace(self._scene, transduction=replace(chain, amplifier=amplifier))
+            self._simulator.change(scene)
+        except Refusal as refusal:
+            raise _Refused(Fault.OUT_OF_RANGE, str(refusal)) from refusal
+        self._scene, self._sensor = scene, scene.sensor()
+        self._information = information.to_json(self._sensor)
+        return struct.pack("<I", asked)
 
     def close(self) -> None:
         """Close the port, after a moment for a listener to take what it was sent."""
@@ -102,9 +233,17 @@ class PseudoDevice:
         os.close(self._master)
 
 
+def _numbers(form: str, arguments: bytes) -> tuple[int, ...]:
+    if len(arguments) != struct.calcsize(form):
+        raise _Refused(
+            Fault.WRONG_LENGTH,
+            f"expected {struct.calcsize(form)} bytes of arguments, got {len(arguments)}",
+        )
+    return struct.unpack(form, arguments)
+
+
 def _corrupted(message: bytes) -> bytes:
-    """The message with a bit in its middle turned over, and its end where it was."""
+    """The message with a bit in its middle turned over."""
     spoilt = bytearray(message)
-    middle = len(spoilt) // 2
-    spoilt[middle] ^= 1 if spoilt[middle] != 1 else 2
+    spoilt[len(spoilt) // 2] ^= 1
     return bytes(spoilt)

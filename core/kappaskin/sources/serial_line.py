@@ -19,7 +19,9 @@ from kappaskin.errors import SourceError
 from kappaskin.frames import Frame
 from kappaskin.sensor import Sensor
 from kappaskin.sources import information
-from kappaskin.sources.wire import VERSION, Accounting, Decoder, Information, Message, Samples
+from kappaskin.sources.accounting import Accounting
+from kappaskin.sources.decoder import Decoder
+from kappaskin.sources.wire import VERSION, Information, Message, Samples
 
 BAUD_RATE = 2_000_000
 """What a UART must run at for 300 channels at 300 frames/s; USB ports ignore it."""

@@ -11,8 +11,8 @@ from kappaskin.region import Scanner
 from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
+from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.information import to_json
-from kappaskin.sources.wire import Accounting
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
 _DEPTH = 0.02  # m from the middle of the skin down to the force/torque sensor

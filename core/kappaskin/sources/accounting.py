@@ -1,0 +1,92 @@
+"""What became of every byte and every sequence number that came over a line."""
+
+from dataclasses import dataclass
+
+SEQUENCES = 2**32
+"""Sequence numbers there are, before they begin again at 0."""
+
+_LATE = 64  # how far back a sequence number may be late rather than a restart of the device
+
+
+@dataclass(frozen=True, slots=True)
+class Accounting:
+    """What became of every byte and every sequence number since a source was opened.
+
+    bytes_in = bytes_good + sum of discarded + buffered; good = accepted + duplicate;
+    span = accepted + lost.
+    """
+
+    bytes_in: int = 0
+    bytes_good: int = 0
+    discarded: tuple[tuple[str, int], ...] = ()
+    buffered: int = 0
+    good: int = 0
+    accepted: int = 0
+    duplicate: int = 0
+    lost: int = 0
+    span: int = 0
+    restarts: int = 0
+    other_version: int | None = None
+
+    @property
+    def bytes_discarded(self) -> int:
+        return sum(n for _, n in self.discarded)
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the three sums hold, as they always do."""
+        return (
+            self.bytes_in == self.bytes_good + self.bytes_discarded + self.buffered
+            and self.good == self.accepted + self.duplicate
+            and self.span == self.accepted + self.lost
+        )
+
+
+class Sequence:
+    """Tells accepted, duplicate, late and lost sequence numbers apart, through wrap and restart."""
+
+    def __init__(self) -> None:
+        self.good = self.accepted = self.duplicate = self.lost = self.span = self.restarts = 0
+        self._next: int | None = None
+        self._missing: set[int] = set()
+
+    def take(self, sequence: int) -> bool:
+        """Count one good message; False when it came before."""
+        self.good += 1
+        if sequence == self._next and not self._missing:  # nearly all of them
+            self.span += 1
+            self.accepted += 1
+            self._next = (sequence + 1) % SEQUENCES
+            return True
+        expected = sequence if self._next is None else self._next
+        ahead = (sequence - expected) % SEQUENCES
+        if ahead < SEQUENCES // 2:
+            self._advance(sequence, ahead)
+        elif SEQUENCES - ahead > _LATE:
+            self.restarts += 1
+            self._missing.clear()
+            self._advance(sequence, 0)
+        elif sequence in self._missing:
+            self._missing.remove(sequence)
+            self.lost -= 1
+        else:
+            self.duplicate += 1
+            return False
+        self.accepted += 1
+        return True
+
+    def begin_anew(self) -> None:
+        """Count the next number as the first of a restart: another device may send it."""
+        if self._next is not None:
+            self.restarts += 1
+        self._next = None
+        self._missing.clear()
+
+    def _advance(self, sequence: int, gap: int) -> None:
+        self.lost += gap
+        self.span += gap + 1
+        self._next = (sequence + 1) % SEQUENCES
+        recent = min(gap, _LATE)
+        self._missing.update((sequence - q) % SEQUENCES for q in range(1, recent + 1))
+        if self._missing:
+            self._missing = {s for s in self._missing if (self._next - s) % SEQUENCES <= _LATE}
