@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -91,7 +92,8 @@ class SimulatedSource:
         if rate != self._rate:
             self._first, self._since, self._rate = self._n, due, rate
         self._n, self._taken = self._n + 1, due
-        return self._simulator.scanned(scan, self._n - 1, due, self._clock)
+        frame = self._simulator.scanned(scan, self._n - 1, due, self._clock)
+        return replace(frame, taken=self._start + due, taken_sd=0.0)
 
     def wrench(self) -> Wrench:
         """What `base` reads of the contact, at the time of the last frame."""
