@@ -271,8 +271,7 @@ class MainWindow(QMainWindow):
         self._connect(self.panels.connection.source())
 
     def _find_ports(self) -> None:
-        found = [(port["port"], port["description"]) for port in serial_ports()]
-        ports = [(port, f"{port}  {words}") for port, words in found]
+        ports = [(port.port, port.words) for port in serial_ports()]
         self.panels.connection.show_ports(ports)
 
     def _look(self, direction: Direction) -> Callable[[], None]:

@@ -21,7 +21,6 @@ from kappaskin.calibration import load_calibration as load_calibration
 from kappaskin.calibration import radii_for as radii_for
 from kappaskin.calibration import save_calibration as save_calibration
 from kappaskin.calibration import schedule as schedule
-from kappaskin.doctor import serial_ports as serial_ports
 from kappaskin.effects import EFFECTS as EFFECTS
 from kappaskin.effects import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
 from kappaskin.effects import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS
@@ -53,6 +52,7 @@ from kappaskin.fit import estimator_for as estimator_for
 from kappaskin.fit import singular_values as singular_values
 from kappaskin.frames import COMPONENTS as COMPONENTS
 from kappaskin.frames import Estimate as Estimate
+from kappaskin.frames import Event as Event
 from kappaskin.frames import Frame as Frame
 from kappaskin.frames import LocalGeometry as LocalGeometry
 from kappaskin.frames import Touch as Touch
@@ -101,6 +101,8 @@ from kappaskin.scene import scene_file as scene_file
 from kappaskin.scene import write_scene as write_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
+from kappaskin.sources.ports import Port as Port
+from kappaskin.sources.ports import serial_ports as serial_ports
 from kappaskin.studies.beside import Beside as Beside
 from kappaskin.studies.cost import Cost as Cost
 from kappaskin.studies.cost import EffectCost as EffectCost

@@ -5,10 +5,11 @@ import os
 import platform
 import shutil
 import sys
+from dataclasses import asdict
 from importlib import metadata
 from typing import Any
 
-from serial.tools import list_ports
+from kappaskin.sources.ports import serial_ports
 
 PACKAGES = (
     "numpy",
@@ -70,18 +71,6 @@ def _display() -> str:
     return os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or ""
 
 
-def serial_ports() -> list[dict[str, Any]]:
-    """The ports found, each with its `port`, `description` and whether it may be `opened`."""
-    return [
-        {
-            "port": found.device,
-            "description": "" if found.description == "n/a" else found.description,
-            "opened": sys.platform == "win32" or os.access(found.device, os.R_OK | os.W_OK),
-        }
-        for found in sorted(list_ports.comports())
-    ]
-
-
 def examine() -> dict[str, Any]:
     """Everything `kappaskin doctor` tells, as JSON values."""
     missing = _missing()
@@ -92,7 +81,7 @@ def examine() -> dict[str, Any]:
         "system": platform.platform(),
         "packages": {package: _version(package) for package in PACKAGES},
         "display": _display(),
-        "serial_ports": serial_ports(),
+        "serial_ports": [asdict(port) for port in serial_ports()],
         "missing": missing,
         "install": line,
     }

@@ -1,5 +1,6 @@
 """The values that travel: a frame of counts in, an estimate of shape and contact out."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,8 +32,9 @@ class Frame:
     """One scan of the skin: `counts` (C,) of the channels listed in `channels` (C,).
 
     Channel `component * P + element` is one reading of the (3, P) array of a skin with P
-    elements. Times are in seconds: `device_time` on the device's own clock, `host_time` on this
-    machine's monotonic clock, when the bytes were read.
+    elements. Times are in seconds: `device_time` on the device's own clock when the scan began,
+    `host_time` on this machine's monotonic clock when the bytes were read, and on it `taken` +-
+    `taken_sd`, when the scan began; NaN and infinity where nothing tells.
     """
 
     sequence: int
@@ -41,6 +43,20 @@ class Frame:
     channels: NDArray[np.intp]
     counts: Counts
     truth: Truth | None = None
+    taken: float = math.nan
+    taken_sd: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened on the way, in words; `time` in s on this machine's monotonic clock.
+
+    `kind` is one word: met, gap, gone, back, restarted, other, firmware, changed, rate, refused.
+    """
+
+    time: float
+    kind: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,13 +210,15 @@ class Estimate:
     `fit_time` in s is what the fit took. `geometry` is that of the skin at the contact.
     `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a
     simulation made the frame. `ready_time` is when the estimate was done, on the clock of
-    `host_time`.
+    `host_time`; `taken` +- `taken_sd`, in s on it too, when the scan began, as the frame says.
     """
 
     generation: int
     sequence: int
     device_time: float
     host_time: float
+    taken: float
+    taken_sd: float
     ready_time: float
     curvature: Array
     fresh: Mask

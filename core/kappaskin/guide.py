@@ -17,7 +17,7 @@ from kappaskin.calibration import (
     radii_for,
     schedule,
 )
-from kappaskin.errors import Refusal
+from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import COMPONENTS, Array, Frame
 from kappaskin.scene import load_scene
 from kappaskin.sensor import Sensor
@@ -64,16 +64,22 @@ class _Listener:
     def __init__(self, source: Source) -> None:
         self._source = source
         self._frames: list[Frame] = []
-        while source.sensor is None:  # a device that never says what it is ends this itself
-            self._frames = source.read(_READ)
+        while source.sensor is None:
+            self._frames = self._read()
         self.sensor: Sensor = source.sensor
+
+    def _read(self) -> list[Frame]:
+        frames = self._source.read(_READ)
+        if self._source.trouble:
+            raise SourceError(self._source.trouble)
+        return frames
 
     def frames(self) -> list[Frame]:
         """The next frames, refused when none come or another device answers."""
         found, self._frames = self._frames, []
         begun = time.monotonic()
         while not found:
-            found = self._source.read(_READ)
+            found = self._read()
             if time.monotonic() - begun > _SILENCE:
                 raise Refusal(f"no frame came for {_SILENCE:g} s; is the device still sending?")
         if self._source.sensor is not self.sensor:

@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from kappaskin.errors import Refusal, SourceError
+from kappaskin.frames import Event
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.region import Region
 from kappaskin.ring import Ring, slot_type
@@ -25,6 +26,8 @@ OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _LIVE = 64  # frames of one read that are computed, the newest: older ones are history
+_AGAIN = 0.5  # s between two tries to open a port
+_EVENTS = 64  # last ones that are told
 _GAPS = 4096  # gaps between reads that the percentile is taken over
 
 
@@ -38,7 +41,8 @@ class Status:
     says why not. `meetings` counts the devices that said what they are, `skipped` the frames that
     came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
     of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
-    `playing` tells where a simulated scene is at a device time.
+    `playing` tells where a simulated scene is at a device time. `events` are the last of those that
+    `happened`.
     """
 
     state: str = OFF
@@ -60,6 +64,8 @@ class Status:
     last_frame: float = -math.inf
     reported: float = -math.inf
     playing: Playing = FROM_THE_BEGINNING
+    events: tuple[Event, ...] = ()
+    happened: int = 0
 
 
 @dataclass(frozen=True)
@@ -98,7 +104,7 @@ class Loop:
         self._building: Future[_Built] | None = None
         self._gaps: deque[float] = deque(maxlen=_GAPS)
         self._times: deque[float] = deque(maxlen=1024)
-        self._last_read = math.inf
+        self._last_read = self._again = math.inf
 
     def run(self) -> None:
         """Serve until the parent closes its end, or is gone."""
@@ -110,6 +116,8 @@ class Loop:
                     wait = 0.0
                 if self._source is not None:
                     self._read(self._source)
+                elif time.monotonic() >= self._again:
+                    self._open(self._status.source)
                 if self._building is not None and self._building.done():
                     self._swap(self._building.result())
                 if time.monotonic() - self._status.reported >= _REPORT:
@@ -150,11 +158,16 @@ class Loop:
         self._report()
 
     def _open(self, name: str) -> None:
-        self._status = replace(self._status, state=WAITING, source=name)
+        """Open the source, or say why not; a port that cannot be is tried again now and then."""
+        self._again = math.inf
         try:
             self._source = open_source(name)
+            self._status = replace(self._status, state=WAITING, source=name, message="")
+        except SourceError as error:
+            self._again = time.monotonic() + _AGAIN
+            self._status = replace(self._status, state=LOST, source=name, message=str(error))
         except Refusal as refusal:
-            self._status = replace(self._status, state=LOST, message=str(refusal))
+            self._status = replace(self._status, state=LOST, source=name, message=str(refusal))
 
     def _play(self, scene: Scene) -> None:
         if not isinstance(self._source, SimulatedSource):
@@ -185,7 +198,7 @@ class Loop:
         self._steering = None
         self._gaps.clear()
         self._times.clear()
-        self._last_read = math.inf
+        self._last_read = self._again = math.inf
 
     def _set_up(self, smaller: bool) -> None:
         """Begin to build the pipeline asked for, beside the running one."""
@@ -227,7 +240,7 @@ class Loop:
     def _read(self, source: Source) -> None:
         try:
             frames = source.read(_READ)
-        except (SourceError, Refusal) as error:  # a device gone, or a scene that leaves its skin
+        except Refusal as error:  # a scene that leaves its skin
             accounting, last = source.accounting(), self._status.last_frame
             self._close()
             self._status = replace(
@@ -241,8 +254,7 @@ class Loop:
             )
             self._report()
             return
-        if source.sensor is not self._status.sensor:
-            self._meet(source.sensor)
+        self._follow(source)
         for frame in frames:
             if frame.host_time > self._last_read:
                 self._gaps.append(frame.host_time - self._last_read)
@@ -261,16 +273,32 @@ class Loop:
             if self._steering is not None:
                 self._steering(estimate.touch, self._pipeline.fit)
 
+    def _follow(self, source: Source) -> None:
+        """Say how the source is doing, and who is on it."""
+        trouble, was = source.trouble, self._status
+        if source.sensor is not was.sensor:
+            self._meet(source.sensor)
+        state = LOST if trouble else WAITING if source.sensor is None else STREAMING
+        if state != was.state or ((trouble or was.state == LOST) and trouble != was.message):
+            self._status = replace(self._status, state=state, message=trouble)
+        if events := source.events():
+            last = (*self._status.events, *events)[-_EVENTS:]
+            happened = self._status.happened + len(events)
+            self._status = replace(self._status, events=last, happened=happened)
+        if state != was.state or events:
+            self._report()
+
     def _meet(self, sensor: Sensor | None) -> None:
         """A device said what it is: make the pipeline for it."""
         self._pipeline = None
         self._status = replace(
             self._status,
-            state=STREAMING,
             sensor=sensor,
-            meetings=self._status.meetings + 1,
+            meetings=self._status.meetings + (sensor is not None),
             slot=None,  # what the last device showed is not this one's
         )
+        if sensor is None:
+            return
         self._steer()
         self._set_up(smaller=True)
 

@@ -130,6 +130,8 @@ class Pipeline:
             frame.sequence,
             frame.device_time,
             frame.host_time,
+            frame.taken,
+            frame.taken_sd,
             self._clock(),
             curvature,
             fresh,

@@ -56,6 +56,8 @@ def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
             ("sequence", "i8"),
             ("device_time", "f8"),
             ("host_time", "f8"),
+            ("taken", "f8"),
+            ("taken_sd", "f8"),
             ("ready_time", "f8"),
             ("curvature", "f8", (3, P)),
             ("fresh", "?", (3, P)),

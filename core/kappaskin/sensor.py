@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Frame, Mask
@@ -18,7 +18,8 @@ from kappaskin.transduction import Transduction
 class Sensor:
     """A sensor, real or simulated: a skin held as `edge` says, its elements, its electronics.
 
-    `rate` in frames/s.
+    `rate` in frames/s. What channel c of its wire reads is number `channel_map[c]` of the (3, P)
+    array, a permutation (3 P,); without one each is its own.
     """
 
     layout: SensorLayout
@@ -30,11 +31,18 @@ class Sensor:
     serial_number: str
     firmware: str
     simulated: bool
+    channel_map: NDArray[np.intp] | None = None
 
     def __post_init__(self) -> None:
         if self.plate.patch != self.layout.patch:
             raise Refusal(
                 f"the elements are on {self.layout.patch}, the plate on {self.plate.patch}; use one"
+            )
+        wired = self.channel_map
+        if wired is not None and not np.array_equal(np.sort(wired), np.arange(self.channels)):
+            raise Refusal(
+                f"expected a channel map that names each number from 0 to {self.channels - 1} "
+                f"once, got {len(wired)} numbers that do not"
             )
         scan_time = self.transduction.scan_time(self.channels)
         if not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):

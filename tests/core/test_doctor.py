@@ -98,14 +98,18 @@ def test_serial_ports_are_listed_with_whether_they_may_be_opened(
 ) -> None:
     mine = str(tmp_path / "ttyACM0")
     (tmp_path / "ttyACM0").touch()
-    ports = [port(mine, "Skin, serial A-7"), port("/dev/ttyABSENT7", "Arduino")]
+    ports = [port(mine, "Skin"), port("/dev/ttyABSENT7", "Arduino")]
+    ports[0].manufacturer, ports[0].serial_number = "Kappa Ltd", "A-7"
+    ports[0].vid, ports[0].pid = 0x2341, 7
     monkeypatch.setattr(list_ports, "comports", lambda: ports)
 
     found, text = json.loads(told(capsys, "--json"))["serial_ports"], told(capsys)
 
-    assert found == [
-        {"port": "/dev/ttyABSENT7", "description": "Arduino", "opened": False},
-        {"port": mine, "description": "Skin, serial A-7", "opened": True},
+    assert [(port["port"], port["opened"]) for port in found] == [
+        ("/dev/ttyABSENT7", False),
+        (mine, True),
     ]
-    assert f"{mine} Skin, serial A-7\n" in text
-    assert "Arduino  no permission: sudo usermod -aG dialout $USER\n" in text
+    assert (found[1]["maker"], found[1]["serial_number"]) == ("Kappa Ltd", "A-7")
+    assert found[1]["usb"] == [0x2341, 7]
+    assert f"{mine}  Skin  Kappa Ltd  [A-7]\n" in text
+    assert "Arduino  no permission. Join the port's group with `sudo usermod -aG dialout" in text

@@ -111,7 +111,8 @@ def test_samples_come_back_as_sent(channels, width, sequence, time_us, random) -
 
 @given(st.text(max_size=400), SEQUENCES)
 def test_information_comes_back_as_sent(text: str, sequence: int) -> None:
-    assert Decoder().feed(encode_information(sequence, 1.5, text)) == [Information(sequence, text)]
+    message = encode_information(sequence, 1.5, text)
+    assert Decoder().feed(message) == [Information(sequence, 1.5, text)]
 
 
 def test_messages_are_the_bytes_that_the_format_describes() -> None:
@@ -420,11 +421,18 @@ def test_a_restarted_device_loses_nothing() -> None:
     assert all(answers)
 
 
-def test_a_device_that_comes_back_may_begin_with_any_number() -> None:
+@pytest.mark.parametrize(
+    ("first", "same", "lost", "restarts"),
+    [(5002, True, 0, 0), (5100, True, 98, 0), (5100, False, 0, 1), (7, True, 0, 1)],
+)
+def test_a_device_that_comes_back_goes_on_or_begins_anew(first, same, lost, restarts) -> None:
     sequence, _ = taken([5000, 5001])
-    sequence.begin_anew()
-    assert sequence.take(5100)
-    assert (sequence.lost, sequence.restarts) == (0, 1)
+    sequence.interrupt()
+    assert sequence.take(first)
+    sequence.take(first + 1)
+    sequence.resume(same)
+    assert (sequence.lost, sequence.restarts) == (lost, restarts)
+    assert sequence.span == sequence.accepted + sequence.lost
 
 
 def test_a_frame_too_late_to_tell_from_a_restart_starts_anew() -> None:

@@ -2,6 +2,7 @@
 
 from kappaskin.cli.common import Switch, print_json
 from kappaskin.doctor import examine
+from kappaskin.sources.ports import Port, permission_line
 
 
 def doctor(*, json: Switch = False) -> None:
@@ -24,8 +25,9 @@ def doctor(*, json: Switch = False) -> None:
         print(f"{package:<20}{version or 'not installed'}")
     print(f"{'display':<20}{found['display'] or 'none (a virtual one will be used)'}")
     for port in found["serial_ports"]:
-        may = "" if port["opened"] else "  no permission: sudo usermod -aG dialout $USER"
-        print(f"{port['port']:<19} {port['description']}{may}")
+        said = Port(**port)
+        may = "" if said.opened else f"  no permission. {permission_line(said.port)}"
+        print(f"{'serial port':<20}{said.words}{may}")
     if not found["serial_ports"]:
         print(f"{'serial ports':<20}none found")
     print(f"{'missing':<20}{' '.join(found['missing']) or 'nothing'}")

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from kappaskin.errors import SourceError
-from kappaskin.frames import Frame
+from kappaskin.frames import Event, Frame
 from kappaskin.scene import load_scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources.accounting import Accounting
@@ -22,7 +22,16 @@ class Source(Protocol):
         ...
 
     def read(self, timeout: float) -> list[Frame]:
-        """The frames that came, after at most `timeout` s; raises `SourceError` when it ended."""
+        """The frames that came, after at most `timeout` s; a `Refusal` when there will be none."""
+        ...
+
+    @property
+    def trouble(self) -> str:
+        """Why no frames come at present, and what to do; empty when nothing is wrong."""
+        ...
+
+    def events(self) -> list[Event]:
+        """What happened since this was last asked."""
         ...
 
     def accounting(self) -> Accounting:

@@ -48,6 +48,9 @@ class Sequence:
     def __init__(self) -> None:
         self.good = self.accepted = self.duplicate = self.lost = self.span = self.restarts = 0
         self._next: int | None = None
+        # The number expected when the line was interrupted, and the first one since.
+        self._before: int | None = None
+        self._first: int | None = None
         self._missing: set[int] = set()
 
     def take(self, sequence: int) -> bool:
@@ -58,6 +61,8 @@ class Sequence:
             self.accepted += 1
             self._next = (sequence + 1) % SEQUENCES
             return True
+        if self._next is None:
+            self._first = sequence
         expected = sequence if self._next is None else self._next
         ahead = (sequence - expected) % SEQUENCES
         if ahead < SEQUENCES // 2:
@@ -75,12 +80,24 @@ class Sequence:
         self.accepted += 1
         return True
 
-    def begin_anew(self) -> None:
-        """Count the next number as the first of a restart: another device may send it."""
+    def interrupt(self) -> None:
+        """The line is gone: whether the next number goes on from the last is to be said then."""
         if self._next is not None:
-            self.restarts += 1
-        self._next = None
+            self._before = self._next
+        self._next = self._first = None
         self._missing.clear()
+
+    def resume(self, same: bool) -> None:
+        """Say of the first number since whether the device went on, or began anew."""
+        if self._before is None or self._first is None:
+            return
+        gap = (self._first - self._before) % SEQUENCES
+        if same and gap < SEQUENCES // 2:
+            self.lost += gap
+            self.span += gap
+        else:
+            self.restarts += 1
+        self._before = None
 
     def _advance(self, sequence: int, gap: int) -> None:
         self.lost += gap

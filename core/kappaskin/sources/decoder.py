@@ -157,7 +157,7 @@ class Decoder:
 
 def _read(kind: int, sequence: int, time: float, payload: bytes) -> Message | None:
     if kind == Kind.INFORMATION:
-        return read_information(sequence, payload)
+        return read_information(sequence, time, payload)
     if kind == Kind.REPLY:
         return read_reply(sequence, time, payload)
     return read_command(sequence, payload)

@@ -7,6 +7,7 @@ from operator import index
 from typing import Any, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal, SourceError
@@ -19,7 +20,7 @@ from kappaskin.transduction import Amplifier, Converter, HalfBridge, Multiplexer
 
 def to_json(sensor: Sensor) -> str:
     """The information text of `sensor`: SI units, channels counted component by component."""
-    layout, stiffness = sensor.layout, sensor.plate.axial_stiffness
+    layout, stiffness, wired = sensor.layout, sensor.plate.axial_stiffness, sensor.channel_map
     where = {"grid": layout.shape} if layout.shape else {"positions": layout.positions.tolist()}
     return json.dumps(
         {
@@ -40,6 +41,7 @@ def to_json(sensor: Sensor) -> str:
             **where,
             "gage_length": layout.gage_length,
             "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
+            **({} if wired is None else {"channel_map": wired.tolist()}),
             **asdict(sensor.transduction),
         },
         separators=(",", ":"),
@@ -74,7 +76,7 @@ _KINDS: dict[str, tuple[Any, tuple[str, ...]]] = {
         (int, float),
         ("rate", "rigidity", "base_curvature", "axial_stiffness", "gage_length", *_OF_THE_PLATE),
     ),
-    "a list": (list, ("size", "grid", "positions", "dead_channels")),
+    "a list": (list, ("size", "grid", "positions", "dead_channels", "channel_map")),
     "an object": (dict, ("bridge", "multiplexer", "amplifier", "converter")),
     "true or false": (bool, ("simulated", "strip", "fluid")),
 }
@@ -154,6 +156,12 @@ def _layout(said: dict[str, Any]) -> SensorLayout:
     return replace(layout, live=live, gage_length=float(said["gage_length"]))
 
 
+def _channel_map(said: dict[str, Any]) -> NDArray[np.intp] | None:
+    if "channel_map" not in said:
+        return None
+    return np.array([index(place) for place in said["channel_map"]], np.intp)
+
+
 def _plate(patch: Patch, said: dict[str, Any]) -> Plate:
     names = [*_OF_THE_PLATE, *({"axial_stiffness"} & said.keys())]
     numbers = {name: float(said[name]) for name in names}
@@ -177,6 +185,7 @@ def from_json(text: str) -> Sensor:
             said["serial_number"],
             said["firmware"],
             said["simulated"],
+            _channel_map(said),
         )
     except KeyError as error:
         raise SourceError(

@@ -1,201 +1,334 @@
-"""Bytes on a serial line, or any URL that pyserial opens, to frames."""
+"""Bytes on a serial line, or any URL that pyserial opens, to frames; a line that may vanish."""
 
-import errno
-import os
-import re
-import select
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
-from queue import Empty, SimpleQueue
-from typing import cast
 
-import serial
-from serial.urlhandler import protocol_socket
+import numpy as np
 
 from kappaskin.errors import SourceError
-from kappaskin.frames import Frame
+from kappaskin.frames import Event, Frame
 from kappaskin.sensor import Sensor
 from kappaskin.sources import information
 from kappaskin.sources.accounting import Accounting
+from kappaskin.sources.asking import Asking
+from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.decoder import Decoder
-from kappaskin.sources.wire import VERSION, Information, Message, Samples
+from kappaskin.sources.line import BAUD_RATES, Line
+from kappaskin.sources.ports import holders, port_called, serial_ports
+from kappaskin.sources.wire import VERSION, FromDevice, Information, Reply, Samples
 
-BAUD_RATE = 2_000_000
-"""What a UART must run at for 300 channels at 300 frames/s; USB ports ignore it."""
-
-_PATIENCE = 3.0  # s a device has to say what it is
-_BLOCK = 65536
-_BACKLOG = 4096  # reads that may wait; beyond it bytes are thrown away, and counted
-
-
-def _open(url: str) -> serial.SerialBase:
-    try:
-        return serial.serial_for_url(url, baudrate=BAUD_RATE, timeout=0.1, exclusive=True)
-    except (serial.SerialException, OSError, ValueError, LookupError, re.error) as error:
-        raise SourceError(_why_not(url, error)) from error
-
-
-def _why_not(url: str, error: Exception) -> str:
-    code = getattr(error, "errno", None)
-    if code in (errno.EACCES, errno.EPERM):
-        return (
-            f"{url}: no permission to open it. Join the port's group with "
-            f"`sudo usermod -aG {_group(url)} $USER`, then log in again"
-        )
-    if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
-        return f"{url}: busy, another program has it open; close that program, then connect again"
-    if code in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
-        return (
-            f"{url}: there is no such port; plug the sensor in, or choose one of the ports found "
-            "(`kappaskin doctor` lists them)"
-        )
-    if code == errno.ECONNREFUSED or "refused" in str(error):
-        return f"{url}: nothing listens there; start the server, then connect again"
-    return (
-        f"{url}: cannot be opened ({error}); expected a port such as /dev/ttyACM0 or COM3, or a "
-        "URL such as socket://host:port"
-    )
-
-
-def _highest(samples: Samples) -> int:
-    return int(samples.channels.max(initial=-1))
-
-
-def _group(url: str) -> str:
-    try:
-        import grp  # not on Windows
-
-        return grp.getgrgid(os.stat(url).st_gid).gr_name
-    except (ImportError, OSError, KeyError):
-        return "dialout"
-
-
-def _arriving(port: serial.SerialBase) -> bytes:
-    """What has come, after waiting 0.1 s at most for a first byte."""
-    if isinstance(port, protocol_socket.Serial):
-        # pyserial does not say how much a socket holds, and a longer read throws away what it has
-        # when the other end closes: with no time-out it is a single `recv`.
-        port.timeout = 0
-        select.select([port], [], [], 0.1)
-        return port.read(_BLOCK)
-    return port.read(cast("serial.Serial", port).in_waiting or 1)
+_PATIENCE = 3.0  # s that a device may say nothing, or not what it is
+_DWELL = 0.8  # s of bytes that mean nothing, after which another baud rate is tried
+_RETRY = 0.25  # s between two tries to open a port that is gone
+_UNREAD = 8192  # messages kept until the device says what it is
+_SUMMED = 1.0  # s of which lost messages are told together
+_APART, _DRIFT = 0.5, 0.01  # s, and share, by which two clocks that both went on may differ
 
 
 class SerialSource:
-    """Frames from a port; a thread of its own reads, so that no byte waits for arithmetic."""
+    """Frames from the device on a port, which is found again when it was unplugged.
+
+    Opening raises a `SourceError` where it cannot be; thereafter `trouble` says why no frames come.
+    A thread of its own reads, so that no byte waits for arithmetic.
+    """
 
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.url, self._clock = url, clock
-        self._port = _open(url)
-        self._sensor: Sensor | None = None
-        self._information = ""
+        self._plug = port_called(url)
         self._decoder = Decoder()
-        self._opened = clock()
-        self._arrived: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
-        self._messages: deque[tuple[float, Message]] = deque()
-        self._overrun = 0
-        self._gone = threading.Event()
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._listen, name="serial-reader", daemon=True)
-        self._thread.start()
+        self._sensor: Sensor | None = None
+        self._text = ""  # the information that the sensor was made of
+        self._absent = self._unusable = ""
+        self._pending: deque[tuple[float, FromDevice]] = deque()
+        self._events: list[Event] = []
+        self._overrun = self._lost_told = self._restarts_told = 0
+        self._summed_at = self._next_try = self._gone_at = 0.0
+        self._last: tuple[float, float] | None = None  # device and host time of the last message
+        self._line: Line | None = None
+        self._begin(Line(url, clock))
 
     @property
     def sensor(self) -> Sensor | None:
         return self._sensor
 
-    def _listen(self) -> None:
-        """Move bytes with the time they came, until the line is gone."""
+    @property
+    def temperature(self) -> float:
+        """The device's, in degrees Celsius; NaN where it does not tell."""
+        return self._asking.temperature
+
+    # The line: there, gone, back.
+
+    def _begin(self, line: Line) -> None:
+        """Listen on `line`, and ask who is there."""
+        now = self._clock()
+        self._line, self._known, self._unusable = line, False, ""
+        self._opened = self._heard = self._good_at = self._tuned = now
+        self._bytes_before = self._decoder.accounting().bytes_in
+        self._holders: list[str] = []
+        self._rate_told = line.baud_rate
+        self._times = ClockMap()
+        self._asking = Asking(line.write, self._times)
+        self._asking.greet(now)
+
+    def reset(self) -> None:
+        """Let the board start anew, if DTR or RTS does that."""
+        if self._line is not None:
+            self._line.reset()
+
+    def _end(self, line: Line) -> None:
+        """Give the line up; the device may come back."""
+        self._overrun += line.overrun
+        line.close()
+        self._line = None
+        self._decoder.line_ended()
+        self._decoder.sequence.interrupt()
+        self._pending.clear()
+        self._gone_at = self._clock()
+        self._absent = (
+            f"{self.url}: the line is gone: unplugged, or the device stopped; plug it in, and it "
+            "goes on"
+        )
+        self._tell("gone", self._absent)
+
+    def _come_back(self, timeout: float) -> None:
+        """Look for the port, or by the serial number of its plug for the one it is now."""
+        now = self._clock()
+        if now < self._next_try:
+            time.sleep(min(timeout, self._next_try - now))
+            return
+        self._next_try = now + _RETRY
         try:
-            while not self._closing.is_set():
-                data = _arriving(self._port)
-                if data and self._arrived.qsize() > _BACKLOG:
-                    self._overrun += len(data)
-                elif data:
-                    self._arrived.put((self._clock(), data))
-        except (serial.SerialException, OSError, TypeError):  # TypeError: closed while reading
-            self._gone.set()
+            self._begin(Line(self._where(), self._clock))
+        except SourceError as error:
+            self._absent = f"{error}; it is tried again until it opens"
+
+    def _where(self) -> str:
+        known = self._plug.serial_number
+        here = (port.port for port in serial_ports() if port.same_plug(self._plug)) if known else ()
+        return next(iter(here), self.url)
+
+    # What comes.
 
     def read(self, timeout: float) -> list[Frame]:
-        gone = self._gone.is_set()
-        self._decode(0.0 if gone or self._messages else timeout)
+        """The frames that came, after at most `timeout` s."""
+        line = self._line
+        if line is None:
+            self._come_back(timeout)
+            return []
+        gone = line.gone  # looked at first: what came before it was is still to be taken
+        for now, data in line.take(0.0 if gone or self._usable() else timeout):
+            messages = self._decoder.feed(data)
+            self._heard = now
+            self._pending += [(now, message) for message in messages]
+            if messages:
+                self._good_at = now
+                self._tell_rate(line)
+        if not self._known:
+            self._look_for_information()
         frames = self._frames()
-        if gone and not frames:
-            raise SourceError(
-                f"{self.url}: the line is gone: unplugged, or the device stopped; plug it in and "
-                "connect again"
-            )
-        if self._sensor is None and self._clock() - self._opened > _PATIENCE:
-            raise SourceError(self._why_unknown())
+        self._tell_losses()
+        if gone and not self._usable():
+            self._end(line)
+        else:
+            self._attend(line)
         return frames
 
-    def _decode(self, timeout: float) -> None:
-        with suppress(Empty):
-            now, data = self._arrived.get(timeout=timeout)
-            while True:
-                self._messages += [(now, message) for message in self._decoder.feed(data)]
-                now, data = self._arrived.get_nowait()
+    def _usable(self) -> bool:
+        """Whether messages wait that can be used without another look at the line."""
+        return self._known and bool(self._pending)
+
+    def _look_for_information(self) -> None:
+        """Learn who is there; what came before that is kept until then."""
+        for place, (_, message) in enumerate(self._pending):
+            if isinstance(message, Information):
+                self._meet(message.text)
+                if not self._known:
+                    self._drop(place + 1)
+                return
+        self._drop(len(self._pending) - _UNREAD)
+
+    def _drop(self, count: int) -> None:
+        for _ in range(count):
+            self._pending.popleft()
+
+    def _meet(self, text: str) -> None:
+        """Take what the device says it is, and say what of it is new."""
+        was, here_before = self._sensor, self._known
+        if text != self._text:
+            self._sensor, self._text, self._known = None, "", False
+            try:
+                self._sensor = information.from_json(text)
+            except SourceError as error:
+                self._unusable = f"{self.url}: {error}"
+                return
+        self._text, self._unusable, self._known = text, "", True
+        if self._sensor is not None:
+            self._compare(was, self._sensor, here_before)
+
+    def _compare(self, was: Sensor | None, now: Sensor, here_before: bool) -> None:
+        name = f"{now.name} {now.serial_number}"
+        same = was is not None and was.serial_number == now.serial_number
+        if not here_before and self._last is not None:
+            self._resume(name, same)
+        if was is None:
+            self._tell("met", f"{name}, firmware {now.firmware}")
+        elif not same:
+            self._tell("other", f"another device: {name} instead of {was.serial_number}")
+        elif now.firmware != was.firmware:
+            self._tell("firmware", f"firmware {now.firmware} instead of {was.firmware}")
+        elif now is not was:
+            self._tell("changed", f"{name} says something else of itself than before")
+
+    def _resume(self, name: str, same: bool) -> None:
+        """Go on counting: with the device as it was, or from its beginning."""
+        sequence, away = self._decoder.sequence, self._clock() - self._gone_at
+        before = sequence.lost
+        sequence.resume(same and self._went_on())
+        again = "" if sequence.restarts == self._restarts_told else ", from its beginning"
+        lost = sequence.lost - before
+        self._lost_told, self._restarts_told = self._lost_told + lost, sequence.restarts
+        if same:
+            self._tell("back", f"{name} is back after {away:.1f} s{again}: {lost} messages lost")
+
+    def _went_on(self) -> bool:
+        """Whether the device's clock went on while nobody listened."""
+        arrived, first = self._pending[0]
+        if self._last is None:
+            return False
+        device, host = first.time - self._last[0], arrived - self._last[1]
+        return abs(device - host) < _APART + _DRIFT * host
 
     def _frames(self) -> list[Frame]:
         """The frames before the next message that changes the sensor, or cannot be used."""
         frames: list[Frame] = []
-        while self._messages and not (frames and self._upsets(self._messages[0][1])):
-            now, message = self._messages.popleft()
-            if frame := self._frame(message, now):
+        while self._usable() and not (frames and self._upsets(self._pending[0][1])):
+            now, message = self._pending.popleft()
+            self._last = message.time, now
+            if isinstance(message, Reply):
+                self._take(message, now)
+            elif isinstance(message, Information):
+                self._meet(message.text)
+            elif frame := self._frame(message, now):
                 frames.append(frame)
         return frames
 
-    def _upsets(self, message: Message) -> bool:
+    def _upsets(self, message: FromDevice) -> bool:
         if isinstance(message, Information):
-            return message.text != self._information
-        return self._sensor is not None and _highest(message) >= self._sensor.channels
+            return message.text != self._text
+        unknown = isinstance(message, Samples) and self._sensor is not None
+        return unknown and _highest(message) >= self._sensor.channels
 
-    def _frame(self, message: Message, now: float) -> Frame | None:
-        if isinstance(message, Information):
-            if message.text != self._information:
-                self._sensor = information.from_json(message.text)
-                self._information = message.text
+    def _take(self, reply: Reply, now: float) -> None:
+        before = self._asking.refusal
+        self._asking.take(reply, now)
+        if self._asking.refusal != before:
+            self._tell("refused", self._asking.refusal)
+
+    def _frame(self, message: Samples, now: float) -> Frame | None:
+        sensor = self._sensor
+        if sensor is None or self._unusable:
             return None
-        if self._sensor is None:
-            return None  # counts mean nothing before the device says what they count
         if self._upsets(message):
-            raise SourceError(
+            self._unusable = (
                 f"{self.url}: the device sends channel {_highest(message)} but says it has "
-                f"{self._sensor.channels}; its firmware and its information disagree"
+                f"{sensor.channels}; its firmware and its information disagree"
             )
-        return Frame(message.sequence, message.time, now, message.channels, message.counts)
+            return None
+        times, began = self._times, self._times.unwrap(message.time)
+        times.heard(began, now)
+        channels = message.channels
+        if sensor.channel_map is not None:
+            channels = sensor.channel_map[channels]
+        taken = times.taken(began), times.sd(began)
+        return Frame(message.sequence, began, now, channels, message.counts, None, *taken)
 
-    def _why_unknown(self) -> str:
+    # What is said, and what is in the way.
+
+    def _tell(self, kind: str, text: str) -> None:
+        self._events.append(Event(self._clock(), kind, text))
+
+    def events(self) -> list[Event]:
+        """What happened since the last time that this was asked."""
+        told, self._events = self._events, []
+        return told
+
+    def _tell_rate(self, line: Line) -> None:
+        if line.baud_rate != self._rate_told:
+            self._rate_told = line.baud_rate
+            self._tell("rate", f"the device speaks at {line.baud_rate} baud")
+
+    def _tell_losses(self) -> None:
+        sequence, now = self._decoder.sequence, self._clock()
+        if self._known and sequence.restarts > self._restarts_told:
+            self._restarts_told = sequence.restarts
+            self._tell("restarted", "the device started anew while it was connected")
+        if sequence.lost != self._lost_told and now - self._summed_at >= _SUMMED:
+            if sequence.lost > self._lost_told:
+                self._tell("gap", f"{sequence.lost - self._lost_told} messages lost")
+            self._lost_told, self._summed_at = sequence.lost, now
+
+    def _attend(self, line: Line) -> None:
+        """Ping now and then; try other baud rates on bytes that mean nothing."""
+        now = self._clock()
+        if self._asking.attend(now) and not self._known:
+            self._asking.greet(now)
+        quiet = now - max(self._good_at, self._tuned)
+        if self._heard > max(self._good_at, self._tuned) and quiet > (
+            _PATIENCE if self._known else _DWELL
+        ):
+            place = BAUD_RATES.index(line.baud_rate)
+            line.speak_at(BAUD_RATES[(place + 1) % len(BAUD_RATES)])
+            self._tuned, self._holders = now, holders(self.url)
+            self._asking.greet(now)
+
+    @property
+    def trouble(self) -> str:
+        """Why no frames come; empty when they do, or may be expected to."""
+        if self._line is None:
+            return self._absent
+        now = self._clock()
+        if self._unusable or now - self._opened < _PATIENCE:
+            return self._unusable
+        if self._known and now - self._good_at < _PATIENCE:
+            return ""
+        return self._why_unknown(now)
+
+    def _why_unknown(self, now: float) -> str:
         seen = self._decoder.accounting()
-        if seen.other_version is not None:
+        if self._asking.refusal and not self._known:
+            return f"{self.url}: {self._asking.refusal}"
+        if seen.other_version is not None and not self._known:
             return (
                 f"{self.url}: the device speaks wire version {seen.other_version}, this program "
                 f"speaks {VERSION}; update the older of the two"
             )
-        if not seen.bytes_in:
+        came = seen.bytes_in - self._bytes_before
+        if not came or (self._known and now - self._heard >= _PATIENCE):
             return (
-                f"{self.url}: silent for {_PATIENCE:g} s; is the device on, and is this its port?"
+                f"{self.url}: silent for more than {_PATIENCE:g} s; is the device on, and is this "
+                "its port?"
             )
-        if not seen.good:
+        if self._good_at > self._opened and not self._known:
             return (
-                f"{self.url}: {seen.bytes_in} bytes came but no message of wire version {VERSION}; "
-                f"this is another kind of device, or its baud rate is not {BAUD_RATE}"
+                f"{self.url}: messages come, but for more than {_PATIENCE:g} s none said what the "
+                "device is; its firmware must send an information message every second"
             )
+        others = ", ".join(self._holders)
         return (
-            f"{self.url}: {seen.good} messages came in {_PATIENCE:g} s but none said what the "
-            "device is; its firmware must send an information message every second"
+            f"{self.url}: {came} bytes came but no message of wire "
+            f"version {VERSION} at any baud rate from {BAUD_RATES[-1]} to {BAUD_RATES[0]}: it is "
+            "another kind of device" + (f", or {others} takes its bytes" if others else "")
         )
 
     def accounting(self) -> Accounting:
-        return self._decoder.accounting(overrun=self._overrun)
+        overrun = self._overrun + (self._line.overrun if self._line else 0)
+        return self._decoder.accounting(overrun=overrun)
 
     def close(self) -> None:
-        self._closing.set()
-        if isinstance(self._port, serial.Serial):
-            with suppress(OSError, serial.SerialException):
-                self._port.cancel_read()
-        self._thread.join(timeout=1.0)
-        with suppress(OSError, serial.SerialException):
-            self._port.close()
+        if self._line is not None:
+            self._line.close()
+
+
+def _highest(samples: Samples) -> int:
+    return int(np.max(samples.channels, initial=-1))

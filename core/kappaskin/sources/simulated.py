@@ -2,10 +2,11 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from kappaskin.frames import Frame
+from kappaskin.frames import Event, Frame
 from kappaskin.intrinsic import ForceTorqueSensor, Wrench
 from kappaskin.region import Scanner
 from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
@@ -91,7 +92,8 @@ class SimulatedSource:
         if rate != self._rate:
             self._first, self._since, self._rate = self._n, due, rate
         self._n, self._taken = self._n + 1, due
-        return self._simulator.scanned(scan, self._n - 1, due, self._clock)
+        frame = self._simulator.scanned(scan, self._n - 1, due, self._clock)
+        return replace(frame, taken=self._start + due, taken_sd=0.0)
 
     def wrench(self) -> Wrench:
         """What `base` reads of the contact, at the time of the last frame."""
@@ -114,6 +116,13 @@ class SimulatedSource:
         self._accepted += len(arrived)
         self._lost += len(frames) - len(arrived)
         return arrived
+
+    @property
+    def trouble(self) -> str:
+        return ""
+
+    def events(self) -> list[Event]:
+        return []
 
     def accounting(self) -> Accounting:
         return Accounting(

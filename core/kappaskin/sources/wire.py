@@ -72,9 +72,10 @@ class Fault(IntEnum):
 
 
 class Information(NamedTuple):
-    """What the device says it is, as JSON text."""
+    """What the device says it is, as JSON text; it said so at device `time` in s."""
 
     sequence: int
+    time: float
     text: str
 
 
@@ -111,7 +112,8 @@ class Reply(NamedTuple):
         return self.data.decode(errors="replace")
 
 
-Message = Information | Samples | Command | Reply
+FromDevice = Information | Samples | Reply
+Message = FromDevice | Command
 
 
 def encode(kind: int, sequence: int, time: float, payload: bytes) -> bytes:
@@ -186,9 +188,9 @@ def read_reply(sequence: int, time: float, payload: bytes) -> Reply | None:
     return Reply(sequence, time, *_REPLY.unpack_from(payload), payload[_REPLY.size :])
 
 
-def read_information(sequence: int, payload: bytes) -> Information | None:
+def read_information(sequence: int, time: float, payload: bytes) -> Information | None:
     """The information in `payload`, None when that is no text."""
     try:
-        return Information(sequence, payload.decode())
+        return Information(sequence, time, payload.decode())
     except UnicodeDecodeError:
         return None

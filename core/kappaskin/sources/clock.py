@@ -1,0 +1,216 @@
+"""Times on a device's clock to times on this machine's, with how far they may be out."""
+
+import math
+from collections import deque
+
+import numpy as np
+
+_FASTEST = 1e-2  # s/s that a clock may go wrong before its drift is known: a resonator's worst
+_WANDER = 5e-6  # s/s by which the drift itself may change within the window: a clock warming up
+_GRAIN = 1e-6  # s, the step of a device's clock
+_WINDOW = 100.0  # s of exchanges that tell the drift
+_BUCKET = 1.0  # s of which only the quickest exchange is kept, and the quickest message
+_MESSAGES = 30  # quickest ones that are kept
+_BACK = 1.0  # s that a message may be older than one before it
+_DELAY = 0.5  # s, longer than a message is under way where no exchange tells how long
+_DOUBTS = 2  # messages in a row that contradict the map before it is given up
+_WRAP = 2**32 * 1e-6  # s after which a counter of 32 bits in us begins again at 0
+_LONGEST = 2**64 * 1e-6  # s, what the wire can say
+
+
+class ClockMap:
+    """Tells the host time of a device time, and within which bound.
+
+    Nothing arrives before it was sent: an exchange bounds host time minus device time from both
+    sides, any other message from one. The clocks drift apart evenly, but for a few parts per
+    million; the bounds of a hundred seconds then enclose offset and drift, whatever the delays and
+    however unequal they are, and one that was delayed only bounds less.
+
+    `steps` counts how often the bounds contradicted each other twice running: the device restarted,
+    or one of the clocks was set or stood still. The map then begins anew. All times are in s.
+    """
+
+    def __init__(self) -> None:
+        self.steps = 0
+        self._exchanges: deque[tuple[float, float, float]] = deque()  # time, low, high
+        self._messages: deque[tuple[float, float]] = deque(maxlen=_MESSAGES)  # time, high
+        self._latest = -math.inf  # device time of the newest message
+        self._wraps, self._last = 0, math.nan
+        self._forget()
+
+    def _forget(self) -> None:
+        self._exchanges.clear()
+        self._messages.clear()
+        self._doubted = self._unanswered = self._delayed = 0
+        self._know(0.0, math.nan, math.inf, 0.0, _FASTEST)
+        self._least, self._quickest = math.inf, (math.nan, math.nan)
+
+    def _know(self, at: float, offset: float, half: float, drift: float, spread: float) -> None:
+        """Take it that host - device is `offset` +- `half` at `at`, and drifts so per second."""
+        self._at, self._offset, self._half = at, offset, half
+        self._drift, self._spread = drift, spread
+        self._early = half if half < math.inf else _DELAY
+
+    # What is known.
+
+    def taken(self, device_time: float) -> float:
+        """The host time of `device_time`; NaN before anything came, or while that is in doubt.
+
+        Without exchanges it is as if the quickest messages had taken no time.
+        """
+        if self._doubted:
+            return math.nan
+        return device_time + self._offset + self._drift * (device_time - self._at)
+
+    def bound(self, device_time: float) -> float:
+        """How far `taken` may be out at most; infinite without exchanges.
+
+        It is half of a round trip, and what the drift may have added since.
+        """
+        return self._half + self._spread * abs(device_time - self._at)
+
+    def sd(self, device_time: float) -> float:
+        """The standard deviation of `taken`, which may be anywhere within its bound."""
+        return self.bound(device_time) / math.sqrt(3)
+
+    @property
+    def drift(self) -> float:
+        """How much slower the device's clock goes, in parts per million; NaN if not known."""
+        return self._drift * 1e6 if len(self._exchanges) > 1 else math.nan
+
+    @property
+    def drift_bound(self) -> float:
+        """How far `drift` may be out at most, in parts per million."""
+        return self._spread * 1e6 if len(self._exchanges) > 1 else math.inf
+
+    # What comes.
+
+    def unwrap(self, device_time: float) -> float:
+        """Device time that goes on where a counter of 32 bits in us begins again.
+
+        To be given every message's, in order. Only a step from within ten seconds of the end to
+        within ten of the beginning is such a wrap; any other back to the beginning is a restart.
+        """
+        if not 0 <= device_time < _WRAP:
+            return device_time  # of a longer counter, or garbage
+        step = device_time - self._last
+        if step > _WRAP - 10.0 and self._wraps:
+            return device_time + (self._wraps - 1) * _WRAP  # a late one, of before the wrap
+        if step < 10.0 - _WRAP:
+            self._wraps += 1
+        elif step < -_BACK:
+            self._wraps = 0
+        self._last = device_time
+        return device_time + self._wraps * _WRAP
+
+    def heard(self, device_time: float, host_time: float) -> None:
+        """Take note of a message made at `device_time` that came at `host_time`."""
+        away = device_time - self._at
+        late = host_time - device_time - self._offset - self._drift * away
+        early = -self._early - self._spread * abs(away)
+        # Not the opposites, or NaN, of the first message too, would pass.
+        if not (early < late < math.inf and device_time > self._latest - _BACK):
+            self._contradicted(device_time, host_time)
+            return
+        self._doubted = 0
+        if device_time > self._latest:
+            self._latest = device_time
+        if late < self._least:
+            self._least, self._quickest = late, (device_time, host_time)
+        if away > _BUCKET:
+            self._take_in()
+
+    def exchange(self, sent: float, received: float, answered: float, arrived: float) -> None:
+        """Take note of a ping and its answer.
+
+        Host time when it was `sent`, device time when it was `received` and when it was `answered`,
+        host time when the answer `arrived`.
+        """
+        if not (_possible(received, sent) and _possible(answered, arrived)):
+            return
+        low = sent - received - _GRAIN - _FASTEST * (answered - received)
+        high = arrived - answered + _GRAIN
+        if not (sent <= arrived and received <= answered and low <= high):
+            return
+        middle = self._offset + self._drift * (answered - self._at)
+        reach = self.bound(answered)
+        fits = middle - reach <= high and low <= middle + reach
+        first = math.isnan(self._offset)
+        if not first and not (fits and answered > self._latest - _BACK):
+            self._unanswered += 1
+            if self._unanswered < _DOUBTS:
+                return
+            self._begin_anew()
+        self._unanswered = 0
+        self._latest = max(self._latest, answered) if not first else answered
+        self._keep(answered, low, high)
+        self._fit()
+
+    def _contradicted(self, device_time: float, host_time: float) -> None:
+        if not _possible(device_time, host_time):
+            return
+        if not math.isnan(self._offset):
+            self._doubted += 1
+            if self._doubted < _DOUBTS:
+                return
+            self._begin_anew()
+        self._latest = device_time
+        self._messages.append((device_time, host_time - device_time))
+        self._fit()
+
+    def _begin_anew(self) -> None:
+        self.steps += 1
+        self._latest = -math.inf
+        self._forget()
+
+    def _keep(self, time: float, low: float, high: float) -> None:
+        """Keep an exchange among those of the window, the quickest in each bucket."""
+        kept = self._exchanges
+        # Not the first, or a drift would be known no sooner than a bucket is over.
+        if len(kept) > 1 and time - kept[-1][0] < _BUCKET:
+            if high - low > kept[-1][2] - kept[-1][1]:
+                return
+            kept.pop()
+        kept.append((time, low, high))
+        while kept[0][0] < time - _WINDOW:
+            kept.popleft()
+
+    def _take_in(self) -> None:
+        """Take in the quickest message since the last time."""
+        time, host_time = self._quickest
+        one_sided = math.isinf(self._half)
+        self._delayed = self._delayed + 1 if one_sided and self._least > _DELAY else 0
+        if self._delayed >= _DOUBTS:
+            self._begin_anew()
+            self._latest = time
+        self._messages.append((time, host_time - time))
+        self._fit()
+
+    def _fit(self) -> None:
+        """Find the offset now and the drift that all bounds allow, and forget what came since."""
+        self._least, self._quickest = math.inf, (math.nan, math.nan)
+        one_sided = [(time, -math.inf, high) for time, high in self._messages]
+        t, low, high = np.array([*self._exchanges, *one_sided]).T
+        ago = self._latest - t
+        low, high = low - _WANDER * np.abs(ago), high + _WANDER * np.abs(ago)
+        # Any two times t_i < t_j: low_j - high_i <= drift (t_j - t_i) <= high_j - low_i.
+        i, j = np.nonzero(t[:, None] < t)
+        slowest = max(-_FASTEST, float(np.max((low[j] - high[i]) / (t[j] - t[i]), initial=-1.0)))
+        fastest = min(_FASTEST, float(np.min((high[j] - low[i]) / (t[j] - t[i]), initial=1.0)))
+        if not self._exchanges:
+            drift = float(np.median((high[j] - high[i]) / (t[j] - t[i]))) if i.size else 0.0
+            self._know(self._latest, float(np.min(high + drift * ago)), math.inf, drift, _FASTEST)
+            return
+        drift, spread = (slowest + fastest) / 2, (fastest - slowest) / 2
+        least = float(np.max(low + drift * ago - spread * np.abs(ago)))
+        most = float(np.min(high + drift * ago + spread * np.abs(ago)))
+        if spread < 0 or least > most:
+            # Together they contradict each other, though no two in a row did: the drift changed.
+            self._begin_anew()
+            return
+        half = (most - least) / 2
+        self._know(self._latest, least + half, half, drift, spread + _WANDER)
+
+
+def _possible(device_time: float, host_time: float) -> bool:
+    return 0 <= device_time < _LONGEST and math.isfinite(host_time)
