@@ -116,6 +116,15 @@ def test_a_scattered_sensor_comes_back_to_the_last_digit(positions) -> None:
     assert same(from_json(to_json(sensor)), sensor)
 
 
+def test_a_channel_map_comes_back_and_none_stays_none() -> None:
+    layout = SensorLayout.regular(PATCH, 3, 2)
+    wired = np.roll(np.arange(18), 5)
+    back = from_json(to_json(sensor_on(layout, channel_map=wired)))
+    assert back.channel_map is not None
+    assert np.array_equal(back.channel_map, wired)
+    assert from_json(to_json(sensor_on(layout))).channel_map is None
+
+
 def test_a_single_dead_channel_comes_back() -> None:
     layout = SensorLayout.regular(PATCH, 2, 2)
     live = layout.live.copy()
@@ -245,6 +254,12 @@ BAD = {
     "dead huge": (said(dead_channels=[10**400]), "from 0 to 17"),
     "dead fraction": (said(dead_channels=[1.5]), "from 0 to 17"),
     "dead nested": (said(dead_channels=[[1]]), "from 0 to 17"),
+    "map short": (said(channel_map=[0]), "names each number from 0 to 17 once, got 1 numbers"),
+    "map twice": (said(channel_map=[0, 0, *range(2, 18)]), "names each number from 0 to 17 once"),
+    "map beyond": (said(channel_map=[18, *range(1, 18)]), "names each number from 0 to 17 once"),
+    "map huge": (said(channel_map=[10**400] * 18), "cannot be used"),
+    "map fraction": (said(channel_map=[0.5] * 18), "cannot be used"),
+    "map a text": (said(channel_map="1"), "expected channel_map to be a list"),
     "dead a text": (said(dead_channels="1"), "expected dead_channels to be a list"),
     "rigidity zero": (said(rigidity=0), "rigidity above zero"),
     "rigidity a text": (said(rigidity="stiff"), "expected rigidity to be a number, got 'stiff'"),

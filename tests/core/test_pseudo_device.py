@@ -3,12 +3,13 @@
 import json
 import os
 import signal
+import struct
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +23,16 @@ from kappaskin.live import LOST, STREAMING
 from kappaskin.scene import Orbit
 from kappaskin.sources import SerialSource
 from kappaskin.sources.decoder import Decoder
-from kappaskin.sources.wire import Message
+from kappaskin.sources.wire import (
+    Fault,
+    Information,
+    Message,
+    Operation,
+    Reply,
+    Samples,
+    encode_command,
+    pack_runs,
+)
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice
@@ -68,7 +78,7 @@ class Listener:
 
     def __init__(self, port: str) -> None:
         self._line = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        self.decoder = Decoder()
+        self.decoder, self._asked = Decoder(), 0
 
     def reads(self, spent: int, within: float = 5.0) -> list[Message]:
         """What comes until `spent` numbers are accounted for."""
@@ -80,6 +90,31 @@ class Listener:
             except BlockingIOError:
                 time.sleep(0.001)
         return messages
+
+    def asks(self, operation: int, arguments: bytes = b"") -> tuple[Reply, list[Message]]:
+        """The reply to a command, and what came with it."""
+        self._asked += 1
+        os.write(self._line, encode_command(self._asked, 0.0, operation, arguments))
+        messages: list[Message] = []
+        end = time.monotonic() + 5.0
+        while time.monotonic() < end:
+            with suppress(BlockingIOError):
+                messages += self.decoder.feed(os.read(self._line, 65536))
+            for message in messages:
+                if isinstance(message, Reply) and message.command == self._asked:
+                    return message, messages
+            time.sleep(0.001)
+        pytest.fail("no reply came")
+
+    def takes(self, count: int) -> list[Samples]:
+        """The next `count` scans."""
+        scans: list[Samples] = []
+        end = time.monotonic() + 5.0
+        while len(scans) < count and time.monotonic() < end:
+            with suppress(BlockingIOError):
+                came = self.decoder.feed(os.read(self._line, 65536))
+                scans += [message for message in came if isinstance(message, Samples)]
+        return scans
 
     def close(self) -> None:
         os.close(self._line)
@@ -214,6 +249,96 @@ def test_a_rate_that_no_converter_keeps_is_refused_and_leaves_no_descriptor() ->
     with pytest.raises(Refusal, match=r"at most 666.7 frames/s, got 5000"):
         PseudoDevice(replace(SCENE, rate=5000.0))
     assert os.listdir("/dev/fd") == before
+
+
+# What a host asks for
+
+
+@pytest.fixture
+def asked() -> Iterator[Listener]:
+    """A listener at a device that obeys."""
+    device = PseudoDevice(SCENE)
+    listener = Listener(device.port)
+    with serving(device):
+        yield listener
+        listener.close()
+
+
+def test_it_speaks_a_version_that_both_know_or_refuses(asked: Listener) -> None:
+    assert asked.asks(Operation.HELLO, b"\1\3")[0].data == b"\1"
+    refused, _ = asked.asks(Operation.HELLO, b"\2\3")
+    assert (refused.fault, refused.reason) == (Fault.NO_COMMON_VERSION, "this device speaks 1")
+
+
+def test_it_stops_and_starts(asked: Listener) -> None:
+    asked.asks(Operation.STOP)
+    asked.reads(10**9, within=0.3)  # what was under way
+    assert not [m for m in asked.reads(10**9, within=0.3) if isinstance(m, Samples)]
+    asked.asks(Operation.START)
+    assert len(asked.takes(10)) >= 10
+    assert asked.decoder.accounting().lost == 0
+
+
+def test_it_scans_the_channels_asked_for_and_all_for_none(asked: Listener) -> None:
+    asked.asks(Operation.SCAN_LIST, pack_runs([7, 3, 4, 5]))
+    assert asked.takes(5)[-1].channels.tolist() == [7, 3, 4, 5]
+    for wrong in ([300], [3, 4, 3]):
+        assert asked.asks(Operation.SCAN_LIST, pack_runs(wrong))[0].fault == Fault.OUT_OF_RANGE
+    assert asked.takes(5)[-1].channels.tolist() == [7, 3, 4, 5]
+    asked.asks(Operation.SCAN_LIST, pack_runs([]))
+    assert len(asked.takes(5)[-1].channels) == 300
+
+
+def test_it_goes_at_the_rate_asked_for_if_it_can(asked: Listener) -> None:
+    reply, _ = asked.asks(Operation.RATE, struct.pack("<I", 100_000))
+    assert reply.data == struct.pack("<I", 100_000)
+    times = [scan.time for scan in asked.takes(12)][-8:]
+    assert np.diff(times) == pytest.approx(0.01, abs=1e-5)
+    for wrong in (0, 900_000):
+        refused, _ = asked.asks(Operation.RATE, struct.pack("<I", wrong))
+        assert refused.fault == Fault.OUT_OF_RANGE
+        assert "at most 666.7 frames/s" in refused.reason
+
+
+def test_another_gain_is_told_at_once_and_changes_the_counts(asked: Listener) -> None:
+    before = asked.takes(1)[-1].counts
+    _, with_it = asked.asks(Operation.GAIN, struct.pack("<I", 50_000))
+    told = [m for m in [*with_it, *asked.reads(10**9, 0.1)] if isinstance(m, Information)][-1]
+    assert json.loads(told.text)["amplifier"]["gain"] == 50
+    after = asked.takes(1)[-1].counts
+    assert np.abs(after).max() < 0.7 * np.abs(before).max()
+    assert asked.asks(Operation.GAIN, struct.pack("<I", 0))[0].fault == Fault.OUT_OF_RANGE
+
+
+def test_it_introduces_itself_when_asked(asked: Listener) -> None:
+    asked.takes(1)
+    _, with_it = asked.asks(Operation.IDENTIFY)
+    came = [*with_it, *asked.reads(10**9, within=0.1)]
+    assert any(isinstance(message, Information) for message in came)
+
+
+def test_a_ping_is_answered_with_the_time_it_came(asked: Listener) -> None:
+    reply, _ = asked.asks(Operation.PING)
+    received_us, hundredths = struct.unpack("<Qh", reply.data)
+    assert 0 <= reply.time - received_us * 1e-6 < 0.1
+    assert hundredths == -(2**15)  # this skin does not say how warm it is
+
+
+@pytest.mark.parametrize(
+    ("operation", "arguments", "fault"),
+    [
+        (99, b"", Fault.UNKNOWN_OPERATION),
+        (Operation.HELLO, b"\1", Fault.WRONG_LENGTH),
+        (Operation.START, b"\0", Fault.WRONG_LENGTH),
+        (Operation.PING, b"\0", Fault.WRONG_LENGTH),
+        (Operation.RATE, b"\0", Fault.WRONG_LENGTH),
+        (Operation.SCAN_LIST, b"\2\0\0", Fault.WRONG_LENGTH),
+    ],
+)
+def test_what_is_no_command_is_refused_with_the_reason(asked, operation, arguments, fault) -> None:
+    reply, _ = asked.asks(operation, arguments)
+    assert reply.fault == fault
+    assert reply.reason
 
 
 # As a process of its own

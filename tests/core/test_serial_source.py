@@ -182,6 +182,14 @@ def test_frames_from_before_and_after_a_change_of_sensor_are_never_mixed(line, o
     assert met == [(SENSOR.name, q) for q in (1, 2, 3)] + [("repaired", q) for q in (5, 6, 7)]
 
 
+def test_what_a_channel_reads_is_told_by_the_map_of_the_device(line, opened) -> None:
+    wired = np.roll(np.arange(SENSOR.channels), 7)
+    source = opened(line.port)
+    line.write(introduction(0, information.to_json(replace(SENSOR, channel_map=wired))) + scan(1))
+    (frame,) = read(source, 1)
+    assert frame.channels.tolist() == wired.tolist()
+
+
 def test_a_loop_url_works_like_a_port(opened, monkeypatch) -> None:
     ports: list[serial.SerialBase] = []
     make = serial.serial_for_url
