@@ -308,6 +308,9 @@ def test_a_channel_that_the_device_does_not_have_is_refused_after_the_frames_bef
     frames, why = read_to_trouble(source)
     assert sequences(frames) == [1, 2, 3]
     assert "sends channel 300 but says it has 300" in why
+    line.write(introduction(5) + stream(6, 8))
+    assert read(source, 1, within=0.2) == []
+    assert source.trouble == why  # until it says something else of itself
 
 
 def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened) -> None:

@@ -43,7 +43,8 @@ class SerialSource:
         self._pending: deque[tuple[float, FromDevice]] = deque()
         self._events: list[Event] = []
         self._overrun = self._lost_told = self._restarts_told = 0
-        self._summed_at = self._next_try = self._gone_at = 0.0
+        self._summed_at = self._next_try = 0.0
+        self._gone_at: float | None = None  # when the line was lost, until the device is back
         self._last: tuple[float, float] | None = None  # device and host time of the last message
         self._line: Line | None = None
         self._begin(Line(url, clock))
@@ -154,7 +155,9 @@ class SerialSource:
 
     def _meet(self, text: str) -> None:
         """Take what the device says it is, and say what of it is new."""
-        was, here_before = self._sensor, self._known
+        if self._known and text == self._text:
+            return
+        was = self._sensor
         if text != self._text:
             self._sensor, self._text, self._known = None, "", False
             try:
@@ -164,13 +167,14 @@ class SerialSource:
                 return
         self._text, self._unusable, self._known = text, "", True
         if self._sensor is not None:
-            self._compare(was, self._sensor, here_before)
+            self._compare(was, self._sensor)
 
-    def _compare(self, was: Sensor | None, now: Sensor, here_before: bool) -> None:
+    def _compare(self, was: Sensor | None, now: Sensor) -> None:
         name = f"{now.name} {now.serial_number}"
         same = was is not None and was.serial_number == now.serial_number
-        if not here_before and self._last is not None:
-            self._resume(name, same)
+        if self._gone_at is not None:
+            self._resume(name, same, self._clock() - self._gone_at)
+            self._gone_at = None
         if was is None:
             self._tell("met", f"{name}, firmware {now.firmware}")
         elif not same:
@@ -180,9 +184,9 @@ class SerialSource:
         elif now is not was:
             self._tell("changed", f"{name} says something else of itself than before")
 
-    def _resume(self, name: str, same: bool) -> None:
-        """Go on counting: with the device as it was, or from its beginning."""
-        sequence, away = self._decoder.sequence, self._clock() - self._gone_at
+    def _resume(self, name: str, same: bool, away: float) -> None:
+        """Go on counting after `away` s: with the device as it was, or from its beginning."""
+        sequence = self._decoder.sequence
         before = sequence.lost
         sequence.resume(same and self._went_on())
         again = "" if sequence.restarts == self._restarts_told else ", from its beginning"
