@@ -17,7 +17,7 @@ Compile = Callable[..., Path]
 
 @pytest.fixture(scope="session")
 def compiled(tmp_path_factory: pytest.TempPathFactory) -> Compile:
-    """Makes a program called `name` of C files; `watched` by the sanitizers, it ends at an error."""
+    """Makes a program of C files; `watched` by the sanitizers, it ends at an error."""
     if sys.platform == "win32":
         pytest.skip("no gcc and no pseudo-terminals on this system")
     if not shutil.which("gcc"):

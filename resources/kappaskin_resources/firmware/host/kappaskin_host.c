@@ -184,8 +184,8 @@ static const int16_t *pattern(uint32_t m, uint32_t n) {
         const int64_t y = 8 * (int64_t)n + swing(step + STEPS / 4, STEPS, 4 * (int64_t)n);
         for (uint32_t component = 0; component < 3; component++)
             for (uint32_t p = 0; p < elements; p++)
-                counts[at++] = dented(component, 16 * (int64_t)(p / n) + 8 - x,
-                                      16 * (int64_t)(p % n) + 8 - y);
+                counts[at++] = dented(component, 16 * (int64_t)(p % m) + 8 - x,
+                                      16 * (int64_t)(p / m) + 8 - y);
     }
     return counts;
 }
@@ -406,23 +406,17 @@ static void hold_signals(void) {
 
 /* --- the setup */
 
-/* The numbers that `key` of the information has, as many as there are of `first` and `second`. */
-static int told(const char *text, const char *key, double *first, double *second) {
+/* The number that `key` of the information has, or the next one of its list. */
+static double told_number(const char *text, const char *key, int place) {
     char quoted[64];
+    double numbers[2];
     snprintf(quoted, sizeof quoted, "\"%s\"", key);
     const char *at = strstr(text, quoted);
-    if (!at)
-        return 0;
-    at += strlen(quoted);
-    at += strspn(at, " \t\r\n:[");
-    return sscanf(at, "%lf , %lf", first, second);
-}
-
-static double told_number(const char *text, const char *key) {
-    double first, second;
-    if (told(text, key, &first, &second) < 1)
+    if (at)
+        at += strlen(quoted);
+    if (!at || sscanf(at + strspn(at, " \t\r\n:["), "%lf , %lf", numbers, numbers + 1) <= place)
         refuse("expected information with a number for %s; compare device.json", key);
-    return first;
+    return numbers[place] >= 0 && numbers[place] <= 1e9 ? numbers[place] : 0;
 }
 
 static void change(struct host *host, const char *key, const char *value) {
@@ -454,32 +448,30 @@ static void take_information(struct host *host, const struct options *options) {
     change_text(host, "firmware", options->firmware);
 }
 
-/* Elements along x and y; a grid that is in none of them lies in a row. */
+/* Elements along x and y; those of no grid lie in a row. */
 static void take_grid(struct host *host, const struct options *options, uint32_t *m, uint32_t *n) {
-    double first = 0, second = 0;
     char after, list[64];
+    *n = 1;
     if (options->grid) {
-        if (sscanf(options->grid, "%lfx%lf%c", &first, &second, &after) != 2)
+        if (sscanf(options->grid, "%5" SCNu32 "x%5" SCNu32 "%c", m, n, &after) != 2)
             refuse("expected a grid such as 10x10, got %s", options->grid);
-        snprintf(list, sizeof list, "[%.0f,%.0f]", first, second);
+        snprintf(list, sizeof list, "[%" PRIu32 ",%" PRIu32 "]", *m, *n);
         change(host, "grid", list);
     } else if (options->channels) {
-        first = number("channels", options->channels, 3, 65535, 0) / 3;
-        second = 1;
-    } else if (told(host->setup.information, "grid", &first, &second) != 2) {
-        refuse("expected --channels for a skin whose elements are in no grid");
+        *m = (uint32_t)number("channels", options->channels, 3, 65535, 0) / 3;
+    } else {
+        *m = (uint32_t)told_number(host->setup.information, "grid", 0);
+        *n = (uint32_t)told_number(host->setup.information, "grid", 1);
     }
-    if (!(first >= 1 && second >= 1 && first * second <= 65535 / 3))
-        refuse("expected from 1 to 21845 elements, got %g x %g", first, second);
-    *m = (uint32_t)first;
-    *n = (uint32_t)second;
+    if (!*m || !*n || (uint64_t)*m * *n > 65535 / 3)
+        refuse("expected from 1 to 21845 elements, got %" PRIu32 " x %" PRIu32, *m, *n);
     host->setup.channels = (uint16_t)(3 * *m * *n);
 }
 
 /* Frames/s asked for, and electronics that are as fast. */
 static double take_rate(struct host *host, const struct options *options) {
     const char *text = host->setup.information;
-    const double own = told_number(text, "settling_time") + told_number(text, "conversion_time");
+    const double own = told_number(text, "settling_time", 0) + told_number(text, "conversion_time", 0);
     const double most = 1 / (own * host->setup.channels);
     const double rate = number("frames/s", options->rate, 0.001, 1e6, most);
     const double channel_time = 1e9 / (rate * host->setup.channels);
@@ -503,7 +495,7 @@ static void *memory(uint32_t size) {
 }
 
 static void take_memory(struct kappaskin_setup *setup) {
-    setup->count_bytes = told_number(setup->information, "bits") > 16 ? 4 : 2;
+    setup->count_bytes = told_number(setup->information, "bits", 0) > 16 ? 4 : 2;
     setup->frame_room = KAPPASKIN_FRAME(setup->channels, setup->count_bytes);
     setup->frame = memory(setup->frame_room);
     setup->outbox_room = OUTBOX;
@@ -518,7 +510,7 @@ static void take_board(struct host *host) {
     host->setup.board = board;
     host->begun = now();
     host->gain = host->first_gain =
-        (uint32_t)(1000 * told_number(host->setup.information, "gain") + 0.5);
+        (uint32_t)(1000 * told_number(host->setup.information, "gain", 0) + 0.5);
     if (!host->gain)
         refuse("expected information with a gain of 0.001 and more");
 }
