@@ -16,21 +16,30 @@ Compile = Callable[..., Path]
 
 
 @pytest.fixture(scope="session")
-def compiled(tmp_path_factory: pytest.TempPathFactory) -> Compile:
-    """Makes a program of C files; `watched` by the sanitizers, it ends at an error."""
+def compiler() -> str:
+    """A C compiler, where there is one for C++ too."""
     if sys.platform == "win32":
         pytest.skip("no gcc and no pseudo-terminals on this system")
-    if not shutil.which("gcc"):
-        pytest.fail("the firmware's tests need a C compiler: apt-get install -y gcc libc6-dev")
+    if not (shutil.which("gcc") and shutil.which("g++")):
+        pytest.fail("the firmware's tests need a compiler: apt-get install -y g++")
+    return "gcc"
+
+
+@pytest.fixture(scope="session")
+def compiled(compiler: str, tmp_path_factory: pytest.TempPathFactory) -> Compile:
+    """Makes a program of C files; `watched` by the sanitizers, it ends at an error."""
     folder = tmp_path_factory.mktemp("firmware")
 
     def make(name: str, *files: Path, watched: bool = False) -> Path:
         program = folder / (f"{name}_watched" if watched else name)
         if program.exists():
             return program
-        command = ["gcc", *STRICT, *(WATCHED if watched else ()), f"-I{FIRMWARE}", *map(str, files)]
+        command = [compiler, *STRICT, *(WATCHED if watched else ()), f"-I{FIRMWARE}"]
         told = subprocess.run(
-            [*command, "-o", str(program)], capture_output=True, text=True, check=False
+            [*command, *map(str, files), "-o", str(program)],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert told.returncode == 0, told.stderr
         return program

@@ -56,10 +56,10 @@ class Outcome:
 Run = Callable[..., Outcome]
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["plain", "watched"])
-def driver(compiled, request: pytest.FixtureRequest) -> Path:
+@pytest.fixture(scope="module")
+def driver(compiled) -> Path:
     files = (HERE / "device_driver.c", *FIRMWARE.glob("kappaskin_*.c"))
-    return compiled("device_driver", *files, watched=request.param)
+    return compiled("device_driver", *files, watched=True)
 
 
 @pytest.fixture

@@ -131,9 +131,19 @@ class Running:
         return self.ended
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["plain", "watched"])
-def program(compiled, request: pytest.FixtureRequest) -> Path:
-    return compiled("kappaskin_host", *SOURCES, watched=request.param)
+@pytest.fixture(scope="module")
+def program(compiled) -> Path:
+    return compiled("kappaskin_host", *SOURCES, watched=True)
+
+
+def started(program: Path, **options: object) -> Running:
+    words = [str(word) for option in options.items() for word in option]
+    words[::2] = [f"--{name.replace('_', '-')}" for name in words[::2]]
+    process = subprocess.Popen(
+        [str(program), *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    return Running(process, **json.loads(process.stdout.readline()))
 
 
 @pytest.fixture
@@ -142,16 +152,7 @@ def serve(program: Path) -> Iterator[Callable[..., Running]]:
     running: list[Running] = []
 
     def start(**options: object) -> Running:
-        words = [
-            str(w)
-            for name, value in options.items()
-            for w in (f"--{name.replace('_', '-')}", value)
-        ]
-        process = subprocess.Popen(
-            [str(program), *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        assert process.stdout is not None
-        running.append(Running(process, **json.loads(process.stdout.readline())))
+        running.append(started(program, **options))
         return running[-1]
 
     yield start
@@ -235,12 +236,12 @@ def test_its_clock_may_be_fast(serve) -> None:
     device = serve(rate=100, clock_ppm=100_000)
     with closing(Line(device.port)) as line:
         line.until(sampled)
-        first, began = line.asks(PING), time.monotonic()
-        time.sleep(0.4)
-        second, ended = line.asks(PING), time.monotonic()
+        before, first, after = time.monotonic(), line.asks(PING), time.monotonic()
+        time.sleep(0.3)
+        then, second, end = time.monotonic(), line.asks(PING), time.monotonic()
 
-    told = [struct.unpack_from("<Q", said.payload, 6)[0] for said in (first, second)]
-    assert (told[1] - told[0]) / (ended - began) == pytest.approx(1.1e6, rel=0.03)
+    told = [struct.unpack_from("<Q", said.payload, 6)[0] * 1e-6 for said in (first, second)]
+    assert 1.1 * (then - after) - 1e-4 < told[1] - told[0] < 1.1 * (end - before) + 1e-4
 
 
 def test_it_plays_the_counts_of_a_file_round_and_round(serve, tmp_path) -> None:
@@ -308,19 +309,19 @@ def test_garbage_from_the_host_harms_nothing(line) -> None:
 
 
 def test_without_a_listener_it_spends_nothing_and_the_next_is_introduced(serve) -> None:
-    device = serve(rate=500)
+    device = serve(rate=2000)
     time.sleep(0.1)
     with closing(Line(device.port)) as first:
         heard(first, 5)
-    time.sleep(0.15)
+    time.sleep(0.2)
     with closing(Line(device.port)) as second:
         heard(second, 5)
 
     told = device.end()
     assert first.said[0].sequence == 0
     assert second.said[0].kind == INFORMATION
-    assert second.said[0].sequence - first.said[-1].sequence < 40
-    assert told["spent"] - second.said[-1].sequence < 40
+    assert second.said[0].sequence - first.said[-1].sequence < 200
+    assert told["spent"] - second.said[-1].sequence < 200
 
 
 def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost(serve) -> None:
@@ -361,23 +362,20 @@ def test_it_is_unplugged_and_comes_back_under_its_link(serve, tmp_path) -> None:
 
 def test_it_is_unplugged_again_and_again(serve, tmp_path) -> None:
     device = serve(rate=500, pty_link=tmp_path / "port", unplug_every=30, away=20)
-    time.sleep(0.5)
+    time.sleep(0.4)
 
-    assert device.end()["unplugged"] > 4
+    assert device.end()["unplugged"] > 2
 
 
 # Loads
 
 
 @pytest.mark.parametrize("options", [{"rate": 2000}, {"rate": 200, "grid": "64x64"}])
-def test_nothing_is_lost_at_the_rates_that_are_promised(program, serve, options) -> None:
-    if "watched" in program.name:
-        pytest.skip("the sanitizers cost more than there is")
-    device = serve(**options, frames=options["rate"] // 4)
+def test_nothing_is_lost_at_the_rates_that_are_promised(compiled, options) -> None:
+    program, frames = compiled("kappaskin_host", *SOURCES), options["rate"] // 4
+    device = started(program, **options, frames=frames)
     with closing(Line(device.port)) as line:
-        frames = heard(line, options["rate"] // 4)
-
-    assert len(frames) == options["rate"] // 4
+        assert len(heard(line, frames)) == frames
     assert device.process.wait(5) == 0
     assert device.end()["unsent"] == 0
 

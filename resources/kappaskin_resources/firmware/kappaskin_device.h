@@ -63,7 +63,6 @@ struct kappaskin_device {
     uint64_t due;  /* us, when the next frame begins */
     uint32_t over; /* what a frame's time exceeds whole us by, summed up; in 1 / rate us */
     struct kappaskin_run runs[KAPPASKIN_RUNS];
-    uint8_t number_of_runs;
     uint32_t listed; /* channels in the runs */
 
     bool scanning;
@@ -89,6 +88,9 @@ const char *kappaskin_begin(struct kappaskin_device *device, const struct kappas
 
 /* Do what is due. Returns after some 300 us; must be called at least once an hour. */
 void kappaskin_poll(struct kappaskin_device *device);
+
+/* Write a number into the information, which is sent soon; false where it has no such key. */
+bool kappaskin_tell(struct kappaskin_device *device, const char *key, uint32_t thousandths);
 
 /* Throw away what a host that has gone did not take or say whole. */
 void kappaskin_forget(struct kappaskin_device *device);
