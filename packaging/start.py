@@ -19,6 +19,7 @@ import os
 import platform
 import select
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -94,6 +95,7 @@ def app(arguments: list[str], shown: dict[str, str]) -> int:
 
 def test(arguments: list[str], shown: dict[str, str]) -> int:
     """Run every check, whatever the others say; the exit code is the first failure's."""
+    have_compiler()
     failures: list[tuple[str, int]] = []
     for name, *options in CHECKS:
         extra = arguments if name == "pytest" else []
@@ -162,6 +164,14 @@ def have_libraries() -> None:
         apt("Qt and VTK need system libraries", line)
         if still := doctor()["missing"]:
             raise Stop(f"expected nothing missing after {line!r}, but {' '.join(still)}")
+
+
+def have_compiler() -> None:
+    """Install a compiler for the firmware's tests, or stop with the line that does."""
+    # g++ brings gcc and the C library's headers with it.
+    if sys.platform.startswith("linux") and not (shutil.which("gcc") and shutil.which("g++")):
+        line = "apt-get install -y --no-install-recommends g++"
+        apt("The firmware's tests need a compiler", line)
 
 
 def doctor() -> dict[str, str]:

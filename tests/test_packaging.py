@@ -64,9 +64,11 @@ def test_the_wheel_holds_the_three_packages_and_nothing_else(tmp_path):
     information = f"kappaskin-{PROJECT['project']['version']}.dist-info"
     tops = {name.split("/")[0] for name in names}
     assert tops == {"kappaskin", "kappaskin_app", "kappaskin_resources", information}
+    resources = ROOT / "resources"
     assert {
-        file.relative_to(ROOT / "resources").as_posix()
-        for file in (ROOT / "resources" / "kappaskin_resources" / "scenes").iterdir()
+        file.relative_to(resources).as_posix()
+        for file in (resources / "kappaskin_resources").rglob("*")
+        if file.is_file() and "__pycache__" not in file.parts
     } <= names
 
 
