@@ -3,6 +3,7 @@
 import math
 import time
 from collections import deque
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -66,6 +67,11 @@ class Status:
     playing: Playing = FROM_THE_BEGINNING
     events: tuple[Event, ...] = ()
     happened: int = 0
+
+    def after(self, events: Sequence[Event]) -> "Status":
+        """The same status once `events` happened."""
+        last = (*self.events, *events)[-_EVENTS:]
+        return replace(self, events=last, happened=self.happened + len(events))
 
 
 @dataclass(frozen=True)
@@ -282,9 +288,7 @@ class Loop:
         if state != was.state or ((trouble or was.state == LOST) and trouble != was.message):
             self._status = replace(self._status, state=state, message=trouble)
         if events := source.events():
-            last = (*self._status.events, *events)[-_EVENTS:]
-            happened = self._status.happened + len(events)
-            self._status = replace(self._status, events=last, happened=happened)
+            self._status = self._status.after(events)
         if state != was.state or events:
             self._report()
 
