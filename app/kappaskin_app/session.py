@@ -239,6 +239,7 @@ class Session(QObject):
         now = time.monotonic()
         if now >= self._next_status:
             self._next_status = now + _STATUS
+            self.engine.revive()
             was, self.status = self.status, self.engine.status()
             if self.status.meetings != was.meetings:
                 self.estimate = None  # what the last sensor showed is not this one's

@@ -4,6 +4,8 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
+import time
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -11,7 +13,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import cast
 
-from kappaskin.frames import Estimate
+from kappaskin.frames import Estimate, Event
 from kappaskin.live import LOST, Connect, Disconnect, Loop, Request, Seek, Status
 from kappaskin.pipeline import Setup
 from kappaskin.region import Region
@@ -19,6 +21,24 @@ from kappaskin.ring import Ring
 from kappaskin.scene import Playing, Scene
 
 _SWITCH = 2e-4  # s that one thread may keep the interpreter from another
+_GRACE = 0.5  # s for an orderly end once the parent is gone
+_DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
+
+_AGAIN = "the engine process ended unexpectedly and was started again"
+_DIED = "the engine process ended unexpectedly; connect again to restart it"
+_GIVEN_UP = (
+    f"the engine process ended {_DEATHS} times within {_WITHIN:g} s and is not started again by "
+    "itself; choose a simpler scene or fewer functions, then connect again; why it ended is on "
+    "the terminal that the program was started from"
+)
+
+
+def _end_with_parent() -> None:
+    """End this process soon after the one that started it, whatever is being computed."""
+    if parent := multiprocessing.parent_process():
+        parent.join()
+        time.sleep(_GRACE)
+        os._exit(1)
 
 
 def _serve(requests: "Connection[Request, Request]", name: str) -> None:
@@ -27,6 +47,7 @@ def _serve(requests: "Connection[Request, Request]", name: str) -> None:
     # for each, a loop that always computes would starve it below the rate of the line.
     sys.setswitchinterval(_SWITCH)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
+    threading.Thread(target=_end_with_parent, name="parent-watcher", daemon=True).start()
     ring = Ring.attach(name)
     try:
         Loop(requests, ring).run()
@@ -60,16 +81,18 @@ class Engine:
         self._ring = Ring.create()
         self._setup = setup or Setup()
         self._region = Region()
+        # What was asked for last, for a process that takes over.
+        self._source: str | None = None
+        self._scene: Scene | None = None
+        self._speed = 1.0
+        self._deaths: list[float] = []
         self._seen = Status()
         self._process: BaseProcess | None = None
         self._requests: Connection[Request, Request] | None = None
-        self._start()
+        self._start(Status(setup=self._setup))
 
-    def _start(self) -> None:
-        # A process that takes over goes on counting, so that no generation comes twice.
-        was = self._ring.read_status() or Status()
-        fresh = Status(setup=self._setup, generation=was.generation, meetings=was.meetings)
-        self._ring.write_status(fresh)
+    def _start(self, status: Status) -> None:
+        self._ring.write_status(status)
         context = multiprocessing.get_context("spawn")
         theirs, ours = context.Pipe(duplex=False)
         self._requests = cast("Connection[Request, Request]", ours)
@@ -81,6 +104,40 @@ class Engine:
         theirs.close()
         self._send(self._setup)
         self._send(self._region)
+
+    def _start_again(self, *events: Event) -> None:
+        """Let another process take over; it goes on counting, so that no generation comes twice."""
+        self._end()
+        # One killed while it wrote left no status that can be read.
+        was = self._ring.read_status() or self._seen
+        fresh = Status(setup=self._setup, generation=was.generation, meetings=was.meetings)
+        if events and self._source is not None:
+            fresh = replace(fresh, state=LOST, source=self._source, message=events[-1].text)
+        self._start(replace(fresh, events=was.events, happened=was.happened).after(events))
+
+    def revive(self) -> None:
+        """Start a process that died anew, with all that was asked for last; `status` says so.
+
+        To be called now and then. Where a scene was is lost. After the third death within ten
+        seconds it stays dead until `connect`, and `status` says why.
+        """
+        if self._process is None or self.alive or self._given_up:
+            return
+        now = time.monotonic()
+        self._deaths = [when for when in self._deaths if now - when < _WITHIN] + [now]
+        if self._given_up:
+            return
+        self._start_again(Event(now, "engine", _AGAIN))
+        if self._source is not None:
+            self._send(Connect(self._source))
+        if self._scene is not None:
+            self._send(self._scene)
+        if self._speed != 1.0:
+            self._send(Seek(None, self._speed))
+
+    @property
+    def _given_up(self) -> bool:
+        return len(self._deaths) >= _DEATHS
 
     @property
     def pid(self) -> int | None:
@@ -98,11 +155,13 @@ class Engine:
     def connect(self, source: str) -> None:
         """Take frames from `source` instead of the present one; starts a dead process anew."""
         if not self.alive:
-            self._end()
-            self._start()
+            self._deaths = []
+            self._start_again()
+        self._source, self._scene, self._speed = source, None, 1.0
         self._send(Connect(source))
 
     def disconnect(self) -> None:
+        self._source, self._scene, self._speed = None, None, 1.0
         self._send(Disconnect())
 
     def set_up(self, setup: Setup) -> None:
@@ -112,6 +171,7 @@ class Engine:
 
     def play(self, scene: Scene) -> None:
         """Let the simulated source, if that is what there is, go on with `scene`."""
+        self._scene = scene
         self._send(scene)
 
     def seek(self, at: float | None = None, speed: float = 1.0) -> None:
@@ -121,6 +181,7 @@ class Engine:
         still, and goes on being read. Status tells where it is.
         """
         Playing(at or 0.0, 0.0, speed)  # or refused here
+        self._speed = speed
         self._send(Seek(at, speed))
 
     def scan(self, region: Region) -> None:
@@ -132,12 +193,8 @@ class Engine:
         # One that is being written is not there to read: the last is nearer the truth than none.
         self._seen = self._ring.read_status() or self._seen
         if not self.alive:
-            return replace(
-                self._seen,
-                state=LOST,
-                rate=0.0,
-                message="the engine process ended unexpectedly; connect again to restart it",
-            )
+            message = _GIVEN_UP if self._given_up else _DIED
+            return replace(self._seen, state=LOST, rate=0.0, message=message)
         return self._seen
 
     def latest(self, status: Status) -> Estimate | None:

@@ -51,7 +51,8 @@ class Frame:
 class Event:
     """Something that happened on the way, in words; `time` in s on this machine's monotonic clock.
 
-    `kind` is one word: met, gap, gone, back, restarted, other, firmware, changed, rate, refused.
+    `kind` is one word: met, gap, gone, back, restarted, other, firmware, changed, rate, refused,
+    engine.
     """
 
     time: float

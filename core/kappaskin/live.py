@@ -3,6 +3,7 @@
 import math
 import time
 from collections import deque
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources import SimulatedSource, Source, open_source
 from kappaskin.sources.accounting import Accounting
-from kappaskin.steer import Steering, steered
+from kappaskin.steer import Following, Steering, steered
 
 OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
 
@@ -67,6 +68,11 @@ class Status:
     events: tuple[Event, ...] = ()
     happened: int = 0
 
+    def after(self, events: Sequence[Event]) -> "Status":
+        """The same status once `events` happened."""
+        last = (*self.events, *events)[-_EVENTS:]
+        return replace(self, events=last, happened=self.happened + len(events))
+
 
 @dataclass(frozen=True)
 class Connect:
@@ -98,7 +104,7 @@ class Loop:
         self._pipeline: Pipeline | None = None
         self._status = ring.read_status() or Status()
         self._asked = self._status.setup
-        self._steering: Steering | None = None
+        self._steering: Steering | Following | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
         self._building: Future[_Built] | None = None
@@ -282,10 +288,11 @@ class Loop:
         if state != was.state or ((trouble or was.state == LOST) and trouble != was.message):
             self._status = replace(self._status, state=state, message=trouble)
         if events := source.events():
-            last = (*self._status.events, *events)[-_EVENTS:]
-            happened = self._status.happened + len(events)
-            self._status = replace(self._status, events=last, happened=happened)
-        if state != was.state or events:
+            self._status = self._status.after(events)
+        told = self._steering is None or self._steering.refusal == was.region_refusal
+        if self._steering is not None and not told:
+            self._status = replace(self._status, region_refusal=self._steering.refusal)
+        if state != was.state or events or not told:
             self._report()
 
     def _meet(self, sensor: Sensor | None) -> None:

@@ -381,6 +381,80 @@ def test_killed_it_is_lost_and_connecting_starts_another(own_engine) -> None:
     assert state(engine, STREAMING).source == "sim:line"
 
 
+def killed(engine: Engine) -> None:
+    """Kill the engine's process, and start another as the app does."""
+    pid = engine.pid
+    assert pid is not None
+    os.kill(pid, signal.SIGKILL)
+    assert wait_for(lambda: not engine.alive, within=1.0)
+    engine.revive()
+
+
+def test_revived_it_goes_on_with_what_was_asked_for_last_and_says_so(own_engine) -> None:
+    engine = own_engine
+    engine.connect("sim:circle")
+    engine.play(load_scene("centre").touched_by(PointLoad(0.03, 0.06, 0.5)))
+    engine.set_up(Setup(6, 5, 20, 21))
+    engine.scan(Region("elements", elements=(3, 4), share=0.2))
+    engine.seek(0.5, 0.0)
+    assert wait_for(lambda: next_estimate(engine).coefficients.shape == (6, 5))
+    engine.revive()  # one that lives is left alone
+    before, pid = engine.status(), engine.pid
+    assert before.happened == 0
+
+    killed(engine)
+
+    status, start = engine.status(), time.monotonic()
+    assert (status.state, status.source) == (LOST, "sim:circle")
+    assert "was started again" in status.message
+    after = next_estimate(engine, before.generation)
+    print(f"back after {time.monotonic() - start:.2f} s")
+    assert engine.pid != pid
+    status = state(engine, STREAMING)
+    assert [(event.kind, event.text) for event in status.events] == [
+        ("engine", "the engine process ended unexpectedly and was started again")
+    ]
+    assert (status.happened, status.message) == (1, "")
+    assert start - 1 < status.events[0].time < start
+    assert after.coefficients.shape == (6, 5)
+    assert wait_for(lambda: next_estimate(engine).true_contact.tolist() == [0.03, 0.06])
+    assert wait_for(lambda: 0 < (scanned_of(engine) or 0) < 90)
+    assert wait_for(lambda: engine.status().playing.speed == 0.0)
+
+
+def test_the_third_death_within_ten_seconds_is_the_last_until_it_is_connected(own_engine) -> None:
+    engine = own_engine
+    for deaths in (1, 2):
+        killed(engine)
+        assert engine.alive
+        assert engine.status().happened == deaths
+    killed(engine)
+    engine.revive()
+    assert not engine.alive
+    status = engine.status()
+    assert (status.state, status.happened) == (LOST, 2)
+    assert "ended 3 times within 10 s" in status.message
+    assert "fewer functions, then connect again" in status.message
+
+    engine.connect("sim:")
+
+    assert state(engine, STREAMING).happened == 2
+    killed(engine)
+    assert engine.alive  # it is forgiven
+
+
+def test_deaths_far_apart_are_survived_each_time(own_engine, monkeypatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("kappaskin.engine.time.monotonic", lambda: now[0])
+    for _ in range(4):
+        pid = own_engine.pid
+        os.kill(pid, signal.SIGKILL)
+        os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+        own_engine.revive()
+        assert own_engine.alive
+        now[0] += 5.1
+
+
 def test_interrupted_from_the_keyboard_it_goes_on(own_engine) -> None:
     own_engine.connect("sim:")
     before = next_estimate(own_engine)
@@ -393,13 +467,21 @@ def test_interrupted_from_the_keyboard_it_goes_on(own_engine) -> None:
 
 PARENT = """
 import sys, time
+from kappaskin import Region
 from kappaskin.engine import Engine
+
+class Slow(Region):
+    def __setstate__(self, state):
+        time.sleep(60)
 
 if __name__ == "__main__":
     engine = Engine()
     engine.connect(sys.argv[1])
     while engine.status().state != "streaming":
         time.sleep(0.01)
+    if len(sys.argv) > 2:
+        engine.scan(Slow())
+        time.sleep(0.2)
     print(engine.pid, engine._ring.name, flush=True)
     sys.stdin.read()
     engine.close()
@@ -415,18 +497,20 @@ def gone(pid: int) -> bool:
 
 
 @pytest.fixture
-def parent(tmp_path) -> Iterator[tuple[subprocess.Popen[str], int, Path]]:
+def parent(tmp_path, request) -> Iterator[tuple[subprocess.Popen[str], int, Path]]:
     """Another process with an engine, the pid of that engine and where its memory is listed."""
     script = tmp_path / "parent.py"
     script.write_text(PARENT)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen([sys.executable, str(script), "sim:"], text=True, **pipes) as process:
+    call = [sys.executable, str(script), "sim:", *getattr(request, "param", ())]
+    with subprocess.Popen(call, text=True, **pipes) as process:
         assert process.stdout is not None
         pid, block = process.stdout.readline().split()
         yield process, int(pid), Path("/dev/shm", block)
         process.kill()
 
 
+@pytest.mark.parametrize("parent", [[], ["computing"]], indirect=True)
 def test_an_engine_whose_parent_was_killed_ends_within_a_second(parent) -> None:
     process, pid, block = parent
     assert not gone(pid)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kappaskin import Estimate, Frame, Refusal, Region, Simulator, load_scene
+from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
 from kappaskin.effects import CorruptedFrames, DroppedFrames
 from kappaskin.engine import Engine
 from kappaskin.live import LOST, STREAMING
@@ -244,6 +244,17 @@ def test_a_second_listener_is_introduced_and_served() -> None:
     assert source.accounting().bytes_discarded == 0
 
 
+def test_the_first_commands_of_a_second_host_are_no_repetitions_of_the_firsts() -> None:
+    device = PseudoDevice(SCENE)
+    with serving(device):
+        for _ in range(2):
+            source = SerialSource(device.port)
+            known = wait_for(lambda: [f for f in source.read(0.02) if f.taken_sd < 0.1])  # noqa: B023
+            source.close()
+            time.sleep(0.1)  # until it has seen that nobody listens
+            assert known  # by the answer to a ping
+
+
 def test_a_rate_that_no_converter_keeps_is_refused_and_leaves_no_descriptor() -> None:
     before = os.listdir("/dev/fd")
     with pytest.raises(Refusal, match=r"at most 666.7 frames/s, got 5000"):
@@ -430,19 +441,6 @@ def test_an_engine_on_a_real_port_loses_nothing_and_follows_the_contact(device) 
     assert len(errors) > 100
     assert close > 0.98
     assert all(np.isnan(e.true_contact).all() for e in estimates.values())
-
-
-def test_a_device_that_takes_no_commands_goes_on_and_the_region_is_refused_plainly(device) -> None:
-    with Engine() as engine:
-        engine.scan(Region("skin"))
-        engine.connect(device.port)
-
-        reason = wait_for(lambda: engine.status().region_refusal)
-
-        assert "a device of wire version 1, which scans what it chooses" in reason
-        assert wait_for(lambda: engine.latest(engine.status())).fresh.all()
-        engine.scan(Region())
-        assert wait_for(lambda: not engine.status().region_refusal)
 
 
 def test_a_killed_device_is_lost_within_a_second_and_another_can_take_over(device) -> None:

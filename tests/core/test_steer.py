@@ -165,18 +165,6 @@ def test_a_region_that_is_not_on_the_skin_is_refused_and_everything_scanned():
     assert {len(frame.channels) for frame, _ in loop.run(0.05)} == {300}
 
 
-class Device:
-    """A source that is not simulated."""
-
-    sensor = None
-
-
-def test_a_device_that_takes_no_commands_is_told_so_plainly():
-    with pytest.raises(Refusal, match="wire version 1, which scans what it chooses"):
-        steered(Device(), Region("skin"))
-    assert steered(Device(), Region()) is None
-
-
 def test_the_base_reads_the_load_where_it_is_when_the_frame_is_taken():
     loop = Loop(Region())
     loop.run(0.3)

@@ -7,6 +7,8 @@ SEQUENCES = 2**32
 
 _LATE = 64  # how far back a sequence number may be late rather than a restart of the device
 
+_FEW = 1e-5  # share below which its size is not told
+
 
 @dataclass(frozen=True, slots=True)
 class Accounting:
@@ -33,6 +35,17 @@ class Accounting:
         return sum(n for _, n in self.discarded)
 
     @property
+    def words(self) -> str:
+        """Losses in words, such as "12 of 30,210 messages lost; 0.3 % of bytes discarded"."""
+        told = [f"{self.lost:,} of {self.span:,} messages lost"]
+        if thrown := self.bytes_discarded:
+            why = ", ".join(f"{reason} {n:,}" for reason, n in self.discarded if n)
+            told.append(f"{_percent(thrown / self.bytes_in)} of bytes discarded: {why}")
+        if self.restarts:
+            told.append(f"the device began anew {self.restarts} times")
+        return "; ".join(told)
+
+    @property
     def balanced(self) -> bool:
         """Whether the three sums hold, as they always do."""
         return (
@@ -40,6 +53,10 @@ class Accounting:
             and self.good == self.accepted + self.duplicate
             and self.span == self.accepted + self.lost
         )
+
+
+def _percent(share: float) -> str:
+    return f"under {100 * _FEW:g} %" if share < _FEW else f"{float(f'{100 * share:.2g}'):g} %"
 
 
 class Sequence:

@@ -34,10 +34,11 @@ class Asking:
         self._answered = self._asked = -math.inf
         self.temperature, self.refusal = math.nan, ""
 
-    def ask(self, operation: Operation, now: float, arguments: bytes = b"") -> None:
-        """Send one command at host time `now` in s; it may be lost, as anything on a line."""
+    def ask(self, operation: Operation, now: float, arguments: bytes = b"") -> int:
+        """Send one command at host time `now` in s, its number; it may be lost on the line."""
         self._sequence += 1
         self._write(encode_command(self._sequence, now, operation, arguments))
+        return self._sequence
 
     def greet(self, now: float) -> None:
         """Begin: every channel is wanted, and to know who is there."""

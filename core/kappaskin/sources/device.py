@@ -94,6 +94,7 @@ class PseudoDevice:
         return self._since + (self.samples - self._first) / self.rate
 
     def _stream(self, stopped: Callable[[], bool]) -> None:
+        self._decoder = Decoder(FROM_HOST)  # or the next one's first commands pass for repeated
         self._start, introduced = self._clock() - self._due(), -_INTRODUCTION
         while not (stopped() or self._hung_up()):
             now = self._now()

@@ -8,6 +8,7 @@ import numpy as np
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
+from kappaskin.region import Scanner
 from kappaskin.sensor import Sensor
 from kappaskin.sources import information
 from kappaskin.sources.accounting import Accounting
@@ -16,6 +17,7 @@ from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.line import BAUD_RATES, Line
 from kappaskin.sources.ports import holders, port_called, serial_ports
+from kappaskin.sources.scanning import Scanning
 from kappaskin.sources.wire import VERSION, FromDevice, Information, Reply, Samples
 
 _PATIENCE = 3.0  # s that a device may say nothing, or not what it is
@@ -46,6 +48,7 @@ class SerialSource:
         self._summed_at = self._next_try = 0.0
         self._gone_at: float | None = None  # when the line was lost, until the device is back
         self._last: tuple[float, float] | None = None  # device and host time of the last message
+        self._scanning = Scanning()
         self._line: Line | None = None
         self._begin(Line(url, clock))
 
@@ -68,9 +71,20 @@ class SerialSource:
         self._bytes_before = self._decoder.accounting().bytes_in
         self._holders: list[str] = []
         self._rate_told = line.baud_rate
+        self._tried = [line.baud_rate]
         self._times = ClockMap()
         self._asking = Asking(line.write, self._times)
         self._asking.greet(now)
+        self._scanning.begin()
+
+    def scan(self, scanner: Scanner | None) -> None:
+        """Let the device scan what `scanner` chooses, a few times a second; all without one."""
+        self._scanning.scan(scanner)
+
+    @property
+    def scan_refusal(self) -> str:
+        """Why the device scans something else than was asked for; empty when it does not."""
+        return self._scanning.refusal
 
     def reset(self) -> None:
         """Let the board start anew, if DTR or RTS does that."""
@@ -165,6 +179,7 @@ class SerialSource:
             except SourceError as error:
                 self._unusable = f"{self.url}: {error}"
                 return
+            self._scanning.scan(None)  # what was chosen is on the skin that was
         self._text, self._unusable, self._known = text, "", True
         if self._sensor is not None:
             self._compare(was, self._sensor)
@@ -226,6 +241,7 @@ class SerialSource:
     def _take(self, reply: Reply, now: float) -> None:
         before = self._asking.refusal
         self._asking.take(reply, now)
+        self._scanning.take(reply)
         if self._asking.refusal != before:
             self._tell("refused", self._asking.refusal)
 
@@ -266,6 +282,7 @@ class SerialSource:
         sequence, now = self._decoder.sequence, self._clock()
         if self._known and sequence.restarts > self._restarts_told:
             self._restarts_told = sequence.restarts
+            self._scanning.begin()
             self._tell("restarted", "the device started anew while it was connected")
         if sequence.lost != self._lost_told and now - self._summed_at >= _SUMMED:
             if sequence.lost > self._lost_told:
@@ -273,8 +290,10 @@ class SerialSource:
             self._lost_told, self._summed_at = sequence.lost, now
 
     def _attend(self, line: Line) -> None:
-        """Ping now and then; try other baud rates on bytes that mean nothing."""
+        """Ping, and say what to scan; try other baud rates on bytes that mean nothing."""
         now = self._clock()
+        if self._known and self._sensor is not None:
+            self._scanning.attend(now, self._sensor, self._asking.ask)
         if self._asking.attend(now) and not self._known:
             self._asking.greet(now)
         quiet = now - max(self._good_at, self._tuned)
@@ -284,6 +303,8 @@ class SerialSource:
             place = BAUD_RATES.index(line.baud_rate)
             line.speak_at(BAUD_RATES[(place + 1) % len(BAUD_RATES)])
             self._tuned, self._holders = now, holders(self.url)
+            if line.baud_rate not in self._tried:
+                self._tried.append(line.baud_rate)
             self._asking.greet(now)
 
     @property
@@ -319,9 +340,14 @@ class SerialSource:
                 "device is; its firmware must send an information message every second"
             )
         others = ", ".join(self._holders)
+        untried = len(self._tried) < len(BAUD_RATES)
+        tried = (
+            f"at {', '.join(map(str, self._tried))} baud; as bytes come other rates are tried, or"
+            if untried
+            else f"at any baud rate from {BAUD_RATES[-1]} to {BAUD_RATES[0]}:"
+        )
         return (
-            f"{self.url}: {came} bytes came but no message of wire "
-            f"version {VERSION} at any baud rate from {BAUD_RATES[-1]} to {BAUD_RATES[0]}: it is "
+            f"{self.url}: {came} bytes came but no message of wire version {VERSION} {tried} it is "
             "another kind of device" + (f", or {others} takes its bytes" if others else "")
         )
 

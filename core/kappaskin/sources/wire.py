@@ -36,7 +36,7 @@ RATE_UNIT = 1000
 UNKNOWN_TEMPERATURE = -(2**15)
 
 _REPLY = struct.Struct("<IBB")
-_MOST_RUNS = 255
+MOST_RUNS = 255
 _LONGEST_REASON = 200  # bytes
 
 
@@ -158,8 +158,8 @@ def pack_runs(channels: Sequence[int] | NDArray[np.intp]) -> bytes:
     """The list of `channels` as a number of runs, then the first channel and length of each."""
     chosen = np.asarray(channels, np.intp)
     starts = np.flatnonzero(np.diff(chosen, prepend=-2) != 1)
-    if len(starts) > _MOST_RUNS:
-        raise Refusal(f"expected at most {_MOST_RUNS} runs of channels, got {len(starts)}")
+    if len(starts) > MOST_RUNS:
+        raise Refusal(f"expected at most {MOST_RUNS} runs of channels, got {len(starts)}")
     runs = [(int(chosen[s]), int(e - s)) for s, e in pairwise([*starts, len(chosen)])]
     return bytes([len(runs)]) + b"".join(struct.pack("<HH", *run) for run in runs)
 
