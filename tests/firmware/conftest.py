@@ -10,7 +10,7 @@ import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "resources" / "kappaskin_resources" / "firmware"
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-O2")
-WATCHED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1")
+WATCHED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O0")
 
 Compile = Callable[..., Path]
 

@@ -101,9 +101,9 @@ static int run(char **words) {
         fprintf(stderr,
                 "{\"spent\": %" PRIu32 ", \"sent\": %" PRIu32 ", \"scans\": %" PRIu32
                 ", \"rate\": %" PRIu32 ", \"lights\": %" PRIu32 ", \"ns\": %" PRIu64
-                ", \"waiting\": %" PRIu32 "}\n",
+                ", \"waiting\": %" PRIu32 ", \"scanning\": %d}\n",
                 device->spent, device->sent, device->scans, device->rate, board.lights, board.ns,
-                device->end - device->begin);
+                device->end - device->begin, device->scanning);
     free(setup.outbox);
     free(setup.frame);
     free(setup.information);
