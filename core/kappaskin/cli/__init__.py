@@ -12,6 +12,7 @@ from kappaskin.cli import (
     device,
     doctor,
     figures,
+    monitor,
     plan,
     reconstruct,
     regions,
@@ -39,6 +40,7 @@ for command in (
     plan.plan,
     simulate.simulate,
     device.device,
+    monitor.monitor,
     figures.figures,
     doctor.doctor,
 ):
