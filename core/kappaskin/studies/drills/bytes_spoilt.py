@@ -68,11 +68,15 @@ def _speed(baud_rate: int, stand: Stand) -> Outcome:
             return data
         return OtherRate(baud_rate, rates.get(relay.speed, baud_rate / 2))(data)
 
-    stand.source.read(0.0)
     relay.spoil = as_heard
     stand.recover(_SEARCH)
     relay.spoil = clean
-    return stand.outcome((stand.told("rate"), "the rate that was found is not told"))
+    lost = stand.source.accounting().lost
+    return stand.outcome(
+        (stand.told("rate"), "the rate that was found is not told"),
+        (lost == 0, f"{lost} messages lost after the rate was found"),
+        restarted=True,  # what was sent before is nowhere counted
+    )
 
 
 GARBAGE = [

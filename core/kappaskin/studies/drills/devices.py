@@ -93,7 +93,7 @@ def _twice(stand: Stand) -> Outcome:
 def _untold(stand: Stand) -> Outcome:
     """Keep from the program who is there, for a while after it has begun to listen."""
     stand.relay.rewrite = untold
-    stand.run(2.0)
+    stand.run(1.0)
     stand.heal()
     stand.recover(_BACK)
     return _nothing_lost(stand)

@@ -10,7 +10,7 @@ class NeedsSimulated(Exception):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Figures of a drill: scans `sent` and `accepted`, messages `lost`, bytes `discarded`.
+    """Figures of a drill: messages `sent`, `accepted` and `lost`, and bytes `discarded`.
 
     `wrong` counts frames that were accepted but never sent so. `recovered` is the time from the end
     of the fault to the first good frame sent after it in s, NaN where nothing had to recover.

@@ -40,8 +40,9 @@ class Relay:
     """Passes what `device` sends to whoever opens `port`, and back what they ask for.
 
     It numbers the messages anew: `sent` keeps the counts of every scan under its number until they
-    are asked for. `rewrite` makes other messages of each, `spoil` other bytes of those; `held` keeps
-    bytes back, `deaf` leaves commands unread. Works when `pump` is called, and only then.
+    are asked for, `spent` counts numbers. `rewrite` makes other messages of each, `spoil` other
+    bytes of those; `held` keeps bytes back, `deaf` leaves commands unread. Works when `pump` is
+    called, and only then.
     """
 
     def __init__(self, device: Line, folder: Path) -> None:
@@ -51,7 +52,7 @@ class Relay:
         self.rewrite: Rewrite = unchanged
         self.spoil: Spoil = clean
         self.held = self.deaf = False
-        self.sequence = self.scans = self.written = 0
+        self.sequence = self.spent = self.written = 0
         self.sent: dict[int, Counts] = {}
         self._outbox: deque[bytes] = deque()
         self._waiting = 0
@@ -113,9 +114,9 @@ class Relay:
     def send(self, message: FromDevice) -> bytes:
         """Send a message under the next number; its bytes before they are spoilt."""
         number, self.sequence = self.sequence, (self.sequence + 1) % 2**32
+        self.spent += 1
         if isinstance(message, Samples):
             self.sent[number] = message.counts
-            self.scans += 1
         whole = _bytes_of(message, number)
         self.write(self.spoil(whole))
         return whole

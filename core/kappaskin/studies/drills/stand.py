@@ -145,8 +145,9 @@ class Stand:
 
     def recover(self, within: float) -> None:
         """Go on until the first frame that was sent from now on; how long that takes is noted."""
-        first, began = self.relay.sequence, time.monotonic()
-        if self.until(lambda: self.last and self.last.sequence >= first, within):
+        first, began, relay = self.relay.sequence, time.monotonic(), self.relay
+        self.last = None
+        if self.until(lambda: self.last and first <= self.last.sequence < relay.sequence, within):
             self.recovered = time.monotonic() - began
 
     def drain(self) -> None:
@@ -186,8 +187,8 @@ class Stand:
             text = f"{self.relay.sequence} messages were sent, {seen.span} accounted for"
             laws.append((seen.span == self.relay.sequence, text))
         return Outcome(
-            self.relay.scans,
-            self.frames,
+            self.relay.spent,
+            seen.accepted,
             seen.lost,
             seen.bytes_discarded,
             self.wrong,

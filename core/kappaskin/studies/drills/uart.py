@@ -21,14 +21,15 @@ def heard(data: bytes, sent_at: float, read_at: float) -> bytes:
     line = np.append(_levels(data), np.ones(10, np.uint8))
     step = sent_at / read_at  # bits of the sender per bit of the receiver
     falls = np.flatnonzero(np.diff(line.astype(np.int8), prepend=1) < 0)
-    made, at = bytearray(), 0.0
-    middles = (np.arange(1, 9) + 0.5) * step
-    while (place := int(np.searchsorted(falls, at))) < len(falls):
-        began = float(falls[place])
-        sampled = np.minimum((began + middles).astype(np.intp), len(line) - 1)
-        made.append(int(np.packbits(line[sampled], bitorder="little")[0]))
-        # A line that is still low at the middle of the stop bit begins the next byte when it rises.
-        at = began + 9.5 * step
+    middles = ((np.arange(1, 9) + 0.5) * step).astype(np.intp)
+    sampled = np.minimum(falls[:, None] + middles, len(line) - 1)
+    values = np.packbits(line[sampled], axis=1, bitorder="little").ravel().tolist()
+    # A line that is still low in the middle of the stop bit must rise before it can fall again.
+    following = np.searchsorted(falls, falls + 9.5 * step).tolist()
+    made, at = bytearray(), 0
+    while at < len(values):
+        made.append(values[at])
+        at = following[at]
     return bytes(made)
 
 
