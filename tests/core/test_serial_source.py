@@ -160,6 +160,38 @@ def test_frames_before_the_information_wait_for_it(line, opened) -> None:
     assert source.accounting().accepted == 6
 
 
+def test_of_frames_that_wait_for_it_the_newest_are_kept_in_bounded_memory(
+    line, opened, monkeypatch
+) -> None:
+    monkeypatch.setattr("kappaskin.sources.serial_line._UNREAD", 10 * (300 + 64))
+    source = opened(line.port)
+    line.write(stream(0, 40))
+    assert read(source, 1, within=0.3) == []
+    line.write(introduction(40))
+    assert sequences(read(source, 10)) == list(range(30, 40))
+
+
+def test_bytes_that_nobody_takes_are_thrown_away_beyond_a_bound_and_counted(
+    line, opened, monkeypatch
+) -> None:
+    monkeypatch.setattr("kappaskin.sources.line._BACKLOG", 20_000)
+    source = opened(line.port)
+    sent = introduction(0) + stream(1, 101)
+    line.write(sent)
+    line.wait_until_taken()
+
+    frames = read(source, 101, within=0.3)
+    line.write(stream(101, 111))
+    frames += read(source, 10)
+
+    seen = source.accounting()
+    assert seen.balanced
+    assert seen.bytes_in == len(sent) + len(stream(101, 111))
+    assert 20_000 < seen.bytes_in - dict(seen.discarded)["overrun"] < 40_000
+    assert sequences(frames)[-9:] == list(range(102, 111))
+    assert seen.lost == 110 - len(frames)
+
+
 def test_information_repeated_changes_nothing(line, opened) -> None:
     source = opened(line.port)
     line.write(introduction(0) + scan(1))

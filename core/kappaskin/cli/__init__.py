@@ -11,7 +11,9 @@ from kappaskin.cli import (
     cost,
     device,
     doctor,
+    drill,
     figures,
+    monitor,
     plan,
     reconstruct,
     regions,
@@ -39,6 +41,8 @@ for command in (
     plan.plan,
     simulate.simulate,
     device.device,
+    drill.drill,
+    monitor.monitor,
     figures.figures,
     doctor.doctor,
 ):

@@ -61,7 +61,7 @@ class Asking:
     def take(self, reply: Reply, now: float) -> None:
         """Take note of a reply that came at host time `now`."""
         if reply.fault:
-            self.refusal = f"the device refused {_name(reply.operation)}: {reply.reason}"
+            self.refusal = f"the device refused {name_of(reply.operation)}: {reply.reason}"
             if reply.fault == Fault.NO_COMMON_VERSION:
                 self.refusal += f"; this program speaks {VERSION}: update the older of the two"
             return
@@ -74,7 +74,8 @@ class Asking:
         self.temperature = math.nan if hundredths == UNKNOWN_TEMPERATURE else hundredths / 100
 
 
-def _name(operation: int) -> str:
+def name_of(operation: int) -> str:
+    """What is asked for with this number, in words."""
     try:
         return Operation(operation).name.lower().replace("_", " ")
     except ValueError:

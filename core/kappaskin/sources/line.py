@@ -17,7 +17,8 @@ BAUD_RATES = (BAUD_RATE, 1_000_000, 921_600, 500_000, 460_800, 230_400, 115_200)
 """Rates that a device may speak at, the usual one first."""
 
 _BLOCK = 65536
-_BACKLOG = 4096  # reads that may wait; beyond it bytes are thrown away, and counted
+_BACKLOG = 2**24  # bytes that may wait to be taken; beyond it they are thrown away, and counted
+_EACH = 128  # bytes of memory that a read takes beside what came
 _PULSE = 0.1  # s that DTR and RTS are low to reset a board
 _BROKEN = (serial.SerialException, OSError, TypeError)  # TypeError: closed while reading
 
@@ -33,6 +34,9 @@ class Line:
         self._port = open_port(url)
         self.baud_rate = BAUD_RATE
         self.overrun = 0
+        self._put = self._taken = (
+            0  # bytes: each counted by one thread only, so that none is locked
+        )
         self._arrived: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
         self._gone, self._closing = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._listen, name="serial-reader", daemon=True)
@@ -47,9 +51,10 @@ class Line:
         try:
             while not self._closing.is_set():
                 data = _arriving(self._port)
-                if data and self._arrived.qsize() > _BACKLOG:
+                if data and self._put - self._taken > _BACKLOG:
                     self.overrun += len(data)
                 elif data:
+                    self._put += len(data) + _EACH
                     self._arrived.put((self._clock(), data))
         except _BROKEN:
             self._gone.set()
@@ -61,6 +66,7 @@ class Line:
             taken.append(self._arrived.get(timeout=timeout))
             while True:
                 taken.append(self._arrived.get_nowait())
+        self._taken += sum(len(data) + _EACH for _, data in taken)
         return taken
 
     def write(self, data: bytes) -> bool:

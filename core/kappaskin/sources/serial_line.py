@@ -23,7 +23,8 @@ from kappaskin.sources.wire import VERSION, FromDevice, Information, Reply, Samp
 _PATIENCE = 3.0  # s that a device may say nothing, or not what it is
 _DWELL = 0.8  # s of bytes that mean nothing, after which another baud rate is tried
 _RETRY = 0.25  # s between two tries to open a port that is gone
-_UNREAD = 8192  # messages kept until the device says what it is
+_UNREAD = 2**22  # counts kept until the device says what they are of
+_EACH = 64  # counts that take as much memory as a message beside its own
 _SUMMED = 1.0  # s of which lost messages are told together
 _APART, _DRIFT = 0.5, 0.01  # s, and share, by which two clocks that both went on may differ
 
@@ -161,7 +162,16 @@ class SerialSource:
                 if not self._known:
                     self._drop(place + 1)
                 return
-        self._drop(len(self._pending) - _UNREAD)
+        self._drop_beyond(_UNREAD)
+
+    def _drop_beyond(self, most: int) -> None:
+        """Keep the newest messages, of `most` counts together."""
+        counts = 0
+        for kept, (_, message) in enumerate(reversed(self._pending)):
+            counts += _EACH + (len(message.counts) if isinstance(message, Samples) else 0)
+            if counts > most:
+                self._drop(len(self._pending) - kept)
+                return
 
     def _drop(self, count: int) -> None:
         for _ in range(count):

@@ -1,0 +1,47 @@
+"""What a device says, as readable lines."""
+
+import math
+import signal
+import time
+
+from kappaskin.cli.common import FAILED, Switch
+from kappaskin.errors import Refusal
+from kappaskin.sources.monitor import Monitor
+
+_READ = 0.1  # s
+
+
+def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> int:
+    """Print what comes over a port as readable lines, to bring up a device.
+
+    Every message with its sequence number, time and content (of scans, ten a second), every gap and
+    every byte that was thrown away, and a summary at the end (Ctrl+C). Exit code 1 if no message
+    came, or the line broke.
+
+    Example: `kappaskin monitor /dev/ttyACM0`
+
+    Parameters
+    ----------
+    port
+        A port, or a URL that pyserial opens.
+    seconds
+        How long to listen; until stopped when left out.
+    reset
+        Pulse DTR and RTS first, at which many boards start anew.
+    """
+    if not seconds > 0:
+        raise Refusal(f"expected a time above 0 s to listen, got {seconds:g}")
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda got, _: stopped.append(got))
+    listening, end = Monitor(port), time.monotonic() + seconds
+    try:
+        if reset:
+            listening.reset()
+        while not (stopped or listening.gone) and time.monotonic() < end:
+            for line in listening.read(_READ):
+                print(line, flush=True)
+    finally:
+        listening.close()
+    print(listening.summary())
+    return FAILED if listening.gone or not listening.accounting().accepted else 0

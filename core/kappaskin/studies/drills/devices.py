@@ -1,0 +1,231 @@
+"""Drills on the device and its plug: it stalls, floods, is deaf, restarts, is another, is gone."""
+
+import os
+import signal
+import time
+from functools import partial
+
+from kappaskin.studies.drills.drill import Drill
+from kappaskin.studies.drills.held import Held
+from kappaskin.studies.drills.outcome import Outcome
+from kappaskin.studies.drills.rewrite import Says, Times, untold
+from kappaskin.studies.drills.stand import Stand
+
+_WITHIN = 1.0  # s
+_BACK = 2.0  # s after a port's return
+_BLOCKED = 0.3  # s that a read may take on a busy machine
+_GROWTH = 10 * 2**20  # bytes
+_NUMBERED = 200  # messages after which a restart can be told from a late one
+_NOBODY = bytes(65536)
+
+
+def _nothing_lost(stand: Stand) -> Outcome:
+    stand.drain()
+    seen = stand.source.accounting()
+    return stand.outcome(
+        (seen.lost == 0, f"{seen.lost} messages lost"),
+        (seen.bytes_discarded == 0, f"{seen.bytes_discarded} bytes discarded"),
+    )
+
+
+def _stall(stand: Stand) -> Outcome:
+    """Stop in the middle of a message, and go on with the rest of it."""
+    stand.settle()
+    stand.relay.held = True
+    stand.until(lambda: not stand.relay.empty, _WITHIN)
+    stand.relay.flush(most=100)
+    stand.run(4.0 if stand.long else 1.0)
+    stand.heal()
+    stand.recover(_WITHIN)
+    return _nothing_lost(stand)
+
+
+def _flood(stand: Stand) -> Outcome:
+    stand.settle()
+    stand.relay.rewrite = lambda message: [message] * 10
+    stand.run(20.0 if stand.long else 1.5)
+    stand.heal()
+    stand.recover(_WITHIN)
+    return stand.outcome()
+
+
+def _not_read(stand: Stand) -> Outcome:
+    """Let nobody ask for frames; the thread that reads goes on."""
+    stand.settle()
+    end = time.monotonic() + (10.0 if stand.long else 1.5)
+    while time.monotonic() < end:
+        stand.relay.pump()
+        time.sleep(0.002)
+    stand.recover(_WITHIN)
+    return _nothing_lost(stand)
+
+
+def _deaf(stand: Stand) -> Outcome:
+    """Let nobody read what the program writes, until there is no more room for it."""
+    stand.settle()
+    stand.relay.deaf = True
+    line = os.open(stand.relay.port, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        while os.write(line, _NOBODY):
+            pass
+    except BlockingIOError:
+        stand.slowest = 0.0
+    finally:
+        os.close(line)
+    stand.run(10.0 if stand.long else 1.5)
+    slowest = stand.slowest
+    stand.relay.ignore()
+    stand.heal()
+    stand.recover(_WITHIN)
+    return stand.outcome((slowest < _BLOCKED, f"a read took {slowest:.2f} s"))
+
+
+def _twice(stand: Stand) -> Outcome:
+    stand.settle()
+    stand.relay.spoil = lambda data: data * 2
+    stand.run(10.0 if stand.long else 0.5)
+    stand.heal()
+    stand.recover(_WITHIN)
+    twice = stand.source.accounting().duplicate
+    return stand.outcome((twice > 0, "no message was told to have come twice"))
+
+
+def _untold(stand: Stand) -> Outcome:
+    """Keep from the program who is there, for a while after it has begun to listen."""
+    stand.relay.rewrite = untold
+    stand.run(1.0)
+    stand.heal()
+    stand.recover(_BACK)
+    return _nothing_lost(stand)
+
+
+def _restart(stand: Stand) -> Outcome:
+    """Begin again with the first number, at the device's time 0."""
+    stand.settle()
+    stand.until(lambda: stand.relay.sequence > _NUMBERED, 5.0)
+    began = stand.last.device_time if stand.last else 0.0
+    stand.relay.sequence, stand.relay.rewrite = 0, Times(-began)
+    stand.recover(_WITHIN)
+    stand.run(0.5)
+    return stand.outcome(
+        (stand.told("restarted"), "that the device restarted is not told"), restarted=True
+    )
+
+
+def _other(key: str, event: str, stand: Stand) -> Outcome:
+    """Let it say something else of itself while it is plugged in."""
+    stand.settle()
+    stand.relay.rewrite = Says(key, "drill")
+    told = stand.until(lambda: stand.told(event), _BACK)
+    stand.recover(_WITHIN)
+    stand.heal()
+    return stand.outcome((told, f"another {key.replace('_', ' ')} is not told"))
+
+
+def _other_plugged_in(stand: Stand) -> Outcome:
+    """Unplug it, and plug in another."""
+    stand.settle()
+    stand.relay.unplug()
+    stand.run(0.3)
+    stand.relay.rewrite, stand.relay.sequence = Says("serial_number", "drill"), 0
+    stand.relay.plug()
+    stand.recover(_BACK)
+    said = (stand.told("other"), "that it is another device is not told")
+    return stand.outcome(said, cut_off=True, restarted=True)
+
+
+def _unplug(stand: Stand) -> Outcome:
+    """Unplug it again and again, each time in the middle of a message."""
+    stand.settle()
+    cycles, worst, before = 100 if stand.long else 6, 0.0, Held.now()
+    for _ in range(cycles):
+        stand.relay.held = True
+        stand.until(lambda: not stand.relay.empty, _WITHIN)
+        stand.relay.flush(most=int(stand.rng.integers(600)))
+        stand.run(0.02)
+        stand.relay.unplug()
+        stand.heal()
+        stand.run(float(stand.rng.uniform(0.05, 0.3)))
+        stand.relay.plug()
+        stand.recover(_BACK)
+        worst = max(worst, stand.recovered)
+    stand.recovered = worst
+    stand.run(0.2)
+    told = [sum(event.kind == kind for event in stand.events) for kind in ("gone", "back")]
+    return stand.outcome(
+        (told == [cycles, cycles], f"of {cycles} times, gone was told {told[0]}, back {told[1]}"),
+        *Held.now().leaked(before, _GROWTH),
+        cut_off=True,
+    )
+
+
+def _suspend(stand: Stand) -> Outcome:
+    """Stop the process that plays the device for a while."""
+    stand.settle()
+    stand.device.signal(signal.SIGSTOP)
+    try:
+        stand.run(5.0 if stand.long else 1.0)
+    finally:
+        stand.device.signal(signal.SIGCONT)
+    stand.recover(_WITHIN)
+    return stand.outcome()
+
+
+def _in_step(stand: Stand) -> bool:
+    """Whether the newest frame is said to have been taken just before it came."""
+    frame = stand.last
+    return frame is not None and abs(frame.host_time - frame.taken) < 0.2
+
+
+def _device_clock(stand: Stand) -> Outcome:
+    """Set the device's clock, forth and back."""
+    stand.settle()
+    followed: list[bool] = []
+    for ahead in (100.0, 50.0):
+        stand.relay.rewrite = Times(ahead)
+        stand.recover(_WITHIN)
+        followed.append(stand.until(lambda: _in_step(stand), _BACK))
+    return stand.outcome((all(followed), "times do not follow the device's clock"))
+
+
+def _host_clock(stand: Stand) -> Outcome:
+    """Set this machine's clock, forth and back."""
+    stand.settle()
+    followed: list[bool] = []
+    for ahead in (30.0, 10.0):
+        stand.clock = lambda ahead=ahead: time.monotonic() + ahead
+        stand.recover(_WITHIN)
+        followed.append(stand.until(lambda: _in_step(stand), _BACK))
+    trouble = stand.source.trouble
+    return stand.outcome(
+        (all(followed), "times do not follow this machine's clock"),
+        (not trouble, f"it is still in trouble: {trouble}"),
+    )
+
+
+DRILLS = [
+    Drill("stall", "a device that stops in the middle of a frame, and goes on", _stall, _WITHIN),
+    Drill("flood", "frames at 10 times the rate", _flood, _WITHIN),
+    Drill("not read", "nobody asks for frames for a while", _not_read, _WITHIN),
+    Drill("deaf", "a device that does not read what it is sent", _deaf, _WITHIN),
+    Drill("twice", "every message comes twice", _twice, _WITHIN),
+    Drill("untold", "a device that says late what it is", _untold, _BACK),
+    Drill("restart", "a device that begins anew while it is connected", _restart, _WITHIN),
+    Drill(
+        "other device",
+        "another one on the same line",
+        partial(_other, "serial_number", "other"),
+        _WITHIN,
+    ),
+    Drill(
+        "other firmware",
+        "its firmware is changed",
+        partial(_other, "firmware", "firmware"),
+        _WITHIN,
+    ),
+    Drill("other plugged in", "another one on the port", _other_plugged_in, _BACK),
+    Drill("unplug", "unplugged and plugged in again and again", _unplug, _BACK),
+    Drill("suspend", "the device stands still and goes on", _suspend, _WITHIN),
+    Drill("device clock", "the device's clock is set", _device_clock, _WITHIN),
+    Drill("host clock", "this machine's clock is set", _host_clock, _WITHIN),
+]

@@ -1,0 +1,203 @@
+"""A device, the relay before it and what reads through that: what a drill is done on."""
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kappaskin.errors import SourceError
+from kappaskin.frames import Event, Frame
+from kappaskin.sources import SerialSource
+from kappaskin.sources.line import Line
+from kappaskin.studies.drills.outcome import NeedsSimulated, Outcome
+from kappaskin.studies.drills.relay import Relay, clean, unchanged
+
+RATE = 200  # frames/s of the simulated device
+_TICK = 0.002  # s that a read waits
+_SETTLED = 5  # frames in a row, after which a drill begins
+_START = 20.0  # s that a device may take until its first frame
+
+
+@dataclass
+class Device:
+    """The device's line; `process` plays it, None for the user's own. `rng` spoils."""
+
+    line: Line
+    process: "subprocess.Popen[str] | None"
+    rng: np.random.Generator
+
+    def signal(self, number: int) -> None:
+        """Send a signal to the process that plays the device."""
+        if self.process is None:
+            raise NeedsSimulated
+        self.process.send_signal(number)
+
+
+@contextmanager
+def opened(source: str | None, seed: int) -> Generator[Device]:
+    """The device on a port; the simulated one where `source` is None."""
+    rng = np.random.default_rng(seed)
+    if source is not None:
+        line = Line(source)
+        try:
+            yield Device(line, None, rng)
+        finally:
+            line.close()
+        return
+    process = subprocess.Popen(
+        [sys.executable, "-m", "kappaskin", "device", "centre", "--rate", str(RATE)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    try:
+        line = Line(_port_of(process))
+        try:
+            yield Device(line, process, rng)
+        finally:
+            line.close()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def _port_of(process: "subprocess.Popen[str]") -> str:
+    said = process.stdout.readline() if process.stdout else ""
+    if not said:
+        raise SourceError("the simulated device did not start; try `kappaskin device`")
+    return str(json.loads(said)["port"])
+
+
+class Stand:
+    """One drill's relay, on its own pseudo-terminal, and the source that reads through it.
+
+    `clock` is what the source goes by. What it accepts is compared with what was sent.
+    """
+
+    def __init__(
+        self, device: Device, long: bool, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.device, self.long, self.rng = device, long, device.rng
+        self._folder = Path(tempfile.mkdtemp(prefix="kappaskin-drill-"))
+        device.line.take(0.0)  # from before this drill
+        self.relay = Relay(device.line, self._folder)
+        self.clock = clock
+        self._source: SerialSource | None = None
+        self.frames = self.wrong = 0
+        self.slowest = 0.0
+        self.last: Frame | None = None
+        self.events: list[Event] = []
+        self.recovered = math.nan
+
+    @property
+    def source(self) -> SerialSource:
+        if self._source is None:
+            self._source = SerialSource(self.relay.port, lambda: self.clock())
+        return self._source
+
+    def step(self) -> list[Frame]:
+        """Let relay and source do what there is to do; the frames that came."""
+        source = self.source  # opened first: nothing may be sent before
+        self.relay.pump()
+        began = time.monotonic()
+        frames = source.read(_TICK)
+        self.slowest = max(self.slowest, time.monotonic() - began)
+        for frame in frames:
+            self._compare(frame)
+        self.events += source.events()
+        return frames
+
+    def _compare(self, frame: Frame) -> None:
+        self.frames, self.last = self.frames + 1, frame
+        counts = self.relay.sent.pop(frame.sequence, None)
+        self.wrong += counts is None or not np.array_equal(counts, frame.counts)
+
+    def run(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.step()
+
+    def until(self, done: Callable[[], object], within: float) -> bool:
+        """Go on until `done`; whether it was within so many s."""
+        end = time.monotonic() + within
+        while not done() and time.monotonic() < end:
+            self.step()
+        return bool(done())
+
+    def settle(self) -> None:
+        """Go on until frames come."""
+        if not self.until(lambda: self.frames >= _SETTLED, _START):
+            raise SourceError(f"no frames come: {self.source.trouble or 'the device is silent'}")
+
+    def heal(self) -> None:
+        """End the fault: from now on all that is sent is good."""
+        self.relay.rewrite, self.relay.spoil = unchanged, clean
+        self.relay.held = self.relay.deaf = False
+
+    def recover(self, within: float) -> None:
+        """Go on until the first frame that was sent from now on; how long that takes is noted."""
+        first, began, relay = self.relay.sequence, time.monotonic(), self.relay
+        self.last = None
+        if self.until(lambda: self.last and first <= self.last.sequence < relay.sequence, within):
+            self.recovered = time.monotonic() - began
+
+    def drain(self) -> None:
+        """Send no more, and read until everything that was sent has been taken."""
+        end = time.monotonic() + 2.0
+        while time.monotonic() < end:
+            self.relay.forget()
+            self.relay.flush()
+            for frame in self.source.read(_TICK):
+                self._compare(frame)
+            if self.relay.empty and self.source.accounting().bytes_in == self.relay.written:
+                break
+        while frames := self.source.read(_TICK):
+            for frame in frames:
+                self._compare(frame)
+
+    def told(self, kind: str) -> bool:
+        """Whether the source told of such an event."""
+        return any(event.kind == kind for event in self.events)
+
+    def outcome(
+        self, *claims: tuple[bool, str], cut_off: bool = False, restarted: bool = False
+    ) -> Outcome:
+        """What became of it all, once the line is drained; `claims` that are false are failures.
+
+        Every byte and every number sent must be accounted for, but for bytes on a line that was
+        `cut_off`, and numbers of a device that `restarted`.
+        """
+        self.drain()
+        seen = self.source.accounting()
+        laws: list[tuple[bool, str]] = [(seen.balanced, "the accounting does not balance")]
+        if not cut_off:
+            written = self.relay.written
+            text = f"{written} bytes were sent, {seen.bytes_in} accounted for"
+            laws.append((seen.bytes_in == written, text))
+        if not restarted:
+            text = f"{self.relay.sequence} messages were sent, {seen.span} accounted for"
+            laws.append((seen.span == self.relay.sequence, text))
+        return Outcome(
+            self.relay.spent,
+            seen.accepted,
+            seen.lost,
+            seen.bytes_discarded,
+            self.wrong,
+            self.recovered,
+            tuple(text for holds, text in (*laws, *claims) if not holds),
+        )
+
+    def close(self) -> None:
+        if self._source is not None:
+            self._source.close()
+        self.relay.unplug()
+        shutil.rmtree(self._folder)
