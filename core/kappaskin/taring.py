@@ -33,7 +33,7 @@ _BLIND = 0.1  # of the channels that may read nothing
 _STIR = 2.0  # times the noise of a frame, by which no part may be off
 
 _TAU = 2.0  # s over which a drift is averaged
-_EVERY = 0.01  # s between two frames that count
+_EVERY = 0.02  # s between two frames that count
 _LOOK = 0.5  # s between two looks
 
 
