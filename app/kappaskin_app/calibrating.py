@@ -218,7 +218,9 @@ class Calibrating(QObject):
     def receive(self, estimate: Estimate) -> None:
         """Take in one of the readings of the present step, and the step when it was the last."""
         kept, status = self._kept, self._status
-        nominal = status.setup.calibration is None and estimate.generation == status.generation
+        setup = status.setup
+        plain = setup.calibration is None and setup.tare is None
+        nominal = plain and estimate.generation == status.generation
         if kept is None or not nominal or estimate.host_time < self._begun:
             return
         if kept and estimate.device_time < kept[-1].device_time:

@@ -109,6 +109,7 @@ class Display:
                 status.rate,
                 len(recent),
                 float(np.median(recent)) if recent else math.nan,
+                self.membrane.age_sd,
                 counts.lost,
                 counts.bytes_discarded,
                 status.skipped,

@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from kappaskin import (
     Bargain,
+    Calibration,
     CurvatureMap,
     Engine,
     Estimate,
@@ -23,6 +24,7 @@ from kappaskin import (
     Setup,
     Status,
     Step,
+    Tare,
     bargain,
     basis_for,
 )
@@ -42,13 +44,15 @@ _STATUS = 0.05  # s between two looks at the status
 
 
 def _setup_of(settings: Settings, sensor: Sensor | None = None) -> Setup:
-    """The setup asked for, with the calibration if it is one of `sensor`."""
+    """The setup asked for, with calibration and tare if they are of `sensor`."""
     s = settings
     setup = Setup(s.functions_x, s.functions_y, edge=s.fit_edge, method=s.method)
-    if settings.calibration is not None and sensor is not None:
-        with suppress(Refusal):
-            settings.calibration.check(sensor)
-            return replace(setup, calibration=settings.calibration)
+    for name in ("calibration", "tare"):
+        found: Calibration | Tare | None = getattr(s, name)
+        if found is not None and sensor is not None:
+            with suppress(Refusal):
+                found.check(sensor)
+                setup = replace(setup, **{name: found})
     return setup
 
 
@@ -139,7 +143,7 @@ class Session(QObject):
         """Have the engine compute with what is asked for now, if that is something else."""
         setup = _setup_of(self._settings, self.status.sensor)
         if self._laid is not None:
-            setup = replace(setup, calibration=None)
+            setup = replace(setup, calibration=None, tare=None)
         if setup != self._asked:
             if self.inside and setup.calibration and not self._asked.calibration:
                 # A calibration follows the loops of a skin from rest on: these effects start anew.

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import FIGURES, Engine, Status, serial_ports
+from kappaskin import FIGURES, Engine, Status, Tares, data_folder, serial_ports
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
@@ -40,6 +40,7 @@ from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
 from kappaskin_app.simulation import settings_for
 from kappaskin_app.staging import Staging
+from kappaskin_app.taring import Taring
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
@@ -63,6 +64,7 @@ class MainWindow(QMainWindow):
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
         self.calibrating = Calibrating(self.history, self)
+        self.taring = Taring(self.history, self.session.engine, Tares(data_folder()), self)
         self.seeing = Seeing(self.history, self)
         self.costing = Costing(self.history, self.session, self.wishes, self)
         self.panels, self.display = Panels(), Display(self.session)
@@ -170,6 +172,7 @@ class MainWindow(QMainWindow):
         add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
         add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
         add("ports", source, "&Look for ports", self._find_ports, "F5")
+        add("tare", source, "Ta&re", self.taring.tare, "Ctrl+0")
         calibrating = self.calibrating
         add("calibrate", source, "C&alibrate", self.panels.show_calibration, "Ctrl+L")
         add("take-step", source, "&Take the step of the calibration", calibrating.take, "Ctrl+K")
@@ -225,6 +228,10 @@ class MainWindow(QMainWindow):
         session.estimated.connect(guarded(self.calibrating.receive))
         panels.calibrate.attend(self.calibrating)
         panels.in_use.attend(self.calibrating)
+        session.reported.connect(guarded(self.taring.follow))
+        self.taring.told.connect(guarded(self._tell))
+        self.taring.changed.connect(guarded(self._allow_tare))
+        panels.tare.attend(self.taring)
         self._docks[2].visibilityChanged.connect(guarded(self.costing.watch))
         session.reported.connect(guarded(self.costing.follow))
         session.estimated.connect(guarded(self.costing.receive))
@@ -323,6 +330,11 @@ class MainWindow(QMainWindow):
             self.panels.region.show_bargain(self.session.bargain())
         self.panels.show_status(status, simulating)
         self.stability.show_status(status, self.session.inside)
+
+    def _allow_tare(self) -> None:
+        action, why_not = self.actions_by_name["tare"], self.taring.why_not
+        action.setEnabled(not why_not)
+        action.setStatusTip(why_not or "Tare")
 
     # Small things.
 

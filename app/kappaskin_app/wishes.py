@@ -88,8 +88,9 @@ class Wishes:
         self.wish("exaggeration", float(min(max(wanted, 1), 50)))
 
     def reset(self) -> None:
-        kept = self._history.settings.calibration  # minutes of work, and no matter of taste
-        self._history.change("Reset settings", -1, **vars(Settings(calibration=kept)))
+        now = self._history.settings
+        kept = Settings(calibration=now.calibration, tare=now.tare)  # no matter of taste
+        self._history.change("Reset settings", -1, **vars(kept))
 
     # Scenes as they are written.
 

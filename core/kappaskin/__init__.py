@@ -16,7 +16,10 @@ from kappaskin.calibration import Presentation as Presentation
 from kappaskin.calibration import Procedure as Procedure
 from kappaskin.calibration import Step as Step
 from kappaskin.calibration import Sweep as Sweep
+from kappaskin.calibration import Tare as Tare
+from kappaskin.calibration import Tares as Tares
 from kappaskin.calibration import calibrate as calibrate
+from kappaskin.calibration import data_folder as data_folder
 from kappaskin.calibration import load_calibration as load_calibration
 from kappaskin.calibration import radii_for as radii_for
 from kappaskin.calibration import save_calibration as save_calibration
@@ -116,6 +119,7 @@ from kappaskin.studies.cost import effect_costs as effect_costs
 from kappaskin.studies.cost import frontier as frontier
 from kappaskin.studies.cost import settings_to_try as settings_to_try
 from kappaskin.studies.plan import plan_told as plan_told
+from kappaskin.taring import Drift as Drift
 from kappaskin.touch import NO_OBJECT as NO_OBJECT
 from kappaskin.touch import ContactObject as ContactObject
 from kappaskin.touch import ObjectFinder as ObjectFinder

@@ -17,6 +17,7 @@ PACKAGES = (
     "pyserial",
     "cyclopts",
     "pillow",
+    "platformdirs",
     "trimesh",
     "PySide6-Essentials",
     "pyvista",

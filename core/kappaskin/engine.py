@@ -14,7 +14,7 @@ from multiprocessing.process import BaseProcess
 from typing import cast
 
 from kappaskin.frames import Estimate, Event
-from kappaskin.live import LOST, Connect, Disconnect, Loop, Request, Seek, Status
+from kappaskin.live import LOST, Connect, Disconnect, Loop, Request, Seek, Status, TakeTare
 from kappaskin.pipeline import Setup
 from kappaskin.region import Region
 from kappaskin.ring import Ring
@@ -188,6 +188,10 @@ class Engine:
         """Let every frame scan `region`; where it cannot, `status` says why."""
         self._region = region
         self._send(region)
+
+    def tare(self) -> None:
+        """Take a tare; `status` tells what came of it, and a setup with it uses it."""
+        self._send(TakeTare())
 
     def status(self) -> Status:
         # One that is being written is not there to read: the last is nearer the truth than none.

@@ -203,7 +203,9 @@ class LocalGeometry:
 class Estimate:
     """Everything a view, a publisher or a file may show of one frame.
 
-    `curvature` and `residual` (3, P) in 1/m, NaN where a reading is missing; `fresh` (3, P) which
+    `nominal` (3, P) in 1/m is what this frame brought as Eq. 8 reads it, whatever calibration and
+    tare make of it, `curvature` and `residual` (3, P) in 1/m what they do; NaN where a reading is
+    missing; `fresh` (3, P) which
     readings this frame brought: the others are held from earlier ones; `coefficients`
     (Ni, Nj) in m; `surface` (ny, nx) in m, NaN off the skin; `noise` is the standard deviation of
     a reading in 1/m as the residual tells it; `suspect` (P,) numbers in `WHY` why an element was
@@ -221,6 +223,7 @@ class Estimate:
     taken: float
     taken_sd: float
     ready_time: float
+    nominal: Array
     curvature: Array
     fresh: Mask
     residual: Array

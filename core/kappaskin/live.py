@@ -21,6 +21,8 @@ from kappaskin.sensor import Sensor
 from kappaskin.sources import SimulatedSource, Source, open_source
 from kappaskin.sources.accounting import Accounting
 from kappaskin.steer import Following, Steering, steered
+from kappaskin.tare_taking import TareNews, TareTaking
+from kappaskin.taring import Drift
 
 OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
 
@@ -43,7 +45,8 @@ class Status:
     came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
     of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
     `playing` tells where a simulated scene is at a device time. `events` are the last of those that
-    `happened`.
+    `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
+    tells of those taken, `drift` is that since the tare of the `setup`, None without one.
     """
 
     state: str = OFF
@@ -67,6 +70,9 @@ class Status:
     playing: Playing = FROM_THE_BEGINNING
     events: tuple[Event, ...] = ()
     happened: int = 0
+    temperature: float = math.nan
+    tare: TareNews = field(default_factory=TareNews)
+    drift: Drift | None = None
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status once `events` happened."""
@@ -92,7 +98,12 @@ class Seek:
     speed: float
 
 
-Request = Connect | Disconnect | Setup | Scene | Seek | Region
+@dataclass(frozen=True)
+class TakeTare:
+    """Take a tare from now on, and hold what it finds against the tare of the setup."""
+
+
+Request = Connect | Disconnect | Setup | Scene | Seek | Region | TakeTare
 
 
 class Loop:
@@ -108,6 +119,7 @@ class Loop:
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
         self._building: Future[_Built] | None = None
+        self._taking = TareTaking(self._builder)
         self._gaps: deque[float] = deque(maxlen=_GAPS)
         self._times: deque[float] = deque(maxlen=1024)
         self._last_read = self._again = math.inf
@@ -126,6 +138,8 @@ class Loop:
                     self._open(self._status.source)
                 if self._building is not None and self._building.done():
                     self._swap(self._building.result())
+                if self._pipeline is not None and self._source is not None:
+                    self._taking.go_on(self._pipeline, self._source)
                 if time.monotonic() - self._status.reported >= _REPORT:
                     self._report()
         self._close()
@@ -143,6 +157,8 @@ class Loop:
         elif isinstance(request, Region):
             self._status = replace(self._status, region=request)
             self._steer()
+        elif isinstance(request, TakeTare):
+            self._taking.begin(self._status.sensor if self._status.state == STREAMING else None)
         else:
             self._close()
             self._status = replace(
@@ -158,6 +174,8 @@ class Loop:
                 accounting=Accounting(),
                 rate=0.0,
                 last_frame=-math.inf,
+                temperature=math.nan,
+                drift=None,
             )
             if isinstance(request, Connect):
                 self._open(request.source)
@@ -198,6 +216,7 @@ class Loop:
         self._status = replace(self._status, region_refusal=refusal)
 
     def _close(self) -> None:
+        self._taking.give_up("the connection ended; connect again, then tare")
         if self._source is not None:
             self._source.close()
         self._source, self._pipeline, self._building = None, None, None
@@ -275,6 +294,7 @@ class Loop:
         for frame in frames[late:]:
             estimate = self._pipeline(frame)
             self._ring.write(estimate)
+            self._taking.receive(estimate)
             self._times.append(frame.host_time)
             if self._steering is not None:
                 self._steering(estimate.touch, self._pipeline.fit)
@@ -297,6 +317,7 @@ class Loop:
 
     def _meet(self, sensor: Sensor | None) -> None:
         """A device said what it is: make the pipeline for it."""
+        self._taking.give_up("another device answered, or the same one anew; tare again")
         self._pipeline = None
         self._status = replace(
             self._status,
@@ -312,11 +333,14 @@ class Loop:
     def _report(self) -> None:
         now, source, status = time.monotonic(), self._source, self._status
         if source is not None:
+            watch = self._pipeline.drift if self._pipeline else None
             gaps = np.array(self._gaps)
             recent = [t for t in self._times if t > now - 1.0]
             status = replace(
                 status,
                 accounting=source.accounting(),
+                temperature=source.temperature,
+                drift=watch.tell() if watch else None,
                 rate=len(recent) / min(1.0, max(now - recent[0], 1e-3)) if recent else 0.0,
                 reader_gap=float(np.percentile(gaps, 99)) if len(gaps) else math.nan,
                 last_frame=self._times[-1] if self._times else -math.inf,
@@ -324,7 +348,7 @@ class Loop:
                 if isinstance(source, SimulatedSource)
                 else FROM_THE_BEGINNING,
             )
-        self._status = replace(status, reported=now)
+        self._status = replace(status, reported=now, tare=self._taking.news)
         self._ring.write_status(self._status)
 
 

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from kappaskin.bases import Basis, ValueMap, basis_for
-from kappaskin.calibration import Calibration, Corrector
+from kappaskin.calibration import Calibration, Corrector, Tare
 from kappaskin.errors import RankDeficient
 from kappaskin.fit import METHODS, RIM_SD, Fit, estimator_for
 from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.geometry import contact_geometry
 from kappaskin.hold import Hold
 from kappaskin.sensor import Sensor
-from kappaskin.touch import NO_TOUCH, PointContact
+from kappaskin.taring import DriftWatch, Rest
+from kappaskin.touch import NO_TOUCH, LoadSeeker, PointContact
 
 _LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undecided
 
@@ -27,9 +28,9 @@ class Setup:
 
     `edge` says which functions; empty, those for the edge that the sensor says it has. `method` is
     one of `METHODS`. A channel
-    that a frame leaves out keeps its last reading until that is `hold` s old. Readings are
-    corrected by the `calibration`, which must be the sensor's own. A rim that gives is expected to
-    move by `rim_sd` in m.
+    that a frame leaves out keeps its last reading until that is `hold` s old. Readings are taken
+    from the zero of the `tare` and corrected by the `calibration`, both of which must be the
+    sensor's own. A rim that gives is expected to move by `rim_sd` in m.
     """
 
     Ni: int = 8
@@ -40,6 +41,7 @@ class Setup:
     method: str = next(iter(METHODS))
     hold: float = 0.1
     calibration: Calibration | None = None
+    tare: Tare | None = None
     rim_sd: float = RIM_SD
 
 
@@ -67,7 +69,9 @@ class Pipeline:
     ) -> None:
         self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
         self.past = _Past(self._corrector(setup.calibration), Hold(sensor.channels, setup.hold))
+        self._zero = self._shift(setup.tare)
         edge = setup.edge or sensor.edge
+        self.drift = None if setup.tare is None else DriftWatch(LoadSeeker(sensor, edge))
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
@@ -93,15 +97,42 @@ class Pipeline:
         calibration.check(self.sensor)
         return calibration.start()
 
+    def _shift(self, tare: Tare | None) -> Array | None:
+        """What is taken off the readings (C,) in 1/m, so that rest reads as it was calibrated."""
+        if tare is None:
+            return None
+        tare.check(self.sensor)
+        calibration = self.setup.calibration
+        if calibration is None:
+            return tare.offset
+        return tare.offset - np.nan_to_num(calibration.offset)
+
     def curvature(self, frame: Frame) -> Array:
         """Curvature (3, P) in 1/m; NaN where a channel is dead, unscanned, on a rail or failed.
 
         With a calibration each frame is to be given once, in order: the loops have a memory.
         """
-        flat = self.sensor.nominal(frame)
+        return self._corrected(self.sensor.nominal(frame), frame.device_time)
+
+    def _corrected(self, flat: Array, time: float) -> Array:
+        if self._zero is not None:
+            flat = flat - self._zero
         if self.past.correct is not None:
-            flat = self.past.correct(flat, frame.device_time)
+            flat = self.past.correct(flat, time)
         return flat.reshape(3, -1)
+
+    def rest(self) -> Rest:
+        """What a skin that lies straight now would read, as far as is known without a new tare.
+
+        By the tare in use, or the calibration; what its loops still hold comes on top of that.
+        """
+        correct, calibration, tare = self.past.correct, self.setup.calibration, self.setup.tare
+        zero = np.zeros(self.sensor.channels)
+        if tare is not None:
+            zero = tare.offset
+        elif calibration is not None:
+            zero = np.nan_to_num(calibration.offset)
+        return Rest(zero, 0 * zero if correct is None else correct.remanence(), tare)
 
     def _followed(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         times = np.full(curvature.size, np.nan)
@@ -117,7 +148,8 @@ class Pipeline:
         return Fit(self.fit, unknown, self._no_shape, self._whole.spreads, 0, np.array(math.nan))
 
     def __call__(self, frame: Frame) -> Estimate:
-        scanned = self.curvature(frame)
+        nominal = self.sensor.nominal(frame)
+        scanned = self._corrected(nominal, frame.device_time)
         curvature, fresh = self.past.hold(frame, scanned)
         began = time.perf_counter()
         fit = self._fitted(frame, scanned, curvature)
@@ -125,6 +157,8 @@ class Pipeline:
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
         touch = self._touch(fit.curvature, fit) if math.isfinite(noise) else NO_TOUCH
+        if self.drift is not None:
+            self.drift.follow(frame.device_time, curvature, surface, noise)
         return Estimate(
             self.generation,
             frame.sequence,
@@ -133,6 +167,7 @@ class Pipeline:
             frame.taken,
             frame.taken_sd,
             self._clock(),
+            nominal.reshape(3, -1),
             curvature,
             fresh,
             fit.residual,
@@ -150,8 +185,11 @@ class Pipeline:
     def go_on_from(self, before: "Pipeline") -> None:
         """Take over what `before` remembers, if its readings are of the same sensor and kind."""
         asked, was = self.setup, before.setup
-        alike = (asked.calibration, asked.hold) == (was.calibration, was.hold)
-        if before.sensor is not self.sensor or not alike:
+        if before.sensor is not self.sensor or asked.calibration != was.calibration:
+            return
+        if (asked.tare, asked.hold) != (was.tare, was.hold):
+            # Another zero does not undo how the skin was bent.
+            self.past = _Past(before.past.correct, self.past.hold)
             return
         self.past = before.past
         if _estimating(self) == _estimating(before):

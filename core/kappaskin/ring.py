@@ -59,6 +59,7 @@ def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
             ("taken", "f8"),
             ("taken_sd", "f8"),
             ("ready_time", "f8"),
+            ("nominal", "f8", (3, P)),
             ("curvature", "f8", (3, P)),
             ("fresh", "?", (3, P)),
             ("residual", "f8", (3, P)),

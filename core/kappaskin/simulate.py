@@ -1,5 +1,6 @@
 """A scene to frames: the counts a real device would send, with the truth beside them."""
 
+import math
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,6 +16,7 @@ from kappaskin.effects import (
     ReadingEffect,
     Skew,
     SkinEffect,
+    Temperature,
 )
 from kappaskin.frames import Array, Frame, Truth
 from kappaskin.mechanics import Load
@@ -28,6 +30,8 @@ from kappaskin.scene import (
     effects_of,
     kept_of,
 )
+
+_ROOM = 20.0  # degrees Celsius
 
 
 class Simulator:
@@ -153,6 +157,14 @@ class Simulator:
         if self._dead is not None:
             curvature[self._dead] = 0.0
         return truth, curvature
+
+    def temperature(self, time: float) -> float:
+        """The skin's temperature in degrees Celsius at device `time`; NaN where none is simulated.
+
+        It is `_ROOM` at rest.
+        """
+        warming = [effect for effect in self._kept if isinstance(effect, Temperature)]
+        return _ROOM + warming[0].warmer(time) if warming else math.nan
 
     def failure(self, n: int) -> str:
         """What becomes of frame `n` on the link: the name of what fails, nothing if it arrives."""

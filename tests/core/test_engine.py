@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -29,6 +30,7 @@ from kappaskin import (
 )
 from kappaskin.engine import Engine
 from kappaskin.live import LOST, OFF, STREAMING, Status
+from kappaskin.tare_taking import TareNews
 
 Answer = TypeVar("Answer")
 
@@ -567,3 +569,79 @@ def test_nothing_of_the_last_device_is_shown_as_the_next_ones(own_engine) -> Non
     status = wait_for(lambda: (s := own_engine.status()).source == "loop://" and s)
 
     assert own_engine.latest(status) is None
+
+
+# A tare
+
+
+AT_REST = replace(load_scene("centre"), stimuli=())
+
+
+def tared(engine: Engine) -> TareNews:
+    """How the tare that is asked for now ends."""
+    before = engine.status().tare.ended
+    engine.tare()
+    wait_for(lambda: engine.status().tare.ended > before)
+    news = engine.status().tare
+    assert news.ended == before + 1
+    assert not news.taking
+    return news
+
+
+def test_a_tare_is_taken_used_and_its_drift_told(engine: Engine) -> None:
+    engine.connect("sim:centre")
+    engine.play(AT_REST)
+    next_estimate(engine)
+    time.sleep(0.1)  # until the load is gone
+
+    news = tared(engine)
+    assert news.tare is not None, news.refusal
+    generation = engine.status().generation
+    engine.set_up(Setup(tare=news.tare))
+    next_estimate(engine, generation)
+    drift = wait_for(lambda: (d := engine.status().drift) and math.isfinite(d.curvature) and d)
+
+    assert drift
+    assert drift.curvature < 0.05
+    assert engine.status().setup.tare == news.tare
+
+
+def test_a_loaded_skin_is_not_tared(engine: Engine) -> None:
+    engine.connect("sim:centre")
+    next_estimate(engine)
+
+    news = tared(engine)
+
+    assert news.tare is None
+    assert news.refusal.startswith("the skin is loaded: ")
+
+
+def test_nothing_is_not_tared(engine: Engine) -> None:
+    engine.disconnect()
+    state(engine, OFF)
+
+    assert tared(engine).refusal == "nothing streams: connect a sensor, then tare"
+
+
+def test_a_tare_ends_with_the_connection(engine: Engine) -> None:
+    engine.connect("sim:centre")
+    next_estimate(engine)
+    before = engine.status().tare.ended
+
+    engine.tare()
+    engine.disconnect()
+    wait_for(lambda: engine.status().tare.ended > before)
+
+    assert engine.status().tare.refusal == "the connection ended; connect again, then tare"
+
+
+def test_a_scene_that_warms_tells_its_temperature(engine: Engine) -> None:
+    engine.connect("sim:hot-room")
+    next_estimate(engine)
+    wait_for(lambda: math.isfinite(engine.status().temperature))
+    assert engine.status().temperature >= 20.0
+
+    engine.connect("sim:centre")
+    next_estimate(engine)
+    wait_for(lambda: math.isnan(engine.status().temperature))
+    assert math.isnan(engine.status().temperature)

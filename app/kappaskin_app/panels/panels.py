@@ -15,6 +15,7 @@ from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.panels.sensor import ElectronicsPanel, RegionPanel, SpoilsPanel
 from kappaskin_app.panels.skin import ElementsPanel, ShapePanel, SupportPanel
+from kappaskin_app.panels.tare import TarePanel
 from kappaskin_app.panels.view import ViewPanel
 from kappaskin_app.settings import Settings
 from kappaskin_app.theme import Theme
@@ -32,6 +33,7 @@ class Panels(QTabWidget):
         super().__init__(parent)
         self._pages: dict[str, list[Panel]] = {}
         self.connection = self._add(_LIVE, ConnectionPanel())
+        self.tare = self._add(_LIVE, TarePanel())
         self.load = self._add(_LIVE, LoadPanel())
         self.noise = self._add(_LIVE, NoisePanel())
         self.basis = self._add(_LIVE, BasisPanel())

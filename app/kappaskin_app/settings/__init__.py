@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
-from kappaskin import Calibration
+from kappaskin import Calibration, Tare
 from kappaskin_app.settings.asks import Ask as Ask
 from kappaskin_app.settings.asks import Choice as Choice
 from kappaskin_app.settings.asks import Range as Range
@@ -38,10 +38,11 @@ class SceneSettings(Skin, Load, Noise, Electronics, Spoils, Own):
 class Settings(SceneSettings, Fit, View, Scanning):
     """Everything a person may change, in SI units; a change is a new `Settings`.
 
-    `calibration` is in use whenever the sensor that it is of is connected.
+    `calibration` and `tare` are in use whenever the sensor that they are of is connected.
     """
 
     calibration: Calibration | None = None
+    tare: Tare | None = None
 
 
 def part(settings: Settings, kind: type[SceneSettings | Fit | View | Scanning]) -> tuple[Any, ...]:

@@ -1,5 +1,6 @@
 """The skin in three dimensions: its shape, what bends it, and where it is touched."""
 
+import math
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -44,7 +45,9 @@ class MembraneView(QWidget):
         self.setMinimumSize(320, 240)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
         """(when, age of its frame in s) of each drawing completed."""
-        self._host_time = float("nan")
+        self.age_sd = float("inf")
+        """Standard deviation in s of the last age; infinite where it is only the least."""
+        self._taken = float("nan")
         self._drawn = True
         self.plotter.renderer.AddObserver("EndEvent", self._note_drawing)
         self.skin = self.drag.skin
@@ -102,7 +105,7 @@ class MembraneView(QWidget):
     def _note_drawing(self, *_: object) -> None:
         now = time.monotonic()
         self._drawn = True
-        self.ages.append((now, now - self._host_time))
+        self.ages.append((now, now - self._taken))
         self.drawn.emit()
 
     def _note_turning(self, *_: object) -> None:
@@ -238,7 +241,10 @@ class MembraneView(QWidget):
             height = skin.height.ravel()[self._of_elements] + self._lift
             self._arrays["elements"][:] = points + out * height[:, None]
         self._place(self._contact, estimate.touch.position)
-        self._host_time = estimate.host_time
+        known = math.isfinite(estimate.taken)
+        # It was taken before it came: where nothing else is known, it is at least so old.
+        self._taken = estimate.taken if known else estimate.host_time
+        self.age_sd = estimate.taken_sd if known else math.inf
         self._request()
 
     def _show_truth(self, skin: DrawnSkin, surface: Array, times: float) -> None:

@@ -12,16 +12,21 @@ from kappaskin_app.theme import Theme
 from kappaskin_app.views.line import Line
 
 _FINE = 0.02  # mm of error bar, below which a hundredth is too coarse
+_TINY = 0.05  # ms of error bar, below which it would be shown as none
 NONE = "\N{EN DASH}"
 
 
 @dataclass(frozen=True)
 class Health:
-    """How live the view is: `rate` in frames/s, `drawn` in pictures/s, `age` in s."""
+    """How live the view is: `rate` in frames/s, `drawn` in pictures/s, `age` in s.
+
+    `age_sd` in s is the standard deviation of the age, infinite where it is only the least.
+    """
 
     rate: float
     drawn: float
     age: float
+    age_sd: float
     lost: int
     discarded: int
     skipped: int
@@ -29,7 +34,12 @@ class Health:
 
 FIELDS = {
     "rate": ("Frames", "Frames computed per second, and pictures drawn of them."),
-    "age": ("Latency", "Age of the frame when it was drawn, since its bytes were read."),
+    "age": (
+        "Age",
+        "How old what you see was when it was drawn: since its scan began, with the standard "
+        "deviation that the device's clock is known to by pings. At least so old, where a line "
+        "answers none: then since its bytes came.",
+    ),
     "lost": (
         "Lost frames",
         "Frames that never came; skipped: too many to compute; B: bytes that made no sense.",
@@ -57,7 +67,7 @@ _WIDTHS = {
     "lost": 6,
     "force": 5,
     "depth": 5,
-    "age": 3,
+    "age": 4,
     "error": 4,
     "rms": 4,
 }
@@ -85,6 +95,15 @@ def _contact(touch: Touch) -> str:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, spread"
     sd = float(np.max(touch.position_sd)) * 1e3
     return f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.2f} mm"
+
+
+def _age(age: float, sd: float) -> str:
+    """An age in ms with its error bar, unless that is too small to be seen."""
+    if not math.isfinite(age):
+        return NONE
+    if not math.isfinite(sd):
+        return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
+    return f"{age:.0f} ms" if sd < _TINY else _with_error(age, sd, 0 if sd >= 1 else 1, "ms")
 
 
 def _force(touch: Touch) -> str:
@@ -121,9 +140,8 @@ class Readouts(QWidget):
         return self._numbers[key].text()
 
     def show_health(self, health: Health) -> None:
-        age = f"{health.age * 1e3:.0f} ms" if math.isfinite(health.age) else NONE
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
-        self._write("age", age)
+        self._write("age", _age(1e3 * health.age, 1e3 * health.age_sd))
         also = ((health.skipped, "skipped"), (health.discarded, "B"))
         lost = [str(health.lost), *(f"{count} {what}" for count, what in also if count)]
         self._write("lost", ", ".join(lost))

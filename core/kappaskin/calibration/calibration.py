@@ -1,5 +1,6 @@
 """What a calibration found, as what the pipeline applies to every frame of readings."""
 
+import copy
 import hashlib
 import json
 import math
@@ -17,6 +18,8 @@ from kappaskin.layout import SensorLayout
 from kappaskin.sensor import Sensor
 
 _MOST_CHANNELS = 2**14  # whose numbers the engine can tell with every status
+_STEPS = 200  # towards the reading of a straight skin; a quarter of the rest or more goes in each
+_REST = 1e-6  # 1/m, as near as it need be
 
 
 def fingerprint(layout: SensorLayout) -> str:
@@ -141,11 +144,16 @@ class Corrector:
         self._offset = np.where(failed, 0.0, calibration.offset)
         self._per_gain = 1 / np.where(failed, 1.0, calibration.gain)
         self._blank = np.where(failed, np.nan, 0.0)
-        self._last = self._offset.copy()
+        self._last, self._time = self._offset.copy(), math.nan
         self._restore = calibration.creep.start_inverse() if calibration.creep else None
         self._straighten = (
             calibration.hysteresis.inverse.start() if calibration.hysteresis else None
         )
+        # The least that a reading changes with the curvature.
+        loops = calibration.hysteresis
+        self._slope = 1 / self._per_gain
+        if loops is not None:
+            self._slope = self._slope * loops.linear * np.minimum(loops.stretch, 1 / loops.stretch)
 
     def __call__(self, reading: Array, time: float) -> Array:
         """Curvature (C,) in 1/m for nominal curvature `reading` (C,), NaN if missing, at `time`.
@@ -157,7 +165,7 @@ class Corrector:
         if not math.isfinite(float(reading @ reading)):  # faster than to look at each
             missing = ~np.isfinite(reading)
             reading = np.where(missing, self._last, reading)
-        self._last = reading
+        self._last, self._time = reading, time
         k = reading - self._offset
         k *= self._per_gain
         if self._restore is not None:
@@ -168,3 +176,19 @@ class Corrector:
         if missing is not None:
             k[missing] = np.nan
         return k
+
+    def remanence(self) -> Array:
+        """What creep and loops have left in the readings (C,) of a skin straight again, in 1/m.
+
+        The reading that would now be told as no curvature, without the offset.
+        """
+        left = np.zeros_like(self._offset)
+        if self._restore is None and self._straighten is None:
+            return left
+        for _ in range(_STEPS):
+            told = copy.deepcopy(self)(self._offset + left, self._time)
+            told = np.where(np.isfinite(told), told, 0.0)
+            if np.abs(told).max() < _REST:
+                break
+            left = left - self._slope * told
+        return left

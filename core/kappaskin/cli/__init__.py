@@ -20,6 +20,7 @@ from kappaskin.cli import (
     simulate,
     stability,
     tables,
+    tare,
 )
 from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
@@ -35,6 +36,7 @@ for command in (
     tables.tables,
     reconstruct.reconstruct,
     calibrate.calibrate,
+    tare.tare,
     regions.regions,
     cost.cost,
     stability.stability,

@@ -30,6 +30,11 @@ class Source(Protocol):
         """Why no frames come at present, and what to do; empty when nothing is wrong."""
         ...
 
+    @property
+    def temperature(self) -> float:
+        """The device's temperature in degrees Celsius, as it told last; NaN if it does not."""
+        ...
+
     def events(self) -> list[Event]:
         """What happened since this was last asked."""
         ...

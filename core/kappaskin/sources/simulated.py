@@ -121,6 +121,10 @@ class SimulatedSource:
     def trouble(self) -> str:
         return ""
 
+    @property
+    def temperature(self) -> float:
+        return self._simulator.temperature(self._taken)
+
     def events(self) -> list[Event]:
         return []
 

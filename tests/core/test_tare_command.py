@@ -1,0 +1,88 @@
+"""Taking a tare from a source: told, kept for the device, refused with its reason."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+
+from kappaskin import PointLoad, Scene, Tares, load_scene
+from kappaskin.cli import main
+
+pytest.importorskip("pty", reason="no pseudo-terminals on this system")
+from kappaskin.sources.device import PseudoDevice
+
+
+class RealScene(Scene):
+    """A scene whose device does not say that it is simulated."""
+
+    def sensor(self):
+        return replace(super().sensor(), serial_number="KS/../7", simulated=False)
+
+
+AT_REST = RealScene(**{**vars(replace(load_scene("centre"), stimuli=(), rate=100.0))})
+
+
+@contextmanager
+def device_of(scene) -> Iterator[str]:
+    device, stopped = PseudoDevice(scene), threading.Event()
+    thread = threading.Thread(target=device.serve, args=(stopped.is_set,))
+    thread.start()
+    try:
+        yield device.port
+    finally:
+        stopped.set()
+        thread.join()
+        device.close()
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr("kappaskin.cli.tare.data_folder", lambda: tmp_path / "tares")
+    return tmp_path / "tares"
+
+
+def test_a_tare_is_told_and_kept_and_undone(folder, capsys):
+    with device_of(AT_REST) as port:
+        assert main(["tare", port]) == 0
+        first = capsys.readouterr().out
+        assert main(["tare", port]) == 0
+        second = capsys.readouterr().out
+        kept = Tares(folder).load("KS/../7")
+        assert main(["tare", port, "--undo"]) == 0
+
+    assert "Simulated skin KS/../7: 300 of 300 channels tared, offsets of" in first
+    assert f"kept in {Tares(folder).path('KS/../7')}" in first
+    assert "1/m (RMS) from the tare of" in second
+    assert len(kept.tares) == 2
+    assert kept.used == kept.tares[-1]
+    assert Tares(folder).load("KS/../7").used is None
+    assert "no tare is in use" in capsys.readouterr().out
+
+
+def test_a_loaded_skin_is_refused_with_the_reason_and_nothing_is_kept(folder, capsys):
+    pressed = RealScene(**vars(AT_REST.touched_by(PointLoad(0.05, 0.05, 0.1))))
+    with device_of(pressed) as port:
+        code = main(["tare", port])
+
+    assert code == 2
+    assert "kappaskin: the skin is loaded: " in capsys.readouterr().err
+    assert not folder.exists()
+
+
+def test_a_simulated_sensor_s_is_only_told(folder, capsys):
+    code = main(["tare", "sim:centre"])
+    assert code == 2
+    assert "loaded" in capsys.readouterr().err
+
+    with device_of(replace(load_scene("centre"), stimuli=(), rate=100.0)) as port:
+        assert main(["tare", port]) == 0
+
+    assert "not kept: the sensor is simulated" in capsys.readouterr().out
+    assert not folder.exists()
+
+
+def test_a_source_that_cannot_be_opened_is_refused(folder, capsys):
+    assert main(["tare", "/dev/no-such-port"]) == 2
+    assert "there is no such port" in capsys.readouterr().err
