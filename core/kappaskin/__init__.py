@@ -58,6 +58,9 @@ from kappaskin.frames import LocalGeometry as LocalGeometry
 from kappaskin.frames import Touch as Touch
 from kappaskin.frames import Truth as Truth
 from kappaskin.geometry import local_geometry as local_geometry
+from kappaskin.health import Finding as Finding
+from kappaskin.health import Health as Health
+from kappaskin.health import Monitor as Monitor
 from kappaskin.intrinsic import ForceTorqueSensor as ForceTorqueSensor
 from kappaskin.intrinsic import IntrinsicContact as IntrinsicContact
 from kappaskin.intrinsic import IntrinsicTouch as IntrinsicTouch
