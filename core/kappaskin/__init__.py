@@ -80,6 +80,10 @@ from kappaskin.patch import Patch as Patch
 from kappaskin.patch import Polygon as Polygon
 from kappaskin.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline import Setup as Setup
+from kappaskin.press import Phase as Phase
+from kappaskin.press import PressTest as PressTest
+from kappaskin.press import Verdict as Verdict
+from kappaskin.press import elements_to_press as elements_to_press
 from kappaskin.region import Bargain as Bargain
 from kappaskin.region import Region as Region
 from kappaskin.region import Scanner as Scanner

@@ -61,8 +61,10 @@ class Contradiction:
         self.neighbours = Neighbours(layout)
         self._every = np.arange(len(layout))
         self.missing = np.zeros(C, bool)
-        self.reads, self.base = np.full(C, np.nan), np.full(C, np.nan)
-        """What each channel (C,) read last, and what that is compared with, in 1/m."""
+        self.reads: Array = np.full(C, np.nan)
+        """What each channel (C,) read last, in 1/m."""
+        self.base: Array = np.full(C, np.nan)
+        """What that is compared with, in 1/m."""
         self.changed, self.told, self.open = (np.full((_KEPT, C), np.nan) for _ in range(3))
         self._alike = np.zeros(_KEPT)  # in 1/m, how far off channels are that have nothing wrong
         self.usual = 0.0
@@ -116,8 +118,8 @@ class Contradiction:
 
     def _forget(self, seconds: float) -> None:
         """Let what is compared with follow what is read, or where it is not trusted is told."""
-        latest = np.where(self.missing, self.told[-1], self.changed[-1])
-        step = np.nan_to_num(latest) * min(1.0, seconds / _FORGOTTEN)
+        latest: Array = np.where(self.missing, self.told[-1], self.changed[-1])
+        step: Array = np.nan_to_num(latest) * min(1.0, seconds / _FORGOTTEN)
         self.base += step
 
     def _measure(self, look: Look) -> None:

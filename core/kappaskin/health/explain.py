@@ -1,6 +1,7 @@
 """Channels that contradict those around them to what is wrong with each."""
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,14 +79,14 @@ def _means(values: Array) -> Array:
 def _amounts(values: Array) -> Array:
     """Standard deviations (n,) of what is known of `values` (T, n)."""
     apart, known = centred(values), np.count_nonzero(~np.isnan(values), axis=0)
-    return np.sqrt(np.vecdot(apart, apart, axis=0) / np.maximum(known, 1))
+    return np.sqrt(np.sum(apart**2, axis=0) / np.maximum(known, 1))
 
 
 def _trend(left: Array) -> tuple[Array, Array]:
     """How much of the scatter of `left` (T, n) a line explains, and its slope, (n,) each."""
     time = np.where(np.isnan(left), np.nan, np.arange(len(left))[:, None])
     t, r = centred(time), centred(left)
-    tt, tr, rr = (np.vecdot(a, b, axis=0) for a, b in ((t, t), (t, r), (r, r)))
+    tt, tr, rr = (np.sum(a * b, axis=0) for a, b in ((t, t), (t, r), (r, r)))
     slope = np.divide(tr, tt, where=tt > 0, out=np.zeros_like(tr))
     return np.divide(slope * tr, rr, where=rr > 0, out=np.zeros_like(tr)), slope
 
@@ -99,11 +100,12 @@ def _partners(d: Array, p: Array) -> tuple[Mask, Indices]:
     crossed, partner = np.zeros(n, bool), np.zeros(n, np.intp)
     if not 2 <= n <= _MOST:
         return crossed, partner
-    D, Q, between = np.vecdot(d, d, axis=0), np.vecdot(p, p, axis=0), d.T @ p
+    D, Q, between = np.sum(d**2, axis=0), np.sum(p**2, axis=0), d.T @ p
     own = D + Q - 2 * np.diag(between)
     other = D[:, None] + Q - 2 * between  # of reading i as if it were j
     left = (other + other.T) / np.maximum(own[:, None] + own, np.finfo(float).tiny)
     np.fill_diagonal(left, np.inf)
-    partner = left.argmin(axis=1)
+    partner = cast("Indices", left.argmin(axis=1))
     # Of two stuck ones each moves as little as the other.
-    return (left.min(axis=1) < _CROSSED) & (partner[partner] == np.arange(n)), partner
+    crossed = cast("Mask", left.min(axis=1) < _CROSSED)
+    return crossed & (partner[partner] == np.arange(n)), partner

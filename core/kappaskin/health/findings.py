@@ -71,10 +71,12 @@ def findings(
         Finding(
             int(channel),
             int(channel % P),
-            COMPONENTS[channel // P],
-            WHY[kinds[channel]],
+            COMPONENTS[int(channel) // P],
+            WHY[int(kinds[channel])],
             float(since[channel]),
-            _figure(WHY[kinds[channel]], *figures[channel].tolist(), P),
+            _figure(
+                WHY[int(kinds[channel])], float(figures[channel, 0]), float(figures[channel, 1]), P
+            ),
             bool(kept[channel]),
         )
         for channel in np.flatnonzero(kinds)[:_MOST]

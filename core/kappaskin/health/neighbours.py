@@ -84,7 +84,7 @@ class Neighbours:
         W = np.linalg.solve(S, beside)
         own = np.diag(_covariance(np.zeros(2)))
         self.weights[elements] = W.swapaxes(1, 2)
-        self.spread[elements] = np.maximum(own - np.vecdot(W, beside, axis=1), 0.0)
+        self.spread[elements] = np.maximum(own - np.sum(W * beside, axis=1), 0.0)
 
     def told(self, readings: Array, elements: Indices) -> tuple[Array, Array]:
         """What `elements` (E,) should read and the mean square around them, (T, 3, E) each.
@@ -93,6 +93,6 @@ class Neighbours:
         """
         around = readings.T[self.channels[elements]]  # (E, 3 k, T)
         told = np.matmul(self.weights[elements], around)
-        power = np.vecdot(around, around, axis=1) / max(around.shape[1], 1)
+        power = np.einsum("ert,ert->et", around, around) / max(around.shape[1], 1)
         spread = self.spread[elements][:, :, None] * power[:, None]
         return told.transpose(2, 1, 0), spread.transpose(2, 1, 0)

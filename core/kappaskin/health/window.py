@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -42,7 +43,9 @@ class Window:
         self._chain = sensor.transduction
         self._rest = float(self._chain.curvature(np.zeros(1, np.int32))[0])
         self._long = _LONG * max(1.0, sensor.channels / _AT_ONCE)
-        self._counts = np.empty((_MOST, sensor.channels), np.float32)  # exact up to 24 bits
+        # Typed as float64: in float32 counts are exact up to 24 bits.
+        counts = np.empty((_MOST, sensor.channels), np.float32)
+        self._counts = cast("Array", counts)
         self._taken, self._begun, self._due = 0, -math.inf, -math.inf
 
     def __call__(self, frame: Frame) -> Look | None:
