@@ -61,6 +61,9 @@ from kappaskin.frames import LocalGeometry as LocalGeometry
 from kappaskin.frames import Touch as Touch
 from kappaskin.frames import Truth as Truth
 from kappaskin.geometry import local_geometry as local_geometry
+from kappaskin.health import Finding as Finding
+from kappaskin.health import Health as Health
+from kappaskin.health import Monitor as Monitor
 from kappaskin.intrinsic import ForceTorqueSensor as ForceTorqueSensor
 from kappaskin.intrinsic import IntrinsicContact as IntrinsicContact
 from kappaskin.intrinsic import IntrinsicTouch as IntrinsicTouch
@@ -80,6 +83,10 @@ from kappaskin.patch import Patch as Patch
 from kappaskin.patch import Polygon as Polygon
 from kappaskin.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline import Setup as Setup
+from kappaskin.press import Phase as Phase
+from kappaskin.press import PressTest as PressTest
+from kappaskin.press import Verdict as Verdict
+from kappaskin.press import elements_to_press as elements_to_press
 from kappaskin.region import Bargain as Bargain
 from kappaskin.region import Region as Region
 from kappaskin.region import Scanner as Scanner

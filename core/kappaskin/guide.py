@@ -35,7 +35,7 @@ Ask = Callable[[str], str]
 
 
 @dataclass
-class _Virtual:
+class Virtual:
     """A clock that whoever sleeps by it moves: a simulation need not be waited for."""
 
     now: float = 0.0
@@ -53,12 +53,12 @@ def _steps(sensor: Sensor, radii: tuple[float, ...] | None, hold: float) -> tupl
 
 def _simulated(name: str, radii: tuple[float, ...] | None, hold: float, dwell: float) -> Source:
     """The scene called `name`, laid on the cylinders as fast as it can be computed."""
-    clock, scene = _Virtual(), load_scene(name)
+    clock, scene = Virtual(), load_scene(name)
     laid = Presentation(_steps(scene.sensor(), radii, hold), dwell)
     return SimulatedSource(scene.laid_on(laid), clock, clock.sleep)
 
 
-class _Listener:
+class Listener:
     """The frames of one device, as nominal curvature."""
 
     def __init__(self, source: Source) -> None:
@@ -100,7 +100,7 @@ def _keep(kept: list[Frame], frame: Frame, seconds: float) -> None:
         kept.append(frame)
 
 
-def _follow(listener: _Listener, procedure: Procedure, laid: Presentation, tell: Tell) -> None:
+def _follow(listener: Listener, procedure: Procedure, laid: Presentation, tell: Tell) -> None:
     """Take the steps as they are presented, by the device's own clock."""
     kept: list[Frame] = []
     while not procedure.done:
@@ -121,7 +121,7 @@ def _follow(listener: _Listener, procedure: Procedure, laid: Presentation, tell:
                 _keep(kept, frame, max(laid.dwell, step.hold))
 
 
-def _recorded(listener: _Listener, seconds: float) -> list[Frame]:
+def _recorded(listener: Listener, seconds: float) -> list[Frame]:
     """The frames of the next `seconds`: what came before was read while the skin was moved."""
     begun = now = time.monotonic()
     kept: list[Frame] = []
@@ -139,7 +139,7 @@ def _prompt(step: Step, total: int, again: bool) -> str:
     return f"{step.number}/{total}  {step}: {then}{redo}: "
 
 
-def _guide(listener: _Listener, procedure: Procedure, seconds: float, ask: Ask, tell: Tell) -> None:
+def _guide(listener: Listener, procedure: Procedure, seconds: float, ask: Ask, tell: Tell) -> None:
     """Ask for each step and take it, until all are done."""
     tell(ADVICE)
     while step := procedure.step:
@@ -180,7 +180,7 @@ def take_sweep(
     else:
         source = open_source(name)
     with closing(source):
-        listener = _Listener(source)
+        listener = Listener(source)
         steps = _steps(listener.sensor, radii, hold)
         procedure = Procedure(listener.sensor, steps)
         if dwell is None:

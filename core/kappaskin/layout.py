@@ -103,6 +103,11 @@ class SensorLayout:
         live[:, dead] = False
         return replace(self, live=live)
 
+    @property
+    def lacking(self) -> Mask:
+        """The channels (3, P) that are dead, of those that there are on this patch."""
+        return _channels(self.patch, len(self)) & ~self.live
+
     def __len__(self) -> int:
         return len(self.positions)
 

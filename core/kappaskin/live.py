@@ -12,7 +12,8 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from kappaskin.errors import Refusal, SourceError
-from kappaskin.frames import Event
+from kappaskin.frames import Event, Frame
+from kappaskin.health import Health, Monitor
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.region import Region
 from kappaskin.ring import Ring, slot_type
@@ -46,7 +47,8 @@ class Status:
     of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
     `playing` tells where a simulated scene is at a device time. `events` are the last of those that
     `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
-    tells of those taken, `drift` is that since the tare of the `setup`, None without one.
+    tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
+    tells which channels are not to be trusted.
     """
 
     state: str = OFF
@@ -73,6 +75,7 @@ class Status:
     temperature: float = math.nan
     tare: TareNews = field(default_factory=TareNews)
     drift: Drift | None = None
+    health: Health = field(default_factory=Health)
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status once `events` happened."""
@@ -113,6 +116,9 @@ class Loop:
         self._requests, self._ring = requests, ring
         self._source: Source | None = None
         self._pipeline: Pipeline | None = None
+        self._monitor: Monitor | None = None
+        self._place = np.full(2, math.nan)  # of the last contact, in m
+        self._spoilt: object = None  # by what, in a simulated scene
         self._status = ring.read_status() or Status()
         self._asked = self._status.setup
         self._steering: Steering | Following | None = None
@@ -176,6 +182,7 @@ class Loop:
                 last_frame=-math.inf,
                 temperature=math.nan,
                 drift=None,
+                health=Health(),
             )
             if isinstance(request, Connect):
                 self._open(request.source)
@@ -201,9 +208,17 @@ class Loop:
         self._report()  # another skin may take a while
         try:
             self._source.play(scene)
+            self._spoil(scene)
         except Refusal as refusal:
             message = str(refusal)
         self._status = replace(self._status, message=message, computing=building)
+
+    def _spoil(self, scene: Scene) -> None:
+        """Begin to watch anew where other effects are simulated: they may shift every channel."""
+        spoilt = (scene.effects, scene.choice, scene.seed)
+        if spoilt != self._spoilt and self._monitor is not None:
+            self._monitor.begin_anew()
+        self._spoilt = spoilt
 
     def _steer(self) -> None:
         """Let the source scan the region asked for, or say why it does not."""
@@ -220,7 +235,7 @@ class Loop:
         if self._source is not None:
             self._source.close()
         self._source, self._pipeline, self._building = None, None, None
-        self._steering = None
+        self._steering = self._monitor = None
         self._gaps.clear()
         self._times.clear()
         self._last_read = self._again = math.inf
@@ -257,6 +272,8 @@ class Loop:
             return
         if self._pipeline is not None:
             pipeline.go_on_from(self._pipeline)
+        if self._monitor is not None:
+            pipeline.leave_out(self._monitor.kinds, self._monitor.badness)
         self._pipeline = pipeline
         self._status = replace(
             self._status, setup=pipeline.setup, generation=pipeline.generation, slot=slot
@@ -284,6 +301,7 @@ class Loop:
             if frame.host_time > self._last_read:
                 self._gaps.append(frame.host_time - self._last_read)
             self._last_read = frame.host_time
+            self._watch(frame)
         if self._pipeline is None:
             return
         late = max(0, len(frames) - _LIVE)
@@ -296,6 +314,7 @@ class Loop:
             self._ring.write(estimate)
             self._taking.receive(estimate)
             self._times.append(frame.host_time)
+            self._place = estimate.touch.position
             if self._steering is not None:
                 self._steering(estimate.touch, self._pipeline.fit)
 
@@ -315,10 +334,30 @@ class Loop:
         if state != was.state or events or not told:
             self._report()
 
+    def _watch(self, frame: Frame) -> None:
+        """Look after the health of the channels, and leave out of the fit which are not well."""
+        monitor = self._monitor
+        if monitor is not None and monitor(frame) and self._pipeline is not None:
+            self._pipeline.leave_out(monitor.kinds, monitor.badness)
+
+    def _health(self) -> Health:
+        if self._monitor is None or self._pipeline is None:
+            return Health()
+        out, kinds = self._pipeline.left_out, self._monitor.kinds
+        kept = out.kept.ravel()
+        return Health(
+            self._monitor.findings(kept),
+            int(np.count_nonzero(kinds)),
+            int(np.count_nonzero(kept)),
+            out.cost,
+            out.cost_at(self._place),
+        )
+
     def _meet(self, sensor: Sensor | None) -> None:
         """A device said what it is: make the pipeline for it."""
         self._taking.give_up("another device answered, or the same one anew; tare again")
         self._pipeline = None
+        self._monitor = None if sensor is None else Monitor(sensor)
         self._status = replace(
             self._status,
             sensor=sensor,
@@ -347,6 +386,7 @@ class Loop:
                 playing=source.playing
                 if isinstance(source, SimulatedSource)
                 else FROM_THE_BEGINNING,
+                health=self._health(),
             )
         self._status = replace(status, reported=now, tare=self._taking.news)
         self._ring.write_status(self._status)

@@ -4,9 +4,10 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, Tare
@@ -14,6 +15,7 @@ from kappaskin.errors import RankDeficient
 from kappaskin.fit import METHODS, RIM_SD, Fit, estimator_for
 from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.geometry import contact_geometry
+from kappaskin.health import LeftOut, leave_out
 from kappaskin.hold import Hold
 from kappaskin.sensor import Sensor
 from kappaskin.taring import DriftWatch, Rest
@@ -86,10 +88,20 @@ class Pipeline:
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
-        self._none_suspect = np.zeros(len(layout), np.uint8)
+        self.left_out = LeftOut.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
         self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
+
+    def _ideal(self) -> Fit:
+        """The fit to a skin at rest of which no channel is dead."""
+        layout = self.sensor.layout
+        if layout.lacking.any():
+            whole = replace(layout, live=layout.live | layout.lacking)
+            setup = self.setup
+            estimator = estimator_for(setup.method, self.basis, whole, rim_sd=setup.rim_sd)
+            return estimator.at_rest()
+        return self._whole
 
     def _corrector(self, calibration: Calibration | None) -> Corrector | None:
         if calibration is None:
@@ -134,6 +146,13 @@ class Pipeline:
             zero = np.nan_to_num(calibration.offset)
         return Rest(zero, 0 * zero if correct is None else correct.remanence(), tare)
 
+    def leave_out(self, kinds: NDArray[np.uint8], badness: Array) -> None:
+        """Fit from now on without the channels of any of these `kinds` (C,), as many as it can.
+
+        Numbers in `WHY`, 0 for a good channel; with the worst by `badness` (C,) goes the first.
+        """
+        self.left_out = leave_out(self.left_out, self.fit, kinds, badness, self._loosest)
+
     def _followed(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         times = np.full(curvature.size, np.nan)
         times[frame.channels] = frame.device_time + self._read_at[: len(frame.channels)]
@@ -151,8 +170,9 @@ class Pipeline:
         nominal = self.sensor.nominal(frame)
         scanned = self._corrected(nominal, frame.device_time)
         curvature, fresh = self.past.hold(frame, scanned)
+        out = self.left_out
         began = time.perf_counter()
-        fit = self._fitted(frame, scanned, curvature)
+        fit = self._fitted(frame, out(scanned), out(curvature))
         fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
@@ -174,7 +194,7 @@ class Pipeline:
             fit.coefficients,
             surface,
             noise,
-            self._none_suspect if fit.suspect is None else fit.suspect,
+            out.words(fit.suspect),
             bool(fit.converged),
             fit_time,
             touch,
@@ -201,7 +221,8 @@ class Pipeline:
         held, _ = self.past.hold(frame, curvature)
         if self.fit.remembers:
             with suppress(RankDeficient):
-                self._followed(frame, curvature, held)
+                out = self.left_out
+                self._followed(frame, out(curvature), out(held))
 
     def _compared(
         self, surface: Array, coefficients: Array, truth: Truth | None

@@ -99,6 +99,22 @@ def test_a_simulated_scene_gives_estimates_with_the_truth_beside_them(engine) ->
     assert (status.source, status.message, status.refusal) == ("sim:centre", "", "")
 
 
+def test_failing_channels_are_told_with_what_leaving_them_out_costs(engine) -> None:
+    engine.connect("sim:failing-elements")
+    assert wait_for(lambda: {f.element for f in engine.status().health.findings} >= {44, 45, 63})
+    status = engine.status()
+    estimate = engine.latest(status)
+    assert 1.03 < status.health.cost < 1.2
+    assert status.health.contact_cost > 1.0
+    assert status.health.kept == 0
+    assert "channels left out, error bars +" in str(status.health)
+    assert (estimate.suspect[[44, 45, 63]] > 0).all()
+    engine.connect("sim:circle")
+    state(engine, STREAMING)
+    assert wait_for(lambda: engine.status().health.count == 0)
+    assert engine.status().health.cost == 1.0
+
+
 def test_frames_are_counted_and_timed(engine) -> None:
     engine.connect("sim:")
     next_estimate(engine)

@@ -174,9 +174,13 @@ class Estimator(ABC):
         """
         return self(held)
 
-    def at_rest(self) -> Fit:
-        """The fit to a skin at rest, of which every reading is there."""
-        return self(np.zeros((3, len(self.layout))))
+    def at_rest(self, missing: Mask | None = None) -> Fit:
+        """The fit to a skin at rest, of which only the readings `missing` (3, P) are not there."""
+        return self(self._rest(missing))
+
+    def _rest(self, missing: Mask | None) -> Array:
+        rest = np.zeros((3, len(self.layout)))
+        return rest if missing is None else np.where(missing, np.nan, rest)
 
     @abstractmethod
     def _fit(self, flat: Array, used: Mask) -> Fit:

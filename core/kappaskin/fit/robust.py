@@ -36,7 +36,7 @@ _ENOUGH = 6  # of them: with fewer, any suspect may be a spike
 _OFTEN = 0.3  # of the frames: a suspect of fewer has spikes
 _CROSSED = 0.2  # of the squares left when two elements are swapped back
 
-WHY = ("", "spike", "stuck", "noisy", "swapped", "offset")
+WHY = ("", "spike", "stuck", "noisy", "swapped", "offset", "dead", "saturated", "drifting")
 """Why an element is left out of a fit, by number; the first of them that it is not."""
 
 
@@ -144,11 +144,11 @@ class Robust(Estimator):
         except RankDeficient as error:
             raise RankDeficient(f"frame {number}: {error}") from error
 
-    def at_rest(self) -> Fit:
+    def at_rest(self, missing: Mask | None = None) -> Fit:
         """The fit to a skin at rest, which is no frame of the past."""
         past, self._history = self._history, _History()
         try:
-            return super().at_rest()
+            return super().at_rest(missing)
         finally:
             self._history = past
 

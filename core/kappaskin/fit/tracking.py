@@ -85,11 +85,11 @@ class Tracking(Estimator):
         self._left = np.full(self._A.shape[0], np.nan)
         self._read = np.full(self._A.shape[0], -math.inf)
 
-    def at_rest(self) -> Fit:
+    def at_rest(self, missing: Mask | None = None) -> Fit:
         """The fit to a skin at rest by which nothing is remembered."""
         fresh = copy(self)
         fresh.restart()
-        return fresh(np.zeros((3, len(self.layout))))
+        return fresh(self._rest(missing))
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Take in the next frame (3, P) or T of them (T, 3, P), read 6 ms after each other."""

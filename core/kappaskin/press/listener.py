@@ -1,0 +1,95 @@
+"""Readings of a skin that is pressed and let go to what they changed by at the most."""
+
+import math
+from collections import deque
+from enum import Enum
+
+import numpy as np
+
+from kappaskin.frames import Array
+
+_OFTEN = 0.005  # s between two readings that are kept
+_STILL = 0.4  # s without motion are a rest
+_LATELY = 0.1  # s that are averaged to see a press
+_WHOLE = 0.8  # of that, at least, between the first reading kept and the last
+_FEWEST = 4  # readings of either
+_CLEAR = 8.0  # standard deviations that a press stands out by
+_MOVING = 6.0  # the same, that a skin at rest may move by
+_OVER = 0.25  # of its peak: less is left when a press is over
+
+
+class Phase(Enum):
+    """What is waited for."""
+
+    REST = "rest"
+    PRESS = "press"
+    RELEASE = "release"
+
+
+class Listener:
+    """What C channels answer to one press: their change `peak` (C,) in 1/m when it was hardest.
+
+    The change is that from the rest before it. `phase` says what is waited for: a rest, a press,
+    the end of it; after that `peak` is no longer None. Whatever the readings are, nothing here asks
+    where their channels are.
+    """
+
+    def __init__(self, channels: int, resolution: float) -> None:
+        """Readings of `channels` that come in steps of `resolution` in 1/m: never less noise."""
+        self.phase = Phase.REST
+        self.peak: Array | None = None
+        self._held = np.full(channels, np.nan)
+        self._kept: deque[tuple[float, Array]] = deque()
+        self._rest, self._noise, self._least = np.zeros(channels), math.nan, resolution
+        self._hardest, self._most = np.zeros(channels), 0.0
+
+    def __call__(self, time: float, readings: Array) -> None:
+        """Take in `readings` (C,) in 1/m at `time` in s, NaN where one is missing."""
+        if self._kept and time < self._kept[-1][0]:  # a device that began anew
+            self._kept.clear()
+        # A reading that is missing now, as on a rail, is taken for the last one there was.
+        self._held = np.where(np.isnan(readings), self._held, readings)
+        if self._kept and time - self._kept[-1][0] < _OFTEN:
+            return
+        self._kept.append((time, self._held))
+        while time - self._kept[0][0] > _STILL:
+            self._kept.popleft()
+        if self.phase is Phase.REST:
+            self._settle(time)
+        elif self.peak is None:
+            self._follow(time)
+
+    def _since(self, time: float) -> Array:
+        return np.array([reading for when, reading in self._kept if when >= time])
+
+    def _settle(self, time: float) -> None:
+        """Call it a rest once nothing has moved for a while."""
+        kept = self._since(-math.inf)
+        if len(kept) < 2 * _FEWEST or time - self._kept[0][0] < _WHOLE * _STILL:
+            return
+        steps = np.diff(kept, axis=0)
+        noise = np.sqrt(np.mean(steps**2, axis=0) / 2)
+        self._noise = max(float(np.median(noise[~np.isnan(noise)])), self._least)
+        half = len(kept) // 2
+        moved = np.nan_to_num(np.abs(kept[half:].mean(axis=0) - kept[:half].mean(axis=0)))
+        if moved.max() <= _MOVING * self._noise * 2 / math.sqrt(len(kept)):
+            self._rest, self.phase = kept.mean(axis=0), Phase.PRESS
+
+    def _follow(self, time: float) -> None:
+        lately = self._since(time - _LATELY)
+        if len(lately) < _FEWEST:
+            return
+        change = np.nan_to_num(lately.mean(axis=0) - self._rest)
+        most = float(np.abs(change).max())
+        clear = most > _CLEAR * self._noise / math.sqrt(len(lately))
+        if clear and change.max() == most:
+            # Where it changed most it bulges: it was pressed already when it was called at rest.
+            self.phase, self._hardest, self._most = Phase.REST, 0 * change, 0.0
+            self._kept.clear()
+            return
+        if most > self._most:
+            self._hardest, self._most = change, most
+        if self.phase is Phase.PRESS and clear:
+            self.phase = Phase.RELEASE
+        elif self.phase is Phase.RELEASE and most < _OVER * self._most:
+            self.peak = self._hardest

@@ -1,0 +1,299 @@
+"""Channels that fail: found in time, named rightly, told with their figures, and trusted again."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from kappaskin import (
+    SCENES,
+    WHY,
+    Frame,
+    GaussianLoad,
+    GaussianNoise,
+    Monitor,
+    Orbit,
+    Patch,
+    Plate,
+    Scene,
+    SensorLayout,
+    Simulator,
+    Stimulus,
+    load_scene,
+)
+
+ROUND = load_scene("circle")
+TO_COUNTS = 1 / ROUND.transduction.resolution
+RATE = 128.0  # frames/s: as many as are looked at twice over
+
+
+@cache
+def frames_of(name: str, seconds: float) -> list[Frame]:
+    """Frames of a ready scene, a few times fewer than it has."""
+    scene = load_scene(name)
+    simulator, step = Simulator(scene), max(1, int(scene.rate / RATE))
+    return [
+        simulator.scanned(scene.sensor().scan(), n, n / scene.rate, lambda n=n: n / scene.rate)
+        for n in range(0, int(seconds * scene.rate), step)
+    ]
+
+
+def watched(frames, spoil=None, sensor=None):
+    """What a monitor says of frames that `spoil` changed: (time, kinds) of each look."""
+    monitor, looks = Monitor(sensor or ROUND.sensor()), []
+    for frame in frames:
+        counts = frame.counts.copy()
+        if spoil is not None:
+            spoil(counts, frame.device_time)
+        if monitor(replace(frame, counts=counts)):
+            looks.append((frame.device_time, monitor.kinds.copy()))
+    return monitor, looks
+
+
+def told(monitor):
+    """What is found: {channel: kind}."""
+    return {f.channel: f.kind for f in monitor.findings(np.zeros(len(monitor.kinds), bool))}
+
+
+def found_at(looks, channels):
+    """When the first look found all of `channels`, and what else was found in any."""
+    channels = list(channels)
+    at = next(time for time, kinds in looks if (kinds[channels] > 0).all())
+    others = set(np.flatnonzero(np.any([kinds > 0 for _, kinds in looks], axis=0)))
+    return at, others - set(channels)
+
+
+def swap(a, b):
+    def spoil(counts, time):
+        counts[[*a, *b]] = counts[[*b, *a]]
+
+    return spoil
+
+
+def of(element):
+    return [element, 100 + element, 200 + element]
+
+
+def hold(channels, value):
+    def spoil(counts, time):
+        counts[channels] = np.rint(value * TO_COUNTS)
+
+    return spoil
+
+
+def test_a_dead_element_is_found_once_the_load_comes_by() -> None:
+    monitor, looks = watched(frames_of("circle", 8), hold(of(65), 0.0))
+
+    at, others = found_at(looks, [65, 165])
+
+    assert at <= 6.0
+    assert others <= {265}
+    assert {told(monitor)[c] for c in (65, 165)} == {"dead"}
+
+
+def test_a_stuck_channel_is_found_by_itself() -> None:
+    monitor, looks = watched(frames_of("circle", 8), hold([57], 1.7))
+
+    at, others = found_at(looks, [57])
+
+    assert at <= 6.0
+    assert not others
+    (finding,) = monitor.findings(np.zeros(300, bool))
+    assert (finding.kind, finding.element, finding.component) == ("stuck", 57, "xx")
+    assert finding.figure.startswith("reads +1.70 1/m while those around it tell of ")
+
+
+def test_a_noisy_channel_is_found_in_two_seconds() -> None:
+    rng = np.random.default_rng(0)
+
+    def spoil(counts, time):
+        counts[142] += int(rng.normal(0, 1.5 * TO_COUNTS))
+
+    monitor, looks = watched(frames_of("circle", 4), spoil)
+
+    at, others = found_at(looks, [142])
+
+    assert at <= 2.0
+    assert not others
+    assert told(monitor) == {142: "noisy"}
+
+
+@pytest.mark.parametrize(("name", "most"), [("circle", 1.5), ("centre", 1.1)])
+def test_a_channel_that_drifts_is_found_sooner_where_little_moves(name, most) -> None:
+    def spoil(counts, time):
+        counts[12] += int(0.1 * time * TO_COUNTS)
+
+    monitor, looks = watched(frames_of(name, 16), spoil)
+
+    at, others = found_at(looks, [12])
+
+    assert 0.1 * at <= most  # 1/m
+    assert not others
+    assert told(monitor) == {12: "drifting"}
+
+
+@pytest.mark.parametrize("pair", [(57, 54), (33, 66), (25, 75)])
+def test_swapped_elements_are_found_with_their_partners(pair) -> None:
+    a, b = pair
+    monitor, looks = watched(frames_of("circle", 12), swap(of(a), of(b)))
+
+    at, others = found_at(looks, [a, b, 100 + a, 100 + b])
+
+    assert at <= 8.0
+    assert others <= {200 + a, 200 + b}
+    kinds = told(monitor)
+    assert {kinds[c] for c in (a, b, 100 + a, 100 + b)} == {"swapped"}
+    figures = {f.channel: f.figure for f in monitor.findings(np.zeros(300, bool))}
+    assert figures[a] == f"reads what xx of element {b} should"
+
+
+def test_of_elements_beside_each_other_that_are_swapped_what_differs_is_found() -> None:
+    monitor, looks = watched(frames_of("circle", 12), swap(of(44), of(45)))
+
+    at, others = found_at(looks, [44, 45])
+
+    assert at <= 4.0
+    assert others <= set(of(44) + of(45))
+    assert {told(monitor)[c] for c in (44, 45)} == {"swapped"}
+
+
+def test_two_components_of_an_element_that_are_swapped_are_found() -> None:
+    monitor, looks = watched(frames_of("circle", 12), swap([57], [157]))
+
+    _, others = found_at(looks, [57, 157])
+
+    assert not others
+    assert told(monitor) == {57: "swapped", 157: "swapped"}
+
+
+def test_a_channel_torn_off_to_a_rail_is_dead() -> None:
+    low, high = ROUND.transduction.limits
+
+    def spoil(counts, time):
+        counts[[5, 177]] = low, high
+
+    monitor, looks = watched(frames_of("circle", 3), spoil)
+
+    assert found_at(looks, [5, 177]) == (pytest.approx(1.0, abs=0.6), set())
+    assert told(monitor) == {5: "dead", 177: "dead"}
+
+
+def test_elements_bent_too_far_are_saturated_while_they_are() -> None:
+    scene = load_scene("saturation")
+    _, looks = watched(frames_of("saturation", 5), None, scene.sensor())
+
+    kinds = np.array([kinds for _, kinds in looks])
+
+    assert set(np.unique(kinds)) == {0, WHY.index("saturated")}
+    assert (kinds.max(axis=0) > 0).reshape(3, 100)[0, [44, 45, 54, 55]].all()
+    assert not kinds[-1].any()
+
+
+def test_the_failing_scene_is_told_as_it_was_written() -> None:
+    scene = load_scene("failing-elements")
+    monitor, _ = watched(frames_of("failing-elements", 12), None, scene.sensor())
+
+    kinds = told(monitor)
+
+    assert {kinds[c] for c in (44, 144, 244, 45, 145, 245)} == {"dead"}
+    assert {kinds[c] for c in (27, 63, 127, 163)} == {"stuck"}
+    assert {kinds[c] for c in (55, 155)} == {"noisy"}
+    assert not {c % 100 for c in kinds} - {44, 45, 27, 63, 55}
+
+
+def test_nothing_that_stands_still_on_a_skin_at_rest_is_called_dead() -> None:
+    scene = replace(load_scene("creep-hold").touched_by(), effects=())
+    simulator = Simulator(scene)
+    still = [simulator.frame(n, lambda: 0.0) for n in range(0, 4000, 4)]
+
+    monitor, _ = watched(still, hold([3, 50], 2.0), scene.sensor())
+
+    assert not monitor.kinds.any()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "until"),
+    [
+        (hold(of(65), 0.0), "dead"),
+        (swap([57, 157], [54, 154]), "swapped"),
+        (
+            lambda counts, time: counts.__setitem__(20, counts[20] + 3000 * (int(time * 99) % 2)),
+            "noisy",
+        ),
+        (lambda counts, time: counts.__setitem__(33, counts[33] + 5000), "offset"),
+    ],
+)
+def test_a_channel_that_recovers_is_trusted_again_in_two_turns_of_the_load(spoil, until) -> None:
+    def for_a_while(counts, time):
+        if 1.0 <= time < 9.0:
+            spoil(counts, time)
+
+    _, looks = watched(frames_of("circle", 22), for_a_while)
+
+    bad = np.array([kinds for time, kinds in looks if 7.0 < time < 9.0])
+    assert WHY.index(until) in bad
+    assert not looks[-1][1].any()
+
+
+@pytest.mark.parametrize("name", [n for n in SCENES if n not in ("failing-elements", "saturation")])
+def test_no_healthy_scene_has_a_finding(name) -> None:
+    scene = load_scene(name)
+    seconds = 8.0 if scene.indenter else 16.0
+
+    _, looks = watched(frames_of(name, seconds), None, scene.sensor())
+
+    assert not any(kinds.any() for _, kinds in looks)
+    assert len(looks) >= 2 * seconds
+
+
+def test_what_the_device_calls_dead_is_told_at_once_and_on_a_strip_no_more_than_that() -> None:
+    scene = load_scene("fingertip")
+    sensor = replace(scene, layout=scene.layout.without([4])).sensor()
+
+    monitor, _ = watched(frames_of("fingertip", 1), None, sensor)
+
+    (finding,) = monitor.findings(np.zeros(30, bool))
+    assert (finding.channel, finding.kind, finding.figure) == (4, "dead", "the device says so")
+
+
+def test_frames_that_hold_a_tenth_of_the_channels_in_turn_are_enough() -> None:
+    parts = np.arange(300).reshape(10, 30)
+
+    def part_of(frame, n):
+        return replace(frame, channels=parts[n % 10], counts=frame.counts[parts[n % 10]])
+
+    fine = replace(ROUND, rate=500.0)
+    simulator = Simulator(fine)
+    frames = (simulator.frame(n, lambda: 0.0) for n in range(6000))
+    frames = [replace(f, counts=np.where(f.channels == 57, 1500, f.counts)) for f in frames]
+
+    monitor, _ = watched([part_of(f, n) for n, f in enumerate(frames)])
+
+    assert told(monitor) == {57: "stuck"}
+
+
+def test_a_clock_that_goes_back_begins_anew() -> None:
+    frames = frames_of("circle", 8)
+    monitor, _ = watched(frames, hold([57], 1.7))
+    assert monitor.kinds.any()
+
+    assert not monitor(frames[0])
+
+    assert not monitor.kinds.any()
+
+
+def test_one_element_or_two_are_watched_without_neighbours_to_ask() -> None:
+    patch = Patch(0.1, 0.1)
+    for m in (1, 2):
+        scene = Scene(
+            "few",
+            Plate(patch),
+            SensorLayout.regular(patch, m, 1),
+            (Stimulus(GaussianLoad(0.05, 0.05, 0.006, 0.1), Orbit(0.02, 4.0)),),
+            (GaussianNoise(0.1),),
+        )
+        simulator = Simulator(scene)
+        frames = [simulator.frame(n, lambda: 0.0) for n in range(0, 2000, 4)]
+        monitor, _ = watched(frames, None, scene.sensor())
+        assert not monitor.kinds.any()
