@@ -119,7 +119,7 @@ class Loop:
         self._monitor: Monitor | None = None
         self._place = np.full(2, math.nan)  # of the last contact, in m
         self._spoilt: object = None  # by what, in a simulated scene
-        self._status = ring.read_status() or Status()
+        self._status: Status = ring.read_status() or Status()
         self._asked = self._status.setup
         self._steering: Steering | Following | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.

@@ -13,7 +13,7 @@ from kappaskin.sources.asking import Asking, name_of
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.line import BAUD_RATES, Line
-from kappaskin.sources.wire import VERSION, FromDevice, Information, Reply, Samples
+from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
 _SHOWN = 0.1  # s between two samples that are shown: nobody reads 500 lines a second
 _PATIENCE = 3.0  # s of silence, after which the usual causes are named
@@ -49,7 +49,8 @@ class Monitor:
             self._heard = now
             for message in self._decoder.feed(data):
                 self._good_at = now
-                said += [*self._gap(message.sequence), *self._words(message, now)]
+                said += self._gap(message.sequence)
+                said += [] if isinstance(message, Command) else self._words(message, now)
             said += self._changes(self.accounting())
         self._asking.attend(self._clock())
         said += self._hints(self._clock())

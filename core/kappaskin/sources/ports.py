@@ -92,9 +92,9 @@ def _keep_lines(port: serial.SerialBase) -> None:
     import termios
 
     with suppress(termios.error, OSError):
-        attributes = termios.tcgetattr(port.fd)
+        attributes = termios.tcgetattr(port.fileno())
         attributes[2] &= ~termios.HUPCL
-        termios.tcsetattr(port.fd, termios.TCSANOW, attributes)
+        termios.tcsetattr(port.fileno(), termios.TCSANOW, attributes)
 
 
 def _why_not(url: str, error: Exception) -> str:

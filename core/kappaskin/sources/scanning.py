@@ -112,5 +112,5 @@ def in_few_runs(channels: NDArray[np.intp]) -> NDArray[np.intp]:
     if np.count_nonzero(gaps > 1) < MOST_RUNS:
         return upwards
     breaks = np.sort(np.argsort(gaps, kind="stable")[1 - MOST_RUNS :])
-    ends = pairwise([-1, *breaks, len(upwards) - 1])
+    ends = pairwise([-1, *breaks.tolist(), len(upwards) - 1])
     return np.concatenate([np.arange(upwards[a + 1], upwards[b] + 1) for a, b in ends])

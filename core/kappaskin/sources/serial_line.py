@@ -18,7 +18,14 @@ from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.line import BAUD_RATES, Line
 from kappaskin.sources.ports import holders, port_called, serial_ports
 from kappaskin.sources.scanning import Scanning
-from kappaskin.sources.wire import VERSION, FromDevice, Information, Reply, Samples
+from kappaskin.sources.wire import (
+    VERSION,
+    Command,
+    FromDevice,
+    Information,
+    Reply,
+    Samples,
+)
 
 _PATIENCE = 3.0  # s that a device may say nothing, or not what it is
 _DWELL = 0.8  # s of bytes that mean nothing, after which another baud rate is tried
@@ -136,7 +143,7 @@ class SerialSource:
         for now, data in line.take(0.0 if gone or self._usable() else timeout):
             messages = self._decoder.feed(data)
             self._heard = now
-            self._pending += [(now, message) for message in messages]
+            self._pending += [(now, got) for got in messages if not isinstance(got, Command)]
             if messages:
                 self._good_at = now
                 self._tell_rate(line)
@@ -245,8 +252,9 @@ class SerialSource:
     def _upsets(self, message: FromDevice) -> bool:
         if isinstance(message, Information):
             return message.text != self._text
-        unknown = isinstance(message, Samples) and self._sensor is not None
-        return unknown and _highest(message) >= self._sensor.channels
+        if not isinstance(message, Samples) or self._sensor is None:
+            return False
+        return _highest(message) >= self._sensor.channels
 
     def _take(self, reply: Reply, now: float) -> None:
         before = self._asking.refusal

@@ -185,7 +185,8 @@ def read_reply(sequence: int, time: float, payload: bytes) -> Reply | None:
     """The reply in `payload`, None when it is too short for one."""
     if len(payload) < _REPLY.size:
         return None
-    return Reply(sequence, time, *_REPLY.unpack_from(payload), payload[_REPLY.size :])
+    command, operation, fault = _REPLY.unpack_from(payload)
+    return Reply(sequence, time, command, operation, fault, payload[_REPLY.size :])
 
 
 def read_information(sequence: int, time: float, payload: bytes) -> Information | None:
