@@ -112,5 +112,6 @@ def in_few_runs(channels: NDArray[np.intp]) -> NDArray[np.intp]:
     if np.count_nonzero(gaps > 1) < MOST_RUNS:
         return upwards
     breaks = np.sort(np.argsort(gaps, kind="stable")[1 - MOST_RUNS :])
-    ends = pairwise([-1, *breaks.tolist(), len(upwards) - 1])
-    return np.concatenate([np.arange(upwards[a + 1], upwards[b] + 1) for a, b in ends])
+    ends = pairwise([-1, *map(int, breaks), len(upwards) - 1])
+    runs = [np.arange(int(upwards[a + 1]), int(upwards[b]) + 1) for a, b in ends]
+    return np.concatenate(runs)
