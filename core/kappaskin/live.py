@@ -14,6 +14,7 @@ import numpy as np
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.health import Health, Monitor
+from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.region import Region
 from kappaskin.ring import Ring, slot_type
@@ -29,7 +30,6 @@ OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
 
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
-_LIVE = 64  # frames of one read that are computed, the newest: older ones are history
 _AGAIN = 0.5  # s between two tries to open a port
 _EVENTS = 64  # last ones that are told
 _GAPS = 4096  # gaps between reads that the percentile is taken over
@@ -127,7 +127,8 @@ class Loop:
         self._building: Future[_Built] | None = None
         self._taking = TareTaking(self._builder)
         self._gaps: deque[float] = deque(maxlen=_GAPS)
-        self._times: deque[float] = deque(maxlen=1024)
+        self._times: deque[float] = deque(maxlen=_GAPS)
+        self._pace = Pace()
         self._last_read = self._again = math.inf
 
     def run(self) -> None:
@@ -304,11 +305,13 @@ class Loop:
             self._watch(frame)
         if self._pipeline is None:
             return
-        late = max(0, len(frames) - _LIVE)
+        late = len(frames) - self._pace.affordable(len(frames))
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
         for frame in frames[:late]:
             self._pipeline.pass_over(frame)
+            self._times.append(frame.host_time)
+        began = time.monotonic()
         for frame in frames[late:]:
             estimate = self._pipeline(frame)
             self._ring.write(estimate)
@@ -317,6 +320,7 @@ class Loop:
             self._place = estimate.touch.position
             if self._steering is not None:
                 self._steering(estimate.touch, self._pipeline.fit)
+        self._pace.spend(len(frames) - late, time.monotonic() - began)
 
     def _follow(self, source: Source) -> None:
         """Say how the source is doing, and who is on it."""

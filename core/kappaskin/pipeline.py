@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,10 +49,14 @@ class Setup:
 
 @dataclass(frozen=True)
 class _Past:
-    """What a pipeline remembers of earlier frames: where the loops are, and readings it holds."""
+    """What a pipeline remembers of earlier frames: where the loops are, and readings it holds.
+
+    `passed` are frames passed over that are still to be held.
+    """
 
     correct: Corrector | None
     hold: Hold
+    passed: list[Frame] = field(default_factory=list[Frame])
 
 
 class Pipeline:
@@ -169,6 +173,7 @@ class Pipeline:
     def __call__(self, frame: Frame) -> Estimate:
         nominal = self.sensor.nominal(frame)
         scanned = self._corrected(nominal, frame.device_time)
+        self._catch_up(frame)
         curvature, fresh = self.past.hold(frame, scanned)
         out = self.left_out
         began = time.perf_counter()
@@ -217,12 +222,33 @@ class Pipeline:
 
     def pass_over(self, frame: Frame) -> None:
         """Remember the readings of a frame of which nobody waits for the estimate."""
+        if self.past.correct is None and not self.fit.remembers:
+            # Of those, what a later scan of every channel replaces need never be worked out.
+            if self._is_whole(frame):
+                self.past.passed.clear()
+            self.past.passed.append(frame)
+            return
+        self._catch_up(frame)
         curvature = self.curvature(frame)
         held, _ = self.past.hold(frame, curvature)
         if self.fit.remembers:
             with suppress(RankDeficient):
                 out = self.left_out
                 self._followed(frame, out(curvature), out(held))
+
+    def _is_whole(self, frame: Frame) -> bool:
+        channels = self.sensor.channels
+        if len(frame.channels) != channels:
+            return False
+        return bool((np.bincount(frame.channels, minlength=channels) == 1).all())
+
+    def _catch_up(self, frame: Frame) -> None:
+        """Remember the frames passed over, where `frame` does not replace all their readings."""
+        passed = self.past.passed
+        if passed and not self._is_whole(frame):
+            for earlier in passed:
+                self.past.hold(earlier, self.curvature(earlier))
+        passed.clear()
 
     def _compared(
         self, surface: Array, coefficients: Array, truth: Truth | None

@@ -217,6 +217,21 @@ def test_a_frame_passed_over_is_held_all_the_same():
     assert estimate.fresh.sum() == 10
 
 
+@pytest.mark.parametrize("method", ["least-squares", "tracking"])
+def test_frames_passed_over_are_held_in_their_order_whole_or_not(method):
+    setup = Setup(nx=9, ny=9, method=method)
+    passing, computing = Pipeline(SCENE.sensor(), setup), Pipeline(SCENE.sensor(), setup)
+    rng = np.random.default_rng(2)
+    for n in range(40):
+        few = rng.permutation(300)[: rng.integers(1, 301) if n % 5 else 300]
+        frame = replace(only_these(few, 1e-3 * n), counts=rng.integers(-900, 900, len(few), "i4"))
+        wanted = computing(frame)
+        if rng.random() < 0.8:
+            passing.pass_over(frame)
+        else:
+            assert np.array_equal(passing(frame).curvature, wanted.curvature, equal_nan=True)
+
+
 def test_dead_channels_are_never_fresh():
     scene = replace(SCENE, layout=SCENE.layout.without([7]))
 

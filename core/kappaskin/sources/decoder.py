@@ -28,15 +28,22 @@ from kappaskin.sources.wire import (
 FROM_DEVICE = frozenset((Kind.INFORMATION, Kind.SAMPLES, Kind.REPLY))
 FROM_HOST = frozenset((Kind.COMMAND,))
 
+_WHOLE = 0x2144DF1C  # the CRC-32 of any bytes that their own CRC-32 follows
+_SAMPLES = int(Kind.SAMPLES)
+_COUNTS = np.dtype(np.int32)
 _LISTS = 64  # scan lists that are remembered as arrays
 
 
 class _List(NamedTuple):
-    """A list of channels as samples begin with, and how its counts are told."""
+    """The `head` of a samples payload, its channels and how counts are told; `size` of it all."""
 
+    head: bytes
+    size: int
     channels: NDArray[np.intp]
     kind: "np.dtype[np.signedinteger]"
-    size: int
+
+
+_NO_LIST = _List(b"", -1, np.empty(0, np.intp), np.dtype("<i2"))
 
 
 class Decoder:
@@ -45,24 +52,24 @@ class Decoder:
     def __init__(self, kinds: frozenset[Kind] = FROM_DEVICE) -> None:
         self.sequence = Sequence()
         self._kinds = kinds
-        self._buffer = bytearray()
-        self._needed = HEAD
+        self._parts: list[bytes] = []  # joined once they may hold a message, not at every read
+        self._held, self._needed = 0, HEAD
         self._bytes_in = self._bytes_good = 0
         self._discarded: Counter[str] = Counter()
         self._other_version: int | None = None
         self._lists: dict[bytes, _List] = {}
+        self._list = _NO_LIST  # of the last scan
 
     def feed(self, data: bytes) -> list[Message]:
         """The new messages in order, duplicates left out."""
         self._bytes_in += len(data)
-        self._buffer += data
-        end = len(self._buffer)
+        self._parts.append(data)
+        self._held = end = self._held + len(data)
         if end < self._needed:
             return []
-        stream, messages, at = bytes(self._buffer), list[Message](), 0
+        stream, messages, at = b"".join(self._parts), list[Message](), 0
         while at + HEAD <= end:
-            head = HEADER.unpack_from(stream, at)
-            magic, length, check = head[0], head[3], head[6]
+            magic, version, kind, length, sequence, time_us, check = HEADER.unpack_from(stream, at)
             if magic != MAGIC or crc_hqx(stream[at : at + CHECKED], 0) != check or length > LONGEST:
                 at = self._skip(stream, at, "garbage")
                 continue
@@ -70,20 +77,28 @@ class Decoder:
             stop = last + CHECKSUM.size
             if stop > end:
                 break
-            if CHECKSUM.unpack_from(stream, last)[0] != crc32(stream[at:last]):
+            if crc32(stream[at:stop]) != _WHOLE:
                 at = self._skip(stream, at, "checksum")
                 continue
-            message = self._message(head, stream, at + HEAD, last)
-            if isinstance(message, str):
+            if version != VERSION:
+                self._other_version = version
+                message = "version"
+            elif kind not in self._kinds:
+                message = "unknown kind"
+            elif kind == _SAMPLES:
+                message = self._samples(sequence, time_us * 1e-6, stream, at + HEAD, last)
+            else:
+                message = _read(kind, sequence, time_us * 1e-6, stream[at + HEAD : last])
+            if type(message) is str:
                 self._discarded[message] += stop - at
             else:
                 self._bytes_good += stop - at
-                if self.sequence.take(message[0]):
+                if self.sequence.take(sequence):
                     messages.append(message)
             at = stop
         else:
             stop = at + HEAD
-        self._buffer, self._needed = bytearray(stream[at:]), stop - at
+        self._parts, self._held, self._needed = [stream[at:]], end - at, stop - at
         return messages
 
     def _skip(self, stream: bytes, at: int, reason: str) -> int:
@@ -94,39 +109,37 @@ class Decoder:
         self._discarded[reason] += found - at
         return found
 
-    def _message(self, head: tuple[int, ...], stream: bytes, at: int, stop: int) -> Message | str:
-        """What is said from `at` to `stop` under this header, or why it means nothing."""
-        _, version, kind, _, sequence, time_us, _ = head
-        if version != VERSION:
-            self._other_version = version
-            return "version"
-        if kind not in self._kinds:
-            return "unknown kind"
-        if kind == Kind.SAMPLES:
-            return self._samples(sequence, time_us * 1e-6, stream, at, stop) or "content"
-        return _read(kind, sequence, time_us * 1e-6, stream[at:stop]) or "content"
-
     def _samples(
         self, sequence: int, time: float, stream: bytes, at: int, stop: int
-    ) -> Samples | None:
-        if stop - at < 2:
-            return None
-        start = at + 2 + 4 * stream[at + 1]
-        head = stream[at:start]
-        scan = self._lists.get(head) or self._list(head)
-        if scan is None or stop - start != scan.size:
-            return None
-        counts = np.frombuffer(stream, scan.kind, len(scan.channels), start).astype(np.int32)
-        return Samples(sequence, time, scan.channels, counts)
+    ) -> Samples | str:
+        head, size, channels, kind = self._list
+        if stop - at != size or not stream.startswith(head, at):  # seldom: it changes with the scan
+            if not self._take_list(stream, at, stop):
+                return "content"
+            head, size, channels, kind = self._list
+        counts = np.frombuffer(stream, kind, len(channels), at + len(head)).astype(_COUNTS)
+        return Samples(sequence, time, channels, counts)
 
-    def _list(self, head: bytes) -> _List | None:
+    def _take_list(self, stream: bytes, at: int, stop: int) -> bool:
+        """Go over to the list of channels that a payload begins with; whether it is one."""
+        if stop - at < 2:
+            return False
+        head = stream[at : at + 2 + 4 * stream[at + 1]]
+        found = self._lists.get(head) or self._new_list(head)
+        if found is None or found.size != stop - at:
+            return False
+        self._list = found
+        return True
+
+    def _new_list(self, head: bytes) -> _List | None:
         width, channels = head[0], unpack_runs(head[1:])
         if width not in (2, 4) or channels is None:
             return None
         channels.flags.writeable = False  # every scan of this list shares it
         if len(self._lists) == _LISTS:
             self._lists.clear()
-        found = _List(channels, np.dtype(f"<i{width}"), width * len(channels))
+        size = len(head) + width * len(channels)
+        found = _List(head, size, channels, np.dtype(f"<i{width}"))
         self._lists[head] = found
         return found
 
@@ -138,7 +151,7 @@ class Decoder:
             self._bytes_in + overrun,
             self._bytes_good,
             tuple(discarded.items()),
-            len(self._buffer),
+            self._held,
             counts.good,
             counts.accepted,
             counts.duplicate,
@@ -150,14 +163,15 @@ class Decoder:
 
     def line_ended(self) -> None:
         """Count what is buffered as cut off: the rest of it will not come."""
-        if self._buffer:
-            self._discarded["cut off"] += len(self._buffer)
-            self._buffer, self._needed = bytearray(), HEAD
+        if self._held:
+            self._discarded["cut off"] += self._held
+            self._parts, self._held, self._needed = [], 0, HEAD
 
 
-def _read(kind: int, sequence: int, time: float, payload: bytes) -> Message | None:
+def _read(kind: int, sequence: int, time: float, payload: bytes) -> Message | str:
+    """What a payload says, or why it means nothing."""
     if kind == Kind.INFORMATION:
-        return read_information(sequence, time, payload)
+        return read_information(sequence, time, payload) or "content"
     if kind == Kind.REPLY:
-        return read_reply(sequence, time, payload)
-    return read_command(sequence, payload)
+        return read_reply(sequence, time, payload) or "content"
+    return read_command(sequence, payload) or "content"

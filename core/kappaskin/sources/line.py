@@ -1,6 +1,8 @@
 """An open port: a thread of its own moves bytes with the time they came, others write."""
 
+import os
 import select
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -116,4 +118,19 @@ def _arriving(port: serial.SerialBase) -> bytes:
         port.timeout = 0
         select.select([port], [], [], 0.1)
         return port.read(_BLOCK)
+    if sys.platform != "win32" and isinstance(port, serial.Serial):
+        return _arriving_at(port)
     return port.read(cast("serial.Serial", port).in_waiting or 1)
+
+
+def _arriving_at(port: serial.Serial) -> bytes:
+    """What has come to a terminal, in two calls of the system where pyserial takes four.
+
+    At each another thread may take the interpreter, which is not to be had back at once.
+    """
+    fd = cast("int", port.fd)
+    if fd not in select.select([fd, port.pipe_abort_read_r], [], [], 0.1)[0]:
+        return b""
+    if not (data := os.read(fd, _BLOCK)):
+        raise serial.SerialException("the line ended")
+    return data

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
@@ -57,6 +58,8 @@ class SerialSource:
         self._gone_at: float | None = None  # when the line was lost, until the device is back
         self._last: tuple[float, float] | None = None  # device and host time of the last message
         self._scanning = Scanning()
+        self._looked_at: NDArray[np.intp] | None = None
+        self._highest_there = -1
         self._line: Line | None = None
         self._begin(Line(url, clock))
 
@@ -254,7 +257,14 @@ class SerialSource:
             return message.text != self._text
         if not isinstance(message, Samples) or self._sensor is None:
             return False
-        return _highest(message) >= self._sensor.channels
+        return self._highest(message) >= self._sensor.channels
+
+    def _highest(self, samples: Samples) -> int:
+        """The highest channel; scans of one list share it, and so it is seldom looked for."""
+        if samples.channels is not self._looked_at:
+            self._looked_at = samples.channels
+            self._highest_there = int(np.max(samples.channels, initial=-1))
+        return self._highest_there
 
     def _take(self, reply: Reply, now: float) -> None:
         before = self._asking.refusal
@@ -269,7 +279,7 @@ class SerialSource:
             return None
         if self._upsets(message):
             self._unusable = (
-                f"{self.url}: the device sends channel {_highest(message)} but says it has "
+                f"{self.url}: the device sends channel {self._highest(message)} but says it has "
                 f"{sensor.channels}; its firmware and its information disagree"
             )
             return None
@@ -376,7 +386,3 @@ class SerialSource:
     def close(self) -> None:
         if self._line is not None:
             self._line.close()
-
-
-def _highest(samples: Samples) -> int:
-    return int(np.max(samples.channels, initial=-1))

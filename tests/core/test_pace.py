@@ -1,0 +1,62 @@
+"""How many frames are computed when more come than there is time for."""
+
+import pytest
+
+from kappaskin.pace import Pace
+
+
+class Played:
+    """A loop that is given frames at a `rate` in frames/s, each estimate taking `cost` s."""
+
+    def __init__(self, rate: float, cost: float, reads: float = 1e-3) -> None:
+        self.now, self.rate, self.cost, self.reads = 0.0, rate, cost, reads
+        self.pace = Pace(lambda: self.now)
+        self.came = self.computed = 0
+        self.busy, self.longest, self._last = 0.0, 0.0, 0.0
+
+    def go(self, seconds: float) -> "Played":
+        end = self.now + seconds
+        while self.now < end:
+            self.now += self.reads
+            waiting = int(self.now * self.rate) - self.came
+            count = self.pace.affordable(waiting)
+            assert 0 <= count <= waiting
+            if count:
+                self.longest, self._last = max(self.longest, self.now - self._last), self.now
+            self.now += count * self.cost
+            self.busy += count * self.cost
+            self.pace.spend(count, count * self.cost)
+            self.came, self.computed = self.came + waiting, self.computed + count
+        return self
+
+
+@pytest.mark.parametrize(("rate", "cost"), [(500, 0.5e-3), (500, 1e-3), (2000, 0.25e-3)])
+def test_every_frame_is_computed_where_there_is_time(rate, cost) -> None:
+    played = Played(rate, cost).go(10.0)
+    assert played.came - played.computed <= 10  # until it is known what one costs
+
+
+@pytest.mark.parametrize(("rate", "cost"), [(2000, 0.5e-3), (2000, 2e-3), (20_000, 0.3e-3)])
+def test_where_there_is_not_a_share_of_the_time_is_spent(rate, cost) -> None:
+    played = Played(rate, cost).go(10.0)
+    assert played.computed < played.came
+    assert played.busy / played.now == pytest.approx(0.6, abs=0.03)
+
+
+def test_someone_who_looks_on_is_always_shown_something() -> None:
+    played = Played(500, 0.2).go(20.0)
+    assert played.longest < 0.25
+    assert played.computed > 80
+
+
+def test_a_burst_after_a_pause_is_not_computed_whole() -> None:
+    played = Played(2000, 0.5e-3).go(1.0)
+    played.now += 5.0
+    assert 1 <= played.pace.affordable(10_000) <= 100
+
+
+def test_nothing_waiting_costs_nothing() -> None:
+    pace = Pace(lambda: 0.0)
+    assert pace.affordable(0) == 0
+    pace.spend(0, 0.0)
+    assert pace.affordable(5) == 1
