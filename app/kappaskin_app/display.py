@@ -82,6 +82,7 @@ class Display:
             self._meet(status)
         state = self._session.badge()
         self.badge.show_state(state)
+        self.membrane.alarm.show(self._session.alarm())
         lost = state in (LOST, OFF, STALE, WAITING)
         for view in (self.membrane, *self.heatmaps.values()):
             view.show_lost(lost)
@@ -124,11 +125,11 @@ class Display:
     def _warn(self, estimate: Estimate | None) -> None:
         there = self._session.inside and estimate is not None and self._session.scene.stimuli
         self.notice.show_hint(_HINT if there else _NO_LOAD_HINT)
-        if estimate is None:
-            self.notice.show_warning("")
-            return
-        crossed, _ = self.marks(estimate.curvature)
-        self.notice.show_warning(warnings(estimate, int(crossed.sum())))
+        told = [self._session.stranger()]
+        if estimate is not None:
+            crossed, _ = self.marks(estimate.curvature)
+            told.append(warnings(estimate, int(crossed.sum())))
+        self.notice.show_warning("; ".join(filter(None, told)))
 
     def estimate_shown(self) -> Estimate | None:
         """The newest estimate, None while what it shows is not coming in any more."""

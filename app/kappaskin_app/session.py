@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 STALE_AFTER = 0.5  # s without a frame
 _TICK = 4  # ms between two looks for a new estimate
 _ARRIVES = 0.3  # s after which what was asked of the engine shows in its status
+_NEWS = 60.0  # s for which another device in the last one's place is told
 _STATUS = 0.05  # s between two looks at the status
 
 
@@ -86,6 +87,7 @@ class Session(QObject):
         engine.scan(region_of(history.settings))
         self._laid: Step | None = None
         self.status = Status()
+        self._lost_since = math.inf
         self.estimate: Estimate | None = None
         self.source = ""
         self._next_status, self.closed = 0.0, False
@@ -245,6 +247,7 @@ class Session(QObject):
             self._next_status = now + _STATUS
             self.engine.revive()
             was, self.status = self.status, self.engine.status()
+            self._lost_since = min(self._lost_since, now) if self._lost else math.inf
             if self.status.meetings != was.meetings:
                 self.estimate = None  # what the last sensor showed is not this one's
                 self._set_up()
@@ -257,12 +260,29 @@ class Session(QObject):
             self.estimate = estimate
             self.estimated.emit(estimate)
 
+    @property
+    def _lost(self) -> bool:
+        return self.status.state == "lost"
+
+    def alarm(self) -> str:
+        """Since when nothing comes in any more, and why; empty while something does."""
+        if not self._lost:
+            return ""
+        seconds = max(0.0, time.monotonic() - self._lost_since)
+        return f"LOST {seconds:.0f} s\n{self.status.message}"
+
+    def stranger(self) -> str:
+        """Which device took another's place, for as long as that is news; else nothing."""
+        since = time.monotonic() - _NEWS
+        others = [e.text for e in self.status.events if e.kind == "other" and e.time > since]
+        return others[-1][:1].upper() + others[-1][1:] if others else ""
+
     def badge(self) -> str:
         """The one word that is true now."""
         status, now = self.status, time.monotonic()
         if status.state == "off":
             return OFF
-        if status.state == "lost":
+        if self._lost:
             return LOST
         if status.state == "waiting" or (status.computing and self.estimate is None):
             return WAITING

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import FIGURES, Engine, Status, Tares, data_folder, serial_ports
+from kappaskin import FIGURES, Engine, Status, Tares, data_folder
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
@@ -28,6 +28,7 @@ from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
+from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.cost import CostPanel
@@ -35,6 +36,7 @@ from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
 from kappaskin_app.planning import Planning
+from kappaskin_app.plugs import Plugs
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
@@ -68,6 +70,8 @@ class MainWindow(QMainWindow):
         self.seeing = Seeing(self.history, self)
         self.costing = Costing(self.history, self.session, self.wishes, self)
         self.panels, self.display = Panels(), Display(self.session)
+        self.plugs = Plugs(self.panels.connection.sources, self)
+        self.happenings = Happenings(self)
         self.planning = Planning(self.session, self)
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
         self.timeline = Timeline()
@@ -87,6 +91,8 @@ class MainWindow(QMainWindow):
             "probability; and the principal curvatures of the skin at the contact."
         )
         self.statusBar().addPermanentWidget(self.object, 1)
+        # What it takes of the bar, all that the rest leaves, a passing message needs.
+        self.statusBar().messageChanged.connect(lambda text: self.object.setHidden(bool(text)))
         self.setCentralWidget(self._centre())
         self._make_header()
         area = Qt.DockWidgetArea
@@ -112,7 +118,7 @@ class MainWindow(QMainWindow):
         self._make_actions()
         self._wire()
         self._follow(self.history.settings)
-        self._find_ports()
+        self.plugs.look()
         self.resize(1280, 800)
         self.panels.connection.show_source(source)
         self.naming = Naming(self)
@@ -171,8 +177,9 @@ class MainWindow(QMainWindow):
         add("simulate", source, "&Simulated skin", self._simulate, "Ctrl+M")
         add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
         add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
-        add("ports", source, "&Look for ports", self._find_ports, "F5")
         add("tare", source, "Ta&re", self.taring.tare, "Ctrl+0")
+        add("ports", source, "&Look for ports", self.plugs.look, "F5")
+        add("happenings", source, "What &happened", self.happenings.open_list, "F4")
         calibrating = self.calibrating
         add("calibrate", source, "C&alibrate", self.panels.show_calibration, "Ctrl+L")
         add("take-step", source, "&Take the step of the calibration", calibrating.take, "Ctrl+K")
@@ -219,7 +226,11 @@ class MainWindow(QMainWindow):
         panels.wished.connect(guarded(wishes.wish))
         panels.connection.connect_wanted.connect(guarded(self._connect))
         panels.connection.disconnect_wanted.connect(guarded(session.disconnect_from))
-        panels.connection.ports_wanted.connect(guarded(self._find_ports))
+        panels.connection.ports_wanted.connect(guarded(self.plugs.look))
+        self.plugs.found.connect(guarded(panels.connection.show_ports))
+        session.reported.connect(guarded(self.happenings.follow))
+        self.happenings.told.connect(guarded(self._tell))
+        self.badge.clicked.connect(guarded(self.happenings.open_list))
         self.history.changed.connect(guarded(self._follow))
         session.estimated.connect(guarded(self.display.show_estimate))
         session.reported.connect(guarded(self._show_status))
@@ -276,10 +287,6 @@ class MainWindow(QMainWindow):
 
     def _connect_chosen(self) -> None:
         self._connect(self.panels.connection.source())
-
-    def _find_ports(self) -> None:
-        ports = [(port.port, port.words) for port in serial_ports()]
-        self.panels.connection.show_ports(ports)
 
     def _look(self, direction: Direction) -> Callable[[], None]:
         return partial(self.membrane.look_from, direction)
@@ -370,6 +377,7 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.session.closed:
             guard.forget(self._tell)
+            self.plugs.close()
             self.costing.close()
             self.planning.close()
             self.scene.gallery.close()

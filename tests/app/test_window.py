@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QPushButton,
 )
 
-from kappaskin import EDGES, SCENES, Disk
+from kappaskin import EDGES, SCENES, Disk, Port
 from kappaskin_app.panels.form import Form
 from kappaskin_app.settings import READY_CASES, Settings
 from kappaskin_app.views.line import Line
@@ -152,7 +152,7 @@ def test_two_points_are_not_called_one(window: MainWindow, until) -> None:
 
 
 def test_a_port_typed_is_the_port_meant(window: MainWindow, qtbot) -> None:
-    window.panels.connection.show_ports([("/dev/ttyACM10", "/dev/ttyACM10  Board")])
+    window.panels.connection.show_ports([Port("/dev/ttyACM10", "Board")])
     line = window.panels.connection.sources.lineEdit()
     line.selectAll()
     qtbot.keyClicks(line, "/dev/ttyACM1")

@@ -1,6 +1,10 @@
 """Where the readings come from."""
 
-from PySide6.QtCore import QSignalBlocker, Signal
+import re
+import time
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
@@ -10,11 +14,19 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Calibration, Sensor, Status
+from kappaskin import Calibration, Port, Sensor, Status
 from kappaskin_app.panels.calibration.parts import said
 from kappaskin_app.panels.panel import Panel
 
 _SIMULATED = ("sim:", "Simulated skin")
+_TIP = (
+    "The simulated skin, a serial port found on this machine, or a port or URL typed here, such as "
+    "/dev/ttyACM0, COM3 or socket://host:port."
+)
+_COMMAND = re.compile("`([^`]+)`")  # what a message tells to type
+_LONGEST, _TAIL = 56, 18  # characters of a port in the list, and of these at the end
+_MARGIN = 16  # px
+_LOSSES = 1.0  # s between two looks at what was lost
 
 
 class ConnectionPanel(Panel):
@@ -26,13 +38,17 @@ class ConnectionPanel(Panel):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Connection", parent)
+        self._ports: list[Port] = []
+        self._plug: Port | None = None  # what was chosen, be it there or not
+        self._next_losses = 0.0
         self.sources = QComboBox(editable=True, insertPolicy=QComboBox.InsertPolicy.NoInsert)  # pyright: ignore[reportCallIssue]
         self.sources.setObjectName("source")
-        self.sources.setToolTip(
-            "The simulated skin, a serial port found on this machine, or a port or URL typed here, "
-            "such as /dev/ttyACM0, COM3 or socket://host:port."
-        )
         self.sources.setMinimumContentsLength(12)
+        self.sources.currentTextChanged.connect(self._note_choice)
+        # A port's name is at its beginning.
+        self.sources.currentIndexChanged.connect(
+            lambda: self.sources.lineEdit().setCursorPosition(0)
+        )
         self.look_button = QPushButton("Look again")
         self.look_button.setToolTip("Look for serial ports again.")
         self.connect_button = QPushButton("Connect")
@@ -41,7 +57,11 @@ class ConnectionPanel(Panel):
         self.disconnect_button = QPushButton("Disconnect")
         self.disconnect_button.setObjectName("disconnect")
         self.disconnect_button.setToolTip("Take no more readings (Ctrl+D).")
-        self.device = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.device, self.losses = QLabel(wordWrap=True), QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.losses.setToolTip("What was lost on the line since it was connected.")
+        self.copy_button = QPushButton("Copy the command")
+        self.copy_button.setToolTip("Copy what the message above says to type into a terminal.")
+        self.copy_button.clicked.connect(self._copy)
         self.connect_button.clicked.connect(lambda: self.connect_wanted.emit(self.source()))
         line = QLineEdit()
         line.returnPressed.connect(self.connect_button.click)
@@ -56,7 +76,9 @@ class ConnectionPanel(Panel):
         self.body.addWidget(self.sources)
         self.body.addLayout(buttons)
         self.body.addWidget(self.device)
-        self.show_ports([])
+        self.body.addWidget(self.losses)
+        self._around.addWidget(self.copy_button, alignment=Qt.AlignmentFlag.AlignRight)
+        self._list()
 
     def source(self) -> str:
         """The name of the source chosen or typed."""
@@ -64,15 +86,38 @@ class ConnectionPanel(Panel):
         index = self.sources.findText(text)
         return str(self.sources.itemData(index)) if index >= 0 else text
 
-    def show_ports(self, ports: list[tuple[str, str]]) -> None:
-        """Offer these (port, description) beside the simulation."""
-        chosen = self.sources.currentText()
+    def _note_choice(self) -> None:
+        """Remember the plug chosen, to know it again under another name."""
+        chosen = self.source()
+        known = (port for port in self._ports if port.port == chosen)
+        gone = self._plug if self._plug and self._plug.port == chosen else None
+        self._plug = next(known, gone)
+        words = _SIMULATED[1] if chosen == _SIMULATED[0] else self._plug and _words(self._plug)
+        self.sources.setToolTip(f"{words or chosen}\n\n{_TIP}")
+
+    def show_ports(self, ports: list[Port]) -> None:
+        """Offer these beside the simulation; the choice stays, by plug if its name is another."""
+        if ports == self._ports or self.sources.view().isVisible():
+            return  # one who chooses is left alone until the next look
+        chosen, plug, self._ports = self.source(), self._plug, ports
+        if plug is not None and chosen == plug.port:
+            chosen = next((port.port for port in ports if port.same_plug(plug)), chosen)
+        line = self.sources.lineEdit()
+        at, text = line.cursorPosition(), line.text()
+        self._list()
+        self.show_source(chosen)
+        if line.text() == text:
+            line.setCursorPosition(at)  # where someone types
+
+    def _list(self) -> None:
         with QSignalBlocker(self.sources):
             self.sources.clear()
-            for value, words in (_SIMULATED, *ports):
-                self.sources.addItem(words, value)
-            if chosen:
-                self.sources.setCurrentText(chosen)
+            self.sources.addItem(_SIMULATED[1], _SIMULATED[0])
+            for place, port in enumerate(self._ports, 1):
+                self.sources.addItem(_short(_words(port)), port.port)
+                self.sources.setItemData(place, _words(port), Qt.ItemDataRole.ToolTipRole)
+        # Wider than the panel, or the list would cut off what tells two of a kind apart.
+        self.sources.view().setMinimumWidth(self.sources.view().sizeHintForColumn(0) + _MARGIN)
 
     def show_source(self, source: str) -> None:
         index = self.sources.findData(source)
@@ -81,6 +126,8 @@ class ConnectionPanel(Panel):
                 self.sources.setCurrentIndex(index)
             else:
                 self.sources.setCurrentText(source)
+        self.sources.lineEdit().setCursorPosition(0)
+        self._note_choice()
 
     def show_status(self, status: Status, simulating: bool) -> None:
         text = ""
@@ -92,7 +139,37 @@ class ConnectionPanel(Panel):
             self.device.setText(text)
         self.device.setVisible(bool(text))
         self.show_message(status.message)
+        self._show_losses(status)
         self.disconnect_button.setEnabled(status.state != "off")
+
+    def _show_losses(self, status: Status) -> None:
+        """What was lost, as often as it can be read; of a simulation nothing is."""
+        now, sensor = time.monotonic(), status.sensor
+        there = status.accounting.bytes_in > 0
+        if there and sensor is not None and now >= self._next_losses:
+            self._next_losses = now + _LOSSES
+            self.losses.setText(f"{status.accounting.words}.")
+        self.losses.setVisible(there and sensor is not None)
+
+    def show_message(self, text: str, hint: bool = False) -> None:
+        super().show_message(text, hint)
+        self.copy_button.setVisible(bool(_COMMAND.search(text)))
+
+    def _copy(self) -> None:
+        if command := _COMMAND.search(self.message.text()):
+            QGuiApplication.clipboard().setText(command[1])
+
+
+def _words(port: Port) -> str:
+    """What a port is, and whether it may be opened."""
+    return port.words if port.opened else f"{port.words}  (no permission)"
+
+
+def _short(words: str) -> str:
+    """The `words` as far as a list shows them, the end too: it tells two of a kind apart."""
+    if len(words) <= _LONGEST:
+        return words
+    return f"{words[: _LONGEST - _TAIL - 1]}\N{HORIZONTAL ELLIPSIS}{words[-_TAIL:]}"
 
 
 def _said(sensor: Sensor, calibration: Calibration | None) -> str:

@@ -16,13 +16,16 @@ class Panel(QGroupBox):
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
         self.message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
-        self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        how = Qt.TextInteractionFlag
+        self.message.setTextInteractionFlags(
+            how.TextSelectableByMouse | how.TextSelectableByKeyboard
+        )
         self._theme, self._hint = LIGHT, False
         self.body = QVBoxLayout()
-        around = QVBoxLayout(self)
-        around.setContentsMargins(8, 6, 8, 8)
-        around.addLayout(self.body)
-        around.addWidget(self.message)
+        self._around = QVBoxLayout(self)
+        self._around.setContentsMargins(8, 6, 8, 8)
+        self._around.addLayout(self.body)
+        self._around.addWidget(self.message)
 
     def show_settings(self, settings: Settings) -> None:
         """Show what is chosen."""

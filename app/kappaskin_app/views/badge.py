@@ -1,6 +1,7 @@
 """One large word that always tells the truth about what is shown."""
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
 from kappaskin_app.theme import Theme
@@ -13,13 +14,19 @@ TIPS = {
     SIM: "Readings of a simulation, not of a real sensor.",
     WAITING: "Connecting, or computing what this skin needs: the first reading is still to come.",
     STALE: "No reading has come for half a second: what is shown is old.",
-    LOST: "The connection ended or could not be made: what is shown is the last that came.",
+    LOST: "The connection ended or could not be made: what is shown is the last that came. "
+    "A device that comes back is gone on with by itself.",
     OFF: "Nothing is connected.",
 }
 
 
+_MORE = "Click it, or F4, to read what happened."
+
+
 class Badge(QLabel):
-    """Shows one of the states in its colour."""
+    """Shows one of the states in its colour; `clicked` asks what happened."""
+
+    clicked = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -32,8 +39,12 @@ class Badge(QLabel):
         if state != self.state:
             self.state = state
             self.setText(state)
-            self.setToolTip(TIPS[state])
+            self.setToolTip(f"{TIPS[state]}\n{_MORE}")
             self._paint()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self.clicked.emit()
+        super().mouseReleaseEvent(event)
 
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme

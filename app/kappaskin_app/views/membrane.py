@@ -16,6 +16,7 @@ from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, Load, Sensor
 from kappaskin_app.theme import Colours, Theme
+from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
 from kappaskin_app.views.drag import ARROW, LoadDrag
 from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
@@ -93,6 +94,7 @@ class MembraneView(QWidget):
         self.caption.position = 0.015, 0.94  # of the picture, from its lower left corner
         self.caption.prop.font_size = 14
         plotter.add_actor(self.caption, reset_camera=False, render=False)
+        self.alarm = Alarm(plotter)
 
     def _make_lights(self) -> None:
         """One low lamp from the left for relief, and a weak one at the camera."""
@@ -344,6 +346,7 @@ class MembraneView(QWidget):
         self.plotter.set_background(theme.scene, top=theme.scene_top)
         for text in (*self.labels, self.caption):
             text.prop.color = theme.text
+        self.alarm.show_theme(theme)
         if self._surface_actor:
             self._surface_actor.prop.color = theme.missing
         self.plotter.update()

@@ -42,7 +42,8 @@ class Accounting:
             why = ", ".join(f"{reason} {n:,}" for reason, n in self.discarded if n)
             told.append(f"{_percent(thrown / self.bytes_in)} of bytes discarded: {why}")
         if self.restarts:
-            told.append(f"the device began anew {self.restarts} times")
+            times = "once" if self.restarts == 1 else f"{self.restarts} times"
+            told.append(f"the device began anew {times}")
         return "; ".join(told)
 
     @property

@@ -1,0 +1,77 @@
+"""What happened on the line: each event in passing, and the last of them in a window."""
+
+import time
+from collections import deque
+from collections.abc import Sequence
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QPlainTextEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin import Event, Status
+
+_KEPT = 64
+_NOTHING = "Nothing yet. Here stands when a device came, went, lost messages or began anew."
+
+
+class Happenings(QDialog):
+    """Lists the last events, newest first; `told` brings each new one in words."""
+
+    told = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("happenings")
+        self.setWindowTitle("What happened")
+        self.resize(720, 320)
+        self._happened = 0
+        self._lines: deque[str] = deque(maxlen=_KEPT)
+        self.list = QPlainTextEdit(readOnly=True, placeholderText=_NOTHING)  # pyright: ignore[reportCallIssue]
+        self.list.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
+        self.list.setAccessibleName("What happened, newest first")
+        self.copy_button = QPushButton("&Copy all")
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons.addButton(self.copy_button, QDialogButtonBox.ButtonRole.ActionRole)
+        buttons.rejected.connect(self.reject)
+        self.copy_button.clicked.connect(
+            lambda: QGuiApplication.clipboard().setText(self.list.toPlainText())
+        )
+        layout = QVBoxLayout(self)
+        layout.addWidget(self.list)
+        layout.addWidget(buttons)
+
+    def follow(self, status: Status) -> None:
+        """Take up what happened since the last time."""
+        new = status.events[max(0, len(status.events) - status.happened + self._happened) :]
+        if status.happened == self._happened or not new:
+            return
+        self._happened = status.happened
+        self._lines.extendleft(line for line in _lines(new))
+        self.list.setPlainText("\n".join(self._lines))
+        self.told.emit("; ".join(_sentence(event.text) for event in new[-2:]))
+
+    def open_list(self) -> None:
+        self.show()
+        self.raise_()
+        self.list.setFocus()
+
+
+def _lines(events: Sequence[Event]) -> list[str]:
+    """Each event with the time of day at which it happened."""
+    off = time.time() - time.monotonic()
+    return [
+        f"{time.strftime('%H:%M:%S', time.localtime(off + event.time))}  {event.kind}:  "
+        f"{event.text}"
+        for event in events
+    ]
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,175 @@
+"""The panel that connects, by itself: the ports it lists, the one chosen, and what it says."""
+
+import threading
+import time
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QLineEdit
+
+from kappaskin import Event, Port, Status, load_scene
+from kappaskin_app import plugs
+from kappaskin_app.happenings import Happenings
+from kappaskin_app.panels.connection import ConnectionPanel
+from kappaskin_app.plugs import Plugs
+
+SKIN = Port("/dev/ttyACM0", "Fingertip of ten by ten elements", "Kappa Ltd", "SN-4711", (1, 2))
+BOARD = Port("/dev/ttyUSB0", "CP2102N", "Silicon Labs", "beef", (3, 4), opened=False)
+PERMISSION = (
+    "/dev/ttyUSB0: no permission to open it. Join the port's group with "
+    "`sudo usermod -aG dialout $USER`, then log in again; it is tried again until it opens"
+)
+
+
+@pytest.fixture
+def panel(qtbot):
+    made = ConnectionPanel()
+    qtbot.addWidget(made)
+    made.resize(290, 200)
+    made.show()
+    made.show_ports([SKIN, BOARD])
+    return made
+
+
+def listed(panel):
+    return [panel.sources.itemText(place) for place in range(panel.sources.count())]
+
+
+def test_ports_are_listed_with_maker_and_number_and_whether_they_may_be_opened(panel):
+    simulated, skin, board = listed(panel)
+    assert simulated == "Simulated skin"
+    assert skin.startswith("/dev/ttyACM0  Fingertip")
+    assert "\N{HORIZONTAL ELLIPSIS}" in skin
+    assert skin.endswith("Kappa Ltd  [SN-4711]"[-18:])
+    assert len(skin) <= 56
+    assert board.endswith("(no permission)")
+    whole = panel.sources.itemData(1, Qt.ItemDataRole.ToolTipRole)
+    assert whole == "/dev/ttyACM0  Fingertip of ten by ten elements  Kappa Ltd  [SN-4711]"
+    panel.sources.setCurrentIndex(1)
+    assert panel.source() == "/dev/ttyACM0"
+    assert whole in panel.sources.toolTip()
+    assert panel.sources.lineEdit().cursorPosition() == 0  # the name is to be seen
+
+
+def test_the_choice_stays_when_other_ports_come_and_go(panel):
+    panel.sources.setCurrentIndex(1)
+    panel.show_ports([SKIN])
+    panel.show_ports([Port("/dev/ttyACM7"), SKIN, BOARD])
+    assert (panel.source(), panel.sources.count()) == (SKIN.port, 4)
+    panel.show_ports([])
+    assert panel.source() == SKIN.port  # it may come back
+
+
+def test_a_plug_is_known_again_under_another_name(panel):
+    panel.sources.setCurrentIndex(1)
+    panel.show_ports([BOARD])
+    panel.show_ports([BOARD, replace(SKIN, port="/dev/ttyACM1")])
+    assert panel.source() == "/dev/ttyACM1"
+    panel.show_ports([replace(SKIN, port="/dev/ttyACM2", serial_number="SN-9")])
+    assert panel.source() == "/dev/ttyACM1"  # another of its kind is not it
+
+
+def test_who_types_or_chooses_is_left_alone(panel, qtbot):
+    line: QLineEdit = panel.sources.lineEdit()
+    line.setFocus()
+    line.selectAll()
+    qtbot.keyClicks(line, "/dev/ttyS")
+    line.setCursorPosition(4)
+    panel.show_ports([SKIN])
+    qtbot.keyClicks(line, "x")
+    assert line.text() == "/devx/ttyS"
+    panel.sources.showPopup()
+    panel.show_ports([SKIN, BOARD])
+    assert panel.sources.count() == 2
+    panel.sources.hidePopup()
+    panel.show_ports([SKIN, BOARD])
+    assert panel.sources.count() == 3
+
+
+def test_a_message_is_shown_whole_and_its_command_can_be_copied(panel):
+    panel.show_status(Status(state="lost", message=PERMISSION), False)
+    assert panel.message.text() == PERMISSION
+    how = panel.message.textInteractionFlags()
+    assert how & Qt.TextInteractionFlag.TextSelectableByMouse
+    assert how & Qt.TextInteractionFlag.TextSelectableByKeyboard
+    assert panel.copy_button.isVisible()
+    panel.copy_button.click()
+    assert QGuiApplication.clipboard().text() == "sudo usermod -aG dialout $USER"
+    panel.show_status(Status(state="lost", message="silent"), False)
+    assert not panel.copy_button.isVisible()
+
+
+def test_what_was_lost_on_the_line_is_told_in_words(panel):
+    sensor, counts = load_scene("centre").sensor(), Status().accounting
+    panel.show_status(Status(state="streaming", sensor=sensor), True)
+    assert not panel.losses.isVisible()  # nothing goes over a line
+    counts = replace(counts, bytes_in=40000, discarded=(("checksum", 120),), lost=12, span=30210)
+    panel.show_status(Status(state="streaming", sensor=sensor, accounting=counts), False)
+    assert panel.losses.isVisible()
+    told = "12 of 30,210 messages lost; 0.3 % of bytes discarded: checksum 120."
+    assert panel.losses.text() == told
+
+
+@pytest.fixture
+def found(monkeypatch):
+    """What the finder of ports was called for: the threads that it was called in."""
+    calls = []
+    monkeypatch.setattr(
+        plugs, "serial_ports", lambda: calls.append(threading.current_thread()) or [SKIN]
+    )
+    monkeypatch.setattr(plugs, "_EVERY", 50)
+    return calls
+
+
+def test_ports_are_looked_for_beside_the_window_and_only_while_the_list_is_seen(
+    panel, found, until, qtbot
+):
+    panel.activateWindow()
+    seen = Plugs(panel.sources)
+    seen.found.connect(panel.show_ports)
+    until(lambda: len(found) > 1 and panel.sources.count() == 2)
+    assert threading.main_thread() not in found
+    panel.hide()
+    qtbot.wait(100)
+    count = len(found)
+    qtbot.wait(300)
+    assert len(found) == count
+    seen.look()  # asked for, it looks
+    until(lambda: len(found) == count + 1)
+    seen.close()
+    assert not any(thread.is_alive() for thread in found)
+
+
+def test_the_last_events_are_listed_newest_first_and_each_is_told_once(qtbot):
+    window = Happenings()
+    qtbot.addWidget(window)
+    told = []
+    window.told.connect(told.append)
+    now, status = time.monotonic(), Status()
+    window.follow(status)
+    assert told == []
+    for number in range(70):
+        status = status.after([Event(now - 3600 + number, "gap", f"{number} messages lost")])
+        window.follow(status)
+        window.follow(status)
+    assert told == [f"{number} messages lost" for number in range(70)]
+    lines = window.list.toPlainText().splitlines()
+    assert len(lines) == 64
+    hour_ago = time.strftime("%H:%M", time.localtime(time.time() - 3600 + 69))
+    assert lines[0].startswith(hour_ago)
+    assert lines[0].endswith("  gap:  69 messages lost")
+    assert lines[-1].endswith("  gap:  6 messages lost")
+    window.copy_button.click()
+    assert QGuiApplication.clipboard().text().splitlines() == lines
+
+
+def test_events_that_came_together_are_all_listed(qtbot):
+    window = Happenings()
+    qtbot.addWidget(window)
+    now = time.monotonic()
+    window.follow(Status().after([Event(now, "met", "a"), Event(now, "gap", "b")]))
+    window.follow(Status().after([Event(now, "gap", str(n)) for n in range(100)]))
+    lines = window.list.toPlainText().splitlines()
+    assert [line.split()[-1] for line in (lines[0], lines[-1])] == ["99", "36"]

@@ -1,0 +1,115 @@
+"""A real line in the whole window: pulled, back, another device, and the engine killed."""
+
+import json
+import os
+import signal
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from kappaskin import load_scene
+
+pytest.importorskip("pty", reason="no pseudo-terminals on this system")
+from kappaskin.sources.device import PseudoDevice
+
+SCENE = replace(load_scene("circle"), rate=50.0)
+
+
+class Plugged(PseudoDevice):
+    """A device that says it is a real one, served in a thread until it is pulled."""
+
+    def __init__(self, port, **said):
+        super().__init__(SCENE)
+        self._information = json.dumps(
+            {**json.loads(self._information), "simulated": False, "name": "Fingertip", **said}
+        )
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self.serve, args=(self._stop.is_set,))
+        self._thread.start()
+        self.link = port
+        port.unlink(missing_ok=True)
+        port.symlink_to(self.port)
+
+    def pull(self):
+        self._stop.set()
+        self._thread.join()
+        self.close()
+        self.link.unlink()
+
+
+@pytest.fixture
+def plug(tmp_path):
+    """Plugs a device into the one port that there is."""
+    made = []
+
+    def plug(**said):
+        made.append(Plugged(tmp_path / "ttyACM0", **said))
+        return made[-1]
+
+    yield plug
+    made[-1].pull()
+
+
+def kinds(window):
+    lines = window.happenings.list.toPlainText().splitlines()
+    return [line.split()[1].rstrip(":") for line in lines]
+
+
+def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -> None:
+    device = plug(serial_number="A-1")
+    window = opened(str(device.link))
+    until(lambda: window.badge.state == "LIVE" and len(window.membrane.ages) > 3)
+    until(lambda: "messages lost" in window.panels.connection.losses.text())
+
+    # Pulled: the last picture stays, with since when and what to do across it.
+    device.pull()
+    until(lambda: window.badge.state == "LOST")
+    alarm, message = window.membrane.alarm, window.panels.connection.message
+    assert alarm.text.startswith("LOST 0 s\n")
+    assert "the line is gone" in window.statusBar().currentMessage()
+    assert not window.object.isVisible()  # or the message would have no room
+    assert colours_in(window, window.membrane) > 300
+    heights = window.membrane.skin.height.copy()
+    until(lambda: alarm.text.startswith("LOST 2 s\n"))
+    assert "plug the sensor in" in alarm.text
+    assert message.text() in alarm.text
+    assert np.abs(heights).max() > 0
+    assert np.array_equal(window.membrane.skin.height, heights)
+    generation = window.session.status.generation
+
+    # Back: live again at once, with the same pipeline.
+    device = plug(serial_number="A-1")
+    until(lambda: window.badge.state == "LIVE")
+    assert alarm.text == ""
+    assert window.session.status.generation == generation
+    assert kinds(window) == ["back", "gone", "met"]
+    until(lambda: "began anew once" in window.panels.connection.losses.text())
+
+    # Another device on the port is said, with both names.
+    device.pull()
+    until(lambda: window.badge.state == "LOST")
+    plug(serial_number="B-2", name="Thumb")
+    until(lambda: window.badge.state == "LIVE")
+    until(
+        lambda: window.display.notice.warning.startswith("Another device: Thumb B-2 instead of A-1")
+    )
+
+    # The engine killed: it is started again, and said.
+    os.kill(window.session.engine.pid, signal.SIGKILL)
+    until(lambda: window.badge.state == "LOST")
+    assert "ended unexpectedly and was started again" in alarm.text
+    until(lambda: window.badge.state == "LIVE")
+    until(lambda: kinds(window)[:4] == ["met", "engine", "other", "gone"])
+    assert not message.isVisible()
+
+    # What happened can be read, by key or by a click on the badge.
+    qtbot.keyClick(window, Qt.Key.Key_F4)
+    assert window.happenings.isVisible()
+    qtbot.keyClick(window.happenings, Qt.Key.Key_Escape)
+    assert not window.happenings.isVisible()
+    qtbot.mouseClick(window.badge, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
+    assert window.happenings.isVisible()
+    window.happenings.close()
