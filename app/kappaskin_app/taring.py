@@ -26,7 +26,7 @@ class Taring(QObject):
         super().__init__(parent)
         self._history, self._engine, self._tares = history, engine, tares
         self._status = Status()
-        self._meetings = 0
+        self._meetings, self._aside = 0, False
         self._before: Tare | None = None  # what was in use when the last was taken
         self._last = history.settings.tare
         self.stored: Tare | None = None
@@ -42,16 +42,18 @@ class Taring(QObject):
         """Why no tare can be taken now, or nothing."""
         if self._status.sensor is None or self._status.state != "streaming":
             return "Nothing streams: connect a sensor to tare it."
+        if self._aside:
+            return "Not while calibrating: readings come as they are."
         return "A tare is being taken." if self.taking else ""
 
     # What a person wishes.
 
     def tare(self) -> None:
         """Take what is read now as the zero, unless the skin is loaded or moves."""
-        self.message = self.why_not
-        if not self.message:
+        if not self.why_not:
+            self.message = ""
             self._engine.tare()
-        self.changed.emit()
+            self.changed.emit()
 
     def undo(self) -> None:
         """Go back to the tare before, or to none."""
@@ -76,6 +78,14 @@ class Taring(QObject):
                 self._history.change("Tare", tare=news.tare)
             self.changed.emit()
         elif (status.state, status.sensor) != (was.state, was.sensor):
+            if status.state != "streaming":
+                self.message = ""  # of a skin that is not there any more
+            self.changed.emit()
+
+    def stand_aside(self, aside: bool) -> None:
+        """Take none while a calibration does without, or again."""
+        if aside != self._aside:
+            self._aside = aside
             self.changed.emit()
 
     def _find(self, sensor: Sensor) -> None:

@@ -242,6 +242,10 @@ class MainWindow(QMainWindow):
         session.reported.connect(guarded(self.taring.follow))
         self.taring.told.connect(guarded(self._tell))
         self.taring.changed.connect(guarded(self._allow_tare))
+        calibrating = self.calibrating
+        calibrating.changed.connect(
+            guarded(lambda: self.taring.stand_aside(calibrating.procedure is not None))
+        )
         panels.tare.attend(self.taring)
         self._docks[2].visibilityChanged.connect(guarded(self.costing.watch))
         session.reported.connect(guarded(self.costing.follow))

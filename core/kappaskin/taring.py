@@ -131,7 +131,7 @@ def _still(sensor: Sensor, seeker: LoadSeeker, readings: Array) -> _Found:
     """What `readings` (n, C) are on average, if they hold still but for noise."""
     used = ~np.isnan(readings).all(axis=0)
     # A channel may be missing in a frame or two: its mean stands for it.
-    mean = np.full(len(used), np.nan)
+    mean = np.full(readings.shape[1], np.nan)
     mean[used] = np.nanmean(readings[:, used], axis=0)
     filled = np.where(np.isnan(readings), mean, readings)
     # From one frame to the next, so that a slow motion does not count as noise.

@@ -19,6 +19,7 @@ from kappaskin import (
     Simulator,
     Status,
     Step,
+    Tare,
     Tolerance,
     load_scene,
 )
@@ -367,3 +368,17 @@ def test_a_calibration_rests_while_another_skin_is_connected(
     until(lambda: "Not in use" in window.panels.in_use.message.text())
     window.history.stack.undo()
     until(lambda: window.session.status.setup.calibration is not None)
+
+
+def test_readings_of_a_tared_sensor_do_not_count(bench: Bench) -> None:
+    offset = np.zeros(SCENE.sensor().channels)
+    name, number = SCENE.sensor().name, SCENE.sensor().serial_number
+    layout, now = fingerprint(SCENE.sensor().layout), datetime.now(UTC)
+    tare = Tare(name, number, layout, now, None, 500, 1.0, offset, offset)
+    bench.calibrating.begin(THREE, 1.0)
+    bench.calibrating.take()
+    bench.tell(setup=Setup(tare=tare))
+
+    bench.read()
+
+    assert bench.calibrating.taking

@@ -221,6 +221,23 @@ def test_nothing_can_be_tared_while_nothing_streams(bench):
     assert not bench.panel.take.isEnabled()
 
 
+def test_none_is_taken_while_calibrating(bench):
+    bench.meet()
+    bench.taring.stand_aside(True)
+    assert not bench.panel.take.isEnabled()
+    assert bench.panel.message.text() == "Not while calibrating: readings come as they are."
+    bench.taring.stand_aside(False)
+    assert bench.panel.take.isEnabled()
+
+
+def test_a_refusal_is_forgotten_with_its_connection(bench):
+    bench.meet()
+    bench.taring.tare()
+    bench.end(refusal="the skin is loaded")
+    bench.tell(state="off", sensor=None)
+    assert "Nothing streams" in bench.panel.message.text()
+
+
 def test_drift_is_told_in_words():
     status = Status(setup=Setup(tare=tare_of()), drift=Drift(0.0512, 3.4e-5, 12.0))
     words = "Drift since: 0.051 1/m (RMS), as if moved by 0.034 mm"

@@ -65,15 +65,14 @@ class TarePanel(Panel):
         self.take.setText("Taring\N{HORIZONTAL ELLIPSIS}" if status.tare.taking else "Tare now")
         self.take.setToolTip(why_not or _TAKE)
         alarm = (taring.message if taring else "") or unfit(tare, status)
-        streams = status.state == "streaming"
-        hint = "" if alarm or streams else why_not
+        hint = "" if status.tare.taking else why_not
         self.show_message(sentence(alarm or hint), hint=not alarm)
 
     def _words(self) -> str:
         """Which tare is in use, in words."""
         tare = self._tare
         if tare is None:
-            return "None: readings have the zero that the elements have."
+            return "None: every element reads from a zero of its own."
         stored = self._taring is not None and tare == self._taring.stored
         return f"{'Stored: taken' if stored else 'Taken'} {when(tare)}" + warmth(
             tare.temperature, self._status.temperature

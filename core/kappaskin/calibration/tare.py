@@ -12,7 +12,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.sensor import Sensor
 
-_MOST_CHANNELS = 2**17
+_MOST_CHANNELS = 2**16  # whose numbers the engine can tell with every status
 
 
 @dataclass(frozen=True, eq=False)

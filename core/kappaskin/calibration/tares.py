@@ -6,6 +6,7 @@ import re
 import tomllib
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -145,16 +146,20 @@ def _kept(data: bytes, serial_number: str) -> Kept:
 
 
 def _tare(said: dict[str, Any]) -> Tare:
-    arrays = {key: np.array(said[key], float) for key in ("offset", "offset_sd")}
-    texts = {key: said[key] for key in ("name", "serial_number", "layout")}
-    if not all(isinstance(text, str) for text in texts.values()):
+    name, serial_number, layout = texts = [said[k] for k in ("name", "serial_number", "layout")]
+    if not all(isinstance(text, str) for text in texts):
         raise TypeError(f"expected texts, got {texts}")
+    if not isinstance(said["date"], datetime):
+        raise TypeError(f"expected a date, got {said['date']}")
     temperature = said.get("temperature")
     return Tare(
-        **texts,
-        date=said["date"],
-        temperature=None if temperature is None else float(temperature),
-        frames=int(said["frames"]),
-        seconds=float(said["seconds"]),
-        **arrays,
+        name,
+        serial_number,
+        layout,
+        said["date"],
+        None if temperature is None else float(temperature),
+        int(said["frames"]),
+        float(said["seconds"]),
+        np.array(said["offset"], float),
+        np.array(said["offset_sd"], float),
     )

@@ -84,8 +84,8 @@ class LoadSeeker:
         """
         used: NDArray[np.bool_] = self._live & np.isfinite(readings)
         tables = self._remembered(used, self._tables)
-        K = readings[used]
-        K = K - tables.Q @ (tables.Q.T @ K)
+        read = readings[used]
+        K: Array = read - tables.Q @ (tables.Q.T @ read)
         power, h = float(K @ K), K @ tables.T
         explained = h**2 / tables.norm
         best = int(explained.argmax())
