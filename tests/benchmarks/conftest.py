@@ -12,6 +12,7 @@ _figures: Figures = []
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="measure for as long as the figures ask")
+    parser.addoption("--soak", type=float, help="hold a load for so many s, such as 1800")
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -68,8 +68,9 @@ class Decoder:
         if end < self._needed:
             return []
         stream, messages, at = b"".join(self._parts), list[Message](), 0
+        take, unpack = self.sequence.take, HEADER.unpack_from
         while at + HEAD <= end:
-            magic, version, kind, length, sequence, time_us, check = HEADER.unpack_from(stream, at)
+            magic, version, kind, length, sequence, time_us, check = unpack(stream, at)
             if magic != MAGIC or crc_hqx(stream[at : at + CHECKED], 0) != check or length > LONGEST:
                 at = self._skip(stream, at, "garbage")
                 continue
@@ -93,7 +94,7 @@ class Decoder:
                 self._discarded[message] += stop - at
             else:
                 self._bytes_good += stop - at
-                if self.sequence.take(sequence):
+                if take(sequence):
                     messages.append(message)
             at = stop
         else:

@@ -1,0 +1,133 @@
+"""What is held for long: frames of a fast device with the window drawing, and bytes to messages."""
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kappaskin.sources.decoder import Decoder
+from kappaskin.sources.wire import encode_samples
+
+_LOADING = Path(__file__).with_name("loading.py")
+_FIRMWARE = Path(__file__).parents[2] / "resources" / "kappaskin_resources" / "firmware"
+_MEMORY = 20.0  # MB that may be added
+
+Play = Callable[..., str]
+
+
+@pytest.fixture
+def play(tmp_path: Path) -> Iterator[Play]:
+    """Starts the firmware as a program of this machine, which costs little; gives its port."""
+    if not shutil.which("gcc"):
+        pytest.skip("no C compiler: apt-get install -y gcc libc6-dev")
+    program, files = tmp_path / "host", [*_FIRMWARE.glob("*.c"), *_FIRMWARE.glob("host/*.c")]
+    command = ["gcc", "-std=c99", "-O2", f"-I{_FIRMWARE}", *map(str, files), "-o", str(program)]
+    subprocess.run(command, check=True)
+    running: list[subprocess.Popen[str]] = []
+
+    def start(*options: object) -> str:
+        command = [str(program), *map(str, options)]
+        device = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        running.append(device)
+        return json.loads(device.stdout.readline())["port"]
+
+    yield start
+    for device in running:
+        device.terminate()
+        device.communicate()
+
+
+@pytest.fixture
+def lasting(request: pytest.FixtureRequest) -> float:
+    """How long a load is held in s: ten minutes with --long, or as --soak says."""
+    soak = request.config.getoption("--soak")
+    return float(soak) if soak else 600.0 if request.config.getoption("--long") else 20.0
+
+
+@pytest.fixture
+def quickest() -> Callable[..., list[float]]:
+    """Least seconds of several functions, called turn by turn: what else runs can only add."""
+
+    def measure(*functions: Callable[[], object], turns: int = 200) -> list[float]:
+        least = [math.inf] * len(functions)
+        for _ in range(turns):
+            for place, function in enumerate(functions):
+                start = time.perf_counter()
+                function()
+                least[place] = min(least[place], time.perf_counter() - start)
+        return least
+
+    return measure
+
+
+def _held(port: str, seconds: float) -> dict[str, float]:
+    command = [sys.executable, str(_LOADING), port, str(seconds)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return json.loads(done.stdout)
+
+
+def _words(held: dict[str, float], seconds: float) -> str:
+    return (
+        f"{held['frames']:.0f} frames/s over {seconds:g} s, {held['lost']:.0f} lost, "
+        f"{held['computed']:.0%} computed, {held['drawn']:.1f} drawings/s, reader gap "
+        f"{held['reader_gap_p99_ms']:.1f} ms (99th percentile), memory of the window "
+        f"{held['window_grown_mb']:+.1f} MB, of the engine {held['engine_grown_mb']:+.1f} MB"
+    )
+
+
+def test_2000_frames_a_second_are_held_with_the_window_drawing(play, figure, lasting) -> None:
+    held = _held(play("--rate", 2000), lasting)
+    figure(f"300 channels: {_words(held, lasting)}")
+    assert held["lost"] == held["discarded"] == 0
+    assert held["frames"] == pytest.approx(2000, rel=0.02)
+    assert held["drawn"] >= 20
+    assert held["reader_gap_p99_ms"] < 10
+    assert max(held["window_grown_mb"], held["engine_grown_mb"]) < _MEMORY
+
+
+def test_64_by_64_elements_are_held_at_200_frames_a_second(play, figure, lasting) -> None:
+    held = _held(play("--grid", "64x64", "--rate", 200), lasting)
+    figure(f"64 x 64 elements: {_words(held, lasting)}")
+    assert held["lost"] == held["discarded"] == 0
+    assert held["frames"] == pytest.approx(200, rel=0.02)
+    assert held["drawn"] >= 20
+    assert max(held["window_grown_mb"], held["engine_grown_mb"]) < _MEMORY
+
+
+@pytest.mark.parametrize("channels", [300, 3 * 64 * 64])
+def test_a_message_is_decoded_in_three_times_its_checksum_and_copy(
+    quickest, figure, channels: int
+) -> None:
+    rng, every = np.random.default_rng(0), np.arange(channels)
+    scans = rng.integers(-6000, 6000, (max(10, 60_000 // channels), channels)).astype(np.int32)
+    messages = [encode_samples(q, q / 2e3, every, counts, 2) for q, counts in enumerate(scans)]
+    data, start = b"".join(messages), len(messages[0]) - 4 - 2 * channels
+    blocks = [data[at : at + 65536] for at in range(0, len(data), 65536)]
+
+    def decoded() -> None:
+        decoder = Decoder()
+        assert sum(len(decoder.feed(block)) for block in blocks) == len(messages)
+
+    def copied() -> None:
+        for message in messages:
+            zlib.crc32(message)
+            np.frombuffer(message, "<i2", channels, start).astype(np.int32)
+
+    ours, theirs = quickest(decoded, copied)
+    rate = len(data) / ours / 1e6
+    figure(
+        f"decoder, {channels} channels: {rate:.0f} MB/s, {ours / theirs:.2f} times zlib.crc32 and "
+        "NumPy on each message's bytes"
+    )
+    assert rate >= 20
+    assert ours <= 3.0 * theirs
