@@ -15,10 +15,10 @@ from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.diagnosis import diagnose
 from kappaskin.sources.wire import encode_information
 
-pty = pytest.importorskip("pty", reason="no pseudo-terminals on this system")
+pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice
 
-fcntl, tty = map(pytest.importorskip, ("fcntl", "tty"))
+fcntl, pty, tty = map(pytest.importorskip, ("fcntl", "pty", "tty"))
 
 SCENE = replace(load_scene("centre"), rate=100.0)
 TEXT = information.to_json(SCENE.sensor())
