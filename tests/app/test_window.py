@@ -278,12 +278,15 @@ def test_disconnecting_is_said(window: MainWindow, until) -> None:
     until(lambda: window.badge.state == "OFF")
 
 
-def test_a_killed_engine_is_lost_and_connecting_starts_another(window: MainWindow, until) -> None:
+def test_a_killed_engine_is_started_again_and_what_was_chosen_simulated(
+    window: MainWindow, until
+) -> None:
+    window.history.change("Point", -1, load_case="point", x=0.03, y=0.06)
     os.kill(window.session.engine.pid, 9)
     until(lambda: window.badge.state == "LOST")
-    assert "connect again" in window.panels.connection.message.text()
-    window.actions_by_name["simulate"].trigger()
     until(lambda: window.badge.state == "SIM")
+    assert "was started again" in window.happenings.list.toPlainText()
+    until(lambda: window.session.estimate.true_contact.tolist() == [0.03, 0.06])
     drawn = len(window.membrane.ages)
     until(lambda: len(window.membrane.ages) > drawn + 5)
 

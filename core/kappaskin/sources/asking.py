@@ -36,12 +36,15 @@ class Asking:
 
     def ask(self, operation: Operation, now: float, arguments: bytes = b"") -> int:
         """Send one command at host time `now` in s, its number; it may be lost on the line."""
-        self._sequence += 1
+        self._sequence = (self._sequence + 1) % 2**32
         self._write(encode_command(self._sequence, now, operation, arguments))
         return self._sequence
 
     def greet(self, now: float) -> None:
         """Begin: every channel is wanted, and to know who is there."""
+        # By the clock: a device that did not see the last host go would take the first commands of
+        # the next, were they counted from one, for repeated ones.
+        self._sequence = round(now * 1e3) % 2**32
         self.ask(Operation.HELLO, now, bytes([VERSION, VERSION]))
         self.ask(Operation.IDENTIFY, now)
         self.ask(Operation.SCAN_LIST, now, pack_runs([]))

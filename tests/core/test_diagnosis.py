@@ -1,0 +1,155 @@
+"""Looking at one port: each reason why nothing comes, told apart; else how well it does."""
+
+import itertools
+import json
+import os
+import threading
+from dataclasses import replace
+
+import pytest
+
+from kappaskin import load_scene
+from kappaskin.cli import FAILED, main
+from kappaskin.sources import information
+from kappaskin.sources.accounting import Accounting
+from kappaskin.sources.diagnosis import diagnose
+from kappaskin.sources.wire import encode_information
+
+pytest.importorskip("pty", reason="no pseudo-terminals on this system")
+from kappaskin.sources.device import PseudoDevice
+
+fcntl, pty, tty = map(pytest.importorskip, ("fcntl", "pty", "tty"))
+
+SCENE = replace(load_scene("centre"), rate=100.0)
+TEXT = information.to_json(SCENE.sensor())
+
+
+@pytest.fixture(autouse=True)
+def hasty(monkeypatch):
+    monkeypatch.setattr("kappaskin.sources.serial_line._PATIENCE", 0.3)
+    monkeypatch.setattr("kappaskin.sources.diagnosis._SEARCH", 1.0)
+    monkeypatch.setattr("kappaskin.sources.diagnosis._LISTEN", 1.0)
+
+
+@pytest.fixture
+def served():
+    """The port of a simulated device, once it serves."""
+    device, stop = PseudoDevice(SCENE), threading.Event()
+    thread = threading.Thread(target=device.serve, args=(stop.is_set,))
+    thread.start()
+    yield device.port
+    stop.set()
+    thread.join()
+    device.close()
+
+
+@pytest.fixture
+def saying():
+    """A port on which `data` of 0, 1, 2, ... come one after the other."""
+    stop, threads, masters = threading.Event(), [], []
+
+    def say(data):
+        master, slave = pty.openpty()
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+        masters.extend([master, slave])
+
+        def talk():
+            for number in itertools.count():
+                if stop.wait(0.05):
+                    return
+                os.write(master, data(number))
+
+        threads.append(threading.Thread(target=talk))
+        threads[-1].start()
+        return os.ttyname(slave)
+
+    yield say
+    stop.set()
+    for thread in threads:
+        thread.join()
+    for descriptor in masters:
+        os.close(descriptor)
+
+
+def test_a_device_that_is_well_is_told_of_whole(served):
+    found = diagnose(served)
+    assert found.why == ""
+    assert (found.port, found.plug) == (served, served)
+    assert found.device == "Simulated skin SIM-0001, firmware kappaskin simulator"
+    assert found.rate == pytest.approx(100.0, rel=1e-6)
+    assert found.said_rate == 100.0
+    assert 0 < found.clock_sd < 0.1
+    assert found.accounting.balanced
+    assert found.accounting.accepted > 50
+    assert [event.kind for event in found.events] == ["met"]
+
+
+def test_looking_twice_finds_the_same(served):
+    first, second = diagnose(served), diagnose(served)
+    assert (first.device, first.why) == (second.device, second.why)
+    assert second.clock_sd < 0.1
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (lambda _: b"", "silent for more than 0.3 s"),
+        (lambda _: b"$GPGGA,123519,4807.038,N\r\n", "no message of wire version 1"),
+        (
+            lambda n: b"\x4b\xa7\x07" + encode_information(n, 0.0, TEXT)[3:],
+            "no message of wire version 1",
+        ),
+        (lambda n: encode_information(n, n / 20, TEXT), "says what it is but sends no readings"),
+        (
+            lambda n: encode_information(n, n / 20, '{"name": "Half"}'),
+            "the device's information lacks",
+        ),
+    ],
+    ids=["silent", "another protocol", "a spoilt header", "no readings", "half an information"],
+)
+def test_what_is_wrong_is_told(saying, data, why):
+    found = diagnose(saying(data))
+    assert why in found.why
+
+
+def test_an_absent_port_is_told_and_the_command_fails(capsys):
+    assert main(["doctor", "/dev/ttyABSENT7"]) == FAILED
+    text, errors = capsys.readouterr()
+    assert "port                /dev/ttyABSENT7\n" in text
+    assert "verdict             /dev/ttyABSENT7: there is no such port" in text
+    assert errors == ""
+
+
+def test_a_busy_port_is_told(served):
+    with open(served, "rb+", buffering=0) as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert "busy" in diagnose(served).why
+
+
+def test_the_command_says_in_words_and_in_json_that_a_port_is_well(served, capsys):
+    assert main(["doctor", served]) == 0
+    words = capsys.readouterr().out
+    assert "device              Simulated skin SIM-0001, firmware kappaskin simulator\n" in words
+    assert "rate                100.0 frames/s of the 100 it says\n" in words
+    assert "clock               known to " in words
+    assert "losses              0 of " in words
+    assert words.endswith("verdict             well\n")
+    assert main(["doctor", served, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["well"], found["why"], found["said_rate"]) == (True, "", 100.0)
+    assert found["temperature"] is None
+    assert found["accounting"]["lost"] == 0
+
+
+def test_losses_are_told_in_words():
+    assert Accounting().words == "0 of 0 messages lost"
+    many = Accounting(
+        bytes_in=40_000, discarded=(("checksum", 120), ("overrun", 0)), lost=12, span=30_210
+    )
+    told = "12 of 30,210 messages lost; 0.3 % of bytes discarded: checksum 120"
+    assert many.words == told
+    assert replace(many, restarts=1).words == f"{told}; the device began anew once"
+    assert replace(many, restarts=2).words == f"{told}; the device began anew 2 times"
+    assert "100 % of bytes" in replace(many, bytes_in=120).words
+    assert "under 0.001 % of bytes" in replace(many, bytes_in=10**9).words
