@@ -4,8 +4,9 @@ import math
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kappaskin import COMPONENTS, Estimate, Status
+from kappaskin import COMPONENTS, WHY, Estimate, Status
 from kappaskin_app.scale import Ranges, locked_at
 from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings
@@ -39,7 +40,7 @@ class Display:
         self.ranges = Ranges()
         self._settings = Settings()
         self._mode: Array | None = None
-        self._met = 0
+        self._met, self._asked = 0, -1
         self._colours: object = None
         self._next_heatmaps = self._next_numbers = 0.0
 
@@ -163,10 +164,29 @@ class Display:
         if now >= self._next_heatmaps:
             self._next_heatmaps = now + _HEATMAPS
             crossed, dotted = self.marks(estimate.curvature)
+            kinds = self._kinds(estimate)
+            self.membrane.show_marked(np.flatnonzero(kinds.any(axis=0)), self._asked)
             for row, (name, heatmap) in enumerate(self.heatmaps.items()):
                 readings = estimate.curvature[row]
-                heatmap.show_marks(crossed, dotted, estimate.suspect > 0)
+                heatmap.show_marks(crossed, dotted, kinds[row])
                 heatmap.show_values(readings, self.ranges.limit(name, readings, settings, now))
+
+    def _kinds(self, estimate: Estimate) -> NDArray[np.uint8]:
+        """Why each channel (3, P) is left out, by number in `WHY`; 0 where it is not."""
+        found = np.zeros(estimate.curvature.shape, np.uint8)
+        for finding in self._session.status.health.findings:
+            if finding.element < len(estimate.suspect):  # or it is of another skin
+                row = COMPONENTS.index(finding.component)
+                found[row, finding.element] = WHY.index(finding.kind)
+        # What the fit itself suspects, it suspects of an element as a whole.
+        whole = np.where(found.any(axis=0), 0, estimate.suspect)
+        return np.maximum(found, whole)
+
+    def ask_for(self, element: int) -> None:
+        """Show which element is to be pressed; -1 for none."""
+        self._asked = element
+        for heatmap in self.heatmaps.values():
+            heatmap.show_wanted(element)
 
     def marks(self, curvature: Array) -> tuple[Mask, Mask]:
         """Which elements are bent beyond their strain limit, and which were chosen to scan."""

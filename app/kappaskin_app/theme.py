@@ -139,6 +139,9 @@ PULLED = SEQUENTIAL[::-1]  # the same for what lies below zero
 # What is drawn over each: seen against every one of its colours.
 LIGHT_INK, DARK_INK = "#f4f6f8", "#16191d"
 
+# On the skin and beside it: an element that is left out, and one that is to be pressed.
+OUT, WANTED = "#e8267d", "#ffd400"
+
 # Told apart in the common colour blindnesses (after Okabe and Ito), on a light and a dark ground.
 SERIES = (
     ("#0072b2", "#5ab4e8"),

@@ -32,6 +32,7 @@ from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.cost import CostPanel
+from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
@@ -43,6 +44,7 @@ from kappaskin_app.settings import COLOURS, Settings
 from kappaskin_app.simulation import settings_for
 from kappaskin_app.staging import Staging
 from kappaskin_app.taring import Taring
+from kappaskin_app.testing import Testing
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
@@ -74,6 +76,7 @@ class MainWindow(QMainWindow):
         self.happenings = Happenings(self)
         self.planning = Planning(self.session, self)
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
+        self.health, self.testing = HealthPanel(), Testing(self)
         self.timeline = Timeline()
         self.staging = Staging(
             *(self.history, self.session, self.wishes, self.planning),
@@ -108,6 +111,7 @@ class MainWindow(QMainWindow):
             self._dock("cost", "Cost of accuracy", self.cost, below),
             self._dock("stability", "Stability", self.stability, below),
             self._dock("scene", "Scene", self.scene, below),
+            self._dock("health", "Health", self.health, below),
         ]
         for first, second in pairwise(self._docks[2:]):
             self.tabifyDockWidget(first, second)
@@ -202,7 +206,7 @@ class MainWindow(QMainWindow):
         for dock in self._docks[:2]:
             name = f"dock-{dock.objectName()}"
             self.actions_by_name.register(name, view, dock.toggleViewAction())
-        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2"), strict=True):
+        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2", "F3"), strict=True):
             name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
             action = add(name, view, dock.windowTitle(), turn, key)
             action.setCheckable(True)
@@ -255,6 +259,7 @@ class MainWindow(QMainWindow):
         session.reported.connect(guarded(self.seeing.follow))
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
+        self._attend_health()
         self.staging.told.connect(guarded(self._tell))
         self.staging.played.connect(guarded(panels.connection.show_source))
         session.reported.connect(guarded(wishes.follow))
@@ -277,6 +282,20 @@ class MainWindow(QMainWindow):
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
         guard.on_failure(self._tell)
+
+    def _attend_health(self) -> None:
+        session, testing = self.session, self.testing
+        session.reported.connect(guarded(testing.follow))
+        session.estimated.connect(guarded(testing.receive))
+        testing.begun.connect(guarded(self._hold_still))
+        testing.asked.connect(guarded(self.display.ask_for))
+        self.health.pointed.connect(guarded(self.display.point))
+        self.health.attend(testing)
+
+    def _hold_still(self) -> None:
+        """Let a simulated load rest, so that it is moved by who presses with it alone."""
+        if self.session.inside and self.session.running:
+            self.session.run(False)
 
     # Wishes that are no settings, or need what is shown.
 
@@ -315,6 +334,7 @@ class MainWindow(QMainWindow):
         self.timeline.show_theme(theme)
         self.stability.show_settings(settings)
         self.stability.show_theme(theme)
+        self.health.show_theme(theme)
         self.display.show_theme(theme)
 
     def _show_shape(self) -> None:
@@ -341,6 +361,7 @@ class MainWindow(QMainWindow):
             self.panels.region.show_bargain(self.session.bargain())
         self.panels.show_status(status, simulating)
         self.stability.show_status(status, self.session.inside)
+        self.health.show_status(status, self.session.inside)
 
     def _allow_tare(self) -> None:
         action, why_not = self.actions_by_name["tare"], self.taring.why_not

@@ -227,6 +227,22 @@ def test_noise_drift_and_a_finger_that_lies_on_already_are_no_press():
     assert finger.press(45).verdict == "ok"
 
 
+def test_a_finger_that_moves_on_without_being_lifted_presses_one_after_the_other():
+    test = PressTest(SENSOR, (22, 45, 77, 32))
+    finger = Finger(test)
+    before = under_press_of(54)
+    finger.read(before, 1.0)
+    for element in test.elements:
+        came, there = None, under_press_of(element)
+        for share in np.linspace(0, 1, 12):
+            came = finger.read(before + (there - before) * share, 0.02) or came
+        came = finger.read(there, 1.5) or came
+        assert came.verdict == "ok"
+        before = there
+
+    assert test.over
+
+
 def test_a_press_waits_for_rest():
     test = PressTest(SENSOR, (45,))
     finger = Finger(test)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from kappaskin import SensorLayout
-from kappaskin_app.theme import DIVERGING, Colours, Theme
+from kappaskin import WHY, SensorLayout
+from kappaskin_app.theme import DARK_INK, DIVERGING, WANTED, Colours, Theme
 from kappaskin_app.views.colour_bar import ColourBar, LockButton
 from kappaskin_app.views.line import Line
 
@@ -21,8 +21,20 @@ Indices = NDArray[np.intp]
 _LEGEND = (
     "One cell for each element. Grey: no reading, dead or at the end of the converter's range. "
     "Crossed: bent beyond 1 % strain, where the gage is not elastic any more. Dotted: chosen to be "
-    "in every frame. Ringed: left out, because the others contradict it."
+    "in every frame. A letter: left out, and why: D dead, S stuck, N noisy, "
+    "R on a rail, X swapped, T drifting, O off by the same, P a spike. Framed: to be pressed now."
 )
+_LETTERS = dict(
+    zip(
+        ("spike", "stuck", "noisy", "swapped", "offset", "dead", "saturated", "drifting"),
+        "PSNXODRT",
+        strict=True,
+    )
+)
+
+
+_LEGIBLE = 9  # px at least, of a letter
+_ROOM = 18.0  # px of a cell with room for a letter in a ring
 
 
 def coloured(values: Array, limits: tuple[float, float], colours: Colours, missing: str) -> Colours:
@@ -50,7 +62,9 @@ class _Cells(QWidget):
         self._colours: Colours = np.empty((0, 3), np.uint8)
         self._line = QColor("#888888")
         self._under, self._faded = -1, False
-        self._marks: tuple[list[int], ...] = ([], [], [])
+        self._marks: tuple[list[int], ...] = ([], [])
+        self._kinds: dict[int, str] = {}
+        self._wanted = -1
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(90, 90)
@@ -60,7 +74,7 @@ class _Cells(QWidget):
 
     def show_layout(self, layout: SensorLayout) -> None:
         self._layout = layout
-        self._under, self._marks = -1, ([], [], [])
+        self._under, self._marks, self._kinds, self._wanted = -1, ([], []), {}, -1
 
     def _spacing(self) -> float:
         """What separates the two nearest elements, in m: squares of that side hide none."""
@@ -75,11 +89,17 @@ class _Cells(QWidget):
         self._colours = rgb
         self.update()
 
-    def show_marks(self, crossed: Indices, dotted: Indices, ringed: Indices) -> None:
-        """Cross out, dot and ring elements by number."""
-        marks = (crossed.tolist(), dotted.tolist(), ringed.tolist())
-        if marks != self._marks:
-            self._marks = marks
+    def show_marks(self, crossed: Indices, dotted: Indices, kinds: dict[int, str]) -> None:
+        """Cross out and dot elements by number, and ring those of some kind in `WHY`."""
+        marks = (crossed.tolist(), dotted.tolist())
+        if (marks, kinds) != (self._marks, self._kinds):
+            self._marks, self._kinds = marks, kinds
+            self.update()
+
+    def show_wanted(self, element: int) -> None:
+        """Frame the element that is to be pressed; -1 for none."""
+        if element != self._wanted:
+            self._wanted = element
             self.update()
 
     def show_faded(self, faded: bool) -> None:
@@ -137,28 +157,51 @@ class _Cells(QWidget):
         painter.setPen(QPen(self._line, 1))
         painter.drawRect(area)
         self._paint_marks(painter, area)
+        self._paint_kinds(painter, area)
+        if self._wanted >= 0:
+            self._frame(painter, self._cell(area, self._wanted))
         if self._under >= 0:
             cell = self._cell(area, self._under)
             for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # seen on every colour
                 painter.setPen(QPen(QColor(colour), width))
                 painter.drawRect(cell)
 
+    def _frame(self, painter: QPainter, cell: QRectF) -> None:
+        """A frame around what is to be pressed, wider than the cell: seen at a glance."""
+        around = cell.adjusted(-3, -3, 3, 3)
+        for colour, width in (("#16191d", 6), (WANTED, 3)):
+            painter.setPen(QPen(QColor(colour), width))
+            painter.drawRect(around)
+
     def _paint_marks(self, painter: QPainter, area: QRectF) -> None:
-        crossed, dotted, ringed = self._marks
+        crossed, dotted = self._marks
         for colour, width in (("#16191d", 3), ("#ffffff", 1)):  # seen on every colour
             painter.setPen(QPen(QColor(colour), width))
             for element in crossed:
                 cell = self._cell(area, element)
                 painter.drawLine(cell.topLeft(), cell.bottomRight())
                 painter.drawLine(cell.bottomLeft(), cell.topRight())
-            for element in ringed:
-                cell = self._cell(area, element)
-                reach = 0.36 * min(cell.width(), cell.height())
-                painter.drawEllipse(cell.center(), reach, reach)
             painter.setBrush(QColor(colour))
             for element in dotted:
                 painter.drawEllipse(self._cell(area, element).center(), 1.5, 1.5)
             painter.setBrush(Qt.BrushStyle.NoBrush)
+
+    def _paint_kinds(self, painter: QPainter, area: QRectF) -> None:
+        """A letter for each element that is left out, in a ring where there is room for both."""
+        for element, kind in self._kinds.items():
+            cell = self._cell(area, element)
+            side = min(cell.width(), cell.height())
+            ringed, font = side >= _ROOM, painter.font()
+            font.setPixelSize(max(_LEGIBLE, round((0.55 if ringed else 0.95) * side)))
+            font.setBold(True)
+            path = QPainterPath()
+            path.addText(0, 0, font, _LETTERS[kind])
+            path.translate(cell.center() - path.boundingRect().center())
+            painter.strokePath(path, QPen(QColor(DARK_INK), 2.5))
+            painter.fillPath(path, QColor("#ffffff"))
+            for colour, width in ((DARK_INK, 3), ("#ffffff", 1)) if ringed else ():
+                painter.setPen(QPen(QColor(colour), width))
+                painter.drawEllipse(cell.center(), 0.42 * side, 0.42 * side)
 
     def _cell(self, area: QRectF, element: int) -> QRectF:
         if self._layout is None or not self._layout.shape:
@@ -219,6 +262,7 @@ class Heatmap(QWidget):
         self.cells.chosen.connect(self.chosen)
         self._limit, self._layout, self._element = 1.0, None, -1
         self._missing = "#888888"
+        self._kinds: dict[int, str] = {}
         top = QHBoxLayout()
         top.addWidget(self._title)
         top.addWidget(self.value, 1)
@@ -252,9 +296,17 @@ class Heatmap(QWidget):
         self.cells.show_cells(coloured(values, limits, DIVERGING, self._missing))
         self.bar.show_scale(DIVERGING, limits, "1/m")
 
-    def show_marks(self, crossed: Mask, dotted: Mask, ringed: Mask) -> None:
-        """Cross out elements (P,) bent too far, dot those chosen to scan, ring those left out."""
-        self.cells.show_marks(*(np.flatnonzero(mask) for mask in (crossed, dotted, ringed)))
+    def show_marks(self, crossed: Mask, dotted: Mask, kinds: NDArray[np.uint8]) -> None:
+        """Cross out elements (P,) bent too far, dot those chosen to scan, ring those left out.
+
+        Of these `kinds` (P,) say why, by number in `WHY`.
+        """
+        self._kinds = {int(p): WHY[kinds[p]] for p in np.flatnonzero(kinds)}
+        self.cells.show_marks(np.flatnonzero(crossed), np.flatnonzero(dotted), self._kinds)
+
+    def show_wanted(self, element: int) -> None:
+        """Frame the element that is to be pressed; -1 for none."""
+        self.cells.show_wanted(element)
 
     def show_lost(self, lost: bool) -> None:
         """Fade the cells while what they show is not coming in any more."""
@@ -270,7 +322,8 @@ class Heatmap(QWidget):
             x, y = self._layout.positions[element] * 1e3
             reading = values[element]
             what = f"{reading:+.2f} 1/m" if math.isfinite(reading) else "no reading"
-            text = f"{what} at ({x:.0f}, {y:.0f}) mm"
+            why = f", {self._kinds[element]}" if element in self._kinds else ""
+            text = f"{what} at ({x:.0f}, {y:.0f}) mm{why}"
         else:
             finite = values[np.isfinite(values)]
             peak = f"peak {finite[np.argmax(np.abs(finite))]:+.2f} 1/m" if len(finite) else ""

@@ -15,12 +15,13 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, Load, Sensor
-from kappaskin_app.theme import Colours, Theme
+from kappaskin_app.theme import OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
 from kappaskin_app.views.drag import ARROW, LoadDrag
 from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
 from kappaskin_app.views.footprint import footprint
+from kappaskin_app.views.marks import Marks
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,7 @@ class MembraneView(QWidget):
         self._lift, self._want_elements, self._want_truth = 0.0, True, True
         self._of_elements: Indices = np.empty(0, np.intp)
         self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
+        self._positions, self._marked = np.empty((0, 2)), (b"", -1)
         self._arrays: dict[str, Any] = {}
         self._lost = False
         self._fitted, self._from = True, FROM_THE_LEFT
@@ -77,6 +79,7 @@ class MembraneView(QWidget):
         self._elements_actor = plotter.add_mesh(
             self._elements, style="points", point_size=5, **unlit
         )
+        self.out, self.asked = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
         self._line_actor = plotter.add_mesh(self._line, line_width=5, color="#e8543f", **unlit)
         # Sized for a skin of size 1; `show_skin` scales them to the one there is.
         self._arrow = pv.Arrow(
@@ -132,6 +135,9 @@ class MembraneView(QWidget):
         self._lift = _LIFT * skin.size
         self._wire = self._wireframe(skin)
         self._put_into_scene()
+        self._positions = sensor.layout.positions
+        self._marked = (b"", -1)
+        self.show_marked(np.empty(0, np.intp), -1)
         self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
         self._contact.scale = skin.size
         self._arrays = self._changing()
@@ -194,6 +200,15 @@ class MembraneView(QWidget):
             [np.ones(len(points), int), np.arange(len(points))]
         ).ravel()
 
+    def show_marked(self, out: Indices, asked: int) -> None:
+        """Mark elements that are left `out`, and the one that is `asked` to be pressed, if any."""
+        marked = (out.tobytes(), asked)
+        if marked != self._marked:
+            self._marked = marked
+            self.out.place(self.skin, self._positions[out])
+            self.asked.place(self.skin, self._positions[[asked] if asked >= 0 else []])
+            self.plotter.update()
+
     def _place_labels(self, skin: DrawnSkin) -> None:
         a, b = skin.patch.a, skin.patch.b
         corners, _ = skin.at_rest(np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]))
@@ -242,6 +257,8 @@ class MembraneView(QWidget):
             points, out = self._elements_at_rest
             height = skin.height.ravel()[self._of_elements] + self._lift
             self._arrays["elements"][:] = points + out * height[:, None]
+        for marks in (self.out, self.asked):
+            marks.follow(skin, self._lift)
         self._place(self._contact, estimate.touch.position)
         known = math.isfinite(estimate.taken)
         # It was taken before it came: where nothing else is known, it is at least so old.

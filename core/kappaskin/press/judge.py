@@ -45,7 +45,8 @@ def judge(layout: SensorLayout, asked: int, answer: Array) -> Pressed:
     Where a skin is pressed it bends most, whichever of its components is read as which: no fit is
     asked, and none of what the map says of other elements.
     """
-    strength = np.linalg.norm(np.where(layout.live, answer, 0.0), axis=0)
+    # Where it bulges it was let go: under a finger that moved on from elsewhere.
+    strength = np.linalg.norm(np.where(layout.live, np.minimum(answer, 0.0), 0.0), axis=0)
     peak = int(strength.argmax())
     apart = np.linalg.norm(layout.positions - layout.positions[peak], axis=1)
     near = apart <= _BESIDE * _pitch(layout)

@@ -12,9 +12,10 @@ _OFTEN = 0.005  # s between two readings that are kept
 _STILL = 0.4  # s without motion are a rest
 _LATELY = 0.1  # s that are averaged to see a press
 _WHOLE = 0.8  # of that, at least, between the first reading kept and the last
-_FEWEST = 4  # readings of either
+_FEWEST, _FEWEST_AT_REST = 3, 6  # readings that are averaged, and of a rest
 _CLEAR = 8.0  # standard deviations that a press stands out by
 _MOVING = 6.0  # the same, that a skin at rest may move by
+_LET_GO = 3.0  # times as far as it is bent in, it bulges where it was let go
 _OVER = 0.25  # of its peak: less is left when a press is over
 
 
@@ -41,7 +42,7 @@ class Listener:
         self._held = np.full(channels, np.nan)
         self._kept: deque[tuple[float, Array]] = deque()
         self._rest, self._noise, self._least = np.zeros(channels), math.nan, resolution
-        self._hardest, self._most = np.zeros(channels), 0.0
+        self._hardest, self._most, self._pressed = np.zeros(channels), 0.0, 0.0
 
     def __call__(self, time: float, readings: Array) -> None:
         """Take in `readings` (C,) in 1/m at `time` in s, NaN where one is missing."""
@@ -54,42 +55,52 @@ class Listener:
         self._kept.append((time, self._held))
         while time - self._kept[0][0] > _STILL:
             self._kept.popleft()
+        kept = np.array([reading for _, reading in self._kept])
         if self.phase is Phase.REST:
-            self._settle(time)
+            self._settle(kept)
         elif self.peak is None:
-            self._follow(time)
+            self._follow(kept)
 
-    def _since(self, time: float) -> Array:
-        return np.array([reading for when, reading in self._kept if when >= time])
+    def _whole(self) -> bool:
+        """Whether what is kept is long enough to tell a rest."""
+        return self._kept[-1][0] - self._kept[0][0] >= _WHOLE * _STILL
 
-    def _settle(self, time: float) -> None:
-        """Call it a rest once nothing has moved for a while."""
-        kept = self._since(-math.inf)
-        if len(kept) < 2 * _FEWEST or time - self._kept[0][0] < _WHOLE * _STILL:
-            return
-        steps = np.diff(kept, axis=0)
-        noise = np.sqrt(np.mean(steps**2, axis=0) / 2)
-        self._noise = max(float(np.median(noise[~np.isnan(noise)])), self._least)
+    def _still(self, kept: Array) -> bool:
+        """Whether nothing moved from the first half of `kept` (n, C) to the second."""
         half = len(kept) // 2
         moved = np.nan_to_num(np.abs(kept[half:].mean(axis=0) - kept[:half].mean(axis=0)))
-        if moved.max() <= _MOVING * self._noise * 2 / math.sqrt(len(kept)):
+        return bool(moved.max() <= _MOVING * self._noise * 2 / math.sqrt(len(kept)))
+
+    def _settle(self, kept: Array) -> None:
+        """Call it a rest once nothing has moved for a while."""
+        if len(kept) < _FEWEST_AT_REST or not self._whole():
+            return
+        noise = np.sqrt(np.mean(np.diff(kept, axis=0) ** 2, axis=0) / 2)
+        self._noise = max(float(np.median(noise[~np.isnan(noise)])), self._least)
+        if self._still(kept):
             self._rest, self.phase = kept.mean(axis=0), Phase.PRESS
 
-    def _follow(self, time: float) -> None:
-        lately = self._since(time - _LATELY)
-        if len(lately) < _FEWEST:
-            return
+    def _follow(self, kept: Array) -> None:
+        now = self._kept[-1][0]
+        count = sum(when >= now - _LATELY for when, _ in self._kept)
+        lately = kept[-max(count, _FEWEST) :]
         change = np.nan_to_num(lately.mean(axis=0) - self._rest)
         most = float(np.abs(change).max())
         clear = most > _CLEAR * self._noise / math.sqrt(len(lately))
-        if clear and change.max() == most:
-            # Where it changed most it bulges: it was pressed already when it was called at rest.
+        if clear and change.max() > _LET_GO * -change.min():
+            # It bulges: it was pressed already when it was called at rest.
             self.phase, self._hardest, self._most = Phase.REST, 0 * change, 0.0
             self._kept.clear()
             return
         if most > self._most:
             self._hardest, self._most = change, most
         if self.phase is Phase.PRESS and clear:
-            self.phase = Phase.RELEASE
-        elif self.phase is Phase.RELEASE and most < _OVER * self._most:
+            self.phase, self._pressed = Phase.RELEASE, now
+        elif self.phase is Phase.RELEASE and self._over(kept, most, now):
             self.peak = self._hardest
+
+    def _over(self, kept: Array, most: float, now: float) -> bool:
+        """Whether it was let go, or lies still: then what comes next is the next press."""
+        if most < _OVER * self._most:
+            return True
+        return now - self._pressed > _STILL and self._whole() and self._still(kept)
