@@ -146,6 +146,19 @@ def test_without_pings_it_tells_the_latest_that_it_can_have_been():
     assert np.median(errors) < 2e-3
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_no_message_is_told_to_be_made_after_it_came(seed):
+    line = Line(50e-6, least=(1e-3, 1e-4), jitter=(2e-3, 1e-4), seed=seed)
+
+    for n in range(2000):
+        if n % 100 == 0:
+            line.ping()
+        line.now += 5e-3
+        device, came = line.device(line.now), line.now + line.delay(1)
+        line.clock.heard(device, came)
+        assert line.clock.taken(device) < came + 3e-4
+
+
 def test_a_message_that_came_sooner_than_an_answer_narrows_the_bound():
     line = Line(least=(5e-3, 5e-3), jitter=(0.0, 0.0))
     line.errors(100)

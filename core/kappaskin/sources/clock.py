@@ -10,6 +10,7 @@ _WANDER = 5e-6  # s/s by which the drift itself may change within the window: a 
 _GRAIN = 1e-6  # s, the step of a device's clock
 _WINDOW = 100.0  # s of exchanges that tell the drift
 _BUCKET = 1.0  # s of which only the quickest exchange is kept, and the quickest message
+_SOON = 0.05  # s after which one that shows the map wrong is taken in
 _MESSAGES = 30  # quickest ones that are kept
 _BACK = 1.0  # s that a message may be older than one before it
 _DELAY = 0.5  # s, longer than a message is under way where no exchange tells how long
@@ -117,7 +118,8 @@ class ClockMap:
             self._latest = device_time
         if late < self._least:
             self._least, self._quickest = late, (device_time, host_time)
-        if away > _BUCKET:
+        # One that would have been made after it came shows a drift wrongly guessed.
+        if away > (_SOON if late < 0 else _BUCKET):
             self._take_in()
 
     def exchange(self, sent: float, received: float, answered: float, arrived: float) -> None:
