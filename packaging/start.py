@@ -1,9 +1,10 @@
-"""A fresh machine, set up, and one task run on it: the app, every check, or the benchmarks.
+"""A fresh machine, set up, and one task run on it: the app, every check, benchmarks or fuzzing.
 
     python3 packaging/start.py                     opens the app on the simulated fingertip
     python3 packaging/start.py app [ARGUMENTS]     opens the app, e.g. app --source sim:
     python3 packaging/start.py test [ARGUMENTS]    runs every check; ARGUMENTS go to pytest
     python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; ARGUMENTS go to pytest
+    python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
 
 Standard library only. A second start with nothing changed installs nothing.
 """
@@ -114,7 +115,12 @@ def bench(arguments: list[str], shown: dict[str, str]) -> int:
     return run([tool("pytest"), *BENCHMARKS, *arguments], shown, cwd=ROOT)
 
 
-TASKS = {"app": app, "test": test, "bench": bench}
+def fuzz(arguments: list[str], shown: dict[str, str]) -> int:
+    """Give the readers of files and lines mutated bytes, for minutes or hours."""
+    return run([tool("python"), str(ROOT / "tests" / "fuzz" / "fuzz.py"), *arguments], shown)
+
+
+TASKS = {"app": app, "test": test, "bench": bench, "fuzz": fuzz}
 
 
 # --- the setup

@@ -250,6 +250,7 @@ def test_heights_that_are_no_map_are_refused(heights, said):
         ("map.npy", b"", "numpy.save"),
         ("map.png", b"no picture", "PNG picture"),
         ("map.png", b"", "PNG picture"),
+        ("map.npy", b"\x93NUMPY\x01\x00\x0c\x00{'descr': '(\n", "numpy.save"),
         ("map.npy", None, "numpy.save"),
         ("map.png", None, "PNG picture"),
     ],
@@ -261,6 +262,15 @@ def test_a_map_that_cannot_be_read_is_refused(tmp_path, name, content, said):
 
     with pytest.raises(Refusal, match=said):
         HeightMap.read(path, 1e-2, 1e-2, 1e-3)
+
+
+def test_the_least_difference_there_is_makes_a_relief(tmp_path):
+    path = tmp_path / "map.npy"
+    np.save(path, np.array([[0.0, 5e-324]]))
+
+    read = HeightMap.read(path, 1e-2, 1e-2, 1e-3)
+
+    assert read.heights == pytest.approx(np.array([[1e-3, 0.0]]))
 
 
 def test_a_picture_cut_short_is_refused(tmp_path):
@@ -285,6 +295,7 @@ def test_a_picture_in_colour_is_refused(tmp_path):
     [
         (np.array([[1.0, np.nan]]), "NaN or infinity"),
         (np.array([[1.0, np.inf]]), "NaN or infinity"),
+        (np.array([[1e308, -1e308]]), "pixels of one size"),
         (np.zeros(4), r"\(ny, nx\) pixels"),
         (np.zeros((2, 2, 3)), r"\(ny, nx\) pixels"),
         (np.zeros((0, 4)), r"\(ny, nx\) pixels"),
@@ -326,6 +337,21 @@ def test_a_mesh_that_is_not_closed_is_refused():
         Mesh(np.array(box.vertices), np.array(box.faces)[1:])
 
 
+def test_a_mesh_of_many_layers_is_refused_before_they_are_all_tried():
+    flat = np.array([[0, 0, 0], [0.02, 0, 0], [0, 0.02, 0], [0, 0, 0.02]])
+    faces = np.tile([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], (5000, 1))
+
+    with pytest.raises(Refusal, match=r"too many layers: .* 10000 times the map.*simplify it"):
+        Mesh(flat, faces).height(np.zeros((1, 2)))
+
+
+TRIANGLE = (
+    b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+    b"property float z\nelement face 1\nproperty list uchar int %s\nend_header\n"
+    b"0 0 0\n1 0 0\n0 1 0\n%s 0 1 2\n"
+)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
@@ -336,6 +362,9 @@ def test_a_mesh_that_is_not_closed_is_refused():
         ("thing.ply", b"hello", "cannot read"),
         ("thing.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot read"),
         ("thing.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "found none|4 to"),
+        ("thing.ply", TRIANGLE % (b"vertex_indices", b"1e400"), "cannot read"),
+        ("thing.ply", TRIANGLE % (b"others", b"3"), "cannot read"),
+        ("thing.obj", b"v 1e300 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "cannot read|4 to"),
         ("thing.stl", None, "cannot read"),
     ],
 )

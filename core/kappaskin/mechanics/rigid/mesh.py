@@ -18,9 +18,21 @@ _FILES = (".stl", ".ply", ".obj")
 _MOST = 2_000_000  # triangles
 _PIXELS = 256  # along the longer side of the map
 _AT_ONCE = 2**18  # pixels tried against triangles at a time
+_TRIED = 2**25  # pixels tried in all: many large triangles above each other take minutes
 _SIZES = (1e-4, 1.0)  # m
 _EDGE_ON = 1e-9  # pixels: a face seen with less area is seen from the side
 _ON_EDGE = 1e-9  # of a face: a pixel as far beside it is on it
+# What trimesh raises on files of other contents, a local variable that was never set among it.
+_UNREADABLE = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    NameError,
+    struct.error,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +85,9 @@ class Mesh:
         if not 0 < unit < np.inf:
             raise Refusal(f"expected a unit above zero in m, got {unit}")
         try:
-            mesh = cast("Any", trimesh).load_mesh(str(path))  # not typed throughout
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, struct.error) as error:
+            with np.errstate(all="ignore"):  # what is no number is refused below
+                mesh = cast("Any", trimesh).load_mesh(str(path))  # not typed throughout
+        except _UNREADABLE as error:
             raise Refusal(f"cannot read a mesh from {path}: {error}") from error
         if not len(mesh.faces):
             raise Refusal(f"expected triangles in {path}, found none; export the object again")
@@ -108,6 +121,11 @@ def _lowest(triangles: Array, nx: int, ny: int) -> Array:
     last = np.minimum(np.floor(triangles[..., :2].max(axis=1)), (nx - 1, ny - 1)).astype(int)
     across, up = np.maximum(last - first + 1, 0).T
     pixels = across * up
+    if pixels.sum() > _TRIED:
+        raise Refusal(
+            f"the mesh lies in too many layers: its triangles cover {pixels.sum() / (nx * ny):.0f} "
+            f"times the map, expected {_TRIED / (nx * ny):.0f} at most; simplify it"
+        )
     batch = np.cumsum(pixels) // _AT_ONCE
     for number in range(int(batch.max(initial=0)) + 1):
         part = np.flatnonzero(batch == number)

@@ -1,11 +1,13 @@
 """Objects with any underside: a map of heights, given or read from a picture."""
 
 import struct
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, cast
 
 import numpy as np
@@ -64,9 +66,12 @@ class HeightMap:
                 f"expected a relief of at least zero in m, {_HIGHEST:g} at most, got {relief}"
             )
         low, high = float(pixels.min()), float(pixels.max())
+        if not np.isfinite(high - low):
+            raise Refusal(f"expected pixels of one size, got {low:g} to {high:g} in {path}")
         if low == high and relief:
             raise Refusal(f"{path} has no relief: all its pixels are {low:g}; give 0 m for a flat")
-        return cls((high - pixels) * (relief / (high - low) if relief else 0.0), length, width)
+        # Not times relief / (high - low): of the smallest differences that is infinite.
+        return cls((high - pixels) / ((high - low) or 1.0) * relief, length, width)
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -121,8 +126,10 @@ def _check_pixels(path: Path, shape: tuple[int, ...]) -> None:
 
 def _read_array(path: Path) -> Array:
     try:
-        stored = cast("NDArray[Any]", np.lib.format.open_memmap(path, mode="r"))
-    except (OSError, ValueError, EOFError, SyntaxError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a header as Python 2 wrote it
+            stored = cast("NDArray[Any]", np.lib.format.open_memmap(path, mode="r"))
+    except (OSError, ValueError, EOFError, SyntaxError, TokenError) as error:
         raise Refusal(f"expected an array in {path}, as numpy.save writes it: {error}") from error
     _check_pixels(path, stored.shape)
     if stored.dtype.kind not in "buif":

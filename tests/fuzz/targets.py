@@ -1,0 +1,204 @@
+"""What is read from elsewhere: for each reader, how bytes are given to it, and some it likes."""
+
+import io
+import tomllib
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from kappaskin import SCENES, Calibration, load_scene
+from kappaskin.calibration.calibration import digest
+from kappaskin.calibration.file import from_toml, to_toml
+from kappaskin.effects import SECOND_GENERATION_LOOPS, Creep
+from kappaskin.mechanics import HeightMap, Mesh
+from kappaskin.scene import read_scene
+from kappaskin.sources import information
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
+from kappaskin.sources.wire import (
+    Command,
+    Kind,
+    Operation,
+    encode,
+    encode_command,
+    encode_information,
+    encode_reply,
+    encode_samples,
+)
+
+Read = Callable[[bytes, Path], object]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader: `read` is given bytes and a folder for files, and may raise a `Refusal` only.
+
+    `seeds` are bytes that it reads, `words` what its formats are made of.
+    """
+
+    name: str
+    read: Read
+    seeds: tuple[bytes, ...]
+    words: tuple[bytes, ...] = ()
+
+
+SENSOR = load_scene("centre").sensor()
+SMALL = load_scene("calibration").sensor()
+SCENE_FOLDER = Path(str(files("kappaskin_resources"))) / "scenes"
+
+_NUMBERS = tuple(b"0 -1 1 2 0.5 -0.0 1e308 1e-308 nan inf 65535 4294967296 99999999999".split())
+_TOML = (*_NUMBERS, b"true", b'""', b"[]", b"{}", b"[[", b"]]", b"=", b"\n", b'"""', b"2026-01-01")
+_JSON = (*_NUMBERS, b"null", b"NaN", b"Infinity", b"{}", b"[]", b'""', b":", b",", b"\\ud800")
+
+
+# The wire
+
+
+def _balanced(decoder: Decoder, fed: int) -> None:
+    seen = decoder.accounting()
+    if not seen.balanced or seen.bytes_in != fed:
+        raise RuntimeError(f"the accounting does not balance: {seen}")
+
+
+def _wire(data: bytes, _: Path) -> None:
+    """As they come, from either side, in pieces whose sizes the bytes themselves decide."""
+    for kinds in (FROM_DEVICE, FROM_HOST):
+        decoder, at = Decoder(kinds), 0
+        while at < len(data):
+            size = 1 + data[at] * 3
+            decoder.feed(data[at : at + size])
+            at += size
+        _balanced(decoder, len(data))
+        decoder.line_ended()
+        _balanced(decoder, len(data))
+
+
+def _content(data: bytes, _: Path) -> None:
+    """As payloads of messages whose checks are right."""
+    for kind in (*Kind, 0, 77):
+        message = encode(kind, 1, 0.0, data)
+        for kinds in (FROM_DEVICE, FROM_HOST):
+            decoder = Decoder(kinds)
+            for said in decoder.feed(message + message[:-1] + message):
+                str(said)
+            _balanced(decoder, 3 * len(message) - 1)
+
+
+def _information(data: bytes, _: Path) -> None:
+    sensor = information.from_json(data.decode(errors="replace"))
+    information.from_json(information.to_json(sensor))
+
+
+_SCAN = encode_samples(7, 0.1, np.arange(300), np.arange(300, dtype=np.int32), 2)
+_PIECES = (
+    encode_information(0, 0.0, information.to_json(SENSOR)),
+    _SCAN,
+    encode_samples(8, 0.2, np.array([5, 6, 7, 90]), np.array([1, -2, 3, 2**20], np.int32), 4),
+    encode_reply(9, 0.3, Command(1, Operation.PING, b""), 0, bytes(10)),
+    encode_command(3, 0.4, Operation.SCAN_LIST, bytes([1, 0, 0, 44, 1])),
+)
+
+
+# Files
+
+
+def _scene(data: bytes, _: Path) -> None:
+    read_scene(data.decode(errors="replace"), SCENE_FOLDER / "a.toml")
+
+
+def _resealed(data: bytes) -> bytes:
+    """The file with the hash that belongs to it, as one who means harm would write it."""
+    lines = [line for line in data.splitlines() if not line.startswith(b"sha256")]
+    said: object = None
+    with suppress(ValueError, RecursionError, TypeError, AttributeError):
+        said = tomllib.loads(b"\n".join(lines).decode())
+        said.pop("format", None)
+        lines.insert(1, b'sha256 = "' + digest(said).encode() + b'"')
+    return b"\n".join(lines)
+
+
+def _calibration(data: bytes, folder: Path) -> None:
+    path = folder / "a.toml"
+    path.write_bytes(_resealed(data))
+    from_toml(path).check(SMALL)
+
+
+def _mesh(kind: str) -> Read:
+    def read(data: bytes, folder: Path) -> None:
+        path = folder / f"a.{kind}"
+        path.write_bytes(data)
+        Mesh.read(path, 1e-3).height(np.zeros((1, 2)))
+
+    return read
+
+
+def _map(kind: str) -> Read:
+    def read(data: bytes, folder: Path) -> None:
+        path = folder / f"a.{kind}"
+        path.write_bytes(data)
+        HeightMap.read(path, 0.02, 0.01, 1e-3).height(np.zeros((1, 2)))
+
+    return read
+
+
+def _npy(values: "np.ndarray") -> bytes:
+    written = io.BytesIO()
+    np.save(written, values)
+    return written.getvalue()
+
+
+def _calibrated(channels: int) -> bytes:
+    ones = np.ones(channels)
+    return to_toml(
+        Calibration(
+            "skin", "1", "2", "layout", datetime(2026, 1, 1, tzinfo=UTC), ones, 0 * ones, 0 * ones,
+            0 * ones, SECOND_GENERATION_LOOPS.operator(channels), Creep(0.03, 20.0).solid(channels),
+        )
+    ).encode()  # fmt: skip
+
+
+_PLY = (SCENE_FOLDER / "bolt.ply").read_bytes()
+_OBJ = b"v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+_ASCII = (
+    b"solid a\n" + b"facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 9 0 0\nvertex 0 9 0\n"
+    b"endloop\nendfacet\n" * 4 + b"endsolid a\n"
+)
+_BINARY = bytes(80) + (4).to_bytes(4, "little") + bytes(4 * 50)
+
+TARGETS = (
+    Target("wire", _wire, (b"".join(_PIECES), _SCAN * 3), (b"\x4b\xa7", _SCAN[:22], _SCAN)),
+    Target(
+        "content",
+        _content,
+        tuple(piece[22:-4] for piece in _PIECES),
+        (bytes([2, 1, 0, 0, 255, 255]), bytes([4, 255]), b"\xff\xff"),
+    ),
+    Target("information", _information, (_PIECES[0][22:-4],), _JSON),
+    Target(
+        "scene", _scene, tuple((SCENE_FOLDER / f"{n}.toml").read_bytes() for n in SCENES), _TOML
+    ),
+    Target("calibration", _calibration, (_calibrated(3), _calibrated(1)), _TOML),
+    Target("ply", _mesh("ply"), (_PLY[:4000], _PLY), (*_NUMBERS, b"element face ", b"\nproperty ")),
+    Target(
+        "obj", _mesh("obj"), (_OBJ,), (*_NUMBERS, b"\nf ", b"\nv ", b"\nvn ", b"//", b"\nmtllib ")
+    ),
+    Target(
+        "stl", _mesh("stl"), (_ASCII, _BINARY), (*_NUMBERS, b"\nfacet ", b"\nvertex ", b"\xff" * 4)
+    ),
+    Target(
+        "npy",
+        _map("npy"),
+        (_npy(np.eye(5)), _npy(np.eye(3, dtype="i2"))),
+        (*_NUMBERS, b"'O'", b"True"),
+    ),
+    Target(
+        "png",
+        _map("png"),
+        ((SCENE_FOLDER / "coin.png").read_bytes(),),
+        (b"IHDR", b"IDAT", b"\xff" * 4),
+    ),
+)
