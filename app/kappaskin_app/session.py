@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from kappaskin import (
+    LISTS,
     Bargain,
     Calibration,
     CurvatureMap,
@@ -40,6 +41,7 @@ Array = NDArray[np.float64]
 STALE_AFTER = 0.5  # s without a frame
 _TICK = 4  # ms between two looks for a new estimate
 _ARRIVES = 0.3  # s after which what was asked of the engine shows in its status
+_LATE = 1.2  # times as long as the lists take, for what comes late
 _NEWS = 60.0  # s for which another device in the last one's place is told
 _STATUS = 0.05  # s between two looks at the status
 
@@ -55,6 +57,16 @@ def _setup_of(settings: Settings, sensor: Sensor | None = None) -> Setup:
                 found.check(sensor)
                 setup = replace(setup, **{name: found})
     return setup
+
+
+def _turn(region: Region) -> float:
+    """For how many s a device on a line leaves elements out that take turns; 0 if it leaves none.
+
+    Were readings held for less, too few would be there to decide the shape.
+    """
+    if region.around not in ("elements", "skin") or not region.share:
+        return 0.0
+    return _LATE / (LISTS * region.share)
 
 
 class Session(QObject):
@@ -146,6 +158,8 @@ class Session(QObject):
         setup = _setup_of(self._settings, self.status.sensor)
         if self._laid is not None:
             setup = replace(setup, calibration=None, tare=None)
+        if not self.inside:
+            setup = replace(setup, hold=max(setup.hold, _turn(region_of(self._settings))))
         if setup != self._asked:
             if self.inside and setup.calibration and not self._asked.calibration:
                 # A calibration follows the loops of a skin from rest on: these effects start anew.

@@ -113,6 +113,7 @@ from kappaskin.sensor import Sensor as Sensor
 from kappaskin.simulate import Simulator as Simulator
 from kappaskin.sources.ports import Port as Port
 from kappaskin.sources.ports import serial_ports as serial_ports
+from kappaskin.sources.scanning import LISTS as LISTS
 from kappaskin.studies.beside import Beside as Beside
 from kappaskin.studies.cost import Cost as Cost
 from kappaskin.studies.cost import EffectCost as EffectCost

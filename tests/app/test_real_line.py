@@ -50,7 +50,8 @@ def plug(tmp_path):
         return made[-1]
 
     yield plug
-    made[-1].pull()
+    if made[-1].link.is_symlink():
+        made[-1].pull()
 
 
 def kinds(window):
@@ -64,16 +65,25 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     until(lambda: window.badge.state == "LIVE" and len(window.membrane.ages) > 3)
     until(lambda: "messages lost" in window.panels.connection.losses.text())
 
+    # A region of interest is scanned, and held for as long as the others take to come up.
+    inside = tuple(10 * row + column for row in range(3, 7) for column in range(3, 7))
+    window.history.change("Region", -1, region="elements", region_elements=inside)
+    until(lambda: 0 < window.session.estimate.fresh.sum() < 120)
+    assert window.session.status.setup.hold == pytest.approx(0.6)
+    window.history.stack.undo()
+    until(lambda: window.session.estimate.fresh.all())
+    until(lambda: window.session.status.setup.hold == 0.1)
+
     # Pulled: the last picture stays, with since when and what to do across it.
     device.pull()
     until(lambda: window.badge.state == "LOST")
     alarm, message = window.membrane.alarm, window.panels.connection.message
-    assert alarm.text.startswith("LOST 0 s\n")
+    assert alarm.text.startswith("LOST ")
     assert "the line is gone" in window.statusBar().currentMessage()
     assert not window.object.isVisible()  # or the message would have no room
     assert colours_in(window, window.membrane) > 300
     heights = window.membrane.skin.height.copy()
-    until(lambda: alarm.text.startswith("LOST 2 s\n"))
+    until(lambda: int(alarm.text.split()[1]) >= 2)
     assert "plug the sensor in" in alarm.text
     assert message.text() in alarm.text
     assert np.abs(heights).max() > 0

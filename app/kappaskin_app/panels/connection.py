@@ -46,9 +46,7 @@ class ConnectionPanel(Panel):
         self.sources.setMinimumContentsLength(12)
         self.sources.currentTextChanged.connect(self._note_choice)
         # A port's name is at its beginning.
-        self.sources.currentIndexChanged.connect(
-            lambda: self.sources.lineEdit().setCursorPosition(0)
-        )
+        self.sources.currentIndexChanged.connect(lambda: self._line.setCursorPosition(0))
         self.look_button = QPushButton("Look again")
         self.look_button.setToolTip("Look for serial ports again.")
         self.connect_button = QPushButton("Connect")
@@ -63,9 +61,9 @@ class ConnectionPanel(Panel):
         self.copy_button.setToolTip("Copy what the message above says to type into a terminal.")
         self.copy_button.clicked.connect(self._copy)
         self.connect_button.clicked.connect(lambda: self.connect_wanted.emit(self.source()))
-        line = QLineEdit()
-        line.returnPressed.connect(self.connect_button.click)
-        self.sources.setLineEdit(line)
+        self._line = QLineEdit()
+        self._line.returnPressed.connect(self.connect_button.click)
+        self.sources.setLineEdit(self._line)
         # A completer would turn a typed ttyACM1 into a listed ttyACM10.
         self.sources.setCompleter(None)  # pyright: ignore[reportArgumentType]
         self.disconnect_button.clicked.connect(self.disconnect_wanted)
@@ -102,7 +100,7 @@ class ConnectionPanel(Panel):
         chosen, plug, self._ports = self.source(), self._plug, ports
         if plug is not None and chosen == plug.port:
             chosen = next((port.port for port in ports if port.same_plug(plug)), chosen)
-        line = self.sources.lineEdit()
+        line = self._line
         at, text = line.cursorPosition(), line.text()
         self._list()
         self.show_source(chosen)
@@ -126,7 +124,7 @@ class ConnectionPanel(Panel):
                 self.sources.setCurrentIndex(index)
             else:
                 self.sources.setCurrentText(source)
-        self.sources.lineEdit().setCursorPosition(0)
+        self._line.setCursorPosition(0)
         self._note_choice()
 
     def show_status(self, status: Status, simulating: bool) -> None:

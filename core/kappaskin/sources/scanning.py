@@ -20,7 +20,10 @@ _DEAF = (
 
 Ask = Callable[[Operation, float, bytes], int]
 
-_PAUSE = 0.05  # s between two lists
+LISTS = 20
+"""Lists a second that a device is asked to scan, at most."""
+
+_PAUSE = 1 / LISTS
 _AGAIN = 0.5  # s after which a command without a reply is sent again
 _PATIENCE = 2.0  # s after which a device is taken for one that obeys nothing
 
