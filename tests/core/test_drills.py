@@ -14,7 +14,7 @@ pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin import SourceError, load_scene
 from kappaskin.cli import main
 from kappaskin.sources import information
-from kappaskin.sources.line import BAUD_RATES
+from kappaskin.sources.tuning import BAUD_RATES
 from kappaskin.sources.wire import Fault, Information, Operation, Reply, Samples
 from kappaskin.studies.drills import DRILLS, drills, drills_text
 from kappaskin.studies.drills.devices import DRILLS as OF_DEVICES

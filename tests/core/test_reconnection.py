@@ -17,7 +17,7 @@ import pytest
 from kappaskin import Port, SourceError, load_scene
 from kappaskin.sources import SerialSource, information, ports, serial_line
 from kappaskin.sources.decoder import FROM_HOST, Decoder
-from kappaskin.sources.line import BAUD_RATES
+from kappaskin.sources.tuning import BAUD_RATES
 from kappaskin.sources.wire import Operation, encode_information, encode_reply, encode_samples
 
 pty = pytest.importorskip("pty", reason="no pseudo-terminals on this system")

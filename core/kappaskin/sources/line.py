@@ -15,9 +15,6 @@ from serial.urlhandler import protocol_socket
 
 from kappaskin.sources.ports import BAUD_RATE, open_port
 
-BAUD_RATES = (BAUD_RATE, 1_000_000, 921_600, 500_000, 460_800, 230_400, 115_200)
-"""Rates that a device may speak at, the usual one first."""
-
 _BLOCK = 65536
 _BACKLOG = 2**24  # bytes that may wait to be taken; beyond it they are thrown away, and counted
 _EACH = 128  # bytes of memory that a read takes beside what came

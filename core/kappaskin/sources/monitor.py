@@ -12,7 +12,8 @@ from kappaskin.sources.accounting import SEQUENCES, Accounting
 from kappaskin.sources.asking import Asking, name_of
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.decoder import Decoder
-from kappaskin.sources.line import BAUD_RATES, Line
+from kappaskin.sources.line import Line
+from kappaskin.sources.tuning import BAUD_RATES
 from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
 _SHOWN = 0.1  # s between two samples that are shown: nobody reads 500 lines a second

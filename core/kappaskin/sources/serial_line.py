@@ -16,9 +16,10 @@ from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.asking import Asking
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.decoder import Decoder
-from kappaskin.sources.line import BAUD_RATES, Line
+from kappaskin.sources.line import Line
 from kappaskin.sources.ports import holders, port_called, serial_ports
 from kappaskin.sources.scanning import Scanning
+from kappaskin.sources.tuning import Tuning
 from kappaskin.sources.wire import (
     VERSION,
     Command,
@@ -81,8 +82,7 @@ class SerialSource:
         self._opened = self._heard = self._good_at = self._tuned = now
         self._bytes_before = self._decoder.accounting().bytes_in
         self._holders: list[str] = []
-        self._rate_told = line.baud_rate
-        self._tried = [line.baud_rate]
+        self._tuning = Tuning(line.baud_rate)
         self._times = ClockMap()
         self._asking = Asking(line.write, self._times)
         self._asking.greet(now)
@@ -149,7 +149,8 @@ class SerialSource:
             self._pending += [(now, got) for got in messages if not isinstance(got, Command)]
             if messages:
                 self._good_at = now
-                self._tell_rate(line)
+                if self._tuning.good(line.baud_rate):
+                    self._tell("rate", f"the device speaks at {line.baud_rate} baud")
         if not self._known:
             self._look_for_information()
         frames = self._frames()
@@ -301,11 +302,6 @@ class SerialSource:
         told, self._events = self._events, []
         return told
 
-    def _tell_rate(self, line: Line) -> None:
-        if line.baud_rate != self._rate_told:
-            self._rate_told = line.baud_rate
-            self._tell("rate", f"the device speaks at {line.baud_rate} baud")
-
     def _tell_losses(self) -> None:
         sequence, now = self._decoder.sequence, self._clock()
         if self._known and sequence.restarts > self._restarts_told:
@@ -324,15 +320,11 @@ class SerialSource:
             self._scanning.attend(now, self._sensor, self._asking.ask)
         if self._asking.attend(now) and not self._known:
             self._asking.greet(now)
-        quiet = now - max(self._good_at, self._tuned)
-        if self._heard > max(self._good_at, self._tuned) and quiet > (
-            _PATIENCE if self._known else _DWELL
-        ):
-            place = BAUD_RATES.index(line.baud_rate)
-            line.speak_at(BAUD_RATES[(place + 1) % len(BAUD_RATES)])
+        since = max(self._good_at, self._tuned)
+        patience = _PATIENCE if self._known and self._tuned < self._good_at else _DWELL
+        if self._heard > since and now - since > patience:
+            line.speak_at(self._tuning.next(line.baud_rate))
             self._tuned, self._holders = now, holders(self.url)
-            if line.baud_rate not in self._tried:
-                self._tried.append(line.baud_rate)
             self._asking.greet(now)
 
     @property
@@ -368,15 +360,10 @@ class SerialSource:
                 "device is; its firmware must send an information message every second"
             )
         others = ", ".join(self._holders)
-        untried = len(self._tried) < len(BAUD_RATES)
-        tried = (
-            f"at {', '.join(map(str, self._tried))} baud; as bytes come other rates are tried, or"
-            if untried
-            else f"at any baud rate from {BAUD_RATES[-1]} to {BAUD_RATES[0]}:"
-        )
         return (
-            f"{self.url}: {came} bytes came but no message of wire version {VERSION} {tried} it is "
-            "another kind of device" + (f", or {others} takes its bytes" if others else "")
+            f"{self.url}: {came} bytes came but no message of wire version {VERSION} "
+            f"{self._tuning.told} it is another kind of device"
+            + (f", or {others} takes its bytes" if others else "")
         )
 
     def accounting(self) -> Accounting:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
-from kappaskin.sources.line import BAUD_RATES
+from kappaskin.sources.tuning import BAUD_RATES
 from kappaskin.sources.wire import FromDevice
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.outcome import Outcome
