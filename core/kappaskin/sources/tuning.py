@@ -24,6 +24,8 @@ class Tuning:
         if self._good not in (None, rate):
             return self._good
         self._place = (self._place + 1) % len(BAUD_RATES)
+        if BAUD_RATES[self._place] == rate:
+            self._place = (self._place + 1) % len(BAUD_RATES)
         self._tried.add(BAUD_RATES[self._place])
         return BAUD_RATES[self._place]
 
