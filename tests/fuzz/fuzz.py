@@ -3,8 +3,8 @@
     python tests/fuzz/fuzz.py [SECONDS] [NAME ...]
 
 Each reader gets an equal part of the time. Whatever is raised but a `Refusal`, takes longer than
-twenty seconds of work or more than two GiB is a finding: it is printed, and written to this folder as
-`fuzz-NAME-N.bin`; the exit code is 1.
+twenty seconds of work or more than two GiB is a finding: it is printed, and written to this folder
+as `fuzz-NAME-N.bin`; the exit code is 1.
 """
 
 import logging
