@@ -242,6 +242,10 @@ def test_heights_that_are_no_map_are_refused(heights, said):
         HeightMap(heights, 1e-2, 1e-2)
 
 
+_SHAPE = b"{'descr': '<f8', 'fortran_order': False, 'shape': (5, True), }".ljust(117) + b"\n"
+ODD_SHAPE = b"\x93NUMPY\x01\x00\x76\x00" + _SHAPE + bytes(40)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
@@ -251,6 +255,7 @@ def test_heights_that_are_no_map_are_refused(heights, said):
         ("map.png", b"no picture", "PNG picture"),
         ("map.png", b"", "PNG picture"),
         ("map.npy", b"\x93NUMPY\x01\x00\x0c\x00{'descr': '(\n", "numpy.save"),
+        ("map.npy", ODD_SHAPE, "numpy.save"),
         ("map.npy", None, "numpy.save"),
         ("map.png", None, "PNG picture"),
     ],

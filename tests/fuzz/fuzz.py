@@ -3,8 +3,8 @@
     python tests/fuzz/fuzz.py [SECONDS] [NAME ...]
 
 Each reader gets an equal part of the time. Whatever is raised but a `Refusal`, takes longer than
-twenty seconds or more than two GiB is a finding: it is printed, and written to this folder as
-`fuzz-NAME-N.bin`; the exit code is 1.
+twenty seconds of work or more than two GiB is a finding: it is printed, and written to this folder
+as `fuzz-NAME-N.bin`; the exit code is 1.
 """
 
 import logging
@@ -24,7 +24,7 @@ from kappaskin import Refusal
 HERE = Path(__file__).parent
 _OTHER = runpy.run_path(str(HERE / "targets.py"))
 TARGETS, Target = _OTHER["TARGETS"], _OTHER["Target"]
-LONGEST = 20.0  # s that reading may take
+LONGEST = 20.0  # s of work that reading may take
 MEMORY = 2 * 2**30  # bytes
 OURS = "kappaskin"
 
@@ -84,7 +84,7 @@ def mutated(rng: random.Random, corpus: list[bytes], words: tuple[bytes, ...]) -
 
 def tried(target, data: bytes, folder: Path) -> str:
     """What is wrong with how `data` is read; empty if nothing is."""
-    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    signal.setitimer(signal.ITIMER_PROF, LONGEST)
     try:
         target.read(data, folder)
     except Refusal:
@@ -96,7 +96,7 @@ def tried(target, data: bytes, folder: Path) -> str:
             raise
         return "".join(traceback.format_exception(error)[-4:])
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
     return ""
 
 
@@ -131,7 +131,7 @@ def main(arguments: list[str]) -> int:
     seed = time.time_ns() % 10**6
     print(f"{seconds:g} s, seed {seed}")
     limit_memory()
-    signal.signal(signal.SIGALRM, late)
+    signal.signal(signal.SIGPROF, late)
     warnings.simplefilter("error")
     logging.disable()  # trimesh tells at length what it cannot read
     rng, code = random.Random(seed), 0

@@ -90,7 +90,7 @@ class Decoder:
                 message = self._samples(sequence, time_us * 1e-6, stream, at + HEAD, last)
             else:
                 message = _read(kind, sequence, time_us * 1e-6, stream[at + HEAD : last])
-            if type(message) is str:
+            if isinstance(message, str):
                 self._discarded[message] += stop - at
             else:
                 self._bytes_good += stop - at

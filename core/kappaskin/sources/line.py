@@ -125,8 +125,8 @@ def _arriving_at(port: serial.Serial) -> bytes:
 
     At each another thread may take the interpreter, which is not to be had back at once.
     """
-    fd = cast("int", port.fd)
-    if fd not in select.select([fd, port.pipe_abort_read_r], [], [], 0.1)[0]:
+    fd, ended = cast("int", port.fd), cast("int", port.pipe_abort_read_r)
+    if fd not in select.select([fd, ended], [], [], 0.1)[0]:
         return b""
     if not (data := os.read(fd, _BLOCK)):
         raise serial.SerialException("the line ended")

@@ -20,6 +20,8 @@ from kappaskin.mechanics.rigid.objects import check_sizes
 _MOST = 2**24  # pixels
 _HIGHEST = 1.0  # m
 _BLOCKS = 8  # along each side, each with its lowest pixel on the keel
+# What numpy raises on files of other contents, or of shapes that are none.
+_NO_ARRAY = (OSError, ValueError, TypeError, OverflowError, EOFError, SyntaxError, TokenError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +131,7 @@ def _read_array(path: Path) -> Array:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a header as Python 2 wrote it
             stored = cast("NDArray[Any]", np.lib.format.open_memmap(path, mode="r"))
-    except (OSError, ValueError, EOFError, SyntaxError, TokenError) as error:
+    except _NO_ARRAY as error:
         raise Refusal(f"expected an array in {path}, as numpy.save writes it: {error}") from error
     _check_pixels(path, stored.shape)
     if stored.dtype.kind not in "buif":
