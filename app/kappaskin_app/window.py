@@ -30,6 +30,7 @@ from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
+from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.health import HealthPanel
@@ -44,7 +45,6 @@ from kappaskin_app.settings import COLOURS, Settings
 from kappaskin_app.simulation import settings_for
 from kappaskin_app.staging import Staging
 from kappaskin_app.taring import Taring
-from kappaskin_app.testing import Testing
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
@@ -76,7 +76,7 @@ class MainWindow(QMainWindow):
         self.happenings = Happenings(self)
         self.planning = Planning(self.session, self)
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
-        self.health, self.testing = HealthPanel(), Testing(self)
+        self.health, self.testing = HealthPanel(), MapTesting(self)
         self.timeline = Timeline()
         self.staging = Staging(
             *(self.history, self.session, self.wishes, self.planning),

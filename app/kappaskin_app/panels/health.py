@@ -13,9 +13,9 @@ from PySide6.QtWidgets import (
 
 from kappaskin import Health, Status
 from kappaskin_app.guard import guarded
+from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.calibration.parts import sentence, text_label
 from kappaskin_app.panels.press import PressPage
-from kappaskin_app.testing import Testing
 from kappaskin_app.theme import Theme
 
 _COLUMNS = ("Element", "Channel", "What", "Since", "Figure")
@@ -69,7 +69,7 @@ class HealthPanel(QWidget):
         table.itemSelectionChanged.connect(guarded(self._point))
         return table
 
-    def attend(self, testing: Testing) -> None:
+    def attend(self, testing: MapTesting) -> None:
         """Show how `testing` goes, and tell it what a person wishes."""
         self.press.attend(testing)
 

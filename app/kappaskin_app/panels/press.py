@@ -4,8 +4,8 @@ from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 
 from kappaskin import Phase, PressTest, Status
 from kappaskin_app.guard import guarded
+from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.calibration.parts import button, sentence, text_label
-from kappaskin_app.testing import Testing
 from kappaskin_app.theme import Theme
 
 _WHAT = (
@@ -42,7 +42,7 @@ class PressPage(QWidget):
         )
         self.back = button("&Back", "press-back", "Press the last one again.")
         self.stop = button("S&top", "press-stop", "End the test and forget what was pressed.")
-        self._testing: Testing | None = None
+        self._testing: MapTesting | None = None
         self._inside = False
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 0, 0, 0)
@@ -58,7 +58,7 @@ class PressPage(QWidget):
             grid.addWidget(widget, 1, place)
         around.addLayout(grid)
 
-    def attend(self, testing: Testing) -> None:
+    def attend(self, testing: MapTesting) -> None:
         self._testing = testing
         testing.changed.connect(guarded(self._show))
         for widget, wish in (

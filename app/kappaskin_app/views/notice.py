@@ -10,7 +10,8 @@ _TIP = (
     "Near the rim: no force moves the skin where it is held, so that a light touch further inside "
     "and a hard one at the rim read alike; an edge that gives may be assumed instead (Basis). "
     "Strain: beyond 1 % a metal gage is not elastic any more; these elements are crossed out in "
-    "the heatmaps. Left out: elements, counted from 0, that the others contradict; ringed there."
+    "the heatmaps. Left out: elements, counted from 0, that the others contradict, or of which "
+    "channels were found wanting: Health (F3) lists these, and letters in the heatmaps say why."
 )
 
 

@@ -9,10 +9,16 @@ from kappaskin.layout import SensorLayout
 
 _KEPT = 128  # means, 16 a second
 _RECENT = 32  # of them are judged
+_OFTEN = 24  # of them at most may be explained where a channel is beyond what can be
 _FEWEST = 8  # of those at least
 _FORGOTTEN = 60.0  # s after which a reading that stays is what one is compared with
 _SHAPE = 2.0  # times the mean square around is the most that a shape is thought to be
 _GAIN = 0.05  # by which channels that are well may differ
+_FAR = 4.0  # standard deviations
+# Of what elements beside one change, what a point load on it makes its own reading differ by at
+# most: 1.6 times, with 25 x 25 functions, where it presses on 10 x 10 elements; in a corner, with
+# fewer beside it, so many times more.
+_SHARP = 2.0
 _USUAL = 1.4826  # standard deviations are so many times the median of the amounts
 _FINE = 0.01  # of the largest change anywhere: finer than that nothing is foretold
 
@@ -53,7 +59,8 @@ class Contradiction:
     nothing. A channel that is `missing` tells nothing of others, and is told of by them.
     `open` (T, C) in 1/m^2 is the variance of what the others leave open. `distance` (C,) is how far
     a channel was off in the last two seconds, in standard deviations, zero where nothing is known;
-    `off` (C,) the same in 1/m.
+    `off` (C,) the same in 1/m. `beyond` (C,) is above one where for a quarter of the time a channel
+    was further off than four of them and a point load on its element could explain.
     """
 
     def __init__(self, layout: SensorLayout) -> None:
@@ -66,17 +73,20 @@ class Contradiction:
         self.base: Array = np.full(C, np.nan)
         """What that is compared with, in 1/m."""
         self.changed, self.told, self.open = (np.full((_KEPT, C), np.nan) for _ in range(3))
+        self._beside = np.zeros((_KEPT, len(layout)))
+        """How much an element next to each changed at most, in 1/m."""
         self._alike = np.zeros(_KEPT)  # in 1/m, how far off channels are that have nothing wrong
         self.usual = 0.0
         """Noise in 1/m that half of the channels have."""
         self.distance, self.off, self.left_open = np.zeros(C), np.zeros(C), np.zeros(C)
+        self.beyond = np.zeros(C)
 
     @property
     def recent(self) -> slice:
         return slice(_KEPT - _RECENT, None)
 
-    def __call__(self, look: Look, missing: Mask) -> None:
-        """Take in what was read, without what is `missing` (C,)."""
+    def __call__(self, look: Look, missing: Mask, wrong: Mask) -> None:
+        """Take in what was read, without what is `missing` (C,), some of it known to be `wrong`."""
         known = ~np.isnan(look.means)
         with np.errstate(invalid="ignore"):  # of none comes NaN
             reads = np.where(known, look.means, 0.0).sum(axis=0) / known.sum(axis=0)
@@ -85,7 +95,7 @@ class Contradiction:
         self._push(look.means - self.base)
         unread = np.isnan(self.changed[self.recent]).all(axis=0)
         self.leave_out(missing | unread)
-        self._forget(look.seconds)
+        self._forget(look.seconds, wrong)
         self._measure(look)
 
     def _push(self, changed: Array) -> None:
@@ -94,6 +104,9 @@ class Contradiction:
             ring[:-T] = ring[T:]
         self.changed[-T:] = changed
         self._tell(self._every, slice(_KEPT - T, None))
+        heard = np.nan_to_num(np.where(self.missing, 0.0, np.abs(self.changed[-T:])))
+        self._beside[:-T] = self._beside[T:]
+        self._beside[-T:] = heard[:, self.neighbours.beside].max(axis=2, initial=0.0)
         self._alike[:-T] = self._alike[T:]
         self._alike[-T:] = [
             np.hypot(_USUAL * _median(np.abs(now - told)), _FINE * _largest(now))
@@ -116,9 +129,9 @@ class Contradiction:
             self.neighbours.leave_out(missing, elements)
             self._tell(elements, slice(None))
 
-    def _forget(self, seconds: float) -> None:
+    def _forget(self, seconds: float, wrong: Mask) -> None:
         """Let what is compared with follow what is read, or where it is not trusted is told."""
-        latest: Array = np.where(self.missing, self.told[-1], self.changed[-1])
+        latest: Array = np.where(wrong, self.told[-1], self.changed[-1])
         step: Array = np.nan_to_num(latest) * min(1.0, seconds / _FORGOTTEN)
         self.base += step
 
@@ -132,6 +145,9 @@ class Contradiction:
         s2 += white + self._alike[self.recent, None] ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
             self.distance = rms(left / np.sqrt(s2))
+            sharp = _SHARP * np.tile(self.neighbours.alone * self._beside[self.recent], 3)
+            beyond = np.nan_to_num(np.abs(left) / (_FAR * np.sqrt(s2) + sharp))
+        self.beyond = np.partition(beyond, _OFTEN, axis=0)[_OFTEN]
         self.off, self.left_open = rms(left), rms(np.sqrt(s2))
 
     def answer(self) -> tuple[Array, Array, Array]:

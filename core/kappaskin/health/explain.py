@@ -17,7 +17,7 @@ DEAD, STUCK, NOISY, SWAPPED, OFFSET, SATURATED, DRIFTING = (
 )
 
 _STILL = 0.25  # of how the others say that it moves: a channel that moves less does not answer
-_MOVED = 3.0  # times what is left open, that others say it moves: what it does then is told by
+_MOVED = 4.0  # times what is left open, that others say it moves: what it does then is told by
 _AT_REST = 0.1  # of the same: one that stays nearer to zero is dead
 _COUNTS = 5.0  # resolutions, within which zero is zero
 _CROSSED = 0.2  # of the squares left where two channels are swapped back
@@ -50,7 +50,7 @@ def explain(against: Contradiction, channels: Indices, resolution: float, step: 
         np.where(lately, _amounts(values[against.recent]), _amounts(values))
         for values in (changed, told)
     )
-    still = moves < _STILL * should
+    still = (moves < _STILL * should) & (should > _MOVED * against.left_open[channels])
     reads = against.reads[channels]
     rest = np.maximum(_AT_REST * should, _COUNTS * resolution)
     off, scatter = _means(left[against.recent]), _amounts(left[against.recent])

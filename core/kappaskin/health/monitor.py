@@ -78,7 +78,8 @@ class Monitor:
         if look is None:
             return False
         self._since[np.isnan(self._since) & (self.kinds > 0)] = look.time
-        self._against(look, self._dead | self._suspects | (self.kinds > 0))
+        wrong = self._dead | (self.kinds > 0)
+        self._against(look, wrong | self._suspects, wrong)
         self._listen(look)
         self._look_at_rails(look)
         self._suspect(look)
@@ -166,6 +167,8 @@ class Monitor:
         better = (self.kinds[channels] != NOISY) | ~np.isin(told.kinds, _LOOSE)
         # What is unsteady for a moment may be about to stand still.
         better &= (told.kinds != NOISY) | (self._accused[channels] >= 2 * _CONFIRMED)
+        # Under a point that presses on it an element reads much more than those around it tell.
+        better &= ~np.isin(told.kinds, _LOOSE) | (self._against.beyond[channels] > 1)
         for kind in np.unique(told.kinds[better]):
             these = channels[better & (told.kinds == kind)]
             self._find(np.isin(np.arange(len(sure)), these), kind, since)

@@ -10,6 +10,8 @@ from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
 
 _COUNT = 20  # elements around one, that tell of it: two rings of a grid without its corners
+_BESIDE = 8  # of them are next to it
+_CLOSE = 1.6  # distances of elements: as far as they reach on a grid
 _LENGTHS = (1.2, 2.5)  # of what bends the skin, in distances of elements
 _NOISE = 1e-3  # in power, beside what a neighbour reads
 _MISSING = 1e9  # the same, of a reading that is not there
@@ -59,6 +61,11 @@ class Neighbours:
         self.near = near
         """The elements (P, k) around each."""
         self.channels: Indices = (near[:, None] + P * np.arange(3)[:, None]).reshape(P, 3 * k)
+        self.beside: Indices = self.channels.reshape(P, 3, k)[:, :, :_BESIDE].reshape(P, -1)
+        """The channels (P, c) of the elements next to each."""
+        close = (np.reshape(apart, (P, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
+        self.alone: Array = _BESIDE / np.clip(close, 1, _BESIDE)
+        """How many times fewer elements are close to each (P,) than inside a grid."""
         self.weights = np.zeros((P, 3, 3 * k))
         self.spread = np.ones((P, 3))
         self.leave_out(np.zeros(3 * P, bool), np.arange(P))

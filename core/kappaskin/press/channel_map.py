@@ -51,7 +51,9 @@ def verdict_of(sensor: Sensor, done: tuple[Pressed, ...]) -> Verdict:
     order = np.concatenate([orders[c] * len(layout) + elements for c in range(3)])
     if not words and told and not open_:
         return Verdict(True, (f"the map is right: {_counted(told)} where pressed",), order)
-    if not words:
+    if not told:
+        words = ["nothing is told of the map"]
+    elif not words:
         words = [f"nothing wrong was found: {_counted(told)} where pressed"]
     return Verdict(False, (*words, *_some(open_)), order if told else None)
 

@@ -15,7 +15,7 @@ from kappaskin import (
 _ENDED = "The connection ended, or another device answered. Once it is back, begin anew."
 
 
-class Testing(QObject):
+class MapTesting(QObject):
     """A press-here test: `test` while one is done or was, with its `verdict` once it is over.
 
     `changed` tells of anything new, `asked` which element is to be pressed now, -1 for none, and

@@ -1,0 +1,163 @@
+"""The health of elements in the window: found, listed, marked; and the test of their map."""
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+
+from kappaskin import WHY, Finding, Health, Patch, Phase, SensorLayout
+from kappaskin_app.map_testing import MapTesting
+from kappaskin_app.panels.health import HealthPanel
+from kappaskin_app.theme import DARK
+from kappaskin_app.views.heatmap import Heatmap
+from kappaskin_app.window import MainWindow
+
+STUCK = Finding(157, 57, "yy", "stuck", 100.0, "reads -1.70 1/m")
+KEPT = Finding(12, 12, "xx", "dead", 20.0, "the device says so", kept=True)
+
+
+def told(panel: HealthPanel) -> list[list[str]]:
+    table = panel.table
+    columns = range(table.columnCount())
+    return [[table.item(row, c).text() for c in columns] for row in range(table.rowCount())]
+
+
+def test_findings_are_listed_with_their_age_and_figure(qapp) -> None:
+    panel = HealthPanel()
+
+    panel._show(Health((KEPT, STUCK), 2, 1, 1.08, 1.3), 130.0)  # noqa: SLF001
+
+    assert told(panel) == [
+        ["12", "xx", "dead, kept", "2 min", "the device says so"],
+        ["57", "yy", "stuck", "30 s", "reads \N{MINUS SIGN}1.70 1/m"],
+    ]
+    assert panel.words.text() == (
+        "1 channel left out, error bars +8%, at the contact +30%, 1 found wanting, but no shape "
+        "can be told without."
+    )
+    panel._show(Health(), 130.0)  # noqa: SLF001
+    assert told(panel) == []
+    assert panel.words.text() == "No channel is found wanting."
+
+
+def test_a_finding_that_is_chosen_is_pointed_at(qapp, qtbot) -> None:
+    panel = HealthPanel()
+    panel._show(Health((KEPT, STUCK), 2), 130.0)  # noqa: SLF001
+    pointed = list[int]()
+    panel.pointed.connect(pointed.append)
+
+    panel.table.selectRow(0)
+    qtbot.keyClick(panel.table, Qt.Key.Key_Down)
+
+    assert pointed == [12, 57]
+
+
+def test_a_letter_says_why_an_element_is_left_out_and_so_does_its_value(qapp) -> None:
+    heatmap = Heatmap("xx", "tip")
+    heatmap.resize(300, 260)
+    heatmap.show_theme(DARK)
+    heatmap.show_layout(SensorLayout.regular(Patch(0.1, 0.1), 4, 4))
+    heatmap.show_values(np.zeros(16), 1.0)
+    none, kinds = np.zeros(16, bool), np.zeros(16, np.uint8)
+    heatmap.show_marks(none, none, kinds)
+    bare = heatmap.cells.grab().toImage()
+    pictures = []
+    for kind in WHY[1:]:
+        kinds[5] = WHY.index(kind)
+        heatmap.show_marks(none, none, kinds)
+        pictures.append(heatmap.cells.grab().toImage())
+        heatmap.show_element(5)
+        heatmap.show_reading(np.zeros(16))
+        assert heatmap.value.text().endswith(f", {kind}")
+        heatmap.show_element(-1)
+
+    assert all(picture != bare for picture in pictures)
+    assert all(a != b for a in pictures for b in pictures if a is not b)
+
+
+def test_the_element_to_press_is_framed(qapp) -> None:
+    heatmap = Heatmap("xx", "tip")
+    heatmap.resize(300, 260)
+    heatmap.show_layout(SensorLayout.regular(Patch(0.1, 0.1), 4, 4))
+    heatmap.show_values(np.zeros(16), 1.0)
+    bare = heatmap.cells.grab().toImage()
+
+    heatmap.show_wanted(5)
+    assert heatmap.cells.grab().toImage() != bare
+
+    heatmap.show_wanted(-1)
+    assert heatmap.cells.grab().toImage() == bare
+
+
+@pytest.fixture
+def failing(opened, until) -> MainWindow:
+    window = opened("sim:failing-elements")
+    until(lambda: len(window.membrane.ages) > 2 and window.session.status.health.count >= 6)
+    return window
+
+
+def test_what_is_found_is_shown_in_the_list_on_the_heatmap_and_on_the_skin(
+    failing: MainWindow, until, qtbot
+) -> None:
+    assert not failing.health.isVisible()
+    qtbot.keyClick(failing, Qt.Key.Key_F3)
+    assert failing.health.isVisible()
+    until(lambda: {"44", "45"} <= {row[0] for row in told(failing.health)})
+    assert "channels left out, error bars +" in failing.health.words.text()
+    until(lambda: failing.membrane.out.actor.visibility)
+    failing.display.point(44)
+    until(lambda: failing.heatmaps["xx"].value.text().endswith(", dead"))
+    assert failing.minimumSizeHint().height() <= 800
+
+
+def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, until) -> None:
+    window.actions_by_name["dock-health"].trigger()
+    page = window.health.press
+    page.quick.click()
+    assert window.testing.running
+    assert not window.session.running  # the load rests, until it is dragged
+    until(lambda: window.membrane.asked.actor.visibility)
+    until(lambda: window.testing.test.phase is Phase.PRESS)
+    assert "Press it now" in page.words.text()
+    asked = window.testing.test.asked
+    x, y = window.session.scene.layout.positions[asked]
+    wishes, at = window.wishes, window.session.estimate.touch.position
+
+    wishes.grab(*at)
+    wishes.drag(float(x), float(y))
+    until(lambda: window.testing.test.done)
+    wishes.release()
+
+    assert str(window.testing.test.done[0]) == f"element {asked} answers"
+    assert page.last.text() == f"Element {asked} answers."
+    page.back.click()
+    assert window.testing.test.asked == asked
+    page.skip.click()
+    page.nothing.click()
+    assert [p.verdict for p in window.testing.test.done] == ["skipped", "nothing"]
+    page.stop.click()
+    assert not window.testing.running
+    assert not window.membrane.asked.actor.visibility or window.display._asked == -1  # noqa: SLF001
+
+
+def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(
+    window: MainWindow, until
+) -> None:
+    testing, page = window.testing, window.health.press
+    window.actions_by_name["dock-health"].trigger()
+    page.quick.click()
+    while testing.running:
+        testing.skip()
+    assert page.verdict.text().startswith("Nothing is told of the map; element 0")
+    page.quick.click()
+    window.session.disconnect_from()
+    until(lambda: not testing.running)
+    assert "begin anew" in page.words.text()
+
+
+def test_without_a_sensor_there_is_nothing_to_press(qapp) -> None:
+    testing = MapTesting()
+
+    testing.begin(quick=True)
+
+    assert not testing.running
+    assert testing.message.startswith("no sensor is connected")
