@@ -24,7 +24,7 @@ _LEGEND = (
     "in every frame. A letter: left out, and why: D dead, S stuck, N noisy, "
     "R on a rail, X swapped, T drifting, O off by the same, P a spike. Framed: to be pressed now."
 )
-_LETTERS = dict(
+_LETTERS: dict[str, str] = dict(
     zip(
         ("spike", "stuck", "noisy", "swapped", "offset", "dead", "saturated", "drifting"),
         "PSNXODRT",

@@ -1,5 +1,7 @@
 """What channels read to how far each is from what those around it say, over the last seconds."""
 
+from typing import cast
+
 import numpy as np
 
 from kappaskin.frames import Array, Mask
@@ -131,7 +133,7 @@ class Contradiction:
 
     def _forget(self, seconds: float, wrong: Mask) -> None:
         """Let what is compared with follow what is read, or where it is not trusted is told."""
-        latest: Array = np.where(wrong, self.told[-1], self.changed[-1])
+        latest = cast("Array", np.where(wrong, self.told[-1], self.changed[-1]))
         step: Array = np.nan_to_num(latest) * min(1.0, seconds / _FORGOTTEN)
         self.base += step
 

@@ -96,8 +96,9 @@ def _partners(d: Array, p: Array) -> tuple[Mask, Indices]:
 
     Of how they move, `d` (T, n), and how they should, `p` (T, n).
     """
-    n = d.shape[1]
-    crossed, partner = np.zeros(n, bool), np.zeros(n, np.intp)
+    n = int(d.shape[1])
+    crossed = cast("Mask", np.zeros(n, bool))
+    partner = cast("Indices", np.zeros(n, np.intp))
     if not 2 <= n <= _MOST:
         return crossed, partner
     D, Q, between = np.sum(d**2, axis=0), np.sum(p**2, axis=0), d.T @ p
@@ -108,4 +109,5 @@ def _partners(d: Array, p: Array) -> tuple[Mask, Indices]:
     partner = cast("Indices", left.argmin(axis=1))
     # Of two stuck ones each moves as little as the other.
     crossed = cast("Mask", left.min(axis=1) < _CROSSED)
-    return crossed & (partner[partner] == np.arange(n)), partner
+    each_other = cast("Mask", partner[partner] == np.arange(n))
+    return crossed & each_other, partner
