@@ -198,6 +198,20 @@ def test_a_device_that_began_anew_while_away_is_not_said_to_have_lost_messages(s
     assert (seen.lost, seen.restarts, seen.balanced) == (0, 1, True)
 
 
+def test_a_device_that_went_on_while_this_machine_slept_has_its_losses_counted(streaming, plug):
+    device, reader = streaming
+    pull(device, reader)
+    reader.until(lambda: "no such port" in reader.source.trouble)
+    away = 100_000  # scans, in 200 s of which this machine knows nothing
+    put_back(plug, reader).say(
+        encode_information(away, away * PERIOD, TEXT) + stream(away + 1, away + 6)
+    )
+    reader.took(away + 5)
+    assert reader.told("back").endswith(f": {away - 11} messages lost")
+    seen = reader.source.accounting()
+    assert (seen.lost, seen.restarts, seen.balanced) == (away - 11, 0, True)
+
+
 def test_another_device_on_the_port_is_said_with_both_names(streaming, plug):
     device, reader = streaming
     sensor = reader.source.sensor

@@ -31,6 +31,7 @@ from kappaskin.sources.wire import (
 
 _OUTBOX = 2**19  # bytes held before a frame goes unsent: more than a second of a full scan
 _LINGER = 0.3  # s
+_AT_ONCE = 32  # frames that are due, as after standing still, before it listens again
 _INTRODUCTION = 0.5  # s between two information messages
 
 
@@ -102,7 +103,9 @@ class PseudoDevice:
                 introduced = now
                 self._introduce()
             self._listen()
-            while self._due() <= now and self._running:
+            for _ in range(_AT_ONCE):
+                if self._due() > now or not self._running:
+                    break
                 self._send_samples()
             self._flush()
             wait = self._due() - self._now() if self._running else _INTRODUCTION

@@ -232,12 +232,15 @@ class SerialSource:
             self._tell("back", f"{name} is back after {away:.1f} s{again}: {lost} messages lost")
 
     def _went_on(self) -> bool:
-        """Whether the device's clock went on while nobody listened."""
+        """Whether the device's clock went on while nobody listened.
+
+        One that shows more than has passed here went on too: this machine was asleep, or busy.
+        """
         arrived, first = self._pending[0]
         if self._last is None:
             return False
         device, host = first.time - self._last[0], arrived - self._last[1]
-        return abs(device - host) < _APART + _DRIFT * host
+        return device > 0 and device - host > -_APART - _DRIFT * host
 
     def _frames(self) -> list[Frame]:
         """The frames before the next message that changes the sensor, or cannot be used."""

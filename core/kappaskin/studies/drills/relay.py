@@ -23,6 +23,7 @@ from kappaskin.sources.wire import (
 
 _OUTBOX = 2**21  # bytes that wait; beyond it a message goes unsent, as from a device
 _BLOCK = 4096
+_KEPT = 16384  # scans that are remembered: more than wait anywhere
 
 Rewrite = Callable[[FromDevice], list[FromDevice]]
 Spoil = Callable[[bytes], bytes]
@@ -117,6 +118,8 @@ class Relay:
         self.spent += 1
         if isinstance(message, Samples):
             self.sent[number] = message.counts
+            if len(self.sent) > _KEPT:
+                del self.sent[next(iter(self.sent))]
         whole = _bytes_of(message, number)
         self.write(self.spoil(whole))
         return whole
