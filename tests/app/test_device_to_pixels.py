@@ -75,7 +75,8 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
     assert told["unsent"] == 0
     assert counts.lost == 0
     assert counts.accepted == told["spent"]
-    assert "line is gone" in window.panels.connection.message.text()
+    assert window.session.status.events[-1].kind == "gone"
+    assert device.port in window.panels.connection.message.text()
     assert window.membrane.greyed
 
     again = Device()
