@@ -12,7 +12,7 @@ from kappaskin import (
     elements_to_press,
 )
 
-_ENDED = "The connection ended, or another device answered. Once it is back, begin anew."
+_ENDED = "The test ended: the line was lost, or another skin answered. Begin anew."
 
 
 class MapTesting(QObject):

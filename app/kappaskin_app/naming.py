@@ -45,8 +45,9 @@ class Naming(QObject):
                 if self._learning:
                     self.named.emit(_LEARNING)
                 return
-            self.named.emit(self._busy.result())
-            self._busy = None
+            # Forgotten first: what failed once is told once, and the next estimate is named.
+            done, self._busy = self._busy, None
+            self.named.emit(done.result())
         if estimate is None or status.sensor is None:
             self.named.emit("")
         elif estimate.generation == status.generation:

@@ -99,7 +99,7 @@ class Session(QObject):
         engine.scan(region_of(history.settings))
         self._laid: Step | None = None
         self.status = Status()
-        self._lost_since = math.inf
+        self._lost_since, self._turned_at = math.inf, 0.0
         self.estimate: Estimate | None = None
         self.source = ""
         self._next_status, self.closed = 0.0, False
@@ -127,6 +127,7 @@ class Session(QObject):
         was simulated last is simulated again.
         """
         self.source, self.estimate = source.strip(), None
+        self._turned_at = time.monotonic()
         if not already:
             self.engine.connect(self.source)
         if self.inside:
@@ -143,6 +144,7 @@ class Session(QObject):
         self._play()
 
     def disconnect_from(self) -> None:
+        self._turned_at = time.monotonic()
         self.engine.disconnect()
 
     def _follow(self, settings: Settings) -> None:
@@ -286,8 +288,8 @@ class Session(QObject):
         return f"LOST {seconds:.0f} s\n{self.status.message}"
 
     def stranger(self) -> str:
-        """Which device took another's place, for as long as that is news; else nothing."""
-        since = time.monotonic() - _NEWS
+        """Which device took another's place on this source, for as long as that is news."""
+        since = max(time.monotonic() - _NEWS, self._turned_at)
         others = [e.text for e in self.status.events if e.kind == "other" and e.time > since]
         return others[-1][:1].upper() + others[-1][1:] if others else ""
 

@@ -288,6 +288,7 @@ class MainWindow(QMainWindow):
         session.reported.connect(guarded(testing.follow))
         session.estimated.connect(guarded(testing.receive))
         testing.begun.connect(guarded(self._hold_still))
+        session.playing.connect(guarded(lambda *_: testing.running and self._hold_still()))
         testing.asked.connect(guarded(self.display.ask_for))
         self.health.pointed.connect(guarded(self.display.point))
         self.health.attend(testing)

@@ -151,7 +151,7 @@ def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(
     page.quick.click()
     window.session.disconnect_from()
     until(lambda: not testing.running)
-    assert "begin anew" in page.words.text()
+    assert "Begin anew" in page.words.text()
 
 
 def test_without_a_sensor_there_is_nothing_to_press(qapp) -> None:

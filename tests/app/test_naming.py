@@ -2,6 +2,8 @@
 
 import time
 
+import pytest
+
 from kappaskin import Pipeline, PointLoad, Setup, Simulator, load_scene
 from kappaskin_app.naming import curved
 
@@ -46,3 +48,24 @@ def test_a_skin_that_objects_cannot_be_told_on_says_so(window, until):
     window.history.change("Elements", -1, elements_x=50, elements_y=50)
 
     until(lambda: "at most 2000 elements to tell objects by" in window.object.text())
+
+
+@pytest.mark.fails_inside
+def test_what_fails_once_is_told_once_and_the_next_estimate_is_named(
+    window, until, monkeypatch
+) -> None:
+    until(lambda: "curves" in window.object.text())
+    told: list[str] = []
+    window.statusBar().messageChanged.connect(lambda text: text and told.append(text))
+
+    def fail_once(estimate):
+        monkeypatch.undo()
+        raise ZeroDivisionError("once")
+
+    monkeypatch.setattr("kappaskin_app.naming.curved", fail_once)
+    until(lambda: told)
+    named: list[str] = []
+    window.naming.named.connect(named.append)
+    until(lambda: named)
+
+    assert told == ["Something went wrong: once"]

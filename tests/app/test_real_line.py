@@ -123,3 +123,9 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     qtbot.mouseClick(window.badge, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
     assert window.happenings.isVisible()
     window.happenings.close()
+
+    # What is read from elsewhere has no other device in its place.
+    assert "Another device" in window.display.notice.warning
+    window.actions_by_name["simulate"].trigger()
+    until(lambda: window.badge.state == "SIM")
+    assert "Another device" not in window.display.notice.warning

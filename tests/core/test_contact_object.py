@@ -14,14 +14,18 @@ from kappaskin import (
     LeastSquares,
     ObjectFinder,
     Patch,
+    Pipeline,
     Plate,
     PointContact,
     PointLoad,
     Polygon,
     Refusal,
     SensorLayout,
+    Setup,
+    Simulator,
     SineBasis,
     basis_for,
+    load_scene,
     local_geometry,
 )
 
@@ -484,6 +488,17 @@ def test_objects_on_other_outlines_are_told_apart(patch):
         assert edge.length == pytest.approx(0.025, abs=2e-3)
     for rim in found(PointLoad(0.0485, 0.002, 0.3)):  # forces beside it would lie off the skin
         assert math.hypot(*(rim.position - [0.0485, 0.002])) < 3e-3
+
+
+def test_a_weak_press_into_a_corner_is_answered():
+    # Of some frames the best edge has its ends and its middle at one place, on the corner.
+    scene = load_scene("centre").touched_by(PointLoad(0.095, 0.095, 0.05))
+    sensor, simulator = scene.sensor(), Simulator(scene)
+    find, pipeline = ObjectFinder(sensor.plate, sensor.layout), Pipeline(sensor, Setup())
+    for number in range(3):
+        estimate = pipeline(simulator.frame(number, lambda: 0.0))
+        found = find(estimate.curvature, estimate.noise, estimate.touch)
+        assert found.kind in found.probability
 
 
 def test_a_skin_that_cannot_tell_is_refused():

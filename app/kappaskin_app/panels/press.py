@@ -29,14 +29,14 @@ class PressPage(QWidget):
         self.progress = QProgressBar()
         self.progress.setFormat("%v of %m")
         self.progress.setToolTip("Elements that were asked for.")
-        self.all = button("&Every element", "press-all", "Ask for each live element, row by row.")
+        self.all = button("Ever&y element", "press-all", "Ask for each live element, row by row.")
         self.quick = button(
             "&Quick test",
             "press-quick",
             "Ask for two elements in each row and column: tells whether rows, columns or "
             "components are exchanged, but not every two elements.",
         )
-        self.skip = button("S&kip", "press-skip", "Go on without this element.")
+        self.skip = button("Sk&ip", "press-skip", "Go on without this element.")
         self.nothing = button(
             "N&othing came", "press-nothing", "You pressed it, but nothing was noticed."
         )

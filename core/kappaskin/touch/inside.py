@@ -143,7 +143,8 @@ def middle(skin: ElasticSkin, edge: Optimum) -> float:
         rise = _rise(skin, forces, (first + second) / 2, np.stack([first, second]))
         gaps.append(float(rise.mean()))
     lifted, pressed = gaps
-    share = min(-lifted / (pressed - lifted) * _TRIAL, _MOST) if lifted < 0 else 0.0
+    gained = pressed - lifted  # none where both ends and the middle are one place
+    share = min(-lifted / gained * _TRIAL, _MOST) if lifted < 0 < gained else 0.0
     return share if share > _NOTHING else 0.0
 
 
