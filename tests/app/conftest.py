@@ -74,7 +74,9 @@ def opened(qapp: QApplication) -> Iterator[Callable[[str], MainWindow]]:
 def window(opened: Callable[[str], MainWindow], until: Wait) -> MainWindow:
     """The window on the default simulation, once it has drawn an estimate."""
     window = opened("sim:")
-    until(lambda: len(window.membrane.ages) > 3 and window.session.estimate is not None)
+    until(lambda: window.badge.state == "SIM")
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 1)
     return window
 
 

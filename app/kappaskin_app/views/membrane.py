@@ -292,8 +292,8 @@ class MembraneView(QWidget):
             actor.orientation = (0.0, np.degrees(np.arctan2(out[0, 0], out[0, 2])), 0.0)
 
     def show_loads(self, loads: Sequence[Load]) -> None:
-        """Draw the simulated loads where they are now, none for a real sensor."""
-        loads = [load for load in loads if load.force]
+        """Draw the simulated loads where they are now; none for a real sensor, or a lost one."""
+        loads = [load for load in loads if load.force and not self._lost]
         centres = [load.centre() for load in loads]
         self.drag.handles = np.array(centres).reshape(-1, 2)
         size = self.skin.size
