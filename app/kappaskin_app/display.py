@@ -41,6 +41,7 @@ class Display:
         self._settings = Settings()
         self._mode: Array | None = None
         self._met, self._asked = 0, -1
+        self._out = np.empty(0, np.intp)  # elements that are left out
         self._colours: object = None
         self._next_heatmaps = self._next_numbers = 0.0
 
@@ -93,7 +94,7 @@ class Display:
         sensor, setup = status.sensor, status.setup
         if sensor is None:
             return
-        self._met = status.meetings
+        self._met, self._out = status.meetings, np.empty(0, np.intp)
         self.membrane.show_skin(sensor, setup.nx, setup.ny)
         self.ranges = Ranges(1e3 * max(sensor.layout.patch.a, sensor.layout.patch.b))
         for heatmap in self.heatmaps.values():
@@ -165,7 +166,8 @@ class Display:
             self._next_heatmaps = now + _HEATMAPS
             crossed, dotted = self.marks(estimate.curvature)
             kinds = self._kinds(estimate)
-            self.membrane.show_marked(np.flatnonzero(kinds.any(axis=0)), self._asked)
+            self._out = np.flatnonzero(kinds.any(axis=0))
+            self.membrane.show_marked(self._out, self._asked)
             for row, (name, heatmap) in enumerate(self.heatmaps.items()):
                 readings = estimate.curvature[row]
                 heatmap.show_marks(crossed, dotted, kinds[row])
@@ -185,6 +187,7 @@ class Display:
     def ask_for(self, element: int) -> None:
         """Show which element is to be pressed; -1 for none."""
         self._asked = element
+        self.membrane.show_marked(self._out, element)
         for heatmap in self.heatmaps.values():
             heatmap.show_wanted(element)
 

@@ -86,6 +86,7 @@ class MainWindow(QMainWindow):
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
         self._next_bargain = self._next_words = 0.0
+        self._held_still = False
         # There from the start, or its first message would push the rest up.
         self.statusBar().addWidget(self.display.notice)
         self.object = Line()
@@ -289,6 +290,7 @@ class MainWindow(QMainWindow):
         session.estimated.connect(guarded(testing.receive))
         testing.begun.connect(guarded(self._hold_still))
         session.playing.connect(guarded(lambda *_: testing.running and self._hold_still()))
+        testing.changed.connect(guarded(self._let_go))
         testing.asked.connect(guarded(self.display.ask_for))
         self.health.pointed.connect(guarded(self.display.point))
         self.health.attend(testing)
@@ -296,7 +298,14 @@ class MainWindow(QMainWindow):
     def _hold_still(self) -> None:
         """Let a simulated load rest, so that it is moved by who presses with it alone."""
         if self.session.inside and self.session.running:
+            self._held_still = True
             self.session.run(False)
+
+    def _let_go(self) -> None:
+        """Let a simulation that was held still for a test go on after it."""
+        if self._held_still and not self.testing.running:
+            self._held_still = False
+            self.session.run(True)
 
     # Wishes that are no settings, or need what is shown.
 

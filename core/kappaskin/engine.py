@@ -126,6 +126,8 @@ class Engine:
         now = time.monotonic()
         self._deaths = [when for when in self._deaths if now - when < _WITHIN] + [now]
         if self._given_up:
+            was = self._ring.read_status() or self._seen
+            self._ring.write_status(was.after((Event(now, "engine", _GIVEN_UP),)))
             return
         self._start_again(Event(now, "engine", _AGAIN))
         if self._source is not None:

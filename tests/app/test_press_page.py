@@ -34,3 +34,15 @@ def test_a_scene_that_is_chosen_meanwhile_does_not_press_by_itself(window, until
     until(lambda: played)
     assert not window.session.running
     until(lambda: window.session.status.playing.speed == 0)
+
+    window.testing.stop()
+    until(lambda: window.session.status.playing.speed == 1)  # it goes on
+
+
+def test_the_element_asked_for_is_marked_on_the_skin_until_the_test_ends(window, until) -> None:
+    window.testing.begin(quick=True)
+    until(lambda: window.membrane.asked.actor.visibility)
+    window.actions_by_name["disconnect"].trigger()
+    until(lambda: window.badge.state == "OFF")
+    assert not window.testing.running
+    assert not window.membrane.asked.actor.visibility

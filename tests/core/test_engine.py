@@ -450,13 +450,14 @@ def test_the_third_death_within_ten_seconds_is_the_last_until_it_is_connected(ow
     engine.revive()
     assert not engine.alive
     status = engine.status()
-    assert (status.state, status.happened) == (LOST, 2)
+    assert (status.state, status.happened) == (LOST, 3)
+    assert status.message == status.events[-1].text
     assert "ended 3 times within 10 s" in status.message
     assert "fewer functions, then connect again" in status.message
 
     engine.connect("sim:")
 
-    assert state(engine, STREAMING).happened == 2
+    assert state(engine, STREAMING).happened == 3
     killed(engine)
     assert engine.alive  # it is forgiven
 

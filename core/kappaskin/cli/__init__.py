@@ -59,6 +59,12 @@ def _add_commands() -> None:
             app.command(entry.load(), name=entry.name)
 
 
+def _named(arguments: list[str] | None) -> str:
+    """The command that was typed, as far as there is one."""
+    first, *_ = (sys.argv[1:] if arguments is None else arguments) or [""]
+    return f"kappaskin {first}" if first and first in app else "kappaskin"
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit code is 0 when done, 1 or 2 as `FAILED` and `REFUSED` say."""
     _add_commands()
@@ -70,7 +76,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"kappaskin: {refusal}", file=sys.stderr)
         return REFUSED
     except CycloptsError as error:
-        print(f"kappaskin: {error} See `kappaskin --help`.", file=sys.stderr)
+        print(f"kappaskin: {error} See `{_named(arguments)} --help`.", file=sys.stderr)
         return REFUSED
     except MemoryError as error:
         print(f"kappaskin: {error}; ask for less of it, or of finer things", file=sys.stderr)
