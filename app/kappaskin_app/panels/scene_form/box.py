@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QPaintEvent, QResizeEvent
+from PySide6.QtGui import QAction, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QGroupBox,
@@ -171,7 +171,10 @@ class SectionBox(QGroupBox):
                 inside.setTitle(offer.words)
                 menu.addMenu(inside)
                 continue
-            action = menu.addAction(offer.words)
+            # Not the one that `addAction` makes: PySide may take it for an object of another kind
+            # that was there before.
+            action = QAction(offer.words, menu)
+            menu.addAction(action)
             action.setToolTip(offer.tip)
             action.triggered.connect(guarded(lambda *_, o=offer: self._wish(o.change)))
         return menu
