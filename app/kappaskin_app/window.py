@@ -51,7 +51,7 @@ from kappaskin_app.views.line import Line
 from kappaskin_app.views.timeline import Timeline
 from kappaskin_app.wishes import Wishes
 
-_WORDS = 0.5  # s between two looks at what touches the skin: as fast as one can read
+_WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38}
 _BARGAIN = 1.0  # s between two looks at what a region buys

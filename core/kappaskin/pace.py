@@ -4,32 +4,39 @@ import math
 import time
 from collections.abc import Callable
 
-_SHARE = 0.6  # of the time, for estimates: the rest is for reading, which must not wait
+_ALL = 0.8  # of the time: where estimates of all frames take less, every one is computed
+_SHARE = 0.4  # of it, for estimates where they take more: reading and drawing must not wait
 _SAVED = 0.05  # s of computing that may be saved up for a burst, or be owed
+_AT_ONCE = 0.02  # s of computing between two reads at most
 _SEEN = 1 / 30  # s after which one is computed whatever there is time for: somebody looks on
 _LATEST = 0.1  # weight of the last costs in what one is taken to cost
+_WHILE = 0.5  # s over which it is judged how many come
 
 
 class Pace:
-    """Spends a share of the time on estimates, and lets those few be of the newest frames.
+    """Computes every frame where there is time for it, or else spends a share of it on the newest.
 
-    Where one takes 0.3 ms, each of 2,000 frames/s is computed; where it takes longer, as many as
-    fit. A frame that is not computed costs a tenth.
+    A frame that is not computed costs a hundredth of one that is.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._credit, self._cost = _SAVED, 0.0
+        self._credit, self._cost, self._rate = _SAVED, 0.0, 0.0
         self._then, self._seen = clock(), -math.inf
 
     def affordable(self, waiting: int) -> int:
         """How many of so many frames are to be computed now."""
         now = self._clock()
-        self._credit = min(_SAVED, self._credit + _SHARE * (now - self._then))
-        self._then = now
+        passed, self._then = now - self._then, now
+        if passed:
+            latest = min(1.0, passed / _WHILE)
+            self._rate += latest * (waiting / passed - self._rate)
+        self._credit = min(_SAVED, self._credit + _SHARE * passed)
         least = int(now - self._seen >= _SEEN)
-        count = int(self._credit / self._cost) if self._cost else least
-        return min(waiting, max(count, least))
+        if not self._cost:
+            return min(waiting, least)
+        time = _AT_ONCE if self._rate * self._cost <= _ALL else self._credit
+        return min(waiting, max(int(time / self._cost), least))
 
     def spend(self, count: int, seconds: float) -> None:
         """Take note that `count` frames were computed in so many s."""

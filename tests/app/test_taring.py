@@ -295,3 +295,16 @@ def test_the_age_has_its_error_bar(window, until):
     assert told(0.0124, 0.0014) == "12 ± 1 ms"
     assert told(0.0124, np.inf) == "≥ 12 ms"
     assert told(np.nan, np.inf) == "–"
+
+
+def test_large_counts_are_told_in_few_digits(window):
+    from kappaskin_app.views.readouts import Health
+
+    def told(*counts):
+        window.readouts.show_health(Health(500, 60, 0.01, 0.0, *counts))
+        return window.readouts.text("lost")
+
+    assert told(0, 0, 0) == "0"
+    assert told(3, 120, 9_999) == "3, 9999 skipped, 120 B"
+    assert told(0, 0, 43_210) == "0, 43 k skipped"
+    assert told(0, 0, 999_600) == "0, 1.0 M skipped"

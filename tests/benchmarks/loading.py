@@ -37,6 +37,7 @@ def held(application: QApplication, port: str, seconds: float) -> dict[str, floa
     application.exec()
     now, status, before = time.monotonic(), window.session.status, first[0]
     timer.stop()
+    came = status.accounting.accepted - before.accounting.accepted
     lasted, watched = now - begun - SETTLE, min(seconds, 60.0)
     drawn = sum(when > now - watched for when, _ in window.membrane.ages)
     window.close()
@@ -44,8 +45,8 @@ def held(application: QApplication, port: str, seconds: float) -> dict[str, floa
     grown = np.subtract(*(np.mean(part, axis=0) for part in (memory[-quarter:], memory[:quarter])))
     return {
         "drawn": drawn / watched,
-        "frames": (status.accounting.accepted - before.accounting.accepted) / lasted,
-        "computed": 1 - (status.skipped - before.skipped) / max(1, status.accounting.accepted),
+        "frames": came / lasted,
+        "computed": 1 - (status.skipped - before.skipped) / max(1, came),
         "lost": status.accounting.lost,
         "discarded": status.accounting.bytes_discarded,
         "reader_gap_p99_ms": float(np.nanmedian(gaps)) * 1e3,

@@ -30,7 +30,7 @@ class Played:
         return self
 
 
-@pytest.mark.parametrize(("rate", "cost"), [(500, 0.5e-3), (500, 1e-3), (2000, 0.25e-3)])
+@pytest.mark.parametrize(("rate", "cost"), [(500, 0.5e-3), (500, 1e-3), (2000, 0.25e-3), (900, 0.8e-3)])
 def test_every_frame_is_computed_where_there_is_time(rate, cost) -> None:
     played = Played(rate, cost).go(10.0)
     assert played.came - played.computed <= 10  # until it is known what one costs
@@ -38,9 +38,11 @@ def test_every_frame_is_computed_where_there_is_time(rate, cost) -> None:
 
 @pytest.mark.parametrize(("rate", "cost"), [(2000, 0.5e-3), (2000, 2e-3), (20_000, 0.3e-3)])
 def test_where_there_is_not_a_share_of_the_time_is_spent(rate, cost) -> None:
-    played = Played(rate, cost).go(10.0)
+    played = Played(rate, cost).go(2.0)  # until it is known how many come and what one costs
+    begun, busy = played.now, played.busy
+    played.go(10.0)
     assert played.computed < played.came
-    assert played.busy / played.now == pytest.approx(0.6, abs=0.03)
+    assert (played.busy - busy) / (played.now - begun) == pytest.approx(0.4, abs=0.03)
 
 
 def test_someone_who_looks_on_is_always_shown_something() -> None:
@@ -53,6 +55,19 @@ def test_a_burst_after_a_pause_is_not_computed_whole() -> None:
     played = Played(2000, 0.5e-3).go(1.0)
     played.now += 5.0
     assert 1 <= played.pace.affordable(10_000) <= 100
+
+
+def test_frames_that_come_in_heaps_are_computed_too_where_there_is_time() -> None:
+    played = Played(500, 0.5e-3, reads=0.03).go(10.0)
+    assert played.came - played.computed <= 20
+
+
+def test_a_device_that_becomes_faster_than_can_be_computed_is_noticed_within_a_second() -> None:
+    played = Played(500, 1e-3).go(5.0)
+    played.rate = 3000
+    played.came = int(played.now * played.rate)
+    before = played.busy
+    assert played.go(1.0).busy - before < 0.7
 
 
 def test_nothing_waiting_costs_nothing() -> None:

@@ -33,7 +33,7 @@ class Health:
 
 
 FIELDS = {
-    "rate": ("Frames", "Frames computed per second, and pictures drawn of them."),
+    "rate": ("Frames", "Frames that come per second, and pictures drawn of them."),
     "age": (
         "Age",
         "How old what you see was when it was drawn: since its scan began, with the standard "
@@ -62,14 +62,14 @@ FIELDS = {
 }
 
 _WIDTHS = {
-    "contact": 6,
+    "contact": 7,
     "rate": 5,
     "lost": 6,
     "force": 5,
     "depth": 5,
     "age": 4,
-    "error": 4,
-    "rms": 4,
+    "error": 3,
+    "rms": 3,
 }
 
 
@@ -83,6 +83,13 @@ def _with_error(value: float, sd: float, digits: int, unit: str) -> str:
 def _number(value: float, digits: int, sign: str = "") -> str:
     rounded = round(value, digits) + 0.0  # no minus before a zero
     return f"{rounded:{sign}.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _short(count: int) -> str:
+    """A count in few digits, so that three of them fit beside each other."""
+    if count < 10_000:
+        return str(count)
+    return f"{count / 1e3:.0f} k" if count < 999_500 else f"{count / 1e6:.1f} M"
 
 
 def _contact(touch: Touch) -> str:
@@ -143,7 +150,7 @@ class Readouts(QWidget):
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
         self._write("age", _age(1e3 * health.age, 1e3 * health.age_sd))
         also = ((health.skipped, "skipped"), (health.discarded, "B"))
-        lost = [str(health.lost), *(f"{count} {what}" for count, what in also if count)]
+        lost = [_short(health.lost), *(f"{_short(count)} {what}" for count, what in also if count)]
         self._write("lost", ", ".join(lost))
 
     def show_estimate(self, estimate: Estimate | None) -> None:
