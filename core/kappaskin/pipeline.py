@@ -95,6 +95,7 @@ class Pipeline:
         self.left_out = LeftOut.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
+        self._listed, self._listed_whole = np.empty(0, np.intp), False
         self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
 
     def _ideal(self) -> Fit:
@@ -237,10 +238,11 @@ class Pipeline:
                 self._followed(frame, out(curvature), out(held))
 
     def _is_whole(self, frame: Frame) -> bool:
-        channels = self.sensor.channels
-        if len(frame.channels) != channels:
-            return False
-        return bool((np.bincount(frame.channels, minlength=channels) == 1).all())
+        """Whether every channel was read; scans of one list share it, so it is seldom counted."""
+        if frame.channels is not self._listed:
+            counts = np.bincount(frame.channels, minlength=self.sensor.channels)
+            self._listed, self._listed_whole = frame.channels, bool((counts == 1).all())
+        return self._listed_whole
 
     def _catch_up(self, frame: Frame) -> None:
         """Remember the frames passed over, where `frame` does not replace all their readings."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import QTimer, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
@@ -38,6 +38,9 @@ class MembraneView(QWidget):
         super().__init__(parent)
         # Multisampling would halve the rate in software; a timer of its own would draw twice.
         self.plotter = QtInteractor(self, auto_update=False, multi_samples=0)
+        # Else each picture has the whole window put together anew, a fifth of its time in software.
+        self.plotter.setAttribute(Qt.WidgetAttribute.WA_DontCreateNativeAncestors)
+        self.plotter.setAttribute(Qt.WidgetAttribute.WA_NativeWindow)
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 0, 0, 0)
         around.addWidget(self.plotter)
