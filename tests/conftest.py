@@ -1,12 +1,13 @@
 """What every test shares: none may leave a thread, a process or a block of memory behind."""
 
+import multiprocessing
 import os
 import signal
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from multiprocessing import resource_tracker
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 
@@ -29,20 +30,33 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A background job begins with Ctrl+C ignored, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-resource_tracker.ensure_running()  # a process that stays, and is nobody's leak
+# With the resource tracker: they stay, and are nobody's leak.
+if "forkserver" in multiprocessing.get_all_start_methods():
+    multiprocessing.set_forkserver_preload(["kappaskin.live"])
+    forkserver.ensure_running()
+else:
+    resource_tracker.ensure_running()
 
 _PATIENCE = 2.0  # s that what was told to end may take
 
 
 def _children() -> set[int]:
-    """The processes this one started: Linux lists them, elsewhere psutil looks at all there are."""
+    """The processes this one started, and those that the fork server did.
+
+    Linux lists them, elsewhere psutil looks at all there are.
+    """
     if not Path("/proc/self/task").exists():
-        return {child.pid for child in psutil.Process().children()}
+        return {child.pid for child in psutil.Process().children(recursive=True)}
+    own = _children_of(os.getpid())
+    return own.union(*map(_children_of, own))
+
+
+def _children_of(pid: int) -> set[int]:
     found = ""
-    for thread in Path("/proc/self/task").iterdir():
-        with suppress(OSError):  # it ended meanwhile
+    with suppress(OSError):  # it ended meanwhile
+        for thread in Path(f"/proc/{pid}/task").iterdir():
             found += (thread / "children").read_text()
-    return {int(pid) for pid in found.split()}
+    return {int(child) for child in found.split()}
 
 
 _NO_WINDOW = ("drawn", "footprint", "history", "scale", "scene_picture", "scene_text", "simulation")

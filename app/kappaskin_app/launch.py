@@ -2,6 +2,7 @@
 
 import signal
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,14 +16,18 @@ if TYPE_CHECKING:
 
 def opened(source: str) -> "tuple[QApplication, MainWindow]":
     """The application and its window, shown, on `source`."""
-    # First of all, so that the engine's process starts while this one loads Qt and VTK.
-    engine = Engine()
+    # Beside: the engine's process starts while this one loads Qt and VTK.
+    with ThreadPoolExecutor(1) as beside:
+        starting = beside.submit(_connected, source)
+        try:
+            from PySide6.QtWidgets import QApplication
+
+            from kappaskin_app.window import MainWindow
+        except BaseException:
+            starting.result().close()
+            raise
+    engine = starting.result()
     try:
-        engine.connect(source)
-        from PySide6.QtWidgets import QApplication
-
-        from kappaskin_app.window import MainWindow
-
         application = QApplication.instance() or QApplication(sys.argv[:1])
         if not isinstance(application, QApplication):
             raise Refusal("expected a Qt application with widgets, got one without")
@@ -34,6 +39,12 @@ def opened(source: str) -> "tuple[QApplication, MainWindow]":
         raise
     window.show()
     return application, window
+
+
+def _connected(source: str) -> Engine:
+    engine = Engine()
+    engine.connect(source)
+    return engine
 
 
 def launch(source: str, seconds: float | None = None, screenshot: Path | None = None) -> None:

@@ -6,8 +6,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -16,6 +15,7 @@ from typing import cast
 from kappaskin.frames import Estimate, Event
 from kappaskin.live import LOST, Connect, Disconnect, Loop, Request, Seek, Status, TakeTare
 from kappaskin.pipeline import Setup
+from kappaskin.processes import beginning_processes
 from kappaskin.region import Region
 from kappaskin.ring import Ring
 from kappaskin.scene import Playing, Scene
@@ -55,22 +55,6 @@ def _serve(requests: "Connection[Request, Request]", name: str) -> None:
         ring.close()
 
 
-@contextmanager
-def one_thread_per_process() -> Generator[None]:
-    # Small products lose by threading, and the threads would take the cores from whoever draws.
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-    was = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in was.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
 class Engine:
     """The live process, seen from the one that shows; no call here waits for it.
 
@@ -93,10 +77,9 @@ class Engine:
 
     def _start(self, status: Status) -> None:
         self._ring.write_status(status)
-        context = multiprocessing.get_context("spawn")
-        theirs, ours = context.Pipe(duplex=False)
+        theirs, ours = multiprocessing.Pipe(duplex=False)
         self._requests = cast("Connection[Request, Request]", ours)
-        with one_thread_per_process():
+        with beginning_processes() as context:
             self._process = context.Process(
                 target=_serve, args=(theirs, self._ring.name), name="kappaskin-engine", daemon=True
             )
@@ -110,7 +93,9 @@ class Engine:
         self._end()
         # One killed while it wrote left no status that can be read.
         was = self._ring.read_status() or self._seen
-        fresh = Status(setup=self._setup, generation=was.generation, meetings=was.meetings)
+        fresh = Status(
+            setup=self._setup, generation=was.generation, meetings=was.meetings, tare=was.tare
+        )
         if events and self._source is not None:
             fresh = replace(fresh, state=LOST, source=self._source, message=events[-1].text)
         self._start(replace(fresh, events=was.events, happened=was.happened).after(events))

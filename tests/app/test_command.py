@@ -30,7 +30,7 @@ def test_a_signal_closes_the_app_and_leaves_nothing(number: int, pause: float) -
     parent = psutil.Process(app.pid)
     end = time.monotonic() + 30
     while time.monotonic() < end and not any(
-        "spawn_main" in " ".join(child.cmdline()) for child in parent.children()
+        "forkserver" in " ".join(child.cmdline()) for child in parent.children()
     ):
         time.sleep(0.05)
     time.sleep(pause)

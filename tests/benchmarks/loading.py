@@ -25,7 +25,7 @@ def held(application: QApplication, port: str, seconds: float) -> dict[str, floa
     def look() -> None:
         if time.monotonic() - begun > SETTLE:
             gaps.append(window.session.status.reader_gap)
-            children = [process.memory_info().rss for process in own.children()]
+            children = [process.memory_info().rss for process in own.children(recursive=True)]
             memory.append([own.memory_info().rss, max(children, default=0)])
 
     timer = QTimer()

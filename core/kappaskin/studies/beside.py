@@ -7,8 +7,8 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, Generic, TypeVar, cast
 
-from kappaskin.engine import one_thread_per_process
 from kappaskin.errors import Refusal
+from kappaskin.processes import beginning_processes
 
 _Item = TypeVar("_Item")
 
@@ -36,10 +36,9 @@ class Beside(Generic[_Item]):
 
     def __init__(self, name: str, make: Callable[..., Iterable[_Item]], *about: object) -> None:
         self.done, self._refused = False, cast("Refusal | None", None)
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe(duplex=False)
+        ours, theirs = multiprocessing.Pipe(duplex=False)
         self._pipe = cast("Connection[None, tuple[_Item] | Refusal | None]", ours)
-        with one_thread_per_process():
+        with beginning_processes() as context:
             self._process = context.Process(
                 target=_tell, args=(theirs, make, about), name=name, daemon=True
             )

@@ -1,7 +1,6 @@
 """The gallery to rows: every case through every method that claims it, in both precisions."""
 
 import math
-import multiprocessing
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -11,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from kappaskin.engine import one_thread_per_process
 from kappaskin.errors import Refusal
 from kappaskin.fit import METHODS, Estimator
 from kappaskin.frames import Array
+from kappaskin.processes import beginning_processes
 from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.gallery import gallery
 from kappaskin.studies.stability.judge import Answer, answered, verdict
@@ -48,8 +47,10 @@ def stability(
     of one thread each: on matrices of this size more threads only wait for each other.
     """
     names, rows = [case.name for case in gallery(long)], list[dict[str, Any]]()
-    context = multiprocessing.get_context("spawn")
-    with one_thread_per_process(), ProcessPoolExecutor(os.cpu_count(), context) as pool:
+    with (
+        beginning_processes() as context,
+        ProcessPoolExecutor(os.cpu_count(), context) as pool,
+    ):
         found = pool.map(_rows_of_the, names, repeat(long))
         for name, its_own in zip(names, found, strict=True):
             progress(name)
