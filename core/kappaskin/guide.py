@@ -214,7 +214,7 @@ def summary(report: CalibrationReport) -> list[str]:
             )
     if calibration.creep:
         share = float(np.median(calibration.creep.share[report.passed]))
-        lines.append(f"creep      {share:.1%} in {calibration.creep.time_constant:.3g} s")
+        lines.append(f"creep      {100 * share:.1f} % in {calibration.creep.time_constant:.3g} s")
     worst = np.argsort(np.where(report.passed, -report.fitted.left_out, 0.0))[:_WORST]
     told = (f"{_named(c, P)} {report.fitted.left_out[c]:.3f}" for c in worst)
     lines.append(f"worst      {', '.join(told)}")

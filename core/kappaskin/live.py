@@ -125,7 +125,7 @@ class Loop:
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
         self._building: Future[_Built] | None = None
-        self._taking = TareTaking(self._builder)
+        self._taking = TareTaking(self._builder, self._status.tare)
         self._gaps: deque[float] = deque(maxlen=_GAPS)
         self._times: deque[float] = deque(maxlen=_GAPS)
         self._pace = Pace()

@@ -30,13 +30,23 @@ class TareNews:
 
 
 class TareTaking:
-    """Takes one tare at a time; it is worked out by the `worker`, beside the frames."""
+    """Takes one tare at a time; it is worked out by the `worker`, beside the frames.
 
-    def __init__(self, worker: Executor, clock: Callable[[], float] = time.monotonic) -> None:
+    `news` goes on from what was told `before`, by an engine that may have died taking one.
+    """
+
+    def __init__(
+        self,
+        worker: Executor,
+        before: TareNews,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._worker, self._clock = worker, clock
         self._taring: Taring | None = None
         self._found: Future[Tare] | None = None
-        self.news = TareNews()
+        self.news = before
+        if before.taking:
+            self._end("the engine ended while it was taken; tare again")
 
     def begin(self, sensor: Sensor | None) -> None:
         """Take a tare of `sensor` from the frames that come from now on; None when none do."""

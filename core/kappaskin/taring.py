@@ -90,7 +90,7 @@ class Taring:
             )
         readings = _known(self.sensor, np.array(self._readings))
         found = _still(self.sensor, seeker, readings)
-        _check_unloaded(seeker, found, rest)
+        _check_unloaded(self.sensor, seeker, found, rest)
         known = math.isfinite(temperature)
         return Tare(
             self.sensor.name,
@@ -112,8 +112,8 @@ def _known(sensor: Sensor, readings: Array) -> Array:
     if np.count_nonzero(blind & live) > _BLIND * np.count_nonzero(live):
         raise Refusal(
             f"{np.count_nonzero(blind & live)} of {np.count_nonzero(live)} channels read nothing, "
-            f"expected at most {_BLIND:.0%}: they are on a rail, or not scanned; lift what touches "
-            "the skin, scan all elements, or lower the amplifier's gain"
+            f"expected at most {100 * _BLIND:.0f} %: they are on a rail, or not scanned; lift what "
+            "touches the skin, scan all elements, or lower the amplifier's gain"
         )
     return np.where(blind | ~live, np.nan, readings)
 
@@ -171,21 +171,21 @@ def _named(sensor: Sensor, channel: int) -> str:
     return f"{COMPONENTS[component]} of element {element} at ({x:.0f}, {y:.0f}) mm"
 
 
-def _check_unloaded(seeker: LoadSeeker, found: _Found, rest: Rest) -> None:
+def _check_unloaded(sensor: Sensor, seeker: LoadSeeker, found: _Found, rest: Rest) -> None:
     load = seeker(found.mean - rest.zero - rest.remanence, found.noise**2)
     if load is None:
         return
     x, y = 1e3 * load.position
-    if rest.tare is None:
-        then = "lift what touches the skin, then tare again"
-    else:
-        then = (
-            f"lift what touches the skin, then tare again; if nothing does, it was bent or mounted "
-            f"anew since the tare of {rest.tare.date:%Y-%m-%d %H:%M}: undo that one first"
+    simulated = "play a scene without a load, or set its force to 0"
+    then = f"{simulated if sensor.simulated else 'lift what touches the skin'}, then tare again"
+    if rest.tare is not None:
+        then += (
+            "; if nothing does, it was bent or mounted anew since the tare of "
+            f"{rest.tare.date:%Y-%m-%d %H:%M}: undo that one first"
         )
     raise Refusal(
         f"the skin is loaded: {_force(load.force)} near ({x:.0f}, {y:.0f}) mm explain "
-        f"{load.share:.0%} of what stands out; {then}"
+        f"{100 * load.share:.0f} % of what stands out; {then}"
     )
 
 

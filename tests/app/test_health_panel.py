@@ -31,7 +31,7 @@ def test_findings_are_listed_with_their_age_and_figure(qapp) -> None:
         ["57", "yy", "stuck", "30 s", "reads \N{MINUS SIGN}1.70 1/m"],
     ]
     assert panel.words.text() == (
-        "1 channel left out, error bars +8%, at the contact +30%, 1 found wanting, but no shape "
+        "1 channel left out, error bars +8 %, at the contact +30 %, 1 found wanting, but no shape "
         "can be told without."
     )
     panel._show(Health(), 130.0)  # noqa: SLF001

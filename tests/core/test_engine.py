@@ -463,15 +463,15 @@ def test_the_third_death_within_ten_seconds_is_the_last_until_it_is_connected(ow
 
 
 def test_deaths_far_apart_are_survived_each_time(own_engine, monkeypatch) -> None:
-    now = [100.0]
-    monkeypatch.setattr("kappaskin.engine.time.monotonic", lambda: now[0])
+    clock, later = time.monotonic, [0.0]
+    monkeypatch.setattr("kappaskin.engine.time.monotonic", lambda: clock() + later[0])
     for _ in range(4):
-        pid = own_engine.pid
-        os.kill(pid, signal.SIGKILL)
-        os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+        process = psutil.Process(own_engine.pid)
+        process.kill()
+        process.wait(5.0)
         own_engine.revive()
         assert own_engine.alive
-        now[0] += 5.1
+        later[0] += 5.1
 
 
 def test_interrupted_from_the_keyboard_it_goes_on(own_engine) -> None:
@@ -631,6 +631,7 @@ def test_a_loaded_skin_is_not_tared(engine: Engine) -> None:
 
     assert news.tare is None
     assert news.refusal.startswith("the skin is loaded: ")
+    assert news.refusal.endswith("without a load, or set its force to 0, then tare again")
 
 
 def test_nothing_is_not_tared(engine: Engine) -> None:
@@ -650,6 +651,22 @@ def test_a_tare_ends_with_the_connection(engine: Engine) -> None:
     wait_for(lambda: engine.status().tare.ended > before)
 
     assert engine.status().tare.refusal == "the connection ended; connect again, then tare"
+
+
+def test_a_tare_that_dies_with_its_engine_is_said_to(own_engine) -> None:
+    engine = own_engine
+    engine.connect("sim:centre")
+    next_estimate(engine)
+    engine.tare()
+    assert wait_for(lambda: engine.status().tare.taking)
+    assert engine.pid is not None
+    os.kill(engine.pid, signal.SIGKILL)
+    state(engine, LOST, within=1.0)
+
+    engine.revive()
+
+    assert wait_for(lambda: engine.status().tare.ended == 1)
+    assert engine.status().tare.refusal == "the engine ended while it was taken; tare again"
 
 
 def test_a_scene_that_warms_tells_its_temperature(engine: Engine) -> None:

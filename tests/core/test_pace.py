@@ -30,7 +30,9 @@ class Played:
         return self
 
 
-@pytest.mark.parametrize(("rate", "cost"), [(500, 0.5e-3), (500, 1e-3), (2000, 0.25e-3), (900, 0.8e-3)])
+@pytest.mark.parametrize(
+    ("rate", "cost"), [(500, 0.5e-3), (500, 1e-3), (2000, 0.25e-3), (900, 0.8e-3)]
+)
 def test_every_frame_is_computed_where_there_is_time(rate, cost) -> None:
     played = Played(rate, cost).go(10.0)
     assert played.came - played.computed <= 10  # until it is known what one costs

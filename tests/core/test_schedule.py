@@ -130,7 +130,7 @@ def test_radii_that_make_no_schedule_are_refused(radii, hold, reason):
 
 
 def test_a_cylinder_that_strains_the_gages_beyond_their_limit_is_refused_before_it_is_asked_for():
-    with pytest.raises(Refusal, match=r"radius 12 mm strains .* by 1\.04%.*at least 12\.5 mm"):
+    with pytest.raises(Refusal, match=r"radius 12 mm strains .* by 1\.04 %.*at least 12\.5 mm"):
         Procedure(SENSOR, schedule((0.05, 0.02, 0.012)))
     Procedure(SENSOR, schedule((0.05, 0.02, 0.0125)))  # 1 % sharp
 

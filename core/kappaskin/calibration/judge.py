@@ -57,8 +57,8 @@ class Limits:
             ),
             (
                 linear >= self.linear,
-                f"shows {linear:.0%} of a small change, expected at least {self.linear:.0%}; the "
-                "rest hides in its loops",
+                f"shows {100 * linear:.0f} % of a small change, expected at least "
+                f"{100 * self.linear:.0f} %; the rest hides in its loops",
             ),
         )
         return next((why for fine, why in judged if not fine), None)

@@ -191,8 +191,8 @@ def check_strain(steps: tuple[Step, ...], sensor: Sensor) -> None:
             strain = float(sensor.transduction.bridge.strain(1 / step.radius))
             raise Refusal(
                 f"step {step.number}: a cylinder of radius {1e3 * step.radius:g} mm strains the "
-                f"gages of {sensor.name} by {strain:.2%}, beyond their elastic limit; use radii of "
-                f"at least {1e3 * least:.3g} mm"
+                f"gages of {sensor.name} by {100 * strain:.2f} %, beyond their elastic limit; use "
+                f"radii of at least {1e3 * least:.3g} mm"
             )
 
 

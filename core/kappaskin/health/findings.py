@@ -54,9 +54,9 @@ class Health:
             return "no channel is found wanting"
         out = self.count - self.kept
         words = [f"{out} channel{'' if out == 1 else 's'} left out"]
-        words.append(f"error bars {self.cost - 1:+.0%}")
+        words.append(f"error bars {100 * (self.cost - 1):+.0f} %")
         if math.isfinite(self.contact_cost):
-            words.append(f"at the contact {self.contact_cost - 1:+.0%}")
+            words.append(f"at the contact {100 * (self.contact_cost - 1):+.0f} %")
         if self.kept:
             words.append(f"{self.kept} found wanting, but no shape can be told without")
         return ", ".join(words)
@@ -92,7 +92,7 @@ def _figure(kind: str, first: float, second: float, elements: int) -> str:
     if kind == "noisy":
         return f"{first:.2g} 1/m of noise, others have {second:.2g} 1/m"
     if kind == "saturated":
-        return f"on a rail for {first:.0%} of the last second"
+        return f"on a rail for {100 * first:.0f} % of the last second"
     if kind == "swapped":
         other = int(first)
         return f"reads what {COMPONENTS[other // elements]} of element {other % elements} should"

@@ -45,7 +45,7 @@ def tables_text(rows: list[dict[str, Any]]) -> str:
         lines += [title.format(*its[0]["functions"]), head + _LAST[table]]
         lines += [_row(row) for row in its] + [""]
     covered = {row["case"]: row["covered_95"] for row in rows if "covered_95" in row}
-    held = ", ".join(f"{case} {share:.0%}" for case, share in covered.items())
+    held = ", ".join(f"{case} {100 * share:.0f} %" for case, share in covered.items())
     return "\n".join(
         [
             *lines,

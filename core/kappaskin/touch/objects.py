@@ -70,7 +70,8 @@ class ContactObject:
         if not self.kind and first >= _SURE:
             return f"cannot tell: fits none of these objects, {likeliest} the least badly"
         if not self.kind:
-            return f"{likeliest} or {second}: cannot tell ({first:.0%} to {chance:.0%})"
+            odds = f"{100 * first:.0f} % to {100 * chance:.0f} %"
+            return f"{likeliest} or {second}: cannot tell ({odds})"
         parts = [self.kind]
         if self.kind in ("cylinder", "sphere"):
             parts.append(self._radius())

@@ -139,7 +139,7 @@ frame   median from readings to coefficients, and over numpy.linalg.lstsq on the
 scan    conversion of the channels; set-up to the first answer, memory at its highest point
 RMS     error over the skin, mean of {DRAWS} frames with the scene's noise; exact: without noise
 E       signed error at the load, mean +- standard deviation of those frames
-* +     more accurate, by {ALIKE:.0%} at least, than all that are faster: *frame, +scan and frame"""
+* +     more accurate, by {100 * ALIKE:.0f} % at least, than all faster ones: *frame, +with scan"""
 
 
 def _outro(costs: Sequence[Cost | Refused]) -> str:

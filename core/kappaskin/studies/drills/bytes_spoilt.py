@@ -81,8 +81,8 @@ def _speed(baud_rate: int, stand: Stand) -> Outcome:
 
 GARBAGE = [
     Drill(
-        f"garbage {share:.0%}",
-        f"bursts of noise over and between {share:.0%} of the bytes",
+        f"garbage {100 * share:.0f} %",
+        f"bursts of noise over and between {100 * share:.0f} % of the bytes",
         partial(_garbage, share),
         _WITHIN,
     )

@@ -147,14 +147,16 @@ def verdict(
         return "wrong", "the coefficients are no numbers"
     at_truth, covered = _at_truth(case, reference, answer, eps), answer.covered
     if covered is not None and not (at_truth or covered >= COVERED):
-        return "wrong", f"the 95 % bar covers {covered:.0%} of the truth"
+        return "wrong", f"the 95 % bar covers {100 * covered:.0f} % of the truth"
     if flagged := int(answer.flagged.sum()):
         return "degraded", f"{flagged} of {len(answer.flagged)} frames are flagged: not converged"
     if not np.isfinite(reference.condition):
         return "degraded", "not all is determined; the bar covers the truth"
     if peer is not None and not reference.near(answer.coefficients, peer, eps):
         return "degraded", "rounding costs digits; the bar covers the truth"
-    return "exact", "to rounding" if at_truth else f"the bar covers {covered:.0%}"
+    if at_truth or covered is None:
+        return "exact", "to rounding"
+    return "exact", f"the bar covers {100 * covered:.0f} %"
 
 
 def _at_truth(case: Case, reference: Reference, answer: Answer, eps: float) -> bool:
