@@ -88,7 +88,7 @@ def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> 
     out = tmp_path / "s.toml"
     _, printed, told = run("calibrate", "sim:creeping", "--out", out, "--hold", "10", *FAST)
     assert "held for 10 s" in told
-    assert "creep      5.0% in 2" in printed
+    assert "creep      5.0 % in 2" in printed
     assert from_toml(out).creep.time_constant == pytest.approx(2.0, rel=0.03)
 
 
