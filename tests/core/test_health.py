@@ -83,6 +83,19 @@ def hold(channels, value):
     return spoil
 
 
+@pytest.mark.parametrize("at", [(0.095, 0.095), (0.005, 0.095)])
+def test_a_point_held_on_the_element_in_a_corner_accuses_nobody(at) -> None:
+    scene = load_scene("centre")
+    pressed = replace(scene, stimuli=(Stimulus(PointLoad(*at, 0.5)),))
+    free, held = Simulator(replace(scene, stimuli=())), Simulator(pressed)
+    scan, monitor = scene.sensor().scan(), Monitor(scene.sensor())
+    for n in range(round(8 * RATE)):
+        time = n / RATE
+        simulator = held if 1.0 <= time < 6.0 else free
+        monitor(simulator.scanned(scan, n, time, lambda time=time: time))
+        assert not monitor.kinds.any()
+
+
 def test_a_dead_element_is_found_once_the_load_comes_by() -> None:
     monitor, looks = watched(frames_of("circle", 8), hold(of(65), 0.0))
 

@@ -21,6 +21,7 @@ _FAR = 4.0  # standard deviations
 # most: 1.6 times, with 25 x 25 functions, where it presses on 10 x 10 elements; in a corner, with
 # fewer beside it, so many times more.
 _SHARP = 2.0
+_SAME = 0.99  # of the correlation of what a channel reads and should, where a load presses on it
 _USUAL = 1.4826  # standard deviations are so many times the median of the amounts
 _FINE = 0.01  # of the largest change anywhere: finer than that nothing is foretold
 
@@ -62,7 +63,8 @@ class Contradiction:
     `open` (T, C) in 1/m^2 is the variance of what the others leave open. `distance` (C,) is how far
     a channel was off in the last two seconds, in standard deviations, zero where nothing is known;
     `off` (C,) the same in 1/m. `beyond` (C,) is above one where for a quarter of the time a channel
-    was further off than four of them and a point load on its element could explain.
+    was further off than four of them and a point load on its element could explain. What is no
+    further off, and always reads more than it should, may be `pressed` (C,) by such a load.
     """
 
     def __init__(self, layout: SensorLayout) -> None:
@@ -82,6 +84,7 @@ class Contradiction:
         """Noise in 1/m that half of the channels have."""
         self.distance, self.off, self.left_open = np.zeros(C), np.zeros(C), np.zeros(C)
         self.beyond = np.zeros(C)
+        self.pressed = np.zeros(C, bool)
 
     @property
     def recent(self) -> slice:
@@ -150,6 +153,10 @@ class Contradiction:
             sharp = _SHARP * np.tile(self.neighbours.alone * self._beside[self.recent], 3)
             beyond = np.nan_to_num(np.abs(left) / (_FAR * np.sqrt(s2) + sharp))
         self.beyond = np.partition(beyond, _OFTEN, axis=0)[_OFTEN]
+        changed, told = (np.nan_to_num(ring[self.recent]) for ring in (self.changed, self.told))
+        own, alike = (np.einsum("tc,tc->c", changed, other) for other in (changed, told))
+        same = alike**2 > _SAME**2 * own * np.einsum("tc,tc->c", told, told)
+        self.pressed = (self.beyond <= 1) & same & (alike > 0) & (alike < own)
         self.off, self.left_open = rms(left), rms(np.sqrt(s2))
 
     def answer(self) -> tuple[Array, Array, Array]:

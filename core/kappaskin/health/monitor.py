@@ -147,6 +147,7 @@ class Monitor:
     def _suspect(self, look: Look) -> None:
         """Suspect the worst of those accused, and go on with those suspected before."""
         far = (self._against.distance > _FAR) & ~self._dead & (self.kinds == 0)
+        far &= ~self._against.pressed
         off = np.where(far & ~self._suspects, self._against.off, 0.0).reshape(3, -1)
         near = self._against.neighbours.near
         around = off.max(axis=0)[near].max(axis=1, initial=0.0)
