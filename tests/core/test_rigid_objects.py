@@ -1,6 +1,8 @@
 """Rigid objects: the height of their underside, what files make of them, and what is refused."""
 
 import math
+import tracemalloc
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -285,6 +287,22 @@ def test_a_picture_cut_short_is_refused(tmp_path):
 
     with pytest.raises(Refusal, match="PNG picture"):
         HeightMap.read(path, 1e-2, 1e-2, 1e-3)
+
+
+def test_no_memory_is_taken_for_what_a_picture_only_says_it_holds(tmp_path):
+    path = tmp_path / "map.png"
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64), np.uint8)).save(path)
+    picture = path.read_bytes()
+    at = picture.index(b"IDAT") - 4
+    path.write_bytes(picture[:at] + (2**31 - 100).to_bytes(4, "big") + picture[at + 4 :])
+
+    tracemalloc.start()
+    with suppress(Refusal):
+        HeightMap.read(path, 1e-2, 1e-2, 1e-3)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+
+    assert most < 2**25
 
 
 def test_a_picture_in_colour_is_refused(tmp_path):

@@ -199,6 +199,10 @@ WRONG = {
         HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=nan\ny=0.05\nforce=1\n',
         r"line 5: touch\[1\]: expected a finite place",
     ),
+    "a load moved nowhere": (
+        HEAD + '[[touch]]\nwhat="point"\nx=inf\ny=0.05\ndisplacement=1e-3\n',
+        r"line 5: touch\[1\]: expected a load on .*x=inf",
+    ),
     "an object pressed through": (
         HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=0.05\ny=0.05\ndepth=1\n',
         "line 5: .*a depth of at most 0.1 m, .* depths are in metres",

@@ -82,6 +82,8 @@ def read_stimulus(
         if "displacement" in table:
             if "force" in table:
                 raise table.refusal("expected a force or a displacement, got both", "displacement")
+            with table.blamed():
+                what.check(plate.patch)
             with table.blamed("displacement"):
                 what = moved(what, table.get("displacement", float))
     if what.force is not None and what.force not in _FORCE:

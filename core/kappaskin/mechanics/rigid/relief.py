@@ -1,5 +1,6 @@
 """Objects with any underside: a map of heights, given or read from a picture."""
 
+import io
 import struct
 import warnings
 from collections.abc import Callable, Iterator
@@ -143,7 +144,8 @@ def _read_picture(path: Path) -> Array:
     from PIL import Image  # slow to import, and seldom needed
 
     try:
-        with Image.open(path, formats=("PNG",)) as picture:
+        # From memory: from a file Pillow takes as much of that as a length in it says.
+        with Image.open(io.BytesIO(path.read_bytes()), formats=("PNG",)) as picture:
             _check_pixels(path, picture.size[::-1])
             if picture.mode not in ("1", "L", "I", "I;16"):
                 raise Refusal(
