@@ -1,5 +1,6 @@
 """Tares are kept per sensor, whole or not at all, whatever its number and whoever damages them."""
 
+import tomllib
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal, Tare, Tares, data_folder, load_scene
-from kappaskin.calibration.calibration import fingerprint
+from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.calibration.tares import KEPT
 
 SENSOR = replace(load_scene("centre").sensor(), serial_number="KS-7", simulated=False)
@@ -156,6 +157,18 @@ def test_a_file_that_was_edited_is_refused(tares, was, becomes):
     with pytest.raises(Refusal, match=r"holds no tares that can be used .* delete it") as told:
         tares.load("KS-7")
     assert str(told.value).startswith(str(path))
+
+
+def test_a_file_edited_by_one_who_knows_its_hash_is_refused_too(tares):
+    tares.add(tare_of())
+    path = tares.path("KS-7")
+    text = path.read_text().replace("frames = 480", "frames = inf")
+    said = tomllib.loads(text)
+    content = {"used": said["used"], "tare": said["tare"]}
+    path.write_text(text.replace(said["sha256"], digest(content)))
+
+    with pytest.raises(Refusal, match="holds no tares that can be used"):
+        tares.load("KS-7")
 
 
 @given(st.integers(0, 2**32), st.binary(max_size=3))

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from kappaskin import SCENES, Calibration, load_scene
-from kappaskin.calibration.calibration import digest
+from kappaskin.calibration import Tare, Tares
+from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.calibration.file import from_toml, to_toml
 from kappaskin.effects import SECOND_GENERATION_LOOPS, Creep
 from kappaskin.mechanics import HeightMap, Mesh
@@ -127,6 +129,13 @@ def _calibration(data: bytes, folder: Path) -> None:
     from_toml(path).check(SMALL)
 
 
+def _tares(data: bytes, folder: Path) -> None:
+    tares = Tares(folder)
+    tares.path(SMALL.serial_number).write_bytes(_resealed(data))
+    if (tare := tares.load(SMALL.serial_number).fit_for(SMALL)) is not None:
+        str(datetime.now().astimezone() - tare.date)
+
+
 def _mesh(kind: str) -> Read:
     def read(data: bytes, folder: Path) -> None:
         path = folder / f"a.{kind}"
@@ -161,6 +170,18 @@ def _calibrated(channels: int) -> bytes:
     ).encode()  # fmt: skip
 
 
+def _tared() -> bytes:
+    """A file of two tares, as it is kept."""
+    name, number, layout = SMALL.name, SMALL.serial_number, fingerprint(SMALL.layout)
+    offset = np.linspace(-1.0, 1.0, SMALL.channels)
+    with TemporaryDirectory() as folder:
+        tares = Tares(Path(folder))
+        for hour, temperature in ((1, None), (2, 21.5)):
+            date = datetime(2026, 1, 1, hour, tzinfo=UTC)
+            tares.add(Tare(name, number, layout, date, temperature, 50, 1.0, offset, offset**2))
+        return tares.path(number).read_bytes()
+
+
 _PLY = (SCENE_FOLDER / "bolt.ply").read_bytes()
 _OBJ = b"v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 _ASCII = (
@@ -182,6 +203,7 @@ TARGETS = (
         "scene", _scene, tuple((SCENE_FOLDER / f"{n}.toml").read_bytes() for n in SCENES), _TOML
     ),
     Target("calibration", _calibration, (_calibrated(3), _calibrated(1)), _TOML),
+    Target("tares", _tares, (_tared(),), _TOML),
     Target("ply", _mesh("ply"), (_PLY[:4000], _PLY), (*_NUMBERS, b"element face ", b"\nproperty ")),
     Target(
         "obj", _mesh("obj"), (_OBJ,), (*_NUMBERS, b"\nf ", b"\nv ", b"\nvn ", b"//", b"\nmtllib ")

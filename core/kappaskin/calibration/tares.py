@@ -76,7 +76,7 @@ class Tares:
             raise Refusal(f"{path}: cannot be read ({error}); check its permissions") from error
         try:
             return _kept(data, serial_number)
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
             raise Refusal(
                 f"{path}: holds no tares that can be used ({error!s:.120}); delete it, then tare "
                 "again"
