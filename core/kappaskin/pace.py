@@ -35,8 +35,8 @@ class Pace:
         least = int(now - self._seen >= _SEEN)
         if not self._cost:
             return min(waiting, least)
-        time = _AT_ONCE if self._rate * self._cost <= _ALL else self._credit
-        return min(waiting, max(int(time / self._cost), least))
+        allowed = _AT_ONCE if self._rate * self._cost <= _ALL else self._credit
+        return min(waiting, max(int(allowed / self._cost), least))
 
     def spend(self, count: int, seconds: float) -> None:
         """Take note that `count` frames were computed in so many s."""

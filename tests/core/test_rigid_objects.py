@@ -3,6 +3,7 @@
 import math
 import tracemalloc
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -303,6 +304,18 @@ def test_no_memory_is_taken_for_what_a_picture_only_says_it_holds(tmp_path):
     tracemalloc.stop()
 
     assert most < 2**25
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="has no device that never ends")
+def test_a_picture_without_end_or_too_large_is_refused(tmp_path):
+    endless, large = tmp_path / "endless.png", tmp_path / "large.png"
+    endless.symlink_to("/dev/zero")
+    with large.open("wb") as file:
+        file.truncate(2**26 + 1)
+
+    for path in (endless, large):
+        with pytest.raises(Refusal, match="a file of at most 67108864 bytes"):
+            HeightMap.read(path, 1e-2, 1e-2, 1e-3)
 
 
 def test_a_picture_in_colour_is_refused(tmp_path):

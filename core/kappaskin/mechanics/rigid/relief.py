@@ -19,6 +19,7 @@ from kappaskin.frames import Array
 from kappaskin.mechanics.rigid.objects import check_sizes
 
 _MOST = 2**24  # pixels
+_LARGEST = 2**26  # bytes of a picture
 _HIGHEST = 1.0  # m
 _BLOCKS = 8  # along each side, each with its lowest pixel on the keel
 # What numpy raises on files of other contents, or of shapes that are none.
@@ -144,6 +145,8 @@ def _read_picture(path: Path) -> Array:
     from PIL import Image  # slow to import, and seldom needed
 
     try:
+        if path.stat().st_size > _LARGEST or not path.is_file():
+            raise Refusal(f"expected a file of at most {_LARGEST} bytes, got {path}")
         # From memory: from a file Pillow takes as much of that as a length in it says.
         with Image.open(io.BytesIO(path.read_bytes()), formats=("PNG",)) as picture:
             _check_pixels(path, picture.size[::-1])
