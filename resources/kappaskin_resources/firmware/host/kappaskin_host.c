@@ -283,6 +283,15 @@ static void make_raw(const char *port) {
     close(line); /* with no other holder of this end, a hang-up says that nobody listens */
 }
 
+/* Throw away what was written just after the last listener closed: the next one is greeted first. */
+static void clear_unread(const char *port) {
+    const int line = open(port, O_RDWR | O_NOCTTY | O_NONBLOCK);
+    if (line < 0)
+        return;
+    tcflush(line, TCIFLUSH);
+    close(line);
+}
+
 static void put_link(const struct host *host) {
     struct stat found;
     if (!host->link)
@@ -364,8 +373,10 @@ static void serve(struct host *host, uint32_t frames) {
     while (!stopped) {
         plug(host);
         if (host->line >= 0 && hung_up(host)) {
-            if (host->listened)
+            if (host->listened) {
+                clear_unread(host->port);
                 kappaskin_forget(device);
+            }
             host->listened = false;
             nap(host, false, QUIET * 1000);
             continue;
