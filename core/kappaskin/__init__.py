@@ -69,7 +69,6 @@ from kappaskin.intrinsic import IntrinsicContact as IntrinsicContact
 from kappaskin.intrinsic import IntrinsicTouch as IntrinsicTouch
 from kappaskin.intrinsic import Wrench as Wrench
 from kappaskin.layout import SensorLayout as SensorLayout
-from kappaskin.live import Status as Status
 from kappaskin.mechanics import Compliance as Compliance
 from kappaskin.mechanics import DiscLoad as DiscLoad
 from kappaskin.mechanics import GaussianLoad as GaussianLoad
@@ -114,6 +113,7 @@ from kappaskin.simulate import Simulator as Simulator
 from kappaskin.sources.ports import Port as Port
 from kappaskin.sources.ports import serial_ports as serial_ports
 from kappaskin.sources.scanning import LISTS as LISTS
+from kappaskin.status import Status as Status
 from kappaskin.studies.beside import Beside as Beside
 from kappaskin.studies.cost import Cost as Cost
 from kappaskin.studies.cost import EffectCost as EffectCost

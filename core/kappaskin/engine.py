@@ -13,12 +13,14 @@ from multiprocessing.process import BaseProcess
 from typing import cast
 
 from kappaskin.frames import Estimate, Event
-from kappaskin.live import LOST, Connect, Disconnect, Loop, Request, Seek, Status, TakeTare
+from kappaskin.live import Loop
 from kappaskin.pipeline import Setup
 from kappaskin.processes import beginning_processes
 from kappaskin.region import Region
+from kappaskin.requests import Connect, Disconnect, Request, Seek, TakeTare
 from kappaskin.ring import Ring
 from kappaskin.scene import Playing, Scene
+from kappaskin.status import LOST, Status
 
 _SWITCH = 2e-4  # s that one thread may keep the interpreter from another
 _GRACE = 0.5  # s for an orderly end once the parent is gone

@@ -3,110 +3,34 @@
 import math
 import time
 from collections import deque
-from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from multiprocessing.connection import Connection
 
 import numpy as np
 
+from kappaskin.building import Built, built
 from kappaskin.errors import Refusal, SourceError
-from kappaskin.frames import Event, Frame
+from kappaskin.frames import Frame
 from kappaskin.health import Health, Monitor
 from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.region import Region
+from kappaskin.requests import Connect, Request, Seek, TakeTare
 from kappaskin.ring import Ring, slot_type
-from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
+from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources import SimulatedSource, Source, open_source
 from kappaskin.sources.accounting import Accounting
+from kappaskin.status import LOST, OFF, STREAMING, WAITING, Status
 from kappaskin.steer import Following, Steering, steered
-from kappaskin.tare_taking import TareNews, TareTaking
-from kappaskin.taring import Drift
-
-OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
+from kappaskin.tare_taking import TareTaking
 
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
-_EVENTS = 64  # last ones that are told
 _GAPS = 4096  # gaps between reads that the percentile is taken over
-
-
-@dataclass(frozen=True)
-class Status:
-    """How the engine is doing.
-
-    `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
-    `message` says why. `setup` is the one in use, `refusal` says why it is not the one asked for
-    last, and `computing` that another is on its way. `region` is scanned unless `region_refusal`
-    says why not. `meetings` counts the devices that said what they are, `skipped` the frames that
-    came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
-    of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
-    `playing` tells where a simulated scene is at a device time. `events` are the last of those that
-    `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
-    tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
-    tells which channels are not to be trusted.
-    """
-
-    state: str = OFF
-    source: str = ""
-    message: str = ""
-    refusal: str = ""
-    sensor: Sensor | None = None
-    meetings: int = 0
-    setup: Setup = field(default_factory=Setup)
-    computing: bool = False
-    region: Region = field(default_factory=Region)
-    region_refusal: str = ""
-    skipped: int = 0
-    generation: int = 0
-    slot: "np.dtype[np.void] | None" = None
-    accounting: Accounting = field(default_factory=Accounting)
-    rate: float = 0.0
-    reader_gap: float = math.nan
-    last_frame: float = -math.inf
-    reported: float = -math.inf
-    playing: Playing = FROM_THE_BEGINNING
-    events: tuple[Event, ...] = ()
-    happened: int = 0
-    temperature: float = math.nan
-    tare: TareNews = field(default_factory=TareNews)
-    drift: Drift | None = None
-    health: Health = field(default_factory=Health)
-
-    def after(self, events: Sequence[Event]) -> "Status":
-        """The same status once `events` happened."""
-        last = (*self.events, *events)[-_EVENTS:]
-        return replace(self, events=last, happened=self.happened + len(events))
-
-
-@dataclass(frozen=True)
-class Connect:
-    source: str
-
-
-@dataclass(frozen=True)
-class Disconnect:
-    pass
-
-
-@dataclass(frozen=True)
-class Seek:
-    """Go on with a simulated scene from its time `at` in s, or from where it is, at a `speed`."""
-
-    at: float | None
-    speed: float
-
-
-@dataclass(frozen=True)
-class TakeTare:
-    """Take a tare from now on, and hold what it finds against the tare of the setup."""
-
-
-Request = Connect | Disconnect | Setup | Scene | Seek | Region | TakeTare
 
 
 class Loop:
@@ -124,7 +48,7 @@ class Loop:
         self._steering: Steering | Following | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
-        self._building: Future[_Built] | None = None
+        self._building: Future[Built] | None = None
         self._taking = TareTaking(self._builder, self._status.tare)
         self._gaps: deque[float] = deque(maxlen=_GAPS)
         self._times: deque[float] = deque(maxlen=_GAPS)
@@ -248,20 +172,20 @@ class Loop:
             self._status = replace(self._status, setup=self._asked, refusal="")
         elif self._building is None:
             generation = self._status.generation + 1
-            job = (_built, sensor, self._asked, generation, smaller)
+            job = (built, sensor, self._asked, generation, smaller)
             self._building = self._builder.submit(*job)
             self._status = replace(self._status, computing=True)
 
-    def _swap(self, built: "_Built") -> None:
+    def _swap(self, made: Built) -> None:
         """Go over to the whole of another pipeline, or keep the one there is and say why."""
         self._building = None
         self._status = replace(self._status, computing=False)
-        if built.asked != self._asked or built.sensor is not self._status.sensor:
+        if made.asked != self._asked or made.sensor is not self._status.sensor:
             self._set_up(smaller=self._pipeline is None)  # overtaken while it was built
             return
-        self._status = replace(self._status, refusal=built.refusal)
-        if built.pipeline is not None:
-            self._use(built.pipeline)
+        self._status = replace(self._status, refusal=made.refusal)
+        if made.pipeline is not None:
+            self._use(made.pipeline)
         self._report()
 
     def _use(self, pipeline: Pipeline) -> None:
@@ -394,31 +318,3 @@ class Loop:
             )
         self._status = replace(status, reported=now, tare=self._taking.news)
         self._ring.write_status(self._status)
-
-
-@dataclass(frozen=True, eq=False)
-class _Built:
-    """What came of building a pipeline: `asked` or a smaller one, or none and why."""
-
-    sensor: Sensor
-    asked: Setup
-    pipeline: Pipeline | None
-    refusal: str = ""
-
-
-def _built(sensor: Sensor, asked: Setup, generation: int, smaller: bool) -> _Built:
-    """A pipeline as asked, or if it may be `smaller` with the most functions that it can have."""
-    refusal = ""
-    most = max(asked.Ni, asked.Nj)
-    for limit in range(most, 0 if smaller else most - 1, -1):
-        setup = replace(asked, Ni=min(asked.Ni, limit), Nj=min(asked.Nj, limit))
-        try:
-            return _Built(sensor, asked, Pipeline(sensor, setup, generation), refusal)
-        except Refusal as reason:
-            refusal = refusal or str(reason)
-        except MemoryError:
-            refusal = refusal or (
-                f"{asked.Ni} x {asked.Nj} functions for {sensor.layout} do not fit in memory; "
-                "use fewer"
-            )
-    return _Built(sensor, asked, None, refusal)

@@ -29,7 +29,7 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.engine import Engine
-from kappaskin.live import LOST, OFF, STREAMING, Status
+from kappaskin.status import LOST, OFF, STREAMING, Status
 from kappaskin.tare_taking import TareNews
 
 Answer = TypeVar("Answer")

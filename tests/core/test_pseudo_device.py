@@ -19,7 +19,6 @@ import pytest
 from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
 from kappaskin.effects import CorruptedFrames, DroppedFrames
 from kappaskin.engine import Engine
-from kappaskin.live import LOST, STREAMING
 from kappaskin.scene import Orbit
 from kappaskin.sources import SerialSource
 from kappaskin.sources.decoder import Decoder
@@ -33,6 +32,7 @@ from kappaskin.sources.wire import (
     encode_command,
     pack_runs,
 )
+from kappaskin.status import LOST, STREAMING
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice

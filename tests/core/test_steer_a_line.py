@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from kappaskin import Plate, Refusal, Region, Scanner, load_scene
-from kappaskin.live import STREAMING
 from kappaskin.sources import SerialSource, information
+from kappaskin.status import STREAMING
 from kappaskin.steer import steered
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")

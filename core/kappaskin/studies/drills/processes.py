@@ -10,8 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from kappaskin.engine import Engine
-from kappaskin.live import LOST, STREAMING
 from kappaskin.sources.accounting import Accounting
+from kappaskin.status import LOST, STREAMING
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.outcome import Outcome
 from kappaskin.studies.drills.stand import Stand
