@@ -1,5 +1,6 @@
 """The live process, away from whatever draws: started, asked, watched and ended from here."""
 
+import itertools
 import multiprocessing
 import os
 import signal
@@ -10,14 +11,16 @@ from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from typing import cast
 
 from kappaskin.frames import Estimate, Event
 from kappaskin.live import Loop
 from kappaskin.pipeline import Setup
 from kappaskin.processes import beginning_processes
+from kappaskin.recording.writing import part_of
 from kappaskin.region import Region
-from kappaskin.requests import Connect, Disconnect, Request, Seek, TakeTare
+from kappaskin.requests import Connect, Disconnect, Note, Record, Request, Seek, TakeTare
 from kappaskin.ring import Ring
 from kappaskin.scene import Playing, Scene
 from kappaskin.status import LOST, Status
@@ -35,11 +38,15 @@ _GIVEN_UP = (
 )
 
 
-def _end_with_parent() -> None:
-    """End this process soon after the one that started it, whatever is being computed."""
+def _end_with_parent(loop: Loop) -> None:
+    """End this process soon after the one that started it, whatever is being computed.
+
+    What was recorded is ended first.
+    """
     if parent := multiprocessing.parent_process():
         parent.join()
         time.sleep(_GRACE)
+        loop.end_recording()
         os._exit(1)
 
 
@@ -49,12 +56,21 @@ def _serve(requests: "Connection[Request, Request]", name: str) -> None:
     # for each, a loop that always computes would starve it below the rate of the line.
     sys.setswitchinterval(_SWITCH)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
-    threading.Thread(target=_end_with_parent, name="parent-watcher", daemon=True).start()
     ring = Ring.attach(name)
     try:
-        Loop(requests, ring).run()
+        loop = Loop(requests, ring)
+        watcher = threading.Thread(target=_end_with_parent, args=(loop,), name="parent-watcher")
+        watcher.daemon = True
+        watcher.start()
+        loop.run()
     finally:
         ring.close()
+
+
+def _unused(path: Path) -> Path:
+    """`path`, or one that is numbered, where no recording is yet."""
+    names = (path.with_stem(f"{path.stem}-{n}") if n > 1 else path for n in itertools.count(1))
+    return next(name for name in names if not (name.exists() or part_of(name).exists()))
 
 
 class Engine:
@@ -71,6 +87,7 @@ class Engine:
         self._source: str | None = None
         self._scene: Scene | None = None
         self._speed = 1.0
+        self._recording: Path | None = None
         self._deaths: list[float] = []
         self._seen = Status()
         self._process: BaseProcess | None = None
@@ -119,6 +136,9 @@ class Engine:
         self._start_again(Event(now, "engine", _AGAIN))
         if self._source is not None:
             self._send(Connect(self._source))
+        if self._recording is not None:
+            # Beside the one that broke off, which `repair` makes whole.
+            self.record(_unused(self._recording))
         if self._scene is not None:
             self._send(self._scene)
         if self._speed != 1.0:
@@ -181,6 +201,15 @@ class Engine:
     def tare(self) -> None:
         """Take a tare; `status` tells what came of it, and a setup with it uses it."""
         self._send(TakeTare())
+
+    def record(self, path: Path | None) -> None:
+        """Record to `path` from now on, or end that with None; `status` tells what came of it."""
+        self._recording = path
+        self._send(Record(path and path.absolute()))
+
+    def note(self, text: str) -> None:
+        """Let `text` be among what happened, and recorded with it."""
+        self._send(Note(text))
 
     def status(self) -> Status:
         # One that is being written is not there to read: the last is nearer the truth than none.

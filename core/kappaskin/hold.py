@@ -6,14 +6,17 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Frame, Mask
+from kappaskin.memory import Remembering
 
 
-class Hold:
+class Hold(Remembering):
     """Holds the last reading of each of `channels` until it is `age` s old on the device's clock.
 
     A channel that was scanned is never filled in: on a rail it has no reading, however fresh the
     last one. A clock that went back, as of a device that restarted, holds nothing from before.
     """
+
+    REMEMBERED = ("_values", "_times")
 
     def __init__(self, channels: int, age: float) -> None:
         if not (math.isfinite(age) and age >= 0):

@@ -7,17 +7,21 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
+from pathlib import Path
 
 import numpy as np
 
 from kappaskin.building import Built, built
 from kappaskin.errors import Refusal, SourceError
-from kappaskin.frames import Frame
+from kappaskin.frames import Array, Event, Frame
 from kappaskin.health import Health, Monitor
+from kappaskin.health.leaving_out import Kinds
 from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.recorder import Recorder
+from kappaskin.recording.writing import Written
 from kappaskin.region import Region
-from kappaskin.requests import Connect, Request, Seek, TakeTare
+from kappaskin.requests import Connect, Note, Record, Request, Seek, TakeTare
 from kappaskin.ring import Ring, slot_type
 from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
@@ -43,6 +47,8 @@ class Loop:
         self._monitor: Monitor | None = None
         self._place = np.full(2, math.nan)  # of the last contact, in m
         self._spoilt: object = None  # by what, in a simulated scene
+        self._out: tuple[Kinds, Array] | None = None  # what the pipeline leaves out of its fits
+        self._recorder: Recorder | None = None
         self._status: Status = ring.read_status() or Status()
         self._asked = self._status.setup
         self._steering: Steering | Following | None = None
@@ -74,6 +80,7 @@ class Loop:
                 if time.monotonic() - self._status.reported >= _REPORT:
                     self._report()
         self._close()
+        self.end_recording()
         self._builder.shutdown(wait=False, cancel_futures=True)
 
     def _take(self, request: Request) -> None:
@@ -90,6 +97,10 @@ class Loop:
             self._steer()
         elif isinstance(request, TakeTare):
             self._taking.begin(self._status.sensor if self._status.state == STREAMING else None)
+        elif isinstance(request, Record):
+            self._record(request.path)
+        elif isinstance(request, Note):
+            self._happen(Event(time.monotonic(), "note", request.text))
         else:
             self._close()
             self._status = replace(
@@ -118,6 +129,8 @@ class Loop:
         self._again = math.inf
         try:
             self._source = open_source(name)
+            self._source.record(self._recorder)
+            self._record_scene()
             self._status = replace(self._status, state=WAITING, source=name, message="")
         except SourceError as error:
             self._again = time.monotonic() + _AGAIN
@@ -134,6 +147,7 @@ class Loop:
         try:
             self._source.play(scene)
             self._spoil(scene)
+            self._record_scene()
         except Refusal as refusal:
             message = str(refusal)
         self._status = replace(self._status, message=message, computing=building)
@@ -159,8 +173,10 @@ class Loop:
         self._taking.give_up("the connection ended; connect again, then tare")
         if self._source is not None:
             self._source.close()
+            if self._recorder is not None:
+                self._recorder.ended(time.monotonic())
         self._source, self._pipeline, self._building = None, None, None
-        self._steering = self._monitor = None
+        self._steering = self._monitor = self._out = None
         self._gaps.clear()
         self._times.clear()
         self._last_read = self._again = math.inf
@@ -197,9 +213,11 @@ class Loop:
             return
         if self._pipeline is not None:
             pipeline.go_on_from(self._pipeline)
+        self._pipeline, self._out = pipeline, None
+        if self._recorder is not None:
+            self._recorder.set_up(pipeline)
         if self._monitor is not None:
-            pipeline.leave_out(self._monitor.kinds, self._monitor.badness)
-        self._pipeline = pipeline
+            self._leave_out(pipeline, self._monitor)
         self._status = replace(
             self._status, setup=pipeline.setup, generation=pipeline.generation, slot=slot
         )
@@ -226,24 +244,31 @@ class Loop:
             if frame.host_time > self._last_read:
                 self._gaps.append(frame.host_time - self._last_read)
             self._last_read = frame.host_time
+        if self._pipeline is not None:
+            self._compute(frames, self._pipeline)
+        # Afterwards: what is left out is left out from the next frame that is read.
+        for frame in frames:
             self._watch(frame)
-        if self._pipeline is None:
-            return
+
+    def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:
+        """Work out the newest frames, as many as there is time for."""
         late = len(frames) - self._pace.affordable(len(frames))
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
         for frame in frames[:late]:
-            self._pipeline.pass_over(frame)
+            pipeline.pass_over(frame)
             self._times.append(frame.host_time)
         began = time.monotonic()
         for frame in frames[late:]:
-            estimate = self._pipeline(frame)
+            estimate = pipeline(frame)
             self._ring.write(estimate)
             self._taking.receive(estimate)
             self._times.append(frame.host_time)
             self._place = estimate.touch.position
             if self._steering is not None:
-                self._steering(estimate.touch, self._pipeline.fit)
+                self._steering(estimate.touch, pipeline.fit)
+            if self._recorder is not None:
+                self._recorder.take(frame, estimate)
         self._pace.spend(len(frames) - late, time.monotonic() - began)
 
     def _follow(self, source: Source) -> None:
@@ -254,8 +279,9 @@ class Loop:
         state = LOST if trouble else WAITING if source.sensor is None else STREAMING
         if state != was.state or ((trouble or was.state == LOST) and trouble != was.message):
             self._status = replace(self._status, state=state, message=trouble)
-        if events := source.events():
-            self._status = self._status.after(events)
+        events = source.events()
+        for event in events:
+            self._happen(event)
         told = self._steering is None or self._steering.refusal == was.region_refusal
         if self._steering is not None and not told:
             self._status = replace(self._status, region_refusal=self._steering.refusal)
@@ -266,7 +292,66 @@ class Loop:
         """Look after the health of the channels, and leave out of the fit which are not well."""
         monitor = self._monitor
         if monitor is not None and monitor(frame) and self._pipeline is not None:
-            self._pipeline.leave_out(monitor.kinds, monitor.badness)
+            self._leave_out(self._pipeline, monitor)
+
+    def _leave_out(self, pipeline: Pipeline, monitor: Monitor) -> None:
+        was = pipeline.left_out
+        pipeline.leave_out(monitor.kinds, monitor.badness)
+        if pipeline.left_out is not was:
+            self._out = monitor.kinds.copy(), monitor.badness.copy()
+            if self._recorder is not None:
+                self._recorder.left_out(*self._out)
+
+    def _happen(self, event: Event) -> None:
+        """Tell of something that happened."""
+        self._status = self._status.after([event])
+        if self._recorder is not None:
+            self._recorder.happened(event)
+
+    # What is recorded.
+
+    def _record(self, path: Path | None) -> None:
+        """Begin to record to `path`, or end; what was recorded until now is ended."""
+        self.end_recording()
+        if path is None:
+            return
+        try:
+            recorder = self._recorder = Recorder(path, time.monotonic())
+        except Refusal as refusal:
+            failed = Written(str(path), trouble=str(refusal))
+            self._status = replace(self._status, recording=failed)
+            return
+        if self._source is not None:
+            self._source.record(recorder)
+        self._record_scene()
+        if self._pipeline is not None:
+            recorder.set_up(self._pipeline)
+            recorder.remembered(self._pipeline.remembered())
+            if self._out is not None:
+                recorder.left_out(*self._out)
+
+    def _record_scene(self) -> None:
+        if self._recorder is not None and isinstance(self._source, SimulatedSource):
+            self._recorder.plays(self._source.scene)
+
+    def end_recording(self) -> None:
+        """End the file, if one is recorded to; until it is on the disk."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            if self._source is not None:
+                self._source.record(None)
+            recorder.close()
+            self._status = replace(self._status, recording=recorder.written)
+
+    def _look_after_recording(self) -> None:
+        """Say how the recording does; one that ended by itself is over, and that is told."""
+        if self._recorder is None:
+            return
+        written = self._recorder.written
+        self._status = replace(self._status, recording=written)
+        if not written.active:
+            self.end_recording()
+            self._happen(Event(time.monotonic(), "recording", written.trouble))
 
     def _health(self) -> Health:
         if self._monitor is None or self._pipeline is None:
@@ -298,6 +383,7 @@ class Loop:
         self._set_up(smaller=True)
 
     def _report(self) -> None:
+        self._look_after_recording()
         now, source, status = time.monotonic(), self._source, self._status
         if source is not None:
             watch = self._pipeline.drift if self._pipeline else None

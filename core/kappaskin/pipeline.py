@@ -17,6 +17,7 @@ from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.geometry import contact_geometry
 from kappaskin.health import LeftOut, leave_out
 from kappaskin.hold import Hold
+from kappaskin.memory import Memory, Remembering
 from kappaskin.sensor import Sensor
 from kappaskin.taring import DriftWatch, Rest
 from kappaskin.touch import NO_TOUCH, LoadSeeker, PointContact
@@ -220,6 +221,26 @@ class Pipeline:
         self.past = before.past
         if _estimating(self) == _estimating(before):
             self.fit = before.fit
+
+    def remembered(self) -> Memory:
+        """What estimates depend on besides their frames, by name; also of frames passed over."""
+        for earlier in self.past.passed:
+            self.past.hold(earlier, self.curvature(earlier))
+        self.past.passed.clear()
+        found = self.past.hold.remembered("hold.")
+        if self.past.correct is not None:
+            found |= self.past.correct.remembered("correct.")
+        if isinstance(self.fit, Remembering):
+            found |= self.fit.remembered("fit.")
+        return found
+
+    def recall(self, memory: Memory) -> None:
+        """Go on from what another of the same sensor and setup `remembered`."""
+        self.past.hold.recall(memory, "hold.")
+        if self.past.correct is not None:
+            self.past.correct.recall(memory, "correct.")
+        if isinstance(self.fit, Remembering):
+            self.fit.recall(memory, "fit.")
 
     def pass_over(self, frame: Frame) -> None:
         """Remember the readings of a frame of which nobody waits for the estimate."""

@@ -1,6 +1,7 @@
 """What may be asked of the live process."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from kappaskin.pipeline import Setup
 from kappaskin.region import Region
@@ -30,4 +31,18 @@ class TakeTare:
     """Take a tare from now on, and hold what it finds against the tare of the setup."""
 
 
-Request = Connect | Disconnect | Setup | Scene | Seek | Region | TakeTare
+@dataclass(frozen=True)
+class Record:
+    """Record to a file at `path` from now on, None to end that."""
+
+    path: Path | None
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something that a person wants to be recorded, in words."""
+
+    text: str
+
+
+Request = Connect | Disconnect | Setup | Scene | Seek | Region | TakeTare | Record | Note

@@ -9,6 +9,7 @@ import numpy as np
 from kappaskin.frames import Event
 from kappaskin.health import Health
 from kappaskin.pipeline import Setup
+from kappaskin.recording.writing import Written
 from kappaskin.region import Region
 from kappaskin.scene import FROM_THE_BEGINNING, Playing
 from kappaskin.sensor import Sensor
@@ -34,7 +35,7 @@ class Status:
     `playing` tells where a simulated scene is at a device time. `events` are the last of those that
     `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
     tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
-    tells which channels are not to be trusted.
+    tells which channels are not to be trusted, `recording` what is being written.
     """
 
     state: str = OFF
@@ -62,6 +63,7 @@ class Status:
     tare: TareNews = field(default_factory=TareNews)
     drift: Drift | None = None
     health: Health = field(default_factory=Health)
+    recording: Written = field(default_factory=Written)
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status once `events` happened."""

@@ -15,6 +15,7 @@ from kappaskin.effects import PrandtlIshlinskii, StandardLinearSolid
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
+from kappaskin.memory import Remembering
 from kappaskin.sensor import Sensor
 
 _MOST_CHANNELS = 2**14  # whose numbers the engine can tell with every status
@@ -136,8 +137,10 @@ def digest(content: dict[str, dict[str, Any]]) -> str:
     return hashlib.sha256(told.encode()).hexdigest()
 
 
-class Corrector:
+class Corrector(Remembering):
     """A calibration at work: each frame of readings to curvature, with a memory of those before."""
+
+    REMEMBERED = ("_last", "_time", "_restore", "_straighten")
 
     def __init__(self, calibration: Calibration) -> None:
         failed = np.isnan(calibration.gain)

@@ -63,17 +63,21 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
         part.unlink(missing_ok=True)
 
 
-def _parsed(path: Path) -> dict[str, Any]:
+def _contents(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            data = file.read(_LARGEST + 1)
-        if len(data) > _LARGEST:
-            raise ValueError(f"it has more than {_LARGEST} bytes")
-        return tomllib.loads(data.decode())
+            return file.read(_LARGEST + 1)
     except FileNotFoundError as error:
         raise Refusal(f"{path}: there is no such file; `kappaskin calibrate` makes one") from error
     except OSError as error:
         raise Refusal(f"{path}: cannot be read ({error}); check its permissions") from error
+
+
+def _parsed(path: Path, data: bytes) -> dict[str, Any]:
+    try:
+        if len(data) > _LARGEST:
+            raise ValueError(f"it has more than {_LARGEST} bytes")
+        return tomllib.loads(data.decode())
     except (ValueError, RecursionError) as error:
         raise Refusal(f"{path}: is no calibration file ({error!s:.120}); {_AGAIN}") from error
 
@@ -117,7 +121,12 @@ def _array(values: Any) -> Array:
 
 def from_toml(path: Path) -> Calibration:
     """The calibration in `path`, whosever it is and however old."""
-    said = _checked(path, _parsed(path))
+    return calibration_in(_contents(path), path)
+
+
+def calibration_in(data: bytes, path: Path) -> Calibration:
+    """The calibration in the `data` of a file that refusals call `path`."""
+    said = _checked(path, _parsed(path, data))
     device, hysteresis, creep = said["device"], said.get("hysteresis"), said.get("creep")
     try:
         if not all(isinstance(device[key], str) for key in _KEYS["device"] - {"date"}):

@@ -117,6 +117,22 @@ class Tares:
             ) from error
 
 
+def tare_text(tare: Tare) -> str:
+    """The text of a file with one tare."""
+    return _text(Kept((tare,), tare))
+
+
+def tare_in(data: bytes, name: str) -> Tare:
+    """The tare in the `data` that `tare_text` made, of a file that refusals call `name`."""
+    try:
+        kept = _kept(data, None)
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+        raise Refusal(f"{name}: is no tare ({error!s:.120}); expected it as it was made") from error
+    if kept.used is None:
+        raise Refusal(f"{name}: expected one tare that is in use, got {len(kept.tares)}")
+    return kept.used
+
+
 def _content(kept: Kept) -> dict[str, Any]:
     used = kept.used.digest if kept.used else ""
     return {"used": used, "tare": [tare.content for tare in kept.tares]}
@@ -128,7 +144,8 @@ def _text(kept: Kept) -> str:
     return "\n".join([table("", head), *(table("[[tare]]", said) for said in content["tare"])])
 
 
-def _kept(data: bytes, serial_number: str) -> Kept:
+def _kept(data: bytes, serial_number: str | None) -> Kept:
+    """The tares in a file of the sensor of this number, or of whichever."""
     if len(data) > _LARGEST:
         raise ValueError(f"it has more than {_LARGEST} bytes")
     said = tomllib.loads(data.decode())
@@ -140,7 +157,7 @@ def _kept(data: bytes, serial_number: str) -> Kept:
     if digest(content) != said["sha256"]:
         raise ValueError("it is damaged or was edited, its SHA-256 differs")
     tares = tuple(_tare(one) for one in content["tare"])
-    if any(tare.serial_number != serial_number for tare in tares):
+    if serial_number is not None and any(t.serial_number != serial_number for t in tares):
         raise ValueError("it is of another sensor")
     return Kept(tares, next((tare for tare in tares if tare.digest == said["used"]), None))
 

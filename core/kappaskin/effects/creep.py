@@ -10,6 +10,7 @@ from kappaskin.effects.effect import ReadingEffect, Running, Size
 from kappaskin.effects.survey import Survey
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.memory import Remembering
 
 
 def _step(elapsed: float, time_constant: float) -> tuple[float, float, float]:
@@ -51,8 +52,10 @@ class StandardLinearSolid:
         return Restoring(self)
 
 
-class _Slow:
+class _Slow(Remembering):
     """The slow part s and the curvature before, both (C,)."""
+
+    REMEMBERED = ("_s", "_x", "_time")
 
     def __init__(self, solid: StandardLinearSolid) -> None:
         self._share, self._tau = solid.share, solid.time_constant

@@ -9,6 +9,7 @@ from kappaskin.effects.effect import ReadingEffect, Running, Size
 from kappaskin.effects.survey import Survey
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.memory import Remembering
 
 _MOST = 100  # plays: each costs time in every frame
 
@@ -69,8 +70,10 @@ class PrandtlIshlinskii:
         return Plays(self)
 
 
-class Plays:
+class Plays(Remembering):
     """The positions of all plays; called with each frame, it moves them."""
+
+    REMEMBERED = ("_w",)
 
     def __init__(self, operator: PrandtlIshlinskii) -> None:
         self._r, self._p = operator.thresholds, operator.weights

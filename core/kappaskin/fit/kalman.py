@@ -9,6 +9,7 @@ from scipy import special
 from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
 from kappaskin.frames import Array
+from kappaskin.memory import Remembering
 
 _BLOCK, _BLOCK_OF_READINGS = 16, 32  # columns that LAPACK reflects at once: the fastest, of 128
 
@@ -30,7 +31,7 @@ class Learned:
         return (self.surprise / variance - self.spread) / 2
 
 
-class MovingModes:
+class MovingModes(Remembering):
     """Amplitudes x (F,) of modes and their rates, expected (2, F), with covariance root' root.
 
     Each mode is a stationary Gaussian process of Matern's class 3/2 with the rate
@@ -41,6 +42,8 @@ class MovingModes:
     Only roots of covariances are kept, changed by orthogonal reflections (LAPACK's tpqrt, of a
     triangle on top of what is added): no rounding can make a variance negative.
     """
+
+    REMEMBERED = ("mean", "root")
 
     def __init__(self, wavenumbers: Array, dtype: DTypeLike) -> None:
         # Typed as float64: what holds for one holds for the other.

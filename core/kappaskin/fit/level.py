@@ -7,6 +7,7 @@ import numpy as np
 
 from kappaskin.fit.kalman import Learned
 from kappaskin.frames import Array
+from kappaskin.memory import Remembering
 
 START = 0.1  # m/s, of a contact of which nothing is known
 _SLOWEST, _FASTEST = 1e-4, 30.0
@@ -23,13 +24,15 @@ _RATIOS = np.exp(np.linspace(math.log(1e-4), math.log(1e14), 145))
 
 
 @dataclass(slots=True)
-class Level:
+class Level(Remembering):
     """What is known of the noise and the signal, kept up to date.
 
     `variance` of a reading, known as from `count` readings, infinitely many when it was told; the
     `amplitude` of modes in units of its root, and the `speed` in m/s with which they move. Of a
     number, a share as large as `rounding` is not known.
     """
+
+    REMEMBERED = ("variance", "count", "rounding", "amplitude", "speed")
 
     variance: float
     count: float

@@ -1,6 +1,7 @@
 """Frames and parts of frames, each reading at its own time, to the shape of a moving skin."""
 
 import math
+from collections.abc import Mapping
 from copy import copy
 from functools import cached_property
 from typing import ClassVar, cast
@@ -17,6 +18,7 @@ from kappaskin.fit.kalman import MovingModes
 from kappaskin.fit.level import START, Level
 from kappaskin.fit.prior import prior_root
 from kappaskin.frames import Array, Mask
+from kappaskin.memory import Remembering
 
 _MOST = 100  # readings that share one step of the filter
 _PHASE = 0.5  # rad that the fastest mode turns meanwhile at most, or
@@ -51,7 +53,7 @@ class TrackedSpread:
         return np.linalg.norm(rows @ self._half.T, axis=-1)
 
 
-class Tracking(Estimator):
+class Tracking(Estimator, Remembering):
     """`fit = Tracking(basis, layout)`; `fit(curvature)` follows frame after frame.
 
     A Kalman filter of what the skin does: a plate under loads that nobody knows (`prior_root`),
@@ -66,6 +68,7 @@ class Tracking(Estimator):
 
     remembers: ClassVar = True
     has_prior: ClassVar = True
+    REMEMBERED = ("_filter", "_level", "_now", "_left", "_read")
 
     def _set_up(self) -> None:
         if not self.readable.any():
@@ -84,6 +87,11 @@ class Tracking(Estimator):
         self._now = -math.inf
         self._left = np.full(self._A.shape[0], np.nan)
         self._read = np.full(self._A.shape[0], -math.inf)
+
+    def recall(self, memory: Mapping[str, Array], before: str = "") -> None:
+        if f"{before}_level.variance" in memory and self._level is None:
+            self._level = Level(0.0, 0.0, 0.0)
+        super().recall(memory, before)
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
         """The fit to a skin at rest by which nothing is remembered."""

@@ -9,6 +9,7 @@ from kappaskin.sensor import Sensor
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.serial_line import SerialSource as SerialSource
 from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
+from kappaskin.sources.tape import Tape
 
 SIMULATION = "sim:"
 
@@ -33,6 +34,10 @@ class Source(Protocol):
     @property
     def temperature(self) -> float:
         """The device's temperature in degrees Celsius, as it told last; NaN if it does not."""
+        ...
+
+    def record(self, tape: Tape | None) -> None:
+        """Tell `tape` from now on all that frames come from; nobody without one."""
         ...
 
     def events(self) -> list[Event]:

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,17 @@ _DELAY = 0.5  # s, longer than a message is under way where no exchange tells ho
 _DOUBTS = 2  # messages in a row that contradict the map before it is given up
 _WRAP = 2**32 * 1e-6  # s after which a counter of 32 bits in us begins again at 0
 _LONGEST = 2**64 * 1e-6  # s, what the wire can say
+
+
+class Known(NamedTuple):
+    """What is known of a clock: the `map` that `ClockMap` tells, and how its counter went on.
+
+    `map` is at, offset, half, drift, spread (see `ClockMap.bound`) and whether they are in doubt.
+    """
+
+    map: tuple[float, float, float, float, float, bool]
+    wraps: int
+    last: float
 
 
 class ClockMap:
@@ -83,6 +95,12 @@ class ClockMap:
     def drift_bound(self) -> float:
         """How far `drift` may be out at most, in parts per million."""
         return self._spread * 1e6 if len(self._exchanges) > 1 else math.inf
+
+    @property
+    def known(self) -> Known:
+        """All that `taken`, `sd` and `unwrap` depend on."""
+        told = self._at, self._offset, self._half, self._drift, self._spread, self._doubted > 0
+        return Known(told, self._wraps, self._last)
 
     # What comes.
 
@@ -216,3 +234,30 @@ class ClockMap:
 
 def _possible(device_time: float, host_time: float) -> bool:
     return 0 <= device_time < _LONGEST and math.isfinite(host_time)
+
+
+class RecordedClock(ClockMap):
+    """The map that a recorded one was at each of its scans: `coming` says how it changes, and when.
+
+    Device times, as `unwrap` gives them, of the scans from which on it is another.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.coming: deque[tuple[float, Known]] = deque(maxlen=_MESSAGES)
+
+    def recall(self, known: Known) -> None:
+        """Go on from what was known at one moment."""
+        self._wraps, self._last = known.wraps, known.last
+        self._go_over(known)
+
+    def _go_over(self, known: Known) -> None:
+        self._know(*known.map[:5])
+        self._doubted = int(known.map[5])
+
+    def heard(self, device_time: float, host_time: float) -> None:
+        if any(since == device_time for since, _ in self.coming):
+            since = math.nan
+            while since != device_time:
+                since, known = self.coming.popleft()
+                self._go_over(known)

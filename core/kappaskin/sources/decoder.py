@@ -144,6 +144,11 @@ class Decoder:
         self._lists[head] = found
         return found
 
+    @property
+    def held(self) -> bytes:
+        """The bytes that wait for more."""
+        return b"".join(self._parts)
+
     def accounting(self, overrun: int = 0) -> Accounting:
         """The balance so far, with `overrun` bytes that came but were never fed."""
         counts = self.sequence

@@ -1,24 +1,23 @@
 """Bytes on a serial line, or any URL that pyserial opens, to frames; a line that may vanish."""
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable
-
-import numpy as np
-from numpy.typing import NDArray
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.region import Scanner
 from kappaskin.sensor import Sensor
-from kappaskin.sources import information
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.asking import Asking
-from kappaskin.sources.clock import ClockMap
+from kappaskin.sources.clock import ClockMap, Known
 from kappaskin.sources.decoder import Decoder
+from kappaskin.sources.interpreter import Interpreter
 from kappaskin.sources.line import Line
 from kappaskin.sources.ports import holders, port_called, serial_ports
 from kappaskin.sources.scanning import Scanning
+from kappaskin.sources.tape import Tape
 from kappaskin.sources.tuning import Tuning
 from kappaskin.sources.wire import (
     VERSION,
@@ -27,6 +26,7 @@ from kappaskin.sources.wire import (
     Information,
     Reply,
     Samples,
+    encode_samples,
 )
 
 _PATIENCE = 3.0  # s that a device may say nothing, or not what it is
@@ -49,9 +49,8 @@ class SerialSource:
         self.url, self._clock = url, clock
         self._plug = port_called(url)
         self._decoder = Decoder()
-        self._sensor: Sensor | None = None
-        self._text = ""  # the information that the sensor was made of
-        self._absent = self._unusable = ""
+        self._means = Interpreter(url)
+        self._absent = ""
         self._pending: deque[tuple[float, FromDevice]] = deque()
         self._events: list[Event] = []
         self._overrun = self._lost_told = self._restarts_told = 0
@@ -59,14 +58,15 @@ class SerialSource:
         self._gone_at: float | None = None  # when the line was lost, until the device is back
         self._last: tuple[float, float] | None = None  # device and host time of the last message
         self._scanning = Scanning()
-        self._looked_at: NDArray[np.intp] | None = None
-        self._highest_there = -1
+        self._tape: Tape | None = None
+        self._told: Known | None = None  # to the tape
+        self._mapped: list[tuple[float, Known]] = []
         self._line: Line | None = None
         self._begin(Line(url, clock))
 
     @property
     def sensor(self) -> Sensor | None:
-        return self._sensor
+        return self._means.sensor
 
     @property
     def temperature(self) -> float:
@@ -78,15 +78,49 @@ class SerialSource:
     def _begin(self, line: Line) -> None:
         """Listen on `line`, and ask who is there."""
         now = self._clock()
-        self._line, self._known, self._unusable = line, False, ""
+        self._line = line
         self._opened = self._heard = self._good_at = self._tuned = now
         self._bytes_before = self._decoder.accounting().bytes_in
         self._holders: list[str] = []
         self._tuning = Tuning(line.baud_rate)
-        self._times = ClockMap()
-        self._asking = Asking(line.write, self._times)
+        times = ClockMap()
+        self._means.begin(times)
+        self._asking = Asking(self._send, times)
         self._asking.greet(now)
         self._scanning.begin()
+
+    def _send(self, data: bytes) -> None:
+        if self._line is not None and self._line.write(data) and self._tape is not None:
+            self._tape.sent(self._clock(), data)
+
+    def record(self, tape: Tape | None) -> None:
+        """Tell `tape` from now on all that frames come from; nobody without one."""
+        self._tape, self._told, self._mapped = tape, None, []
+        if tape is None or self._line is None:
+            return
+        if self._means.known:
+            tape.met(self._means.text)
+        for now, message in self._pending:
+            if isinstance(message, Samples):
+                sequence, began, channels, counts = message
+                tape.came(now, encode_samples(sequence, began, channels, counts, 4))
+        tape.mapped(math.nan, self._means.times.known)
+        self._told = self._means.times.known
+        tape.came(self._clock(), self._decoder.held)
+
+    def _map(self, since: float) -> None:
+        """Take note of what is known of the clock from the scan at device time `since` on."""
+        known = self._means.times.known
+        if self._told is None or known.map != self._told.map:
+            self._mapped.append((since, known))
+            self._told = known
+
+    def _record(self, tape: Tape, came: list[tuple[float, bytes]]) -> None:
+        for since, known in self._mapped:
+            tape.mapped(since, known)
+        self._mapped = []
+        for now, data in came:
+            tape.came(now, data)
 
     def scan(self, scanner: Scanner | None) -> None:
         """Let the device scan what `scanner` chooses, a few times a second; all without one."""
@@ -111,6 +145,8 @@ class SerialSource:
         self._decoder.sequence.interrupt()
         self._pending.clear()
         self._gone_at = self._clock()
+        if self._tape is not None:
+            self._tape.ended(self._gone_at)
         self._absent = (
             f"{self.url}: the line is gone: unplugged, or the device stopped; plug it in, and it "
             "goes on"
@@ -143,7 +179,8 @@ class SerialSource:
             self._come_back(timeout)
             return []
         gone = line.gone  # looked at first: what came before it was is still to be taken
-        for now, data in line.take(0.0 if gone or self._usable() else timeout):
+        came = line.take(0.0 if gone or self._usable() else timeout)
+        for now, data in came:
             messages = self._decoder.feed(data)
             self._heard = now
             self._pending += [(now, got) for got in messages if not isinstance(got, Command)]
@@ -151,9 +188,11 @@ class SerialSource:
                 self._good_at = now
                 if self._tuning.good(line.baud_rate):
                     self._tell("rate", f"the device speaks at {line.baud_rate} baud")
-        if not self._known:
+        if not self._means.known:
             self._look_for_information()
         frames = self._frames()
+        if self._tape is not None:
+            self._record(self._tape, came)
         self._tell_losses()
         if gone and not self._usable():
             self._end(line)
@@ -163,14 +202,14 @@ class SerialSource:
 
     def _usable(self) -> bool:
         """Whether messages wait that can be used without another look at the line."""
-        return self._known and bool(self._pending)
+        return self._means.known and bool(self._pending)
 
     def _look_for_information(self) -> None:
         """Learn who is there; what came before that is kept until then."""
         for place, (_, message) in enumerate(self._pending):
             if isinstance(message, Information):
                 self._meet(message.text)
-                if not self._known:
+                if not self._means.known:
                     self._drop(place + 1)
                 return
         self._drop_beyond(_UNREAD)
@@ -190,20 +229,13 @@ class SerialSource:
 
     def _meet(self, text: str) -> None:
         """Take what the device says it is, and say what of it is new."""
-        if self._known and text == self._text:
+        was, before = self._means.sensor, self._means.text
+        if not self._means.learn(text):
             return
-        was = self._sensor
-        if text != self._text:
-            self._sensor, self._text, self._known = None, "", False
-            try:
-                self._sensor = information.from_json(text)
-            except SourceError as error:
-                self._unusable = f"{self.url}: {error}"
-                return
+        if text != before:
             self._scanning.scan(None)  # what was chosen is on the skin that was
-        self._text, self._unusable, self._known = text, "", True
-        if self._sensor is not None:
-            self._compare(was, self._sensor)
+        if self._means.sensor is not None:
+            self._compare(was, self._means.sensor)
 
     def _compare(self, was: Sensor | None, now: Sensor) -> None:
         name = f"{now.name} {now.serial_number}"
@@ -245,30 +277,18 @@ class SerialSource:
     def _frames(self) -> list[Frame]:
         """The frames before the next message that changes the sensor, or cannot be used."""
         frames: list[Frame] = []
-        while self._usable() and not (frames and self._upsets(self._pending[0][1])):
+        while self._usable() and not (frames and self._means.upsets(self._pending[0][1])):
             now, message = self._pending.popleft()
             self._last = message.time, now
             if isinstance(message, Reply):
                 self._take(message, now)
             elif isinstance(message, Information):
                 self._meet(message.text)
-            elif frame := self._frame(message, now):
+            elif frame := self._means.frame(message, now):
                 frames.append(frame)
+                if self._tape is not None:
+                    self._map(frame.device_time)
         return frames
-
-    def _upsets(self, message: FromDevice) -> bool:
-        if isinstance(message, Information):
-            return message.text != self._text
-        if not isinstance(message, Samples) or self._sensor is None:
-            return False
-        return self._highest(message) >= self._sensor.channels
-
-    def _highest(self, samples: Samples) -> int:
-        """The highest channel; scans of one list share it, and so it is seldom looked for."""
-        if samples.channels is not self._looked_at:
-            self._looked_at = samples.channels
-            self._highest_there = int(np.max(samples.channels, initial=-1))
-        return self._highest_there
 
     def _take(self, reply: Reply, now: float) -> None:
         before = self._asking.refusal
@@ -276,24 +296,6 @@ class SerialSource:
         self._scanning.take(reply)
         if self._asking.refusal != before:
             self._tell("refused", self._asking.refusal)
-
-    def _frame(self, message: Samples, now: float) -> Frame | None:
-        sensor = self._sensor
-        if sensor is None or self._unusable:
-            return None
-        if self._upsets(message):
-            self._unusable = (
-                f"{self.url}: the device sends channel {self._highest(message)} but says it has "
-                f"{sensor.channels}; its firmware and its information disagree"
-            )
-            return None
-        times, began = self._times, self._times.unwrap(message.time)
-        times.heard(began, now)
-        channels = message.channels
-        if sensor.channel_map is not None:
-            channels = sensor.channel_map[channels]
-        taken = times.taken(began), times.sd(began)
-        return Frame(message.sequence, began, now, channels, message.counts, None, *taken)
 
     # What is said, and what is in the way.
 
@@ -307,7 +309,7 @@ class SerialSource:
 
     def _tell_losses(self) -> None:
         sequence, now = self._decoder.sequence, self._clock()
-        if self._known and sequence.restarts > self._restarts_told:
+        if self._means.known and sequence.restarts > self._restarts_told:
             self._restarts_told = sequence.restarts
             self._scanning.begin()
             self._tell("restarted", "the device started anew while it was connected")
@@ -319,12 +321,12 @@ class SerialSource:
     def _attend(self, line: Line) -> None:
         """Ping, and say what to scan; try other baud rates on bytes that mean nothing."""
         now = self._clock()
-        if self._known and self._sensor is not None:
-            self._scanning.attend(now, self._sensor, self._asking.ask)
-        if self._asking.attend(now) and not self._known:
+        if self._means.known and self._means.sensor is not None:
+            self._scanning.attend(now, self._means.sensor, self._asking.ask)
+        if self._asking.attend(now) and not self._means.known:
             self._asking.greet(now)
         since = max(self._good_at, self._tuned)
-        patience = _PATIENCE if self._known and self._tuned < self._good_at else _DWELL
+        patience = _PATIENCE if self._means.known and self._tuned < self._good_at else _DWELL
         if self._heard > since and now - since > patience:
             line.speak_at(self._tuning.next(line.baud_rate))
             self._tuned, self._holders = now, holders(self.url)
@@ -336,28 +338,28 @@ class SerialSource:
         if self._line is None:
             return self._absent
         now = self._clock()
-        if self._unusable or now - self._opened < _PATIENCE:
-            return self._unusable
-        if self._known and now - self._good_at < _PATIENCE:
+        if self._means.unusable or now - self._opened < _PATIENCE:
+            return self._means.unusable
+        if self._means.known and now - self._good_at < _PATIENCE:
             return ""
         return self._why_unknown(now)
 
     def _why_unknown(self, now: float) -> str:
         seen = self._decoder.accounting()
-        if self._asking.refusal and not self._known:
+        if self._asking.refusal and not self._means.known:
             return f"{self.url}: {self._asking.refusal}"
-        if seen.other_version is not None and not self._known:
+        if seen.other_version is not None and not self._means.known:
             return (
                 f"{self.url}: the device speaks wire version {seen.other_version}, this program "
                 f"speaks {VERSION}; update the older of the two"
             )
         came = seen.bytes_in - self._bytes_before
-        if not came or (self._known and now - self._heard >= _PATIENCE):
+        if not came or (self._means.known and now - self._heard >= _PATIENCE):
             return (
                 f"{self.url}: silent for more than {_PATIENCE:g} s; is the device on, and is this "
                 "its port?"
             )
-        if self._good_at > self._opened and not self._known:
+        if self._good_at > self._opened and not self._means.known:
             return (
                 f"{self.url}: messages come, but for more than {_PATIENCE:g} s none said what the "
                 "device is; its firmware must send an information message every second"

@@ -1,5 +1,6 @@
 """A scene, played in real time as frames."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +14,10 @@ from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
 from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.information import to_json
+from kappaskin.sources.clock import Known
+from kappaskin.sources.information import from_json, to_json
+from kappaskin.sources.tape import Tape
+from kappaskin.sources.wire import encode_samples
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
 _DEPTH = 0.02  # m from the middle of the skin down to the force/torque sensor
@@ -39,10 +43,13 @@ class SimulatedSource:
         self._base_noise = np.random.default_rng(scene.seed)
         self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
+        self._tape: Tape | None = None
 
     def _become(self, scene: Scene, due: float, playing: Playing) -> None:
         """Be the device of `scene`, whose next frame is due at device time `due` in s."""
-        self._simulator, self._sensor = Simulator(scene, playing), scene.sensor()
+        self._simulator, self._text = Simulator(scene, playing), to_json(scene.sensor())
+        # As anybody else would know it from what it says: in the last bit not what the scene has.
+        self._sensor = from_json(self._text)
         # Since frame `_first`, due at device time `_since`, frames come at `_rate`.
         self._first, self._since = self._n, due
         self._rate: float = self._sensor.rate
@@ -56,14 +63,33 @@ class SimulatedSource:
     def sensor(self) -> Sensor:
         return self._sensor
 
+    @property
+    def scene(self) -> Scene:
+        return self._simulator.scene
+
     def play(self, scene: Scene) -> None:
         """Go on with another scene, from the same moment; one that is refused changes nothing."""
-        if to_json(scene.sensor()) == to_json(self._sensor):
+        if to_json(scene.sensor()) == self._text:
             self._simulator.change(scene)
             return
         self._become(scene, self._due(), self.playing)
         # The next frame is due now: making what the skin needs took a while, but nothing is lost.
         self._start = self._clock() - self._since
+        self.record(self._tape)
+
+    def record(self, tape: Tape | None) -> None:
+        """Tell `tape` from now on what such a device would send; nobody without one."""
+        self._tape = tape
+        if tape is not None:
+            tape.met(self._text)
+            tape.mapped(math.nan, Known((0.0, self._start, 0.0, 0.0, 0.0, False), 0, math.nan))
+
+    def _record(self, tape: Tape, frames: list[Frame]) -> None:
+        width = 2 if self._simulator.scene.transduction.converter.bits <= 16 else 4
+        for frame in frames:
+            tape.simulated(frame)
+            sent = frame.sequence, frame.device_time, frame.channels, frame.counts, width
+            tape.came(frame.host_time, encode_samples(*sent))
 
     @property
     def playing(self) -> Playing:
@@ -93,7 +119,9 @@ class SimulatedSource:
             self._first, self._since, self._rate = self._n, due, rate
         self._n, self._taken = self._n + 1, due
         frame = self._simulator.scanned(scan, self._n - 1, due, self._clock)
-        return replace(frame, taken=self._start + due, taken_sd=0.0)
+        # A device tells its time in whole us.
+        told = round(due * 1e6) * 1e-6
+        return replace(frame, device_time=told, taken=told + self._start, taken_sd=0.0)
 
     def wrench(self) -> Wrench:
         """What `base` reads of the contact, at the time of the last frame."""
@@ -113,6 +141,8 @@ class SimulatedSource:
         while (now - self._start - self._due()) * self._rate + _ROUNDING >= 0:
             frames.append(self._next())
         arrived = [frame for frame in frames if not self._simulator.failure(frame.sequence)]
+        if self._tape is not None:
+            self._record(self._tape, arrived)
         self._accepted += len(arrived)
         self._lost += len(frames) - len(arrived)
         return arrived

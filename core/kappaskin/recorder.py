@@ -1,0 +1,274 @@
+"""What the live process reads and finds to a recording, before it goes anywhere else."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from kappaskin.frames import Array, Estimate, Event, Frame, Truth
+from kappaskin.memory import Memory
+from kappaskin.pipeline import Pipeline
+from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import Layout, encode
+from kappaskin.recording.writing import RecordingFile, Written
+from kappaskin.scene import Scene, write_scene
+from kappaskin.setup_text import said_of
+from kappaskin.sources.clock import Known
+
+_CONTACTS = 1000.0  # a second at most
+_HEAVY = 50.0  # a second at most, of what is as large as a frame
+_BYTES = 4e6  # a second at most, of that
+_SLACK = 0.5  # of an interval, by which one may come early
+_FRAME_ID = "skin"
+_INFO = 20  # what a log calls what is no warning
+_FLOAT32 = 7  # what a point cloud calls it
+_COLUMNS = ("x", "y", "z", "displacement", "xx", "yy", "xy")
+
+
+class Recorder:
+    """Writes the recording `path`; a `Tape` for a source, and for all that becomes of its frames.
+
+    A `Refusal` where no file can be made. No call waits for the disk.
+    """
+
+    def __init__(self, path: Path, now: float) -> None:
+        self._file = RecordingFile(path)
+        self._now = now  # host time in s of what came last
+        self._truth: Truth | None = None
+        self._attached: set[str] = set()
+        self._views: _Views | None = None
+        self._contact = self._heavy = -math.inf
+
+    @property
+    def written(self) -> Written:
+        return self._file.written
+
+    def close(self) -> None:
+        """Write what waits, and end the file."""
+        self._file.close()
+
+    # What the source tells.
+
+    def met(self, text: str) -> None:
+        self._file.put(m.DEVICE, self._now, encode(m.STRING, {"data": text}))
+
+    def came(self, host_time: float, data: bytes) -> None:
+        self._now = host_time
+        self._file.put(m.LINES, host_time, m.pack_line(host_time, False, data))
+
+    def sent(self, host_time: float, data: bytes) -> None:
+        self._now = host_time
+        self._file.put(m.LINES, host_time, m.pack_line(host_time, True, data))
+
+    def ended(self, host_time: float) -> None:
+        """No bytes at all came: the line is gone."""
+        self.came(host_time, b"")
+
+    def mapped(self, since: float, known: Known) -> None:
+        at, offset, half, drift, spread, doubted = known.map
+        said = {
+            "since": since,
+            "at": at,
+            "offset": offset,
+            "half": half,
+            "drift": drift,
+            "spread": spread,
+            "doubted": doubted,
+            "wraps": known.wraps,
+            "last": known.last,
+        }
+        self._file.put(m.CLOCKS, self._now, encode(m.CLOCK, said))
+
+    def simulated(self, frame: Frame) -> None:
+        truth, was = frame.truth, self._truth
+        if truth is was or (truth is not None and was is not None and _same(truth, was)):
+            return
+        self._truth = truth
+        told = truth or Truth(np.empty((0, 0)), np.full(2, math.nan), "")
+        said = {
+            "sequence": frame.sequence,
+            "edge": told.edge,
+            "shape": told.coefficients.shape,
+            "contact": told.contact,
+            "coefficients": told.coefficients.ravel(),
+        }
+        self._file.put(m.TRUTHS, frame.host_time, encode(m.TRUTH, said))
+
+    # What becomes of it.
+
+    def plays(self, scene: Scene) -> None:
+        """The scene is this from now on."""
+        name = f"scene-{len(self._attached)}.toml"
+        self._attached.add(name)
+        self._file.attach(name, "application/toml", write_scene(scene).encode())
+
+    def set_up(self, pipeline: Pipeline) -> None:
+        """Frames go through `pipeline` from now on."""
+        text, files = said_of(pipeline.setup)
+        for name in files.keys() - self._attached:
+            self._attached.add(name)
+            self._file.attach(name, "application/toml", files[name])
+        self._file.put(m.SETUP, self._now, encode(m.STRING, {"data": text}))
+        self._views = _Views(pipeline)
+
+    def remembered(self, memory: Memory) -> None:
+        """The pipeline goes on from this."""
+        for name, values in memory.items():
+            said = {"name": name, "shape": values.shape, "values": values.ravel()}
+            self._file.put(m.MEMORIES, self._now, encode(m.MEMORY, said))
+
+    def left_out(self, kinds: "np.ndarray[tuple[int], np.dtype[np.uint8]]", badness: Array) -> None:
+        """These channels are left out from now on."""
+        said = {"kinds": kinds, "badness": badness}
+        self._file.put(m.LEFT_OUTS, self._now, encode(m.LEFT_OUT, said))
+
+    def happened(self, event: Event) -> None:
+        stamp = self._file.stamp(event.time)
+        said = {
+            "stamp.sec": stamp // 10**9,
+            "stamp.nanosec": stamp % 10**9,
+            "level": _INFO,
+            "name": event.kind,
+            "msg": event.text,
+            "file": "",
+            "function": "",
+            "line": 0,
+        }
+        self._file.put(m.EVENTS, event.time, encode(m.LOG, said))
+
+    def take(self, frame: Frame, estimate: Estimate) -> None:
+        """Take down what a frame came to, as often as there is room for it."""
+        views, time = self._views, estimate.host_time
+        if views is None:
+            return
+        if time - self._contact >= (1 - _SLACK) / _CONTACTS:
+            self._contact = time
+            self._file.put(m.CONTACTS, time, views.contact(estimate, self._file.stamp(time)))
+        if time - self._heavy >= views.interval:
+            self._heavy = time
+            for topic, data in views.heavy(frame, estimate, self._file.stamp(time)):
+                self._file.put(topic, time, data)
+
+
+def _same(a: Truth, b: Truth) -> bool:
+    same_place = np.array_equal(a.contact, b.contact, equal_nan=True)
+    return a.edge == b.edge and same_place and np.array_equal(a.coefficients, b.coefficients)
+
+
+class _Views:
+    """Estimates of one pipeline to messages."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        layout = pipeline.sensor.layout
+        self._patch, self._positions = layout.patch, layout.positions
+        self._displacement = pipeline.basis.at(layout.positions)
+        P, C, N = len(layout), pipeline.sensor.channels, pipeline.basis.shape
+        head: dict[str, str | int] = {"header.frame_id": _FRAME_ID}
+        self._contact = Layout(m.CONTACT, head)
+        self._pose = Layout(m.POSE, head)
+        self._curvature = Layout(m.CURVATURE, head | {"curvature": 3 * P, "suspect": P})
+        self._shape = Layout(m.COEFFICIENTS, head | {"coefficients": math.prod(N)})
+        self._functions = N
+        step = 4 * len(_COLUMNS)
+        cloud = head | {"fields": len(_COLUMNS), "data": P * step}
+        for n, name in enumerate(_COLUMNS):
+            cloud[f"fields.{n}.name"] = name
+            cloud[f"fields.{n}.offset"] = 4 * n
+            cloud[f"fields.{n}.datatype"] = _FLOAT32
+            cloud[f"fields.{n}.count"] = 1
+        self._cloud = Layout(m.POINT_CLOUD, cloud)
+        self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
+        bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
+        self.interval = max((1 - _SLACK / 10) / _HEAVY, bytes_each / _BYTES)
+
+    def contact(self, estimate: Estimate, stamp: int) -> bytes:
+        touch, here = estimate.touch, estimate.geometry
+        return self._contact(
+            {
+                **_stamped(stamp),
+                "sequence": estimate.sequence,
+                "device_time": estimate.device_time,
+                "host_time": estimate.host_time,
+                "taken": estimate.taken,
+                "taken_sd": estimate.taken_sd,
+                "present": touch.present,
+                "single": touch.single,
+                "near_rim": touch.near_rim,
+                "converged": estimate.converged,
+                "spare": touch.spare,
+                "noise": estimate.noise,
+                "position": touch.position,
+                "position_sd": touch.position_sd,
+                "force": touch.force,
+                "force_sd": touch.force_sd,
+                "displacement": touch.displacement,
+                "displacement_sd": touch.displacement_sd,
+                "point": here.position,
+                "frame": here.frame.ravel(),
+                "metric": here.metric.ravel(),
+                "curvature_form": here.curvature_form.ravel(),
+                "torsion_form": here.torsion_form,
+                "covariance": here.covariance.ravel(),
+            }
+        )
+
+    def heavy(self, frame: Frame, estimate: Estimate, stamp: int) -> list[tuple[m.Topic, bytes]]:
+        """What is as large as a frame."""
+        head = {
+            **_stamped(stamp),
+            "sequence": estimate.sequence,
+            "device_time": estimate.device_time,
+        }
+        curvature = estimate.curvature.reshape(-1)
+        counts = {
+            **head,
+            "header.frame_id": _FRAME_ID,
+            "channels": frame.channels,
+            "counts": frame.counts,
+        }
+        readings = {"curvature": curvature, "noise": estimate.noise, "suspect": estimate.suspect}
+        shape = {"shape": self._functions, "coefficients": estimate.coefficients.ravel()}
+        found = [
+            (m.COUNT, encode(m.COUNTS, counts)),
+            (m.CURVATURES, self._curvature(head | readings)),
+            (m.SHAPES, self._shape(head | shape)),
+            (m.SKIN, self._cloud(_stamped(stamp) | self._points(estimate))),
+        ]
+        if estimate.touch.present:
+            found.append((m.POSES, self._pose(_stamped(stamp) | _pose(estimate))))
+        return found
+
+    def _points(self, estimate: Estimate) -> dict[str, object]:
+        """The skin where its elements are, with what they read."""
+        f = self._displacement @ estimate.coefficients.ravel()
+        rest, normal = self._patch.at_rest(self._positions)
+        columns = [*(rest - normal * f[:, None]).T, f, *estimate.curvature]
+        points = np.stack(columns, axis=1).astype("<f4")
+        return {**self._cloud_size, "data": points.reshape(-1).view(np.uint8)}
+
+
+def _stamped(stamp: int) -> dict[str, int]:
+    return {"header.stamp.sec": stamp // 10**9, "header.stamp.nanosec": stamp % 10**9}
+
+
+def _pose(estimate: Estimate) -> dict[str, float]:
+    """The contact as a pose: its x along the skin's, its z along the outward normal."""
+    where, axes = estimate.geometry.position.tolist(), estimate.geometry.frame.T.tolist()
+    said = {f"pose.position.{name}": value for name, value in zip("xyz", where, strict=True)}
+    turn = _quaternion(axes)
+    return said | {f"pose.orientation.{n}": q for n, q in zip("xyzw", turn, strict=True)}
+
+
+def _quaternion(R: list[list[float]]) -> tuple[float, float, float, float]:
+    """The unit quaternion x, y, z, w of a rotation matrix, by its largest component."""
+    (a, b, c), (d, e, f), (g, h, i) = R
+    squares = (1 + a - e - i, 1 - a + e - i, 1 - a - e + i, 1 + a + e + i)
+    rows = (
+        (squares[0], b + d, c + g, h - f),
+        (b + d, squares[1], f + h, c - g),
+        (c + g, f + h, squares[2], d - b),
+        (h - f, c - g, d - b, squares[3]),
+    )
+    x, y, z, w = max(rows, key=lambda row: math.hypot(*row))
+    length = math.hypot(x, y, z, w)
+    return x / length, y / length, z / length, w / length

@@ -1,0 +1,1 @@
+"""Recordings: MCAP files of messages that other programs know, written while live."""

@@ -1,0 +1,98 @@
+"""A file on a disk that may fill: whatever is written to it stands there whole, or not at all."""
+
+import os
+import tempfile
+from pathlib import Path
+from typing import IO
+
+from kappaskin.errors import Refusal
+
+_RESERVE = 2**20  # bytes kept for the end of the file, which a full disk has no room for otherwise
+
+
+class Disk:
+    """The new file `path`, as what the MCAP writer writes to.
+
+    Once the disk is full, `trouble` says so; what has been kept in reserve is then used for what is
+    still written. A write that finds no room even there, or no disk, raises an `OSError` and leaves
+    the file as it was before.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.trouble = path, ""
+        self._reserve: IO[bytes] | None = None
+        try:
+            self._file = path.open("xb", buffering=0)
+        except OSError as error:
+            raise Refusal(f"{path}: cannot be written ({_why(error)}); {_ELSEWHERE}") from error
+        self._reserved = self._at = 0
+        try:
+            self._reserve = tempfile.TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115
+            self.reserve(_RESERVE)
+        except OSError as error:
+            self.close()
+            path.unlink(missing_ok=True)
+            raise Refusal(
+                f"{path}: expected room for {_RESERVE >> 20} MiB at least ({_why(error)}); "
+                f"{_ELSEWHERE}"
+            ) from error
+
+    def reserve(self, size: int) -> None:
+        """Keep room for `size` bytes more."""
+        if self._reserve is not None and size > self._reserved:
+            _write(self._reserve, bytes(size - self._reserved))
+            self._reserved = size
+
+    def tell(self) -> int:
+        return self._at
+
+    def write(self, data: bytes) -> None:
+        try:
+            _write(self._file, data)
+        except OSError as error:
+            self._back()
+            if self._reserve is None:
+                raise
+            self.trouble = _why(error)
+            self._reserve.close()
+            self._reserve = None
+            self.write(data)
+            return
+        self._at += len(data)
+
+    def _back(self) -> None:
+        self._file.truncate(self._at)
+        self._file.seek(self._at)
+
+    def flush(self) -> None:
+        """Nothing waits in this process."""
+
+    def sync(self) -> None:
+        """Wait until it is on the disk, where a loss of power leaves it."""
+        os.fsync(self._file.fileno())
+
+    @property
+    def there(self) -> bool:
+        """Whether the file is still where it was made."""
+        try:
+            return os.path.samestat(self.path.stat(), os.fstat(self._file.fileno()))
+        except OSError:
+            return False
+
+    def close(self) -> None:
+        self._file.close()
+        if self._reserve is not None:
+            self._reserve.close()
+
+
+_ELSEWHERE = "choose another place"
+
+
+def _write(file: IO[bytes], data: bytes) -> None:
+    left = memoryview(data)
+    while left:
+        left = left[file.write(left) :]
+
+
+def _why(error: OSError) -> str:
+    return error.strerror or str(error)

@@ -1,0 +1,235 @@
+"""The messages of a recording: standard ones of ROS 2 where there are, and our own, with units."""
+
+import struct
+from typing import NamedTuple
+
+from kappaskin.errors import Refusal
+from kappaskin.recording.cdr import MessageType
+
+TIME = MessageType("builtin_interfaces/msg/Time", "int32 sec\nuint32 nanosec")
+HEADER = MessageType("std_msgs/msg/Header", "builtin_interfaces/Time stamp\nstring frame_id", TIME)
+STRING = MessageType("std_msgs/msg/String", "string data")
+LOG = MessageType(
+    "rcl_interfaces/msg/Log",
+    """
+builtin_interfaces/Time stamp
+uint8 level
+string name
+string msg
+string file
+string function
+uint32 line
+""",
+    TIME,
+)
+_POINT = MessageType("geometry_msgs/msg/Point", "float64 x\nfloat64 y\nfloat64 z")
+_QUATERNION = MessageType(
+    "geometry_msgs/msg/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"
+)
+_POSE = MessageType(
+    "geometry_msgs/msg/Pose",
+    "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation",
+    _POINT,
+    _QUATERNION,
+)
+POSE = MessageType(
+    "geometry_msgs/msg/PoseStamped",
+    "std_msgs/Header header\ngeometry_msgs/Pose pose",
+    HEADER,
+    _POSE,
+)
+_POINT_FIELD = MessageType(
+    "sensor_msgs/msg/PointField",
+    "string name\nuint32 offset\nuint8 datatype\nuint32 count",
+)
+POINT_CLOUD = MessageType(
+    "sensor_msgs/msg/PointCloud2",
+    """
+std_msgs/Header header
+uint32 height
+uint32 width
+sensor_msgs/PointField[] fields
+bool is_bigendian
+uint32 point_step
+uint32 row_step
+uint8[] data
+bool is_dense
+""",
+    HEADER,
+    _POINT_FIELD,
+)
+
+LINE = MessageType(
+    "kappaskin_msgs/msg/Line",
+    """
+# Bytes as they came over the line of a device, or were sent to it.
+float64 host_time  # s, monotonic clock of the host
+bool sent          # to the device
+uint8[] data
+""",
+)
+CLOCK = MessageType(
+    "kappaskin_msgs/msg/Clock",
+    """
+# From the scan of device time `since` on: host time = t + offset + drift (t - at), and lies within
+# half + spread |t - at| of that, for the device time t after `wraps` wraps of its counter.
+float64 since   # s, as the device says it
+float64 at      # s
+float64 offset  # s
+float64 half    # s
+float64 drift   # s/s
+float64 spread  # s/s
+bool doubted    # nothing is known until the next
+int32 wraps
+float64 last    # s, device time of the scan before, as the device says it
+""",
+)
+LEFT_OUT = MessageType(
+    "kappaskin_msgs/msg/LeftOut",
+    """
+# Channels (component by component) that are left out of the fit from the next frame on.
+uint8[] kinds      # why, 0 for a good channel
+float64[] badness  # those with the largest are left out first
+""",
+)
+MEMORY = MessageType(
+    "kappaskin_msgs/msg/Memory",
+    """
+# What the pipeline remembered of frames before the recording began.
+string name
+uint32[] shape
+float64[] values
+""",
+)
+TRUTH = MessageType(
+    "kappaskin_msgs/msg/Truth",
+    """
+# What the simulation knows of the frames from the next on.
+uint64 sequence
+string edge            # of the functions that the coefficients belong to
+uint32[2] shape
+float64[2] contact     # m
+float64[] coefficients  # m
+""",
+)
+COUNTS = MessageType(
+    "kappaskin_msgs/msg/Counts",
+    """
+std_msgs/Header header
+uint64 sequence
+float64 device_time  # s
+uint32[] channels    # component by component: xx, yy, xy
+int32[] counts
+""",
+    HEADER,
+)
+CURVATURE = MessageType(
+    "kappaskin_msgs/msg/Curvature",
+    """
+std_msgs/Header header
+uint64 sequence
+float64 device_time   # s
+float64 noise         # 1/m, standard deviation of a reading
+float64[] curvature   # 1/m, component by component: xx, yy, xy; NaN where a reading is missing
+uint8[] suspect       # why an element is left out, 0 if it is not
+""",
+    HEADER,
+)
+COEFFICIENTS = MessageType(
+    "kappaskin_msgs/msg/Coefficients",
+    """
+std_msgs/Header header
+uint64 sequence
+float64 device_time      # s
+uint32[2] shape          # functions along x and y
+float64[] coefficients   # m
+""",
+    HEADER,
+)
+CONTACT = MessageType(
+    "kappaskin_msgs/msg/Contact",
+    """
+std_msgs/Header header
+uint64 sequence
+float64 device_time        # s, on the device's clock, when the scan began
+float64 host_time          # s, on the host's monotonic clock, when it came
+float64 taken              # s, on the host's monotonic clock, when the scan began
+float64 taken_sd           # s
+bool present               # whether there is a contact; every number is NaN without one
+bool single                # whether one point load explains the readings
+bool near_rim              # too near a held edge for place and force to be trusted
+bool converged
+int64 spare                # readings more than a point load needs
+float64 noise              # 1/m, standard deviation of a reading
+float64[2] position        # m, on the skin
+float64[2] position_sd     # m
+float64 force              # N
+float64 force_sd           # N
+float64 displacement       # m
+float64 displacement_sd    # m
+float64[3] point           # m, in space
+float64[9] frame           # rows: along x, across it, outward normal
+float64[4] metric
+float64[4] curvature_form  # 1/m, in that frame
+float64[2] torsion_form    # 1/m
+float64[9] covariance      # 1/m^2, of xx, yy, xy of the curvature form
+""",
+    HEADER,
+)
+
+
+class Topic(NamedTuple):
+    """A channel of the file."""
+
+    name: str
+    kind: MessageType
+
+
+DEVICE = Topic("/kappaskin/device", STRING)
+SETUP = Topic("/kappaskin/setup", STRING)
+EVENTS = Topic("/kappaskin/events", LOG)
+LINES = Topic("/kappaskin/line", LINE)
+CLOCKS = Topic("/kappaskin/clock", CLOCK)
+LEFT_OUTS = Topic("/kappaskin/left_out", LEFT_OUT)
+MEMORIES = Topic("/kappaskin/memory", MEMORY)
+TRUTHS = Topic("/kappaskin/truth", TRUTH)
+CONTACTS = Topic("/kappaskin/contact", CONTACT)
+COUNT = Topic("/kappaskin/counts", COUNTS)
+CURVATURES = Topic("/kappaskin/curvature", CURVATURE)
+SHAPES = Topic("/kappaskin/coefficients", COEFFICIENTS)
+POSES = Topic("/kappaskin/pose", POSE)
+SKIN = Topic("/kappaskin/skin", POINT_CLOUD)
+TOPICS = (
+    DEVICE,
+    SETUP,
+    EVENTS,
+    LINES,
+    CLOCKS,
+    LEFT_OUTS,
+    MEMORIES,
+    TRUTHS,
+    CONTACTS,
+    COUNT,
+    CURVATURES,
+    SHAPES,
+    POSES,
+    SKIN,
+)
+"""Every channel that a recording has."""
+
+_LINE = struct.Struct("<4sd?3xI")
+_HEAD = b"\0\1\0\0"
+
+
+def pack_line(host_time: float, sent: bool, data: bytes) -> bytes:
+    """The message `LINE`: as `cdr.encode` makes it, at a twentieth of the cost."""
+    return _LINE.pack(_HEAD, host_time, sent, len(data)) + data
+
+
+def unpack_line(message: bytes) -> tuple[float, bool, bytes]:
+    """Host time in s, whether they were sent, and the bytes of a message `LINE`."""
+    if len(message) >= _LINE.size:
+        head, host_time, sent, length = _LINE.unpack_from(message)
+        if head == _HEAD and len(message) == _LINE.size + length:
+            return host_time, sent, message[_LINE.size :]
+    raise Refusal(f"expected a message {LINE.name}, got {message[:20]!r}")

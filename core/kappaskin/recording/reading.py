@@ -1,0 +1,377 @@
+"""MCAP files to the messages in them: whole ones, unfinished ones, and none of what is not one.
+
+Every size in a file is held against what is there, so that no file takes more memory than a few
+times `_LARGEST`.
+"""
+
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import IO, NamedTuple, Protocol, TypeVar
+
+import lz4.frame
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+
+from kappaskin.errors import Refusal
+from kappaskin.recording.messages import TOPICS, Topic
+from kappaskin.recording.writing import FORMAT
+
+MAGIC = b"\x89MCAP0\r\n"
+_LARGEST = 2**26  # bytes of a record, or of what is in a chunk
+_HEAD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+_FOOTER = _HEAD.size + 20
+_FAULTS = (McapError, ValueError, struct.error, RuntimeError, zstandard.ZstdError, MemoryError)
+
+
+_KINDS = {topic.name: topic.kind.name for topic in TOPICS}
+
+
+class Spoilt(Exception):
+    """A record is cut off, or is not what it says it is."""
+
+
+class Record(NamedTuple):
+    """A record at the byte `at` of a file, whose next record begins at `end`."""
+
+    at: int
+    end: int
+    code: int
+    body: bytes
+
+
+class Message(NamedTuple):
+    """What one message says: when it was logged in ns since 1970, and its bytes."""
+
+    topic: str
+    stamp: int
+    data: bytes
+
+
+class ChunkAt(NamedTuple):
+    """Where a chunk begins, the first and last time in it, in ns since 1970, and its channels."""
+
+    at: int
+    first: int
+    last: int
+    channels: frozenset[int]
+
+
+class _Read(Protocol):
+    @staticmethod
+    def read(stream: ReadDataStream) -> object: ...
+
+
+_Kind = TypeVar("_Kind")
+
+
+def record_at(file: IO[bytes], at: int, size: int) -> Record:
+    """The record at the byte `at` of a `file` of `size` bytes."""
+    file.seek(at)
+    head = file.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        raise Spoilt("it is cut off")
+    code, length = _HEAD.unpack(head)
+    end = at + _HEAD.size + length
+    if end > size or length > _LARGEST:
+        raise Spoilt("it is cut off" if end > size else f"it has a record of {length} bytes")
+    return Record(at, end, code, file.read(length))
+
+
+def parsed(kind: type[_Kind], body: bytes) -> _Kind:
+    """The record of a `kind` in `body`."""
+    try:
+        return kind.read(ReadDataStream(BytesIO(body)))  # type: ignore[attr-defined]
+    except _FAULTS as error:
+        raise Spoilt(f"a {kind.__name__.lower()} cannot be read ({error!s:.80})") from error
+
+
+def unpacked(body: bytes) -> bytes:
+    """What is in the chunk of a record's `body`: the bytes of its records, checked."""
+    chunk = parsed(Chunk, body)
+    if chunk.uncompressed_size > _LARGEST:
+        raise Spoilt(f"a chunk says that it holds {chunk.uncompressed_size} bytes")
+    try:
+        data = _decompressed(chunk.compression, chunk.data)
+    except _FAULTS as error:
+        raise Spoilt(f"a chunk cannot be decompressed ({error!s:.80})") from error
+    if len(data) != chunk.uncompressed_size or (
+        chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc
+    ):
+        raise Spoilt("a chunk is damaged")
+    return data
+
+
+def _decompressed(compression: str, data: bytes) -> bytes:
+    """The bytes, at most one more than are allowed."""
+    if compression == "zstd":
+        with zstandard.ZstdDecompressor().stream_reader(data) as reader:
+            return reader.read(_LARGEST + 1)
+    if compression == "lz4":
+        return lz4.frame.LZ4FrameDecompressor().decompress(data, _LARGEST + 1)
+    if compression:
+        raise Spoilt(f"a chunk is compressed by {compression!r:.20}, which nobody here knows")
+    return data
+
+
+def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Code and body of the records in a chunk; a `Spoilt` at the first that is cut off."""
+    at = 0
+    while at < len(data):
+        if at + _HEAD.size > len(data):
+            raise Spoilt("a chunk ends within a record")
+        code, length = _HEAD.unpack_from(data, at)
+        at += _HEAD.size
+        if at + length > len(data):
+            raise Spoilt("a chunk ends within a record")
+        yield code, data[at : at + length]
+        at += length
+
+
+class Recording:
+    """The recording at `path`, open until `close`; a `Refusal` when it is none.
+
+    `whole` says whether it was ended as it should be; one that was not is read up to where it
+    breaks off. `first` and `last` are the times it spans, in ns since 1970, `counts` how many
+    messages each topic has, and `chunks` where they are.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._file = path.open("rb")
+            self._size = self._file.seek(0, 2)
+            self._file.seek(0)
+            magic = self._file.read(len(MAGIC))
+        except OSError as error:
+            raise Refusal(
+                f"{path}: cannot be read ({error.strerror or error}); expected a recording"
+            ) from error
+        self.library = ""
+        self.format = 0
+        self.counts: dict[str, int] = {}
+        self.chunks: list[ChunkAt] = []
+        self._topics: dict[int, str] = {}
+        self._schemas: dict[int, str] = {}
+        self._attached: dict[str, int] = {}
+        try:
+            self._check(magic)
+            self.whole = self._summarised()
+            if not self.whole:
+                self._scan()
+            self._check_format()
+        except BaseException:
+            self.close()
+            raise
+
+    def _check(self, magic: bytes) -> None:
+        if magic != MAGIC:
+            raise Refusal(
+                f"{self.path}: expected a recording (an MCAP file), got {magic!r}; "
+                "`kappaskin record` makes one"
+            )
+        try:
+            record = record_at(self._file, len(MAGIC), self._size)
+            self.library = parsed(Header, record.body).library
+        except Spoilt as fault:
+            raise Refusal(f"{self.path}: is no recording: {fault}") from fault
+
+    def _check_format(self) -> None:
+        if self.format > FORMAT:
+            raise Refusal(
+                f"{self.path}: expected a recording of format {FORMAT}, got {self.format}, of a "
+                "later version; update this program"
+            )
+        if not self.format:
+            raise Refusal(
+                f"{self.path}: expected a recording of this program, got an MCAP file of "
+                f"{self.library or 'another'!r:.60}"
+            )
+
+    # What a file says of itself at its end.
+
+    def _summarised(self) -> bool:
+        """Take what the end says, if the file has one."""
+        try:
+            end = self._size - len(MAGIC)
+            self._file.seek(max(end, 0))
+            if self._file.read() != MAGIC:
+                return False
+            footer = record_at(self._file, end - _FOOTER, end)
+            at = parsed(Footer, footer.body).summary_start
+            if footer.code != Opcode.FOOTER or not len(MAGIC) < at < footer.at:
+                return False
+            while at < footer.at:
+                record = record_at(self._file, at, footer.at)
+                self._take(record)
+                at = record.end
+            return bool(self.chunks)
+        except Spoilt:
+            return False
+
+    def _take(self, record: Record) -> None:
+        """Take in a record of the end, or one of the body outside of its chunks."""
+        self._learn(record.code, record.body)
+        if record.code == Opcode.STATISTICS:
+            found = parsed(Statistics, record.body).channel_message_counts
+            known = self._topics.keys() & found.keys()
+            self.counts = {self._topics[n]: found[n] for n in known}
+        elif record.code == Opcode.CHUNK_INDEX:
+            index = parsed(ChunkIndex, record.body)
+            self.chunks.append(
+                ChunkAt(
+                    index.chunk_start_offset,
+                    index.message_start_time,
+                    index.message_end_time,
+                    frozenset(index.message_index_offsets),
+                )
+            )
+        elif record.code == Opcode.ATTACHMENT_INDEX:
+            index = parsed(AttachmentIndex, record.body)
+            self._attached[index.name] = index.offset
+        elif record.code == Opcode.METADATA_INDEX:
+            at = parsed(MetadataIndex, record.body).offset
+            self._take(record_at(self._file, at, self._size))
+        elif record.code == Opcode.METADATA:
+            found = parsed(Metadata, record.body)
+            if found.name == "kappaskin":
+                self.format = _format(found.metadata)
+        elif record.code == Opcode.ATTACHMENT:
+            self._attached[parsed(Attachment, record.body).name] = record.at
+        elif record.code == Opcode.CHUNK:
+            self._count(record)
+
+    def _count(self, record: Record) -> None:
+        """Take in a chunk of a file that does not say at its end what is in it."""
+        chunk, counts = parsed(Chunk, record.body), Counter[str]()
+        for message in self._messages_in(unpacked(record.body)):
+            counts[message.topic] += 1
+        channels = frozenset(n for n, topic in self._topics.items() if topic in counts)
+        self.chunks.append(
+            ChunkAt(record.at, chunk.message_start_time, chunk.message_end_time, channels)
+        )
+        self.counts = dict(Counter(self.counts) + counts)
+
+    def _learn(self, code: int, body: bytes) -> None:
+        """Learn of a channel."""
+        if code == Opcode.SCHEMA:
+            schema = parsed(Schema, body)
+            self._schemas[schema.id] = schema.name
+        elif code == Opcode.CHANNEL:
+            channel = parsed(Channel, body)
+            ours = _KINDS.get(channel.topic) == self._schemas.get(channel.schema_id)
+            if ours and channel.message_encoding == "cdr":
+                self._topics[channel.id] = channel.topic
+
+    # Without an end.
+
+    def _scan(self) -> None:
+        """Go through the file up to where it breaks off."""
+        self.counts, self.chunks, at = {}, [], len(MAGIC)
+        try:
+            while at < self._size:
+                record = record_at(self._file, at, self._size)
+                if record.code in (Opcode.DATA_END, Opcode.FOOTER):
+                    break
+                self._take(record)
+                at = record.end
+        except Spoilt:
+            return
+
+    # What is in it.
+
+    @property
+    def first(self) -> int:
+        return min((chunk.first for chunk in self.chunks), default=0)
+
+    @property
+    def last(self) -> int:
+        return max((chunk.last for chunk in self.chunks), default=0)
+
+    def messages(self, chunk: int = 0) -> Iterator[Message]:
+        """The messages from the chunk of that number on, in the order in which they were written.
+
+        A `Refusal` at the first chunk that is damaged.
+        """
+        for place in self.chunks[chunk:]:
+            yield from self.messages_of(place)
+
+    def messages_on(self, *topics: Topic) -> Iterator[Message]:
+        """The messages of these topics, without a look at what has none of them."""
+        names = {topic.name for topic in topics}
+        channels = {n for n, topic in self._topics.items() if topic in names}
+        for chunk in self.chunks:
+            if not channels.isdisjoint(chunk.channels):
+                yield from (m for m in self.messages_of(chunk) if m.topic in names)
+
+    def messages_of(self, chunk: ChunkAt) -> Iterator[Message]:
+        """The messages of one chunk."""
+        try:
+            record = record_at(self._file, chunk.at, self._size)
+            if record.code != Opcode.CHUNK:
+                raise Spoilt("its index is wrong")
+            yield from self._messages_in(unpacked(record.body))
+        except Spoilt as fault:
+            raise Refusal(
+                f"{self.path}: is damaged at byte {chunk.at} ({fault}); `kappaskin repair` saves "
+                "what is whole"
+            ) from fault
+
+    def _messages_in(self, data: bytes) -> Iterator[Message]:
+        for code, body in records_in(data):
+            if code == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
+                channel, _, stamp, _ = _MESSAGE.unpack_from(body)
+                if topic := self._topics.get(channel):
+                    yield Message(topic, stamp, body[_MESSAGE.size :])
+            else:
+                self._learn(code, body)
+
+    @property
+    def attachments(self) -> tuple[str, ...]:
+        """The names of the files in it."""
+        return tuple(self._attached)
+
+    def attachment(self, name: str) -> bytes:
+        """The file called `name`."""
+        try:
+            record = record_at(self._file, self._attached[name], self._size)
+            if record.code != Opcode.ATTACHMENT:
+                raise Spoilt("its index is wrong")
+            return parsed(Attachment, record.body).data
+        except KeyError as error:
+            raise Refusal(f"{self.path}: has no attachment {name!r:.80}") from error
+        except Spoilt as fault:
+            raise Refusal(f"{self.path}: {name!r:.80} in it is damaged ({fault})") from fault
+
+    def close(self) -> None:
+        self._file.close()
+
+    def __enter__(self) -> "Recording":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _format(said: dict[str, str]) -> int:
+    text = said.get("format", "")
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 9 else 0

@@ -1,0 +1,178 @@
+"""Messages to an MCAP file, by a thread of its own: nothing that is live waits for a disk."""
+
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, replace
+from importlib import metadata
+from pathlib import Path
+
+from mcap.writer import CompressionType, Writer
+
+from kappaskin.errors import Refusal
+from kappaskin.recording.disk import Disk
+from kappaskin.recording.messages import TOPICS, Topic
+
+FORMAT = 1
+"""Version of what our own messages mean."""
+
+_FLUSH = 0.2  # s between two times that all there is goes to the file: what a killed process loses
+_SYNC = 2.0  # s between two times that the file goes to the disk: what a loss of power takes
+_CHUNK = 2**20  # bytes
+_BACKLOG = 2**26  # bytes that may wait for the disk
+_EACH = 128  # bytes of memory that a message takes beside its own
+_SUMMED = 512  # bytes of the end of the file for each chunk
+_UNDATED = 0
+
+
+@dataclass(frozen=True)
+class Written:
+    """How a recording is doing: where it goes, for how long (s) and how much it is.
+
+    `path` is empty where none was asked for. `lost` counts messages that found too many waiting for
+    the disk. `trouble` says why it ended before it was asked to, or does not begin.
+    """
+
+    path: str = ""
+    active: bool = False
+    seconds: float = 0.0
+    size: int = 0
+    messages: int = 0
+    lost: int = 0
+    trouble: str = ""
+
+
+class RecordingFile:
+    """A recording at `path`, called `path` + `.part` until it is closed.
+
+    `put` and `attach` never wait; `written` tells what has become of it. One that ends by itself,
+    as on a full disk, is closed as one that is asked to.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.part = path, part_of(path)
+        for there in (self.path, self.part):
+            if there.exists():
+                raise Refusal(
+                    f"{there}: is there already; choose another name"
+                    + (f", or see `kappaskin repair {there}`" if there == self.part else "")
+                )
+        self._disk = Disk(self.part)
+        self._began = time.monotonic()
+        # Wall-clock time is looked at once, so that a clock that is set does not reorder messages.
+        self._wall = time.time_ns() - time.monotonic_ns()
+        self._waiting: deque[tuple[int, int, bytes]] = deque()
+        self._attachments: deque[tuple[str, str, bytes]] = deque()
+        self._put = self._taken = 0  # bytes: each counted by one thread only
+        self._channels: dict[str, int] = {}
+        self._sequences = dict.fromkeys(range(1, len(TOPICS) + 1), 0)
+        self.written = Written(str(path), active=True)
+        self._lost = 0
+        self._closing = threading.Event()
+        self._writer = Writer(self._disk, _CHUNK, CompressionType.ZSTD)
+        self._begin()
+        self._threads = [
+            threading.Thread(target=self._work, name="recorder", daemon=True),
+            threading.Thread(target=self._sync, name="recorder-sync", daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def _begin(self) -> None:
+        version = metadata.version("kappaskin")
+        self._writer.start("ros2", f"kappaskin {version}")
+        schemas: dict[str, int] = {}
+        for name, kind in TOPICS:
+            if kind.name not in schemas:
+                schema = self._writer.register_schema(kind.name, "ros2msg", kind.definition)
+                schemas[kind.name] = schema
+            said = {"offered_qos_profiles": ""}
+            self._channels[name] = self._writer.register_channel(
+                name, "cdr", schemas[kind.name], said
+            )
+        self._writer.add_metadata("kappaskin", {"format": str(FORMAT), "version": version})
+
+    def stamp(self, time: float) -> int:
+        """Nanoseconds since 1970 at `time` in s on the monotonic clock."""
+        return self._wall + round(time * 1e9)
+
+    def put(self, topic: Topic, time: float, data: bytes) -> None:
+        """Write a message that belongs to `time` in s on the monotonic clock."""
+        if not self.written.active:
+            return
+        if self._put - self._taken > _BACKLOG:
+            self._lost += 1
+            return
+        self._put += len(data) + _EACH
+        self._waiting.append((self._channels[topic.name], self.stamp(time), data))
+
+    def attach(self, name: str, kind: str, data: bytes) -> None:
+        """Attach a file `name` of a media type `kind`."""
+        self._attachments.append((name, kind, data))
+
+    def _work(self) -> None:
+        """Write what there is, now and then, until it is to end."""
+        try:
+            while not (self._closing.wait(_FLUSH) or self._disk.trouble):
+                self._write()
+                if not self._disk.there:
+                    raise OSError("it was moved or removed")
+            self._write()
+            self._writer.finish()
+            self._finish()
+        except OSError as error:
+            self._stop(f"{self.part}: {error.strerror or error}")
+        self._disk.close()
+
+    def _write(self) -> None:
+        writer, sequences = self._writer, self._sequences
+        for _ in range(len(self._attachments)):
+            name, kind, data = self._attachments.popleft()
+            writer.add_attachment(_UNDATED, self.stamp(time.monotonic()), name, kind, data)
+        count = len(self._waiting)
+        for _ in range(count):
+            channel, stamp, data = self._waiting.popleft()
+            writer.add_message(channel, stamp, data, stamp, sequences[channel])
+            sequences[channel] += 1
+            self._taken += len(data) + _EACH
+        writer.flush()
+        was, size = self.written, self._disk.tell()
+        self._disk.reserve(_SUMMED * (size // _CHUNK + int(was.seconds / _FLUSH)))
+        self.written = replace(
+            was,
+            seconds=time.monotonic() - self._began,
+            size=size,
+            messages=was.messages + count,
+            lost=self._lost,
+        )
+
+    def _finish(self) -> None:
+        """Give the whole file its name."""
+        self._disk.sync()
+        if self.path.exists():
+            raise OSError(f"{self.path.name} has appeared beside it")
+        self.part.rename(self.path)
+        trouble = self._disk.trouble
+        self._stop(f"{self.path}: {trouble}; it is whole up to then" if trouble else "")
+
+    def _stop(self, trouble: str) -> None:
+        self.written = replace(self.written, active=False, trouble=trouble)
+
+    def _sync(self) -> None:
+        """Let what is written reach the disk; in a thread of its own, since that may take long."""
+        while not self._closing.wait(_SYNC) and self.written.active:
+            try:
+                self._disk.sync()
+            except (OSError, ValueError):  # closed meanwhile
+                return
+
+    def close(self) -> None:
+        """Write what waits, and end the file."""
+        self._closing.set()
+        for thread in self._threads:
+            thread.join()
+
+
+def part_of(path: Path) -> Path:
+    """What a recording at `path` is called until it is closed."""
+    return path.with_name(path.name + ".part")

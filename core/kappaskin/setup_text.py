@@ -1,0 +1,71 @@
+"""A setup as text that names the files of its calibration and tare, and back."""
+
+import json
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, cast
+
+from kappaskin.calibration.file import calibration_in, to_toml
+from kappaskin.calibration.tares import tare_in, tare_text
+from kappaskin.errors import Refusal
+from kappaskin.fit import METHODS
+from kappaskin.pipeline import Setup
+
+_WHOLE, _REAL, _TEXT = ("Ni", "Nj", "nx", "ny"), ("hold", "rim_sd"), ("edge", "method")
+_MOST = 4096  # functions or points along one side
+_LONGEST = 2**16
+
+
+def said_of(setup: Setup) -> tuple[str, dict[str, bytes]]:
+    """The text, and by name the files that it names."""
+    said: dict[str, Any] = {name: getattr(setup, name) for name in (*_WHOLE, *_REAL, *_TEXT)}
+    files: dict[str, bytes] = {}
+    if setup.calibration is not None:
+        said["calibration"] = f"calibration-{setup.calibration.digest[:16]}.toml"
+        files[said["calibration"]] = to_toml(setup.calibration).encode()
+    if setup.tare is not None:
+        said["tare"] = f"tare-{setup.tare.digest[:16]}.toml"
+        files[said["tare"]] = tare_text(setup.tare).encode()
+    return json.dumps(said), files
+
+
+def setup_from(text: str, file: Callable[[str], bytes]) -> Setup:
+    """The setup that `text` tells of, `file` giving what a name stands for.
+
+    A `Refusal` when it is none.
+    """
+    try:
+        if len(text) > _LONGEST:
+            raise ValueError(f"it is {len(text)} characters long")
+        said: Any = json.loads(text)
+        if not isinstance(said, dict):
+            raise TypeError("it has no keys")
+        said = cast("dict[str, Any]", said)
+        if unknown := set(said) - {field.name for field in fields(Setup)}:
+            raise ValueError(f"it has unknown keys {sorted(unknown)}")
+        values = _checked(said)
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise Refusal(f"expected a setup as it was recorded: {error!s:.120}") from error
+    if name := said.get("calibration"):
+        values["calibration"] = calibration_in(file(str(name)), Path(str(name)))
+    if name := said.get("tare"):
+        values["tare"] = tare_in(file(str(name)), str(name))
+    return Setup(**values)
+
+
+def _checked(said: dict[str, Any]) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for name in _WHOLE:
+        values[name] = said[name]
+        if type(said[name]) is not int or not 0 < said[name] <= _MOST:
+            raise ValueError(f"{name} is {said[name]!r:.40}")
+    for name in _REAL:
+        values[name] = float(said[name])
+    for name in _TEXT:
+        values[name] = said[name]
+        if not isinstance(said[name], str):
+            raise TypeError(f"{name} is {said[name]!r:.40}")
+    if values["method"] not in METHODS:
+        raise ValueError(f"method is {values['method']!r:.40}, expected one of {list(METHODS)}")
+    return values

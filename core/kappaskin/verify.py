@@ -1,0 +1,188 @@
+"""A recording to a verdict: whether its bytes come to the same estimates again, bit for bit."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate, Frame
+from kappaskin.memory import Memory
+from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import decode
+from kappaskin.recording.reading import Message, Recording
+from kappaskin.sensor import Sensor
+from kappaskin.setup_text import setup_from
+from kappaskin.sources.reenact import Reenactment
+
+_COMPARED = {
+    m.CONTACTS.name: m.CONTACT,
+    m.CURVATURES.name: m.CURVATURE,
+    m.SHAPES.name: m.COEFFICIENTS,
+}
+_WAITING = 2**14  # frames that wait for what was recorded of them, at most
+_NAMED_AS: dict[str, Callable[[Estimate], Any]] = {
+    "present": lambda e: e.touch.present,
+    "single": lambda e: e.touch.single,
+    "near_rim": lambda e: e.touch.near_rim,
+    "spare": lambda e: e.touch.spare,
+    "position": lambda e: e.touch.position,
+    "position_sd": lambda e: e.touch.position_sd,
+    "force": lambda e: e.touch.force,
+    "force_sd": lambda e: e.touch.force_sd,
+    "displacement": lambda e: e.touch.displacement,
+    "displacement_sd": lambda e: e.touch.displacement_sd,
+    "point": lambda e: e.geometry.position,
+    "frame": lambda e: e.geometry.frame,
+    "metric": lambda e: e.geometry.metric,
+    "curvature_form": lambda e: e.geometry.curvature_form,
+    "torsion_form": lambda e: e.geometry.torsion_form,
+    "covariance": lambda e: e.geometry.covariance,
+    "shape": lambda e: np.array(e.coefficients.shape),
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of it: `compared` recorded messages, of `frames`; `difference` tells the first.
+
+    `missing` counts recorded estimates whose frames are not there, `frames` all that are.
+    """
+
+    frames: int
+    compared: int
+    missing: int
+    difference: str
+
+    @property
+    def same(self) -> bool:
+        return not self.difference and not self.missing and self.compared > 0
+
+
+def verify(path: Path, told: Callable[[float], object] = lambda share: None) -> Verdict:
+    """Work out everything that was recorded in `path` once more, and compare.
+
+    `told` is called now and then with the share that is done. A `Refusal` where it is no recording.
+    """
+    with Recording(path) as recording:
+        worker = _Worker(recording)
+        span = max(recording.last - recording.first, 1)
+        for n, message in enumerate(recording.messages()):
+            worker(message)
+            if n % 1000 == 0:
+                told((message.stamp - recording.first) / span)
+        return worker.verdict()
+
+
+class _Worker:
+    """Takes the messages as they were written."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._reenact = Reenactment(str(recording.path))
+        self._sensor: Sensor | None = None
+        self._pipeline: Pipeline | None = None
+        self._memory: Memory = {}
+        self._waiting: deque[Frame] = deque(maxlen=_WAITING)
+        self._estimate: Estimate | None = None
+        self._frames = self._compared = self._missing = 0
+        self._difference = ""
+
+    def __call__(self, message: Message) -> None:
+        if kind := _COMPARED.get(message.topic):
+            self._compare(decode(kind, message.data))
+            return
+        for frame in self._reenact(message):
+            self._meet()
+            self._frames += 1
+            self._waiting.append(frame)
+        self._meet()
+        if message.topic == m.SETUP.name:
+            text = decode(m.STRING, message.data)["data"]
+            self._set_up(setup_from(text, self._recording.attachment))
+        elif message.topic == m.LEFT_OUTS.name:
+            said = decode(m.LEFT_OUT, message.data)
+            if pipeline := self._caught_up():
+                pipeline.leave_out(said["kinds"], said["badness"])
+        elif message.topic == m.MEMORIES.name:
+            said = decode(m.MEMORY, message.data)
+            self._memory[said["name"]] = said["values"].reshape(said["shape"])
+
+    def _meet(self) -> None:
+        """Another device, if that is what the next frame is of, has no pipeline yet."""
+        if self._reenact.sensor is not self._sensor:
+            self._sensor, self._pipeline, self._estimate = self._reenact.sensor, None, None
+            self._waiting.clear()
+
+    def _caught_up(self) -> Pipeline | None:
+        """The pipeline, once it has seen every frame until now."""
+        if self._pipeline is not None:
+            self._recall(self._pipeline)
+            for frame in self._waiting:
+                self._pipeline.pass_over(frame)
+        self._waiting.clear()
+        return self._pipeline
+
+    def _recall(self, pipeline: Pipeline) -> None:
+        if self._memory:
+            pipeline.recall(self._memory)
+            self._memory = {}
+
+    def _set_up(self, setup: Setup) -> None:
+        if self._sensor is None:
+            raise Refusal(
+                f"{self._recording.path}: expected a device before a setup; `kappaskin repair` "
+                "saves what is whole"
+            )
+        was, made = self._caught_up(), Pipeline(self._sensor, setup)
+        if was is not None:
+            made.go_on_from(was)
+        self._pipeline = made
+
+    def _compare(self, said: dict[str, Any]) -> None:
+        """Work out the frame that a recorded estimate is of, and hold the two together."""
+        estimate = self._estimate_of(said["sequence"])
+        if estimate is None:
+            self._missing += 1
+            return
+        self._compared += 1
+        for name, value in said.items():
+            if self._difference:
+                return
+            if not name.startswith("header."):
+                self._differ(name, value, estimate)
+
+    def _differ(self, name: str, value: Any, estimate: Estimate) -> None:
+        again = _NAMED_AS[name](estimate) if name in _NAMED_AS else getattr(estimate, name)
+        was, now = np.asarray(value).ravel(), np.asarray(again).ravel()
+        same_kind = was.dtype.kind == "f" and now.dtype.kind == "f"
+        same = was.tobytes() == now.tobytes() if same_kind else np.array_equal(was, now)
+        if not same:
+            self._difference = (
+                f"frame {estimate.sequence} at {estimate.device_time:.6f} s: {name} was "
+                f"{_told(was)}, and is {_told(now)} now"
+            )
+
+    def _estimate_of(self, sequence: int) -> Estimate | None:
+        if self._estimate is not None and self._estimate.sequence == sequence:
+            return self._estimate
+        there = any(frame.sequence == sequence for frame in self._waiting)
+        if self._pipeline is None or not there:
+            return None
+        self._recall(self._pipeline)
+        while (frame := self._waiting.popleft()).sequence != sequence:
+            self._pipeline.pass_over(frame)
+        self._estimate = self._pipeline(frame)
+        return self._estimate
+
+    def verdict(self) -> Verdict:
+        return Verdict(self._frames, self._compared, self._missing, self._difference)
+
+
+def _told(values: "NDArray[Any]") -> str:
+    return ", ".join(f"{value!r}" for value in values[:4].tolist()) + ", ..." * (len(values) > 4)
