@@ -20,7 +20,7 @@ from kappaskin.pipeline import Setup
 from kappaskin.processes import beginning_processes
 from kappaskin.recording.writing import part_of
 from kappaskin.region import Region
-from kappaskin.requests import Connect, Disconnect, Note, Record, Request, Seek, TakeTare
+from kappaskin.requests import Connect, Disconnect, Note, Record, Request, Seek, Step, TakeTare
 from kappaskin.ring import Ring
 from kappaskin.scene import Playing, Scene
 from kappaskin.status import LOST, Status
@@ -183,15 +183,20 @@ class Engine:
         self._scene = scene
         self._send(scene)
 
-    def seek(self, at: float | None = None, speed: float = 1.0) -> None:
-        """Let a simulated scene go on from its time `at` in s, or from where it is.
+    def seek(self, at: float | None = None, speed: float = 1.0, looped: bool | None = None) -> None:
+        """Let a simulated scene or a recording go on from its time `at` in s, or from where it is.
 
         It goes `speed` times as fast as the device's clock, at most ten times; at zero it stands
-        still, and goes on being read. Status tells where it is.
+        still, and a scene goes on being read. A recording that is `looped` begins anew at its end.
+        Status tells where it is.
         """
         Playing(at or 0.0, 0.0, speed)  # or refused here
         self._speed = speed
-        self._send(Seek(at, speed))
+        self._send(Seek(at, speed, looped))
+
+    def step(self, frames: int) -> None:
+        """Let a recording stand, so many `frames` further on, or back if negative."""
+        self._send(Step(frames))
 
     def scan(self, region: Region) -> None:
         """Let every frame scan `region`; where it cannot, `status` says why."""

@@ -21,11 +21,11 @@ from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.recorder import Recorder
 from kappaskin.recording.writing import Written
 from kappaskin.region import Region
-from kappaskin.requests import Connect, Note, Record, Request, Seek, TakeTare
+from kappaskin.requests import Connect, Note, Record, Request, Seek, Step, TakeTare
 from kappaskin.ring import Ring, slot_type
 from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
-from kappaskin.sources import SimulatedSource, Source, open_source
+from kappaskin.sources import ReplayedSource, SimulatedSource, Source, open_source
 from kappaskin.sources.accounting import Accounting
 from kappaskin.status import LOST, OFF, STREAMING, WAITING, Status
 from kappaskin.steer import Following, Steering, steered
@@ -90,8 +90,13 @@ class Loop:
         elif isinstance(request, Scene):
             self._play(request)
         elif isinstance(request, Seek):
-            if isinstance(self._source, SimulatedSource):
+            if isinstance(self._source, ReplayedSource):
+                self._source.seek(request.at, request.speed, request.looped)
+            elif isinstance(self._source, SimulatedSource):
                 self._source.seek(request.at, request.speed)
+        elif isinstance(request, Step):
+            if isinstance(self._source, ReplayedSource):
+                self._source.step(request.frames)
         elif isinstance(request, Region):
             self._status = replace(self._status, region=request)
             self._steer()
@@ -119,6 +124,7 @@ class Loop:
                 temperature=math.nan,
                 drift=None,
                 health=Health(),
+                replay=None,
             )
             if isinstance(request, Connect):
                 self._open(request.source)
@@ -316,6 +322,8 @@ class Loop:
         if path is None:
             return
         try:
+            if isinstance(self._source, ReplayedSource):
+                raise Refusal("expected a live source to record, got a recording; copy its file")
             recorder = self._recorder = Recorder(path, time.monotonic())
         except Refusal as refusal:
             failed = Written(str(path), trouble=str(refusal))
@@ -401,6 +409,7 @@ class Loop:
                 if isinstance(source, SimulatedSource)
                 else FROM_THE_BEGINNING,
                 health=self._health(),
+                replay=source.replay if isinstance(source, ReplayedSource) else None,
             )
         self._status = replace(status, reported=now, tare=self._taking.news)
         self._ring.write_status(self._status)

@@ -20,10 +20,21 @@ class Disconnect:
 
 @dataclass(frozen=True)
 class Seek:
-    """Go on with a simulated scene from its time `at` in s, or from where it is, at a `speed`."""
+    """Go on with a scene or recording from its time `at` in s, or from where it is, at a `speed`.
+
+    A recording that is `looped` begins anew at its end; None leaves that as it is.
+    """
 
     at: float | None
     speed: float
+    looped: bool | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """Let a recording stand, so many `frames` further on, or back."""
+
+    frames: int
 
 
 @dataclass(frozen=True)
@@ -45,4 +56,4 @@ class Note:
     text: str
 
 
-Request = Connect | Disconnect | Setup | Scene | Seek | Region | TakeTare | Record | Note
+Request = Connect | Disconnect | Setup | Scene | Seek | Region | TakeTare | Record | Note | Step

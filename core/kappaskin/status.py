@@ -13,6 +13,7 @@ from kappaskin.recording.writing import Written
 from kappaskin.region import Region
 from kappaskin.scene import FROM_THE_BEGINNING, Playing
 from kappaskin.sensor import Sensor
+from kappaskin.sources import Replay
 from kappaskin.sources.accounting import Accounting
 from kappaskin.tare_taking import TareNews
 from kappaskin.taring import Drift
@@ -35,7 +36,8 @@ class Status:
     `playing` tells where a simulated scene is at a device time. `events` are the last of those that
     `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
     tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
-    tells which channels are not to be trusted, `recording` what is being written.
+    tells which channels are not to be trusted, `recording` what is being written,
+    `replay` where in a recording the source is, None for any other.
     """
 
     state: str = OFF
@@ -64,6 +66,7 @@ class Status:
     drift: Drift | None = None
     health: Health = field(default_factory=Health)
     recording: Written = field(default_factory=Written)
+    replay: Replay | None = None
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status once `events` happened."""

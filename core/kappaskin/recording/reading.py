@@ -323,6 +323,20 @@ class Recording:
             if not channels.isdisjoint(chunk.channels):
                 yield from (m for m in self.messages_of(chunk) if m.topic in names)
 
+    def last_before(self, topic: Topic, stamp: int) -> Message | None:
+        """The last message of a topic up to `stamp`."""
+        channels = {n for n, name in self._topics.items() if name == topic.name}
+        for chunk in reversed(self.chunks):
+            if chunk.first <= stamp and not channels.isdisjoint(chunk.channels):
+                found = [
+                    message
+                    for message in self.messages_of(chunk)
+                    if message.topic == topic.name and message.stamp <= stamp
+                ]
+                if found:
+                    return found[-1]
+        return None
+
     def messages_of(self, chunk: ChunkAt) -> Iterator[Message]:
         """The messages of one chunk."""
         try:

@@ -1,5 +1,6 @@
-"""Where frames come from: a simulation in this process, or bytes on a line."""
+"""Where frames come from: a simulation in this process, a recording, or bytes on a line."""
 
+from pathlib import Path
 from typing import Protocol
 
 from kappaskin.errors import SourceError
@@ -7,11 +8,13 @@ from kappaskin.frames import Event, Frame
 from kappaskin.scene import load_scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources.accounting import Accounting
+from kappaskin.sources.replayed import Replay as Replay
+from kappaskin.sources.replayed import ReplayedSource as ReplayedSource
 from kappaskin.sources.serial_line import SerialSource as SerialSource
 from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
 from kappaskin.sources.tape import Tape
 
-SIMULATION = "sim:"
+SIMULATION, REPLAY = "sim:", "replay:"
 
 
 class Source(Protocol):
@@ -52,11 +55,13 @@ class Source(Protocol):
 
 
 def open_source(name: str) -> Source:
-    """The source called `name`: `sim:`, `sim:SCENE`, or a port or URL that pyserial opens."""
+    """The source called `name`: `sim:`, `sim:SCENE`, `replay:FILE`, or what pyserial opens."""
     if name.startswith(SIMULATION):
         return SimulatedSource(load_scene(name.removeprefix(SIMULATION)))
-    if name.startswith("replay:"):
-        raise SourceError(f"recordings cannot be replayed yet, got {name!r}; use sim: or a port")
+    if name.startswith(REPLAY):
+        return ReplayedSource(Path(name.removeprefix(REPLAY)))
     if not name.strip():
-        raise SourceError("expected a source: sim:, sim:SCENE, a port or a URL; got an empty name")
+        raise SourceError(
+            "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"
+        )
     return SerialSource(name)

@@ -10,16 +10,20 @@ from kappaskin.sources import information
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.wire import FromDevice, Information, Samples
 
+_SENSORS = 8  # that are remembered
+
 
 class Interpreter:
     """What the messages on the line `url` mean.
 
     `sensor` is what the device said it is, in `text`; `known` tells whether it has said so since
-    the line began, and `unusable` why its messages are of no use.
+    the line began, and `unusable` why its messages are of no use. What was `made` of a text once is
+    not made of it again: it is the same device.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, made: dict[str, Sensor] | None = None) -> None:
         self._url = url
+        self._made = {} if made is None else made
         self.sensor: Sensor | None = None
         self.text = ""
         self._looked_at: NDArray[np.intp] | None = None
@@ -37,10 +41,13 @@ class Interpreter:
         if text != self.text:
             self.sensor, self.text, self.known = None, "", False
             try:
-                self.sensor = information.from_json(text)
+                self.sensor = self._made.get(text) or information.from_json(text)
             except SourceError as error:
                 self.unusable = f"{self._url}: {error}"
                 return False
+            if len(self._made) >= _SENSORS:
+                self._made.clear()
+            self._made[text] = self.sensor
         self.text, self.unusable, self.known = text, "", True
         return True
 

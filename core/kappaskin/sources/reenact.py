@@ -24,12 +24,15 @@ _FUNCTIONS = 128  # of a truth along one side, at most
 
 
 class Reenactment:
-    """Takes the messages of the recording called `name` as they were written."""
+    """Takes the messages of the recording called `name` as they were written.
 
-    def __init__(self, name: str) -> None:
+    Sensors `made` by another of the same recording are the same ones here.
+    """
+
+    def __init__(self, name: str, made: dict[str, Sensor] | None = None) -> None:
         self._decoder = Decoder()
         self._times = RecordedClock()
-        self._means = Interpreter(name)
+        self._means = Interpreter(name, made)
         self._means.begin(self._times)
         self._pending: deque[tuple[float, FromDevice]] = deque(maxlen=_UNREAD)
         self._truth: Truth | None = None
@@ -46,9 +49,12 @@ class Reenactment:
     def accounting(self) -> Accounting:
         return self._decoder.accounting()
 
-    def meet(self, text: str) -> None:
-        """The device is the one that the information `text` tells of."""
-        self._means.learn(text)
+    def begin_with(self, message: Message) -> None:
+        """Take it, from the middle of a recording, that a device or clock was last told of so."""
+        if message.topic == m.CLOCKS.name:
+            self._map(decode(m.CLOCK, message.data) | {"since": math.nan})
+        else:
+            self._means.learn(decode(m.STRING, message.data)["data"])
 
     def __call__(self, message: Message) -> Iterator[Frame]:
         """The frames that came with one message, each of the `sensor` that there is then.
@@ -62,7 +68,7 @@ class Reenactment:
             elif not sent:
                 self._ended()
         elif message.topic == m.DEVICE.name:
-            self.meet(decode(m.STRING, message.data)["data"])
+            self._means.learn(decode(m.STRING, message.data)["data"])
         elif message.topic == m.CLOCKS.name:
             self._map(decode(m.CLOCK, message.data))
         elif message.topic == m.TRUTHS.name:

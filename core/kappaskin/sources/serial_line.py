@@ -61,6 +61,7 @@ class SerialSource:
         self._tape: Tape | None = None
         self._told: Known | None = None  # to the tape
         self._mapped: list[tuple[float, Known]] = []
+        self._met = ""  # what the tape was told of the device
         self._line: Line | None = None
         self._begin(Line(url, clock))
 
@@ -98,8 +99,9 @@ class SerialSource:
         self._tape, self._told, self._mapped = tape, None, []
         if tape is None or self._line is None:
             return
-        if self._means.known:
-            tape.met(self._means.text)
+        self._met = self._means.text if self._means.known else ""
+        if self._met:
+            tape.met(self._met)
         for now, message in self._pending:
             if isinstance(message, Samples):
                 sequence, began, channels, counts = message
@@ -121,6 +123,9 @@ class SerialSource:
         self._mapped = []
         for now, data in came:
             tape.came(now, data)
+        if self._means.known and self._means.text != self._met:
+            self._met = self._means.text  # told in those bytes: here for whoever begins after them
+            tape.met(self._met)
 
     def scan(self, scanner: Scanner | None) -> None:
         """Let the device scan what `scanner` chooses, a few times a second; all without one."""
