@@ -20,7 +20,17 @@ from kappaskin.pipeline import Setup
 from kappaskin.processes import beginning_processes
 from kappaskin.recording.writing import part_of
 from kappaskin.region import Region
-from kappaskin.requests import Connect, Disconnect, Note, Record, Request, Seek, Step, TakeTare
+from kappaskin.requests import (
+    Compare,
+    Connect,
+    Disconnect,
+    Note,
+    Record,
+    Request,
+    Seek,
+    Step,
+    TakeTare,
+)
 from kappaskin.ring import Ring
 from kappaskin.scene import Playing, Scene
 from kappaskin.status import LOST, Status
@@ -50,21 +60,22 @@ def _end_with_parent(loop: Loop) -> None:
         os._exit(1)
 
 
-def _serve(requests: "Connection[Request, Request]", name: str) -> None:
+def _serve(requests: "Connection[Request, Request]", name: str, beside: str) -> None:
     """What the child process does."""
     # The thread that reads the line needs the interpreter three times for 4 KiB: with Python's 5 ms
     # for each, a loop that always computes would starve it below the rate of the line.
     sys.setswitchinterval(_SWITCH)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
-    ring = Ring.attach(name)
+    rings = Ring.attach(name), Ring.attach(beside)
     try:
-        loop = Loop(requests, ring)
+        loop = Loop(requests, *rings)
         watcher = threading.Thread(target=_end_with_parent, args=(loop,), name="parent-watcher")
         watcher.daemon = True
         watcher.start()
         loop.run()
     finally:
-        ring.close()
+        for ring in rings:
+            ring.close()
 
 
 def _unused(path: Path) -> Path:
@@ -80,8 +91,9 @@ class Engine:
     """
 
     def __init__(self, setup: Setup | None = None) -> None:
-        self._ring = Ring.create()
+        self._ring, self._beside = Ring.create(), Ring.create()
         self._setup = setup or Setup()
+        self._compared: Setup | None = None
         self._region = Region()
         # What was asked for last, for a process that takes over.
         self._source: str | None = None
@@ -100,12 +112,17 @@ class Engine:
         self._requests = cast("Connection[Request, Request]", ours)
         with beginning_processes() as context:
             self._process = context.Process(
-                target=_serve, args=(theirs, self._ring.name), name="kappaskin-engine", daemon=True
+                target=_serve,
+                args=(theirs, self._ring.name, self._beside.name),
+                name="kappaskin-engine",
+                daemon=True,
             )
             self._process.start()
         theirs.close()
         self._send(self._setup)
         self._send(self._region)
+        if self._compared is not None:
+            self._send(Compare(self._compared))
 
     def _start_again(self, *events: Event) -> None:
         """Let another process take over; it goes on counting, so that no generation comes twice."""
@@ -178,6 +195,11 @@ class Engine:
         self._setup = setup
         self._send(setup)
 
+    def compare(self, setup: Setup | None) -> None:
+        """Compute with another setup too, of the same frames; None ends that."""
+        self._compared = setup
+        self._send(Compare(setup))
+
     def play(self, scene: Scene) -> None:
         """Let the simulated source, if that is what there is, go on with `scene`."""
         self._scene = scene
@@ -230,6 +252,12 @@ class Engine:
             return None
         return self._ring.read(status.generation, status.slot)
 
+    def beside(self, status: Status) -> Estimate | None:
+        """The newest estimate with the setup that is compared with."""
+        if status.beside is None or status.beside.slot is None:
+            return None
+        return self._beside.read(status.beside.generation, status.beside.slot)
+
     def __enter__(self) -> "Engine":
         return self
 
@@ -251,3 +279,4 @@ class Engine:
         """End the process and give the memory back."""
         self._end()
         self._ring.destroy()
+        self._beside.destroy()

@@ -3,7 +3,7 @@
 import math
 import time
 from collections import deque
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from kappaskin.building import Built, built
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Array, Event, Frame
 from kappaskin.health import Health, Monitor
@@ -21,10 +20,11 @@ from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.recorder import Recorder
 from kappaskin.recording.writing import Written
 from kappaskin.region import Region
-from kappaskin.requests import Connect, Note, Record, Request, Seek, Step, TakeTare
-from kappaskin.ring import Ring, slot_type
+from kappaskin.requests import Compare, Connect, Note, Record, Request, Seek, Step, TakeTare
+from kappaskin.ring import Ring
 from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
+from kappaskin.side import Computed, Side
 from kappaskin.sources import ReplayedSource, SimulatedSource, Source, open_source
 from kappaskin.sources.accounting import Accounting
 from kappaskin.status import LOST, OFF, STREAMING, WAITING, Status
@@ -40,21 +40,23 @@ _GAPS = 4096  # gaps between reads that the percentile is taken over
 class Loop:
     """The engine's own side: takes requests, reads, computes, writes, reports."""
 
-    def __init__(self, requests: "Connection[Request, Request]", ring: Ring) -> None:
+    def __init__(self, requests: "Connection[Request, Request]", ring: Ring, beside: Ring) -> None:
         self._requests, self._ring = requests, ring
         self._source: Source | None = None
-        self._pipeline: Pipeline | None = None
         self._monitor: Monitor | None = None
         self._place = np.full(2, math.nan)  # of the last contact, in m
         self._spoilt: object = None  # by what, in a simulated scene
         self._out: tuple[Kinds, Array] | None = None  # what the pipeline leaves out of its fits
         self._recorder: Recorder | None = None
         self._status: Status = ring.read_status() or Status()
-        self._asked = self._status.setup
         self._steering: Steering | Following | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
-        self._building: Future[Built] | None = None
+        status = self._status
+        self._side = Side(ring, self._builder, Computed(status.setup, status.generation))
+        # What is computed beside it, while that is asked for.
+        self._other = Side(beside, self._builder, status.beside or Computed())
+        self._compares = self._changing = False
         self._taking = TareTaking(self._builder, self._status.tare)
         self._gaps: deque[float] = deque(maxlen=_GAPS)
         self._times: deque[float] = deque(maxlen=_GAPS)
@@ -73,10 +75,9 @@ class Loop:
                     self._read(self._source)
                 elif time.monotonic() >= self._again:
                     self._open(self._status.source)
-                if self._building is not None and self._building.done():
-                    self._swap(self._building.result())
-                if self._pipeline is not None and self._source is not None:
-                    self._taking.go_on(self._pipeline, self._source)
+                self._swap()
+                if self._side.pipeline is not None and self._source is not None:
+                    self._taking.go_on(self._side.pipeline, self._source)
                 if time.monotonic() - self._status.reported >= _REPORT:
                     self._report()
         self._close()
@@ -85,8 +86,9 @@ class Loop:
 
     def _take(self, request: Request) -> None:
         if isinstance(request, Setup):
-            self._asked = request
-            self._set_up(smaller=False)
+            self._side.ask(request)
+        elif isinstance(request, Compare):
+            self._compare(request.setup)
         elif isinstance(request, Scene):
             self._play(request)
         elif isinstance(request, Seek):
@@ -114,10 +116,8 @@ class Loop:
                 source="",
                 message="",
                 sensor=None,
-                computing=False,
                 region_refusal="",
                 skipped=0,
-                slot=None,  # what the last device showed is not this one's
                 accounting=Accounting(),
                 rate=0.0,
                 last_frame=-math.inf,
@@ -147,8 +147,7 @@ class Loop:
     def _play(self, scene: Scene) -> None:
         if not isinstance(self._source, SimulatedSource):
             return
-        message, building = "", self._status.computing
-        self._status = replace(self._status, computing=True)
+        message, self._changing = "", True
         self._report()  # another skin may take a while
         try:
             self._source.play(scene)
@@ -156,7 +155,8 @@ class Loop:
             self._record_scene()
         except Refusal as refusal:
             message = str(refusal)
-        self._status = replace(self._status, message=message, computing=building)
+        self._changing = False
+        self._status = replace(self._status, message=message)
 
     def _spoil(self, scene: Scene) -> None:
         """Begin to watch anew where other effects are simulated: they may shift every channel."""
@@ -181,52 +181,37 @@ class Loop:
             self._source.close()
             if self._recorder is not None:
                 self._recorder.ended(time.monotonic())
-        self._source, self._pipeline, self._building = None, None, None
+        self._source = None
+        for side in (self._side, self._other):
+            side.forget()
         self._steering = self._monitor = self._out = None
         self._gaps.clear()
         self._times.clear()
         self._last_read = self._again = math.inf
 
-    def _set_up(self, smaller: bool) -> None:
-        """Begin to build the pipeline asked for, beside the running one."""
-        sensor = self._status.sensor
-        if sensor is None:
-            self._status = replace(self._status, setup=self._asked, refusal="")
-        elif self._building is None:
-            generation = self._status.generation + 1
-            job = (built, sensor, self._asked, generation, smaller)
-            self._building = self._builder.submit(*job)
-            self._status = replace(self._status, computing=True)
-
-    def _swap(self, made: Built) -> None:
-        """Go over to the whole of another pipeline, or keep the one there is and say why."""
-        self._building = None
-        self._status = replace(self._status, computing=False)
-        if made.asked != self._asked or made.sensor is not self._status.sensor:
-            self._set_up(smaller=self._pipeline is None)  # overtaken while it was built
+    def _compare(self, setup: Setup | None) -> None:
+        """Compute with another setup beside, or no more."""
+        self._compares = setup is not None
+        if setup is None:
+            self._other.meet(None)
             return
-        self._status = replace(self._status, refusal=made.refusal)
-        if made.pipeline is not None:
-            self._use(made.pipeline)
-        self._report()
+        self._other.ask(setup)
+        if self._other.pipeline is None:
+            self._other.meet(self._status.sensor)
 
-    def _use(self, pipeline: Pipeline) -> None:
-        slot = slot_type(pipeline)
-        try:
-            self._ring.lay_out(pipeline.generation, slot)
-        except Refusal as refusal:
-            self._status = replace(self._status, refusal=str(refusal))
-            return
-        if self._pipeline is not None:
-            pipeline.go_on_from(self._pipeline)
-        self._pipeline, self._out = pipeline, None
-        if self._recorder is not None:
-            self._recorder.set_up(pipeline)
-        if self._monitor is not None:
-            self._leave_out(pipeline, self._monitor)
-        self._status = replace(
-            self._status, setup=pipeline.setup, generation=pipeline.generation, slot=slot
-        )
+    def _swap(self) -> None:
+        """Go over to what has been built."""
+        was = self._side.pipeline
+        if self._side.swap():
+            if (pipeline := self._side.pipeline) is not None and pipeline is not was:
+                self._out = None
+                if self._recorder is not None:
+                    self._recorder.set_up(pipeline)
+                self._leave_out(self._side)
+            self._report()
+        if self._other.swap():
+            self._leave_out(self._other)
+            self._report()
 
     def _read(self, source: Source) -> None:
         try:
@@ -238,7 +223,6 @@ class Loop:
                 self._status,
                 state=LOST,
                 message=str(error),
-                computing=False,
                 accounting=accounting,
                 last_frame=last,
                 rate=0.0,
@@ -250,8 +234,8 @@ class Loop:
             if frame.host_time > self._last_read:
                 self._gaps.append(frame.host_time - self._last_read)
             self._last_read = frame.host_time
-        if self._pipeline is not None:
-            self._compute(frames, self._pipeline)
+        if self._side.pipeline is not None:
+            self._compute(frames, self._side.pipeline)
         # Afterwards: what is left out is left out from the next frame that is read.
         for frame in frames:
             self._watch(frame)
@@ -261,13 +245,15 @@ class Loop:
         late = len(frames) - self._pace.affordable(len(frames))
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
+        beside = self._other.pipeline
         for frame in frames[:late]:
             pipeline.pass_over(frame)
+            if beside is not None:
+                beside.pass_over(frame)
             self._times.append(frame.host_time)
         began = time.monotonic()
         for frame in frames[late:]:
-            estimate = pipeline(frame)
-            self._ring.write(estimate)
+            estimate = self._side.compute(frame, pipeline)
             self._taking.receive(estimate)
             self._times.append(frame.host_time)
             self._place = estimate.touch.position
@@ -275,6 +261,8 @@ class Loop:
                 self._steering(estimate.touch, pipeline.fit)
             if self._recorder is not None:
                 self._recorder.take(frame, estimate)
+            if beside is not None:
+                self._other.compute(frame, beside)
         self._pace.spend(len(frames) - late, time.monotonic() - began)
 
     def _follow(self, source: Source) -> None:
@@ -296,17 +284,17 @@ class Loop:
 
     def _watch(self, frame: Frame) -> None:
         """Look after the health of the channels, and leave out of the fit which are not well."""
-        monitor = self._monitor
-        if monitor is not None and monitor(frame) and self._pipeline is not None:
-            self._leave_out(self._pipeline, monitor)
+        if self._monitor is not None and self._monitor(frame):
+            self._leave_out(self._side)
+            self._leave_out(self._other)
 
-    def _leave_out(self, pipeline: Pipeline, monitor: Monitor) -> None:
-        was = pipeline.left_out
-        pipeline.leave_out(monitor.kinds, monitor.badness)
-        if pipeline.left_out is not was:
-            self._out = monitor.kinds.copy(), monitor.badness.copy()
-            if self._recorder is not None:
-                self._recorder.left_out(*self._out)
+    def _leave_out(self, side: Side) -> None:
+        monitor = self._monitor
+        if monitor is None or not side.leave_out(monitor) or side is not self._side:
+            return
+        self._out = monitor.kinds.copy(), monitor.badness.copy()
+        if self._recorder is not None:
+            self._recorder.left_out(*self._out)
 
     def _happen(self, event: Event) -> None:
         """Tell of something that happened."""
@@ -332,9 +320,9 @@ class Loop:
         if self._source is not None:
             self._source.record(recorder)
         self._record_scene()
-        if self._pipeline is not None:
-            recorder.set_up(self._pipeline)
-            recorder.remembered(self._pipeline.remembered())
+        if (pipeline := self._side.pipeline) is not None:
+            recorder.set_up(pipeline)
+            recorder.remembered(pipeline.remembered())
             if self._out is not None:
                 recorder.left_out(*self._out)
 
@@ -362,9 +350,10 @@ class Loop:
             self._happen(Event(time.monotonic(), "recording", written.trouble))
 
     def _health(self) -> Health:
-        if self._monitor is None or self._pipeline is None:
+        pipeline = self._side.pipeline
+        if self._monitor is None or pipeline is None:
             return Health()
-        out, kinds = self._pipeline.left_out, self._monitor.kinds
+        out, kinds = pipeline.left_out, self._monitor.kinds
         kept = out.kept.ravel()
         return Health(
             self._monitor.findings(kept),
@@ -375,26 +364,24 @@ class Loop:
         )
 
     def _meet(self, sensor: Sensor | None) -> None:
-        """A device said what it is: make the pipeline for it."""
+        """A device said what it is: make the pipelines for it."""
         self._taking.give_up("another device answered, or the same one anew; tare again")
-        self._pipeline = None
         self._monitor = None if sensor is None else Monitor(sensor)
         self._status = replace(
             self._status,
             sensor=sensor,
             meetings=self._status.meetings + (sensor is not None),
-            slot=None,  # what the last device showed is not this one's
         )
-        if sensor is None:
-            return
-        self._steer()
-        self._set_up(smaller=True)
+        self._side.meet(sensor)
+        self._other.meet(sensor if self._compares else None)
+        if sensor is not None:
+            self._steer()
 
     def _report(self) -> None:
         self._look_after_recording()
         now, source, status = time.monotonic(), self._source, self._status
         if source is not None:
-            watch = self._pipeline.drift if self._pipeline else None
+            watch = self._side.pipeline.drift if self._side.pipeline else None
             gaps = np.array(self._gaps)
             recent = [t for t in self._times if t > now - 1.0]
             status = replace(
@@ -411,5 +398,16 @@ class Loop:
                 health=self._health(),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
             )
-        self._status = replace(status, reported=now, tare=self._taking.news)
+        told = self._side.told
+        self._status = replace(
+            status,
+            reported=now,
+            tare=self._taking.news,
+            setup=told.setup,
+            generation=told.generation,
+            slot=told.slot,
+            refusal=told.refusal,
+            computing=told.computing or self._changing,
+            beside=self._other.told if self._compares else None,
+        )
         self._ring.write_status(self._status)

@@ -19,6 +19,13 @@ class Disconnect:
 
 
 @dataclass(frozen=True)
+class Compare:
+    """Compute with another setup too, beside the one in use; None to end that."""
+
+    setup: Setup | None
+
+
+@dataclass(frozen=True)
 class Seek:
     """Go on with a scene or recording from its time `at` in s, or from where it is, at a `speed`.
 
@@ -56,4 +63,6 @@ class Note:
     text: str
 
 
-Request = Connect | Disconnect | Setup | Scene | Seek | Region | TakeTare | Record | Note | Step
+Request = (
+    Connect | Disconnect | Setup | Compare | Scene | Seek | Step | Region | TakeTare | Record | Note
+)

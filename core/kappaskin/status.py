@@ -13,6 +13,7 @@ from kappaskin.recording.writing import Written
 from kappaskin.region import Region
 from kappaskin.scene import FROM_THE_BEGINNING, Playing
 from kappaskin.sensor import Sensor
+from kappaskin.side import Computed
 from kappaskin.sources import Replay
 from kappaskin.sources.accounting import Accounting
 from kappaskin.tare_taking import TareNews
@@ -37,7 +38,8 @@ class Status:
     `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
     tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
     tells which channels are not to be trusted, `recording` what is being written,
-    `replay` where in a recording the source is, None for any other.
+    `replay` where in a recording the source is, None for any other, and `beside` what else is
+    computed of the same frames, None where nothing is.
     """
 
     state: str = OFF
@@ -67,6 +69,7 @@ class Status:
     health: Health = field(default_factory=Health)
     recording: Written = field(default_factory=Written)
     replay: Replay | None = None
+    beside: Computed | None = None
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status once `events` happened."""
