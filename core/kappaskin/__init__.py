@@ -86,6 +86,8 @@ from kappaskin.press import Phase as Phase
 from kappaskin.press import PressTest as PressTest
 from kappaskin.press import Verdict as Verdict
 from kappaskin.press import elements_to_press as elements_to_press
+from kappaskin.recording.reading import Recording as Recording
+from kappaskin.recording.writing import Written as Written
 from kappaskin.region import Bargain as Bargain
 from kappaskin.region import Region as Region
 from kappaskin.region import Scanner as Scanner
@@ -109,7 +111,10 @@ from kappaskin.scene import read_scene_text as read_scene_text
 from kappaskin.scene import scene_file as scene_file
 from kappaskin.scene import write_scene as write_scene
 from kappaskin.sensor import Sensor as Sensor
+from kappaskin.setup_text import setup_from as setup_from
+from kappaskin.side import Computed as Computed
 from kappaskin.simulate import Simulator as Simulator
+from kappaskin.sources import Replay as Replay
 from kappaskin.sources.ports import Port as Port
 from kappaskin.sources.ports import serial_ports as serial_ports
 from kappaskin.sources.scanning import LISTS as LISTS
