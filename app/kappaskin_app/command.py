@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin import Refusal
+from kappaskin import Recording, Refusal
 
 app = App(name="app", help_format="markdown")
 
@@ -33,7 +33,7 @@ def run(
     Parameters
     ----------
     source
-        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `replay:FILE`, or a port or URL for pyserial.
     seconds
         Close by itself after so long.
     screenshot
@@ -52,3 +52,17 @@ def run(
         raise Refusal(
             f"the desktop app needs {error.name}; install it with: pip install 'kappaskin[app]'"
         ) from error
+
+
+def replay(file: Path) -> None:
+    """Open the desktop app on a recording.
+
+    Example: `kappaskin replay press.mcap`
+
+    Parameters
+    ----------
+    file
+        The recording.
+    """
+    with Recording(file):  # or refused here
+        run(source=f"replay:{file.absolute()}")

@@ -1,7 +1,8 @@
 """A recording to a verdict: whether its bytes come to the same estimates again, bit for bit."""
 
+import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ _COMPARED = {
     m.CURVATURES.name: m.CURVATURE,
     m.SHAPES.name: m.COEFFICIENTS,
 }
+_TOLD = 1000  # messages between two times that the share is told
 _WAITING = 2**14  # frames that wait for what was recorded of them, at most
 _NAMED_AS: dict[str, Callable[[Estimate], Any]] = {
     "present": lambda e: e.touch.present,
@@ -49,34 +51,53 @@ _NAMED_AS: dict[str, Callable[[Estimate], Any]] = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of it: `compared` recorded messages, of `frames`; `difference` tells the first.
+    """What came of it: `compared` recorded messages, made of `frames`; `different` ones of them.
 
-    `missing` counts recorded estimates whose frames are not there, `frames` all that are.
+    `first` tells the first difference, `largest` is the largest one as a share of the largest
+    number beside it. `missing` counts recorded estimates whose frames are not there.
     """
 
     frames: int
     compared: int
     missing: int
-    difference: str
+    different: int
+    first: str
+    largest: float
 
     @property
     def same(self) -> bool:
-        return not self.difference and not self.missing and self.compared > 0
+        return self.compared > 0 and not (self.different or self.missing)
+
+    @property
+    def words(self) -> str:
+        """The verdict as a sentence or two."""
+        told = f"{self.compared:,} recorded estimates of {self.frames:,} frames"
+        if not self.compared:
+            return f"{told}: there is nothing to compare"
+        parts = [f"{told}: {'the same bit for bit' if self.same else 'not the same'}"]
+        if self.different:
+            parts.append(f"{self.different:,} differ, by {self.largest:.1g} of the largest number")
+            parts.append(f"first {self.first}")
+        if self.missing:
+            parts.append(f"the frames of {self.missing:,} more are not there")
+        return "; ".join(parts)
 
 
-def verify(path: Path, told: Callable[[float], object] = lambda share: None) -> Verdict:
+def verifying(path: Path) -> Generator[float | Verdict]:
     """Work out everything that was recorded in `path` once more, and compare.
 
-    `told` is called now and then with the share that is done. A `Refusal` where it is no recording.
+    Now and then the share that is done, and the verdict at the end. To be run where the engine's
+    own arithmetic is, in one thread: others sum in another order. A `Refusal` where it is no
+    recording.
     """
     with Recording(path) as recording:
         worker = _Worker(recording)
         span = max(recording.last - recording.first, 1)
         for n, message in enumerate(recording.messages()):
             worker(message)
-            if n % 1000 == 0:
-                told((message.stamp - recording.first) / span)
-        return worker.verdict()
+            if n % _TOLD == 0:
+                yield (message.stamp - recording.first) / span
+        yield worker.verdict()
 
 
 class _Worker:
@@ -90,8 +111,8 @@ class _Worker:
         self._memory: Memory = {}
         self._waiting: deque[Frame] = deque(maxlen=_WAITING)
         self._estimate: Estimate | None = None
-        self._frames = self._compared = self._missing = 0
-        self._difference = ""
+        self._frames = self._compared = self._missing = self._different = 0
+        self._first, self._largest = "", 0.0
 
     def __call__(self, message: Message) -> None:
         if kind := _COMPARED.get(message.topic):
@@ -151,22 +172,25 @@ class _Worker:
             self._missing += 1
             return
         self._compared += 1
-        for name, value in said.items():
-            if self._difference:
-                return
-            if not name.startswith("header."):
-                self._differ(name, value, estimate)
+        names = (name for name in said if not name.startswith("header."))
+        differences = [d for name in names if (d := self._difference(name, said[name], estimate))]
+        self._different += bool(differences)
+        self._first = self._first or "; ".join(differences[:1])
 
-    def _differ(self, name: str, value: Any, estimate: Estimate) -> None:
+    def _difference(self, name: str, value: Any, estimate: Estimate) -> str:
+        """In which way one number, or list of numbers, is another now; nothing if it is not."""
         again = _NAMED_AS[name](estimate) if name in _NAMED_AS else getattr(estimate, name)
         was, now = np.asarray(value).ravel(), np.asarray(again).ravel()
-        same_kind = was.dtype.kind == "f" and now.dtype.kind == "f"
-        same = was.tobytes() == now.tobytes() if same_kind else np.array_equal(was, now)
-        if not same:
-            self._difference = (
-                f"frame {estimate.sequence} at {estimate.device_time:.6f} s: {name} was "
-                f"{_told(was)}, and is {_told(now)} now"
-            )
+        real = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape
+        if was.tobytes() == now.tobytes() if real else np.array_equal(was, now):
+            return ""
+        scale = float(np.max(np.abs(was), initial=0.0)) if real else math.nan
+        share = float(np.max(np.abs(was - now))) / scale if scale > 0 else math.inf
+        self._largest = max(self._largest, share if share == share else math.inf)
+        return (
+            f"frame {estimate.sequence} at {estimate.device_time:.6f} s: {name} was "
+            f"{_told(was)}, and is {_told(now)} now"
+        )
 
     def _estimate_of(self, sequence: int) -> Estimate | None:
         if self._estimate is not None and self._estimate.sequence == sequence:
@@ -181,7 +205,14 @@ class _Worker:
         return self._estimate
 
     def verdict(self) -> Verdict:
-        return Verdict(self._frames, self._compared, self._missing, self._difference)
+        return Verdict(
+            self._frames,
+            self._compared,
+            self._missing,
+            self._different,
+            self._first,
+            self._largest,
+        )
 
 
 def _told(values: "NDArray[Any]") -> str:

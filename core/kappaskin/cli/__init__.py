@@ -13,15 +13,19 @@ from kappaskin.cli import (
     doctor,
     drill,
     figures,
+    info,
     monitor,
     plan,
     press,
     reconstruct,
+    record,
     regions,
+    repair,
     simulate,
     stability,
     tables,
     tare,
+    verify,
 )
 from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
@@ -47,6 +51,10 @@ for command in (
     device.device,
     drill.drill,
     monitor.monitor,
+    record.record,
+    info.info,
+    verify.verify,
+    repair.repair,
     figures.figures,
     doctor.doctor,
 ):

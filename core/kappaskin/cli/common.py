@@ -1,15 +1,18 @@
 """What commands share: exit codes, and how they read pairs, print JSON and write files."""
 
 import json
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
+
+_Kind = TypeVar("_Kind")
 
 FAILED = 1
 """Exit code of a command that was done, with something in the result that failed."""
@@ -31,6 +34,20 @@ def pair(text: str, what: str) -> tuple[int, int]:
     except ValueError:
         raise Refusal(f"expected {what} as two numbers such as 8x8, got {text!r}") from None
     return first, second
+
+
+def progress(told: Iterable[object], kind: type[_Kind]) -> _Kind:
+    """What comes of work that tells shares of itself, and at its end something of a `kind`.
+
+    The shares are shown where somebody looks.
+    """
+    shown = sys.stderr.isatty()
+    for item in told:
+        if isinstance(item, kind):
+            return item
+        if shown:
+            print(f"{item:4.0%}", end="\r", file=sys.stderr, flush=True)
+    raise Refusal("the work ended without a result; try again")
 
 
 def print_json(value: Any) -> None:

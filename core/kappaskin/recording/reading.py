@@ -1,7 +1,7 @@
 """MCAP files to the messages in them: whole ones, unfinished ones, and none of what is not one.
 
 Every size in a file is held against what is there, so that no file takes more memory than a few
-times `_LARGEST`.
+times `LARGEST`.
 """
 
 import struct
@@ -36,7 +36,7 @@ from kappaskin.recording.messages import TOPICS, Topic
 from kappaskin.recording.writing import FORMAT
 
 MAGIC = b"\x89MCAP0\r\n"
-_LARGEST = 2**26  # bytes of a record, or of what is in a chunk
+LARGEST = 2**26  # bytes of a record, or of what is in a chunk
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _FOOTER = _HEAD.size + 20
@@ -92,7 +92,7 @@ def record_at(file: IO[bytes], at: int, size: int) -> Record:
         raise Spoilt("it is cut off")
     code, length = _HEAD.unpack(head)
     end = at + _HEAD.size + length
-    if end > size or length > _LARGEST:
+    if end > size or length > LARGEST:
         raise Spoilt("it is cut off" if end > size else f"it has a record of {length} bytes")
     return Record(at, end, code, file.read(length))
 
@@ -108,7 +108,7 @@ def parsed(kind: type[_Kind], body: bytes) -> _Kind:
 def unpacked(body: bytes) -> bytes:
     """What is in the chunk of a record's `body`: the bytes of its records, checked."""
     chunk = parsed(Chunk, body)
-    if chunk.uncompressed_size > _LARGEST:
+    if chunk.uncompressed_size > LARGEST:
         raise Spoilt(f"a chunk says that it holds {chunk.uncompressed_size} bytes")
     try:
         data = _decompressed(chunk.compression, chunk.data)
@@ -125,9 +125,9 @@ def _decompressed(compression: str, data: bytes) -> bytes:
     """The bytes, at most one more than are allowed."""
     if compression == "zstd":
         with zstandard.ZstdDecompressor().stream_reader(data) as reader:
-            return reader.read(_LARGEST + 1)
+            return reader.read(LARGEST + 1)
     if compression == "lz4":
-        return lz4.frame.LZ4FrameDecompressor().decompress(data, _LARGEST + 1)
+        return lz4.frame.LZ4FrameDecompressor().decompress(data, LARGEST + 1)
     if compression:
         raise Spoilt(f"a chunk is compressed by {compression!r:.20}, which nobody here knows")
     return data
@@ -145,6 +145,25 @@ def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
             raise Spoilt("a chunk ends within a record")
         yield code, data[at : at + length]
         at += length
+
+
+def summary_of(file: IO[bytes], size: int) -> Iterator[Record]:
+    """The records at the end of a `file` of `size` bytes that say what is in it.
+
+    None where it has no such end; a `Spoilt` where that is damaged.
+    """
+    end = size - len(MAGIC)
+    file.seek(max(end, 0))
+    if file.read(len(MAGIC)) != MAGIC or end < _FOOTER:
+        return
+    footer = record_at(file, end - _FOOTER, end)
+    at = parsed(Footer, footer.body).summary_start
+    if footer.code != Opcode.FOOTER or at < len(MAGIC):
+        return
+    while at < footer.at:
+        record = record_at(file, at, footer.at)
+        yield record
+        at = record.end
 
 
 class Recording:
@@ -167,7 +186,7 @@ class Recording:
                 f"{path}: cannot be read ({error.strerror or error}); expected a recording"
             ) from error
         self.library = ""
-        self.format = 0
+        self.format = FORMAT  # where that was lost with the beginning of the file
         self.counts: dict[str, int] = {}
         self.chunks: list[ChunkAt] = []
         self._topics: dict[int, str] = {}
@@ -201,7 +220,7 @@ class Recording:
                 f"{self.path}: expected a recording of format {FORMAT}, got {self.format}, of a "
                 "later version; update this program"
             )
-        if not self.format:
+        if not self._topics:
             raise Refusal(
                 f"{self.path}: expected a recording of this program, got an MCAP file of "
                 f"{self.library or 'another'!r:.60}"
@@ -212,18 +231,8 @@ class Recording:
     def _summarised(self) -> bool:
         """Take what the end says, if the file has one."""
         try:
-            end = self._size - len(MAGIC)
-            self._file.seek(max(end, 0))
-            if self._file.read() != MAGIC:
-                return False
-            footer = record_at(self._file, end - _FOOTER, end)
-            at = parsed(Footer, footer.body).summary_start
-            if footer.code != Opcode.FOOTER or not len(MAGIC) < at < footer.at:
-                return False
-            while at < footer.at:
-                record = record_at(self._file, at, footer.at)
+            for record in list(summary_of(self._file, self._size)):
                 self._take(record)
-                at = record.end
             return bool(self.chunks)
         except Spoilt:
             return False
@@ -388,4 +397,4 @@ class Recording:
 
 def _format(said: dict[str, str]) -> int:
     text = said.get("format", "")
-    return int(text) if text.isascii() and text.isdigit() and len(text) < 9 else 0
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 9 else FORMAT

@@ -1,0 +1,247 @@
+"""A damaged MCAP file, whoever wrote it, to a whole one with all that can be trusted of it."""
+
+import mmap
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import zstandard
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Header, Metadata, Schema
+from mcap.writer import CompressionType, Writer
+
+from kappaskin.errors import Refusal
+from kappaskin.recording.disk import Disk
+from kappaskin.recording.messages import TOPICS
+from kappaskin.recording.reading import (
+    LARGEST,
+    MAGIC,
+    Record,
+    Spoilt,
+    parsed,
+    record_at,
+    records_in,
+    summary_of,
+    unpacked,
+)
+from kappaskin.recording.writing import part_of
+
+_MESSAGE = struct.Struct("<HIQQ")
+_COMPRESSION = 9 + 8 + 8 + 8 + 4  # bytes of a chunk before the name of its compression
+_NAMES = tuple(struct.pack("<I", len(name)) + name for name in (b"zstd", b"lz4"))
+_ENDS = (Opcode.DATA_END, Opcode.FOOTER)
+_KNOWN = frozenset(Opcode)
+_PRIVATE = 0x80
+_CHUNK = 2**20  # bytes
+_RECORDS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """What was saved: `messages` by topic, and `attachments`; `lost` bytes could not be read.
+
+    `ended` says whether the file had its end.
+    """
+
+    messages: dict[str, int]
+    attachments: int
+    lost: int
+    ended: bool
+
+    @property
+    def total(self) -> int:
+        return sum(self.messages.values())
+
+
+def repair(path: Path, out: Path, told: Callable[[float], object] = lambda share: None) -> Repaired:
+    """Save every whole message of `path` to `out`, with summary and index.
+
+    `told` is called now and then with the share that is done. Nothing is written where nothing is
+    saved. A `Refusal` where `path` cannot be read or is no MCAP file, or `out` cannot be written.
+    """
+    if out.exists() or part_of(out).exists():
+        raise Refusal(f"{out}: is there already; choose another name")
+    try:
+        with path.open("rb") as file:
+            if not path.stat().st_size:
+                raise Refusal(f"{path}: is empty")
+            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+                return _Repair(path, data, out).run(told)
+    except OSError as error:
+        raise Refusal(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+class _Repair:
+    """Goes through the bytes of one file once."""
+
+    def __init__(self, path: Path, data: mmap.mmap, out: Path) -> None:
+        self._path, self._data, self._out, self._size = path, data, out, len(data)
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._new: dict[int, int] = {}  # channels as they are called in what is written
+        self._new_schemas: dict[int, int] = {}
+        self._counts: Counter[str] = Counter()
+        self._attached = self._lost = 0
+        self._ended = False
+
+    def run(self, told: Callable[[float], object]) -> Repaired:
+        disk = Disk(part_of(self._out))
+        try:
+            self._writer = Writer(disk, _CHUNK, CompressionType.ZSTD)
+            self._begin()
+            for at in self._through():
+                told(at / self._size)
+            if self._counts or self._attached:
+                self._writer.finish()
+                disk.sync()
+                disk.path.rename(self._out)
+        except OSError as error:
+            raise Refusal(f"{self._out}: cannot be written ({error.strerror or error})") from error
+        finally:
+            disk.close()
+            disk.path.unlink(missing_ok=True)
+        return Repaired(dict(self._counts), self._attached, self._lost, self._ended)
+
+    def _begin(self) -> None:
+        """Begin as the file itself did."""
+        profile, library = "", "kappaskin"
+        self._at = len(MAGIC)
+        if self._data[: len(MAGIC)] == MAGIC:
+            try:
+                header = parsed(Header, record_at(self._data, len(MAGIC), self._size).body)
+                profile, library = header.profile, header.library
+            except Spoilt:
+                pass
+        elif (found := self._next_chunk(0)) < self._size:
+            self._at = self._lost = found
+        else:
+            raise Refusal(
+                f"{self._path}: expected a recording (an MCAP file), got "
+                f"{self._data[: len(MAGIC)]!r}"
+            )
+        self._writer.start(profile, library)
+        self._expect(library)
+
+    def _expect(self, library: str) -> None:
+        """Learn of the channels where the chunk that tells of them may be damaged."""
+        if library.startswith("kappaskin"):
+            for n, (topic, kind) in enumerate(TOPICS, 1):
+                self._schemas[n] = Schema(n, kind.definition, "ros2msg", kind.name)
+                self._channels[n] = Channel(n, topic, "cdr", {}, n)
+        try:
+            for record in summary_of(self._data, self._size):
+                if record.code in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    self._take(record.code, record.body)
+        except Spoilt:
+            return
+
+    def _through(self) -> Iterator[int]:
+        """Save record after record; where each begins."""
+        while self._at < self._size and not self._ended:
+            yield self._at
+            try:
+                record = record_at(self._data, self._at, self._size)
+                if record.code not in _KNOWN and record.code < _PRIVATE:
+                    raise Spoilt("no record begins so")
+                self._save(record)
+                self._at = record.end
+            except Spoilt:
+                self._save_part()
+                found = self._next_chunk(self._at + 1)
+                self._lost += found - self._at
+                self._at = found
+
+    def _next_chunk(self, at: int) -> int:
+        """Where the next chunk begins that is whole; the end of the file if none does."""
+        while at < self._size:
+            places = [self._data.find(name, at + _COMPRESSION) for name in _NAMES]
+            found = min((place for place in places if place >= 0), default=-1)
+            if found < 0:
+                break
+            at = found - _COMPRESSION
+            try:
+                record = record_at(self._data, at, self._size)
+                if record.code == Opcode.CHUNK:
+                    unpacked(record.body)
+                    return at
+            except Spoilt:
+                pass
+            at += 1
+        return self._size
+
+    def _save(self, record: Record) -> None:
+        if record.code == Opcode.CHUNK:
+            for code, body in records_in(unpacked(record.body)):
+                self._take(code, body)
+        elif record.code in _RECORDS:
+            self._take(record.code, record.body)
+        elif record.code == Opcode.ATTACHMENT:
+            self._attach(record.body)
+        elif record.code == Opcode.METADATA:
+            found = parsed(Metadata, record.body)
+            self._writer.add_metadata(found.name, found.metadata)
+        elif record.code in _ENDS:
+            self._ended = True
+
+    def _save_part(self) -> None:
+        """Of a chunk that is cut off by the end of the file, save what comes before that."""
+        body = self._data[self._at + 9 : min(self._size, self._at + 9 + LARGEST)]
+        zstd = body[_COMPRESSION - 9 :].startswith(_NAMES[0])
+        cut_off = self._at + 9 + int.from_bytes(self._data[self._at + 1 : self._at + 9], "little")
+        if self._data[self._at] != Opcode.CHUNK or not zstd or cut_off <= self._size:
+            return
+        packed = body[_COMPRESSION - 9 + len(_NAMES[0]) + 8 :]
+        try:
+            with zstandard.ZstdDecompressor().stream_reader(BytesIO(packed)) as reader:
+                for code, record in records_in(reader.read(LARGEST)):
+                    self._take(code, record)
+        except (Spoilt, zstandard.ZstdError):
+            return
+
+    def _take(self, code: int, body: bytes) -> None:
+        """Save what is in a chunk, or might be."""
+        if code == Opcode.SCHEMA:
+            schema = parsed(Schema, body)
+            self._schemas[schema.id] = schema
+        elif code == Opcode.CHANNEL:
+            channel = parsed(Channel, body)
+            self._channels[channel.id] = channel
+        elif code == Opcode.MESSAGE:
+            if len(body) < _MESSAGE.size:
+                raise Spoilt("a message is too short")
+            channel, sequence, logged, published = _MESSAGE.unpack_from(body)
+            if (to := self._channel(channel)) is not None:
+                data = body[_MESSAGE.size :]
+                self._writer.add_message(to, logged, data, published, sequence)
+                self._counts[self._channels[channel].topic] += 1
+
+    def _channel(self, number: int) -> int | None:
+        """What the channel is called in the new file; None where nothing tells what it is."""
+        if number in self._new:
+            return self._new[number]
+        if (channel := self._channels.get(number)) is None:
+            return None
+        schema = self._schemas.get(channel.schema_id)
+        if schema is not None and schema.id not in self._new_schemas:
+            to = self._writer.register_schema(schema.name, schema.encoding, schema.data)
+            self._new_schemas[schema.id] = to
+        self._new[number] = self._writer.register_channel(
+            channel.topic,
+            channel.message_encoding,
+            self._new_schemas.get(channel.schema_id, 0),
+            channel.metadata,
+        )
+        return self._new[number]
+
+    def _attach(self, body: bytes) -> None:
+        if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
+            raise Spoilt("an attachment is damaged")
+        found = parsed(Attachment, body)
+        self._writer.add_attachment(
+            found.create_time, found.log_time, found.name, found.media_type, found.data
+        )
+        self._attached += 1
