@@ -143,17 +143,30 @@ class _Repair:
         """Save record after record; where each begins."""
         while self._at < self._size and not self._ended:
             yield self._at
-            try:
-                record = record_at(self._data, self._at, self._size)
-                if record.code not in _KNOWN and record.code < _PRIVATE:
-                    raise Spoilt("no record begins so")
-                self._save(record)
-                self._at = record.end
-            except Spoilt:
-                self._save_part()
-                found = self._next_chunk(self._at + 1)
-                self._lost += found - self._at
-                self._at = found
+            if (record := self._record(self._at)) is not None:
+                try:
+                    self._save(record)
+                    self._at = record.end
+                    continue
+                except Spoilt:
+                    if self._record(record.end) is not None:
+                        self._go_on(record.end)
+                        continue
+            self._save_part()
+            self._go_on(self._next_chunk(self._at + 1))
+
+    def _go_on(self, at: int) -> None:
+        """Go on from `at`: what is before is lost."""
+        self._lost += at - self._at
+        self._at = at
+
+    def _record(self, at: int) -> Record | None:
+        """The record that begins at `at`, if one does."""
+        try:
+            record = record_at(self._data, at, self._size)
+        except Spoilt:
+            return None
+        return record if record.code in _KNOWN or record.code >= _PRIVATE else None
 
     def _next_chunk(self, at: int) -> int:
         """Where the next chunk begins that is whole; the end of the file if none does."""

@@ -117,7 +117,8 @@ class RecordingFile:
                 self._write()
                 if not self._disk.there:
                     raise OSError("it was moved or removed")
-            self._write()
+            if not self._disk.trouble:
+                self._write()
             self._writer.finish()
             self._finish()
         except OSError as error:

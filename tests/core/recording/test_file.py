@@ -1,0 +1,336 @@
+"""The file of a recording: whole or up to where it breaks off, and what no file may do."""
+
+import errno
+import io
+import os
+import struct
+import threading
+import time
+
+import pytest
+import zstandard
+from mcap.reader import make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+from mcap.writer import Writer
+
+from kappaskin import Refusal
+from kappaskin.recording import disk as disk_room
+from kappaskin.recording import messages as m
+from kappaskin.recording import reading, writing
+from kappaskin.recording.reading import Recording
+from kappaskin.recording.writing import RecordingFile, part_of
+
+LINE = m.pack_line(0.0, False, bytes(600))
+
+
+def recorded(path, messages=200):
+    """A recording of so many messages 1 ms after each other, with an event and a file."""
+    file = RecordingFile(path)
+    for n in range(messages):
+        file.put(m.LINES, n * 1e-3, m.pack_line(n * 1e-3, False, bytes([n % 256]) * 600))
+        if n % 50 == 25:
+            time.sleep(0.25)  # into chunks of their own
+    file.attach("scene.toml", "application/toml", b"a = 1")
+    file.close()
+    return file
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recording") / "whole.mcap"
+    recorded(path)
+    return path
+
+
+def test_a_file_has_another_name_until_it_is_whole(tmp_path) -> None:
+    path = tmp_path / "a.mcap"
+    file = RecordingFile(path)
+    assert part_of(path).exists()
+    assert not path.exists()
+    file.put(m.LINES, 1.0, LINE)
+    file.close()
+    assert path.exists()
+    assert not part_of(path).exists()
+    assert os.listdir(tmp_path) == ["a.mcap"]  # nothing that was kept in reserve
+    assert (file.written.active, file.written.messages, file.written.trouble) == (False, 1, "")
+    assert file.written.size > 0
+
+
+def test_others_read_what_was_written_in_order(whole) -> None:
+    with whole.open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        messages = [message for _, _, message in reader.iter_messages()]
+        attachments = list(reader.iter_attachments())
+        header = reader.get_header()
+    assert summary.statistics.message_count == len(messages) == 200
+    assert [message.sequence for message in messages] == list(range(200))
+    assert len(summary.chunk_indexes) > 3
+    assert [(a.name, a.data) for a in attachments] == [("scene.toml", b"a = 1")]
+    assert (header.profile, header.library.split()[0]) == ("ros2", "kappaskin")
+    assert {schema.encoding for schema in summary.schemas.values()} == {"ros2msg"}
+    assert {channel.message_encoding for channel in summary.channels.values()} == {"cdr"}
+
+
+def test_so_do_we(whole) -> None:
+    with Recording(whole) as recording:
+        assert recording.whole
+        assert recording.counts == {m.LINES.name: 200}
+        messages = list(recording.messages())
+        assert [m.unpack_line(got.data)[0] for got in messages] == [n * 1e-3 for n in range(200)]
+        assert recording.attachments == ("scene.toml",)
+        assert recording.attachment("scene.toml") == b"a = 1"
+        assert recording.last - recording.first == pytest.approx(199e6, abs=2)
+        assert list(recording.messages_on(m.EVENTS)) == []
+        at = recording.first + 100_000_000
+        before = recording.last_before(m.LINES, at)
+        assert before is not None
+        assert before.stamp == at
+        assert recording.last_before(m.LINES, recording.first - 1) is None
+        with pytest.raises(Refusal, match="no attachment 'none'"):
+            recording.attachment("none")
+
+
+def test_one_that_breaks_off_anywhere_is_read_up_to_there(whole, tmp_path) -> None:
+    data, path, seen = whole.read_bytes(), tmp_path / "cut.mcap", set()
+    for size in [*range(60, len(data), len(data) // 60), len(data) - 1]:
+        path.write_bytes(data[:size])
+        try:
+            with Recording(path) as recording:
+                found = [got.data for got in recording.messages()]
+                assert not recording.whole
+        except Refusal:
+            assert size < 6000  # before the channels
+            continue
+        assert [m.unpack_line(d)[0] for d in found] == [n * 1e-3 for n in range(len(found))]
+        seen.add(len(found))
+    assert len(seen) > 3
+
+
+def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
+    path = tmp_path / "x.mcap"
+    with pytest.raises(Refusal, match="cannot be read"):
+        Recording(path)
+    with pytest.raises(Refusal, match="cannot be read"):
+        Recording(tmp_path)
+    for data in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), reading.MAGIC, reading.MAGIC * 20):
+        path.write_bytes(data)
+        with pytest.raises(Refusal, match="recording"):
+            Recording(path)
+    with path.open("wb") as file:
+        other = Writer(file)
+        other.start("", "another")
+        schema = other.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = other.register_channel("/chatter", "cdr", schema)
+        other.add_message(channel, 0, b"", 0)
+        other.finish()
+    with pytest.raises(Refusal, match="got an MCAP file of 'another'"):
+        Recording(path)
+
+
+def test_one_of_a_later_version_is_refused(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(writing, "FORMAT", 2)
+    recorded(tmp_path / "later.mcap", 3)
+    with pytest.raises(Refusal, match=r"format 1, got 2.*update this program"):
+        Recording(tmp_path / "later.mcap")
+
+
+def spoilt(whole, path, change):
+    """A copy of which the first chunk is changed by a function of its record."""
+    with whole.open("rb") as file:
+        records = list(StreamReader(file, emit_chunks=True).records)
+    chunk = next(record for record in records if isinstance(record, Chunk))
+    data, packed = whole.read_bytes(), chunk.data
+    at = data.index(packed)
+    path.write_bytes(change(data, at, packed))
+
+
+def test_a_bomb_takes_no_memory(whole, tmp_path) -> None:
+    """A chunk of some kB that says it holds little, and holds twice what may be in one."""
+    bomb, path = zstandard.compress(bytes(2**27)), tmp_path / "bomb.mcap"
+
+    def chunk(size):
+        body = struct.pack("<QQQII4sQ", 0, 1, size, 0, 4, b"zstd", len(bomb)) + bomb
+        return (
+            reading.MAGIC
+            + b"\1"
+            + struct.pack("<QII", 8, 0, 0)
+            + b"\6"
+            + struct.pack("<Q", len(body))
+            + body
+        )
+
+    for size in (2**27, 1000):
+        path.write_bytes(chunk(size))
+        with pytest.raises(Refusal):
+            Recording(path)
+    body = chunk(1000)
+    for size in (2**27, 1000):
+        with pytest.raises(reading.Spoilt):
+            reading.unpacked(chunk(size)[len(body) - len(bomb) - 44 :])
+
+
+def test_no_size_that_a_file_claims_is_believed(whole, tmp_path) -> None:
+    data, path = whole.read_bytes(), tmp_path / "claims.mcap"
+    for at in range(9, len(data) - 8, 997):
+        for claim in (2**63, 2**40, 2**32 - 1, 0):
+            path.write_bytes(data[:at] + struct.pack("<Q", claim) + data[at + 8 :])
+            try:
+                with Recording(path) as recording:
+                    for _ in recording.messages():
+                        pass
+            except Refusal:
+                continue
+
+
+def test_a_damaged_chunk_is_said_to_be_one(whole, tmp_path) -> None:
+    path = tmp_path / "flipped.mcap"
+    spoilt(whole, path, lambda data, at, _: data[:at] + b"\xff" + data[at + 1 :])
+    with Recording(path) as recording, pytest.raises(Refusal, match=r"damaged at byte.*repair"):
+        list(recording.messages())
+
+
+# What a disk does
+
+
+class Full(io.RawIOBase):
+    """A file on a disk with room for so many bytes in all its files."""
+
+    room = 0
+
+    def __init__(self, file):
+        self._file = file
+
+    def write(self, data):
+        used = Full.room - len(data)
+        if used < 0:
+            some = max(Full.room, 0)
+            self._file.write(data[:some])
+            Full.room -= some
+            raise OSError(errno.ENOSPC, "No space left on device")
+        Full.room = used
+        return self._file.write(data)
+
+    def truncate(self, size=None):
+        before = self._file.seek(0, 2)
+        Full.room += before - self._file.truncate(size)
+        return size
+
+    def seek(self, *args):
+        return self._file.seek(*args)
+
+    def fileno(self):
+        return self._file.fileno()
+
+    def close(self):
+        if not self.closed:
+            if self._file.name != self.named:
+                Full.room += self._file.seek(0, 2)  # what was in reserve is free again
+            self._file.close()
+        super().close()
+
+    named = ""
+
+
+@pytest.fixture
+def small_disk(tmp_path, monkeypatch):
+    """A disk of 3 MiB."""
+    Full.room = 3 * 2**20
+    path = tmp_path / "full.mcap"
+    Full.named = str(part_of(path))
+    opened, temporary = type(path).open, disk_room.tempfile.TemporaryFile
+    monkeypatch.setattr(
+        type(path),
+        "open",
+        lambda self, mode="r", *a, **k: (
+            Full(opened(self, mode, *a, **k)) if "x" in mode else opened(self, mode, *a, **k)
+        ),
+    )
+    monkeypatch.setattr(disk_room.tempfile, "TemporaryFile", lambda **k: Full(temporary(**k)))
+    return path
+
+
+def test_a_disk_that_fills_leaves_a_whole_recording(small_disk) -> None:
+    file = RecordingFile(small_disk)
+    end = time.monotonic() + 20
+    sent = 0
+    while file.written.active and time.monotonic() < end:
+        for _ in range(20):
+            file.put(m.LINES, sent * 1e-3, m.pack_line(sent * 1e-3, False, os.urandom(2000)))
+            sent += 1
+        time.sleep(0.01)
+    assert not file.written.active
+    assert "No space left on device; it is whole up to then" in file.written.trouble
+    file.put(m.LINES, 0.0, LINE)  # nobody minds
+    file.close()
+    with Recording(small_disk) as recording:
+        assert recording.whole
+        found = [m.unpack_line(got.data)[0] for got in recording.messages()]
+    assert found == [n * 1e-3 for n in range(len(found))]
+    assert len(found) == file.written.messages > 500
+
+
+def test_without_room_to_end_it_none_is_begun(small_disk) -> None:
+    Full.room = 2**20 - 1
+    with pytest.raises(Refusal, match="room for 1 MiB"):
+        RecordingFile(small_disk)
+    assert not part_of(small_disk).exists()
+
+
+def test_what_is_there_is_never_written_over(tmp_path) -> None:
+    path = tmp_path / "there.mcap"
+    for there in (path, part_of(path)):
+        there.write_bytes(b"mine")
+        with pytest.raises(Refusal, match="is there already"):
+            RecordingFile(path)
+        assert there.read_bytes() == b"mine"
+        there.unlink()
+    with pytest.raises(Refusal, match="cannot be written"):
+        RecordingFile(tmp_path / "no" / "folder.mcap")
+
+
+def test_a_file_that_appears_meanwhile_stays(tmp_path) -> None:
+    path = tmp_path / "a.mcap"
+    file = RecordingFile(path)
+    file.put(m.LINES, 0.0, LINE)
+    path.write_bytes(b"mine")
+    file.close()
+    assert "a.mcap has appeared beside it" in file.written.trouble
+    assert path.read_bytes() == b"mine"
+    with Recording(part_of(path)) as recording:
+        assert recording.whole
+
+
+def test_a_file_that_is_taken_away_ends_the_recording(tmp_path) -> None:
+    file = RecordingFile(tmp_path / "a.mcap")
+    part_of(file.path).unlink()
+    end = time.monotonic() + 5
+    while file.written.active and time.monotonic() < end:
+        time.sleep(0.01)
+    assert "it was moved or removed" in file.written.trouble
+    file.close()
+
+
+def test_a_slow_disk_holds_nobody_up_and_what_is_not_written_is_counted(
+    tmp_path, monkeypatch
+) -> None:
+    monkeypatch.setattr(writing, "_BACKLOG", 2**16)
+    go, write = threading.Event(), disk_room.Disk.write
+    file = RecordingFile(tmp_path / "slow.mcap")
+
+    def slow(self, data):
+        go.wait(10)
+        write(self, data)
+
+    monkeypatch.setattr(disk_room.Disk, "write", slow)
+    began = time.monotonic()
+    for n in range(1000):
+        file.put(m.LINES, n * 1e-3, LINE)
+    assert time.monotonic() - began < 1.0
+    go.set()
+    file.close()
+    assert file.written.lost > 800
+    assert file.written.lost + file.written.messages == 1000
+    with Recording(file.path) as recording:
+        assert recording.counts[m.LINES.name] == file.written.messages
