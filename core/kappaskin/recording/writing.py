@@ -16,7 +16,7 @@ from kappaskin.recording.messages import TOPICS, Topic
 FORMAT = 1
 """Version of what our own messages mean."""
 
-_FLUSH = 0.2  # s between two times that all there is goes to the file: what a killed process loses
+_FLUSH = 0.1  # s between two times that all there is goes to the file: what a killed process loses
 _SYNC = 2.0  # s between two times that the file goes to the disk: what a loss of power takes
 _CHUNK = 2**20  # bytes
 _BACKLOG = 2**26  # bytes that may wait for the disk

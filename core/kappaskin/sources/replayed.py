@@ -221,11 +221,13 @@ class ReplayedSource:
         return frames
 
     def _give(self, ready: _Ready) -> Frame:
-        """The frame, as if it had come now."""
+        """The frame, as if it had come when it was due."""
         self._sensor, frame = ready.sensor, ready.frame
         self._last = ready.mark
-        now = self._clock()
-        return replace(frame, host_time=now, taken=now - (frame.host_time - frame.taken))
+        came = self._clock()
+        if self._speed:
+            came = self._since + (self._place(ready.mark[0]) - self._from) / self._speed
+        return replace(frame, host_time=came, taken=came - (frame.host_time - frame.taken))
 
     @property
     def sensor(self) -> Sensor | None:

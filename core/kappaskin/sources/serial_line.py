@@ -108,7 +108,8 @@ class SerialSource:
                 tape.came(now, encode_samples(sequence, began, channels, counts, 4))
         tape.mapped(math.nan, self._means.times.known)
         self._told = self._means.times.known
-        tape.came(self._clock(), self._decoder.held)
+        if held := self._decoder.held:
+            tape.came(self._clock(), held)
 
     def _map(self, since: float) -> None:
         """Take note of what is known of the clock from the scan at device time `since` on."""
