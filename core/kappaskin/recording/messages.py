@@ -1,6 +1,7 @@
 """The messages of a recording: standard ones of ROS 2 where there are, and our own, with units."""
 
 import struct
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from kappaskin.errors import Refusal
@@ -217,13 +218,34 @@ TOPICS = (
 )
 """Every channel that a recording has."""
 
+FRAME = "skin"
+"""The coordinate frame of everything that has one."""
+
 _LINE = struct.Struct("<4sd?3xI")
+_CONTACT = struct.Struct("<4siII5s7xQ4d4?4xq40d")
 _HEAD = b"\0\1\0\0"
 
 
 def pack_line(host_time: float, sent: bool, data: bytes) -> bytes:
     """The message `LINE`: as `cdr.encode` makes it, at a twentieth of the cost."""
     return _LINE.pack(_HEAD, host_time, sent, len(data)) + data
+
+
+def pack_contact(
+    stamp: int,
+    sequence: int,
+    times: Iterable[float],
+    flags: Iterable[bool],
+    spare: int,
+    numbers: Iterable[float],
+) -> bytes:
+    """The message `CONTACT` of the frame `FRAME`: as `cdr.encode` makes it, at a third of the cost.
+
+    Its fields in their order: four `times`, four `flags`, and from the noise on 40 `numbers`.
+    """
+    name = FRAME.encode() + b"\0"
+    head = _HEAD, *divmod(stamp, 10**9), len(name), name
+    return _CONTACT.pack(*head, sequence, *times, *flags, spare, *numbers)
 
 
 def unpack_line(message: bytes) -> tuple[float, bool, bytes]:

@@ -86,6 +86,8 @@ _Kind = TypeVar("_Kind")
 
 def record_at(file: IO[bytes], at: int, size: int) -> Record:
     """The record at the byte `at` of a `file` of `size` bytes."""
+    if not 0 <= at <= size:
+        raise Spoilt("it is said to begin beyond the end")
     file.seek(at)
     head = file.read(_HEAD.size)
     if len(head) < _HEAD.size:
@@ -110,10 +112,7 @@ def unpacked(body: bytes) -> bytes:
     chunk = parsed(Chunk, body)
     if chunk.uncompressed_size > LARGEST:
         raise Spoilt(f"a chunk says that it holds {chunk.uncompressed_size} bytes")
-    try:
-        data = _decompressed(chunk.compression, chunk.data)
-    except _FAULTS as error:
-        raise Spoilt(f"a chunk cannot be decompressed ({error!s:.80})") from error
+    data = decompressed(chunk.compression, chunk.data)
     if len(data) != chunk.uncompressed_size or (
         chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc
     ):
@@ -121,13 +120,16 @@ def unpacked(body: bytes) -> bytes:
     return data
 
 
-def _decompressed(compression: str, data: bytes) -> bytes:
-    """The bytes, at most one more than are allowed."""
-    if compression == "zstd":
-        with zstandard.ZstdDecompressor().stream_reader(data) as reader:
-            return reader.read(LARGEST + 1)
-    if compression == "lz4":
-        return lz4.frame.LZ4FrameDecompressor().decompress(data, LARGEST + 1)
+def decompressed(compression: str, data: bytes) -> bytes:
+    """The bytes as far as they are there, at most one more than are allowed."""
+    try:
+        if compression == "zstd":
+            with zstandard.ZstdDecompressor().stream_reader(data) as reader:
+                return reader.read(LARGEST + 1)
+        if compression == "lz4":
+            return lz4.frame.LZ4FrameDecompressor().decompress(data, LARGEST + 1)
+    except _FAULTS as error:
+        raise Spoilt(f"a chunk cannot be decompressed ({error!s:.80})") from error
     if compression:
         raise Spoilt(f"a chunk is compressed by {compression!r:.20}, which nobody here knows")
     return data

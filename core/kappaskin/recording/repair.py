@@ -6,10 +6,8 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
-import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from mcap.writer import CompressionType, Writer
@@ -22,6 +20,7 @@ from kappaskin.recording.reading import (
     MAGIC,
     Record,
     Spoilt,
+    decompressed,
     parsed,
     record_at,
     records_in,
@@ -91,7 +90,7 @@ class _Repair:
     def run(self, told: Callable[[float], object]) -> Repaired:
         disk = Disk(part_of(self._out))
         try:
-            self._writer = Writer(disk, _CHUNK, CompressionType.ZSTD)
+            self._writer = Writer(disk, _CHUNK, CompressionType.LZ4)
             self._begin()
             for at in self._through():
                 told(at / self._size)
@@ -203,16 +202,15 @@ class _Repair:
     def _save_part(self) -> None:
         """Of a chunk that is cut off by the end of the file, save what comes before that."""
         body = self._data[self._at + 9 : min(self._size, self._at + 9 + LARGEST)]
-        zstd = body[_COMPRESSION - 9 :].startswith(_NAMES[0])
+        name = next((n for n in _NAMES if body[_COMPRESSION - 9 :].startswith(n)), None)
         cut_off = self._at + 9 + int.from_bytes(self._data[self._at + 1 : self._at + 9], "little")
-        if self._data[self._at] != Opcode.CHUNK or not zstd or cut_off <= self._size:
+        if self._data[self._at] != Opcode.CHUNK or name is None or cut_off <= self._size:
             return
-        packed = body[_COMPRESSION - 9 + len(_NAMES[0]) + 8 :]
+        packed = body[_COMPRESSION - 9 + len(name) + 8 :]
         try:
-            with zstandard.ZstdDecompressor().stream_reader(BytesIO(packed)) as reader:
-                for code, record in records_in(reader.read(LARGEST)):
-                    self._take(code, record)
-        except (Spoilt, zstandard.ZstdError):
+            for code, record in records_in(decompressed(name[4:].decode(), packed)):
+                self._take(code, record)
+        except Spoilt:
             return
 
     def _take(self, code: int, body: bytes) -> None:

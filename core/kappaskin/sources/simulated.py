@@ -17,7 +17,7 @@ from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.clock import Known
 from kappaskin.sources.information import from_json, to_json
 from kappaskin.sources.tape import Tape
-from kappaskin.sources.wire import encode_samples
+from kappaskin.sources.wire import encode_scan, pack_runs
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
 _DEPTH = 0.02  # m from the middle of the skin down to the force/torque sensor
@@ -44,6 +44,7 @@ class SimulatedSource:
         self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
         self._tape: Tape | None = None
+        self._listed, self._runs = np.empty(0, np.intp), b""
 
     def _become(self, scene: Scene, due: float, playing: Playing) -> None:
         """Be the device of `scene`, whose next frame is due at device time `due` in s."""
@@ -88,8 +89,10 @@ class SimulatedSource:
         width = 2 if self._simulator.scene.transduction.converter.bits <= 16 else 4
         for frame in frames:
             tape.simulated(frame)
-            sent = frame.sequence, frame.device_time, frame.channels, frame.counts, width
-            tape.came(frame.host_time, encode_samples(*sent))
+            if frame.channels is not self._listed:  # scans of one list share it
+                self._listed, self._runs = frame.channels, pack_runs(frame.channels)
+            sent = frame.sequence, frame.device_time, self._runs, frame.counts, width
+            tape.came(frame.host_time, encode_scan(*sent))
 
     @property
     def playing(self) -> Playing:

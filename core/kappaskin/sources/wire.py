@@ -135,7 +135,12 @@ def encode_samples(
     sequence: int, time: float, channels: NDArray[np.intp], counts: Counts, width: int
 ) -> bytes:
     """The bytes of a samples message with `width` (2 or 4) bytes per count."""
-    payload = bytes([width]) + pack_runs(channels) + counts.astype(f"<i{width}").tobytes()
+    return encode_scan(sequence, time, pack_runs(channels), counts, width)
+
+
+def encode_scan(sequence: int, time: float, runs: bytes, counts: Counts, width: int) -> bytes:
+    """The bytes of a samples message of the channels that `pack_runs` made `runs` of."""
+    payload = bytes([width]) + runs + counts.astype(f"<i{width}").tobytes()
     return encode(Kind.SAMPLES, sequence, time, payload)
 
 

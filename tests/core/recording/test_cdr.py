@@ -124,3 +124,20 @@ def test_no_bytes_are_read_as_something_that_they_are_not() -> None:
 def test_a_definition_that_is_none_is_a_mistake_of_ours() -> None:
     with pytest.raises(ValueError, match="expected a field"):
         MessageType("pkg/msg/Wrong", "float64")
+
+
+def test_a_contact_is_packed_as_any_other_message() -> None:
+    rng = np.random.default_rng(1)
+    times, flags = rng.normal(size=4).tolist(), [True, False, True, True]
+    numbers = rng.normal(size=40)
+    message = m.pack_contact(17 * 10**9 + 5, 2**40, times, flags, -3, numbers.tolist())
+    read = theirs(m.CONTACT, message)
+    names = [field.name for field in m.CONTACT.fields]
+    head, rest = names[: names.index("noise")], names[names.index("noise") :]
+    assert (read.header.stamp.sec, read.header.stamp.nanosec) == (17, 5)
+    assert read.header.frame_id == m.FRAME
+    assert [getattr(read, name) for name in head[1:]] == [2**40, *times, *flags, -3]
+    assert np.concatenate([np.ravel(getattr(read, name)) for name in rest]).tolist() == (
+        numbers.tolist()
+    )
+    assert encode(m.CONTACT, decode(m.CONTACT, message)) == message
