@@ -3,23 +3,38 @@
 import io
 import tomllib
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass
+from contextlib import closing, suppress
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from mcap.writer import Writer
 
-from kappaskin import SCENES, Calibration, load_scene
+from kappaskin import (
+    SCENES,
+    Calibration,
+    Event,
+    Frame,
+    Pipeline,
+    Recording,
+    Refusal,
+    SensorLayout,
+    Setup,
+    load_scene,
+)
 from kappaskin.calibration import Tare, Tares
 from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.calibration.file import from_toml, to_toml
 from kappaskin.effects import SECOND_GENERATION_LOOPS, Creep
 from kappaskin.mechanics import HeightMap, Mesh
+from kappaskin.recorder import Recorder
+from kappaskin.recording.messages import TOPICS
+from kappaskin.recording.repair import repair
 from kappaskin.scene import read_scene
-from kappaskin.sources import information
+from kappaskin.sources import ReplayedSource, SimulatedSource, information
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
 from kappaskin.sources.wire import (
     Command,
@@ -31,6 +46,7 @@ from kappaskin.sources.wire import (
     encode_reply,
     encode_samples,
 )
+from kappaskin.verify import Verdict, verifying
 
 Read = Callable[[bytes, Path], object]
 
@@ -190,6 +206,90 @@ _ASCII = (
 )
 _BINARY = bytes(80) + (4).to_bytes(4, "little") + bytes(4 * 50)
 
+# Recordings
+
+
+def _recording(data: bytes, folder: Path) -> None:
+    """A file: told of, played, verified and repaired."""
+    path, out = folder / "read.mcap", folder / "repaired.mcap"
+    path.write_bytes(data)
+    out.unlink(missing_ok=True)
+    with suppress(Refusal):
+        repair(path, out)
+    for place in (path, out):
+        if place.exists():
+            with suppress(Refusal):
+                _played(place)
+
+
+def _played(path: Path) -> None:
+    with Recording(path) as recording:
+        for name in recording.attachments:
+            with suppress(Refusal):
+                recording.attachment(name)
+    with suppress(Refusal):
+        *_, verdict = verifying(path)
+        if not isinstance(verdict, Verdict):
+            raise TypeError(f"expected a verdict, got {verdict}")
+    with closing(ReplayedSource(path, sleep=lambda seconds: None)) as source:
+        for at in (source.length, 0.0):
+            source.seek(at, 10.0)
+            source.read(0.0)
+            source.step(-1)
+            source.read(0.0)
+
+
+def _messages(data: bytes, folder: Path) -> None:
+    """Messages of any topic, in a file of which everything else is right."""
+    path = folder / "messages.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2", "kappaskin")
+        numbers = []
+        for name, kind in TOPICS:
+            schema = writer.register_schema(kind.name, "ros2msg", kind.definition)
+            numbers.append(writer.register_channel(name, "cdr", schema))
+        at, stamp = 0, 0
+        while at + 3 <= len(data):
+            topic, size = data[at] % len(TOPICS), int.from_bytes(data[at + 1 : at + 3], "little")
+            stamp += 10**6
+            writer.add_message(numbers[topic], stamp, data[at + 3 : at + 3 + size], stamp)
+            at += 3 + size
+        writer.finish()
+    _played(path)
+
+
+def _recorded() -> tuple[bytes, bytes]:
+    """A file of a few frames of a small skin, and its messages one after the other."""
+    scene = load_scene("centre")
+    scene = replace(scene, layout=SensorLayout.regular(scene.plate.patch, 3, 3))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "a.mcap"
+        source, recorder = SimulatedSource(scene), Recorder(path, 0.0)
+        source.record(recorder)
+        recorder.plays(scene)
+        pipeline = Pipeline(source.sensor, Setup(Ni=3, Nj=3, nx=5, ny=5))
+        recorder.set_up(pipeline)
+        recorder.remembered(pipeline.remembered())
+        recorder.happened(Event(0.0, "note", "seed"))
+        frames: list[Frame] = []
+        while len(frames) < 4:
+            frames += source.read(0.1)
+        recorder.left_out(np.zeros(27, np.uint8), np.zeros(27))
+        for frame in frames:
+            recorder.take(frame, pipeline(frame))
+        recorder.close()
+        names = [topic.name for topic in TOPICS]
+        with Recording(path) as recording:
+            messages = [
+                bytes([names.index(got.topic)]) + len(got.data).to_bytes(2, "little") + got.data
+                for got in recording.messages()
+            ]
+        return path.read_bytes(), b"".join(messages)
+
+
+_FILE, _MESSAGES = _recorded()
+
 TARGETS = (
     Target("wire", _wire, (b"".join(_PIECES), _SCAN * 3), (b"\x4b\xa7", _SCAN[:22], _SCAN)),
     Target(
@@ -204,6 +304,8 @@ TARGETS = (
     ),
     Target("calibration", _calibration, (_calibrated(3), _calibrated(1)), _TOML),
     Target("tares", _tares, (_tared(),), _TOML),
+    Target("recording", _recording, (_FILE,), (b"\x06", b"\x04\0\0\0lz4", b"\xff" * 8)),
+    Target("messages", _messages, (_MESSAGES,), (b"\0\1\0\0", b"\xff" * 4, *_JSON)),
     Target("ply", _mesh("ply"), (_PLY[:4000], _PLY), (*_NUMBERS, b"element face ", b"\nproperty ")),
     Target(
         "obj", _mesh("obj"), (_OBJ,), (*_NUMBERS, b"\nf ", b"\nv ", b"\nvn ", b"//", b"\nmtllib ")

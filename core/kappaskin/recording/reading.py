@@ -40,7 +40,15 @@ LARGEST = 2**26  # bytes of a record, or of what is in a chunk
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _FOOTER = _HEAD.size + 20
-_FAULTS = (McapError, ValueError, struct.error, RuntimeError, zstandard.ZstdError, MemoryError)
+_FAULTS = (
+    McapError,
+    ValueError,
+    OverflowError,
+    struct.error,
+    RuntimeError,
+    zstandard.ZstdError,
+    MemoryError,
+)
 
 
 _KINDS = {topic.name: topic.kind.name for topic in TOPICS}

@@ -3,6 +3,7 @@
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -64,10 +65,19 @@ class ReplayedSource:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._clock, self._sleep = clock, sleep
-        self._recording = recording = Recording(path)
+        self._recording = Recording(path)
+        try:
+            self._begin()
+        except Refusal:
+            self.close()
+            raise
+
+    def _begin(self) -> None:
+        recording = self._recording
         if not recording.counts.get(m.LINES.name):
-            recording.close()
-            raise Refusal(f"{path}: expected bytes of a device, got a recording without any")
+            raise Refusal(
+                f"{recording.path}: expected bytes of a device, got a recording without any"
+            )
         self._first = recording.first
         self.length = (recording.last - recording.first) * 1e-9
         self._gaps, self._happened = self._landmarks()
@@ -86,8 +96,11 @@ class ReplayedSource:
             for a, b in pairwise(chunks)
             if b.first - a.last > _GAP * 1e9
         )
-        logged = self._recording.messages_on(m.EVENTS)
-        return gaps, tuple(self._event(message, self._place(message.stamp)) for message in logged)
+        events: list[Event] = []
+        with suppress(Refusal):  # damage is told of where it is played
+            for message in self._recording.messages_on(m.EVENTS):
+                events.append(self._event(message, self._place(message.stamp)))
+        return gaps, tuple(events)
 
     def _event(self, message: Message, when: float) -> Event:
         said = decode(m.LOG, message.data)
