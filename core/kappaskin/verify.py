@@ -127,12 +127,23 @@ class _Worker:
             text = decode(m.STRING, message.data)["data"]
             self._set_up(setup_from(text, self._recording.attachment))
         elif message.topic == m.LEFT_OUTS.name:
-            said = decode(m.LEFT_OUT, message.data)
-            if pipeline := self._caught_up():
-                pipeline.leave_out(said["kinds"], said["badness"])
+            self._leave_out(decode(m.LEFT_OUT, message.data))
         elif message.topic == m.MEMORIES.name:
             said = decode(m.MEMORY, message.data)
-            self._memory[said["name"]] = said["values"].reshape(said["shape"])
+            shape, values = tuple(said["shape"].tolist()), said["values"]
+            if math.prod(shape) != values.size:
+                raise Refusal(
+                    f"expected {said['name']!r:.40} of {shape}, got {values.size} numbers"
+                )
+            self._memory[said["name"]] = values.reshape(shape)
+
+    def _leave_out(self, said: dict[str, Any]) -> None:
+        if (pipeline := self._caught_up()) is None:
+            return
+        C, sizes = pipeline.sensor.channels, {said["kinds"].size, said["badness"].size}
+        if sizes != {C}:
+            raise Refusal(f"expected {C} channels of which some are left out, got {sizes}")
+        pipeline.leave_out(said["kinds"], said["badness"])
 
     def _meet(self) -> None:
         """Another device, if that is what the next frame is of, has no pipeline yet."""

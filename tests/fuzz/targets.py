@@ -4,7 +4,7 @@ import io
 import tomllib
 from collections.abc import Callable
 from contextlib import closing, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -60,8 +60,8 @@ class Target:
 
     name: str
     read: Read
-    seeds: tuple[bytes, ...]
-    words: tuple[bytes, ...] = ()
+    seeds: tuple[bytes, ...] = field(repr=False)
+    words: tuple[bytes, ...] = field(default=(), repr=False)
 
 
 SENSOR = load_scene("centre").sensor()
