@@ -71,8 +71,13 @@ class ProductBasis(FunctionBasis):
     def _place(self, x: float, y: float) -> Array:
         X = self._jet(x, self.patch.a, self.Ni)
         Y = _ALIKE if self.patch.strip else self._jet(y, self.patch.b, self.Nj)
-        in_x, in_y = np.take(X, _IN_X, axis=0), np.take(Y, _IN_Y, axis=0)
+        in_x, in_y = X.take(_IN_X, axis=0), Y.take(_IN_Y, axis=0)
         return (in_x[:, :, None] * in_y[:, None, :]).reshape(6, self.size)
+
+    def value(self, x: float, y: float, coefficients: Array) -> float:
+        X = self._jet(x, self.patch.a, self.Ni)[0]
+        Y = _ALIKE[0] if self.patch.strip else self._jet(y, self.patch.b, self.Nj)[0]
+        return float(X.dot(coefficients).dot(Y))
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, Ni Nj), at `positions` (P, 2)."""

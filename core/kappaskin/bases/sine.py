@@ -68,11 +68,10 @@ class SineBasis(ProductBasis):
         return k * np.cos(kx) if derivative == 1 else -(k**2) * np.sin(kx)
 
     def _jet(self, x: float, length: float, count: int) -> Array:
-        k, jet = _wavenumbers(length, count), np.empty((3, count))
-        kx = k * x
-        np.sin(kx, out=jet[0])
-        np.multiply(k, np.cos(kx), out=jet[1])
-        np.multiply(-k * k, jet[0], out=jet[2])
+        jet, kx = np.empty((3, count)), _wavenumbers(length, count) * x
+        jet[2] = np.sin(kx, out=jet[0])
+        np.cos(kx, out=jet[1])
+        jet *= _factors(length, count)
         return jet
 
 
@@ -80,3 +79,10 @@ class SineBasis(ProductBasis):
 def _wavenumbers(length: float, count: int) -> Array:
     """The wave numbers i pi/length (count,) in rad/m, from i = 1 on."""
     return np.arange(1.0, count + 1) * np.pi / length
+
+
+@lru_cache(64)
+def _factors(length: float, count: int) -> Array:
+    """What the derivatives of orders 0 to 2 multiply sines and cosines by, (3, count)."""
+    k = _wavenumbers(length, count)
+    return np.stack([np.ones(count), k, -k * k])

@@ -149,8 +149,9 @@ class PointContact:
         Besides the noise, by as much as the point load's own shape disagrees: what lies between is
         finer than the fit's functions.
         """
-        b = fit.estimator.basis.jet(x, y)[:1]
-        fitted, seen = float(b.dot(fit.coefficients.ravel())[0]), float(fit.sd_of(b)[0])
+        shape, covariance = fit.jet(x, y)
+        fitted, seen = float(shape[0]), float(covariance[0, 0])
+        seen = math.sqrt(seen) if seen >= 0 else math.nan
         return fitted, math.hypot(seen, fitted - place.force * place.gives)
 
 
