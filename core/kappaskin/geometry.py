@@ -8,6 +8,7 @@ import numpy as np
 from kappaskin.bases import ORDERS, Basis
 from kappaskin.errors import Refusal
 from kappaskin.fit import Fit
+from kappaskin.fit.fit import seen_through
 from kappaskin.frames import Array, LocalGeometry, Touch
 from kappaskin.patch import Patch
 
@@ -74,7 +75,7 @@ def _geometry(patch: Patch, positions: Array, jet: Jet, covariance: Array) -> Lo
         *_frame(patch, positions, jet),
         _matrix(xx, xy, xy, yy),
         np.array(_torsion_form(jet, H)).T,
-        to_form @ covariance @ to_form.mT,
+        seen_through(to_form, covariance),
     )
 
 

@@ -167,10 +167,12 @@ class Pipeline:
         return self.fit.follow(curvature, times.reshape(curvature.shape), held)
 
     def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
-        with suppress(RankDeficient):
+        try:
             fit = self._followed(frame, curvature, held)
             if self._is_decided(fit):
                 return fit
+        except RankDeficient:
+            pass
         unknown = np.full_like(held, np.nan)
         return Fit(self.fit, unknown, self._no_shape, self._whole.spreads, 0, np.array(math.nan))
 

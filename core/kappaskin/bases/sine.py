@@ -5,6 +5,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from kappaskin.bases.basis import ORDERS
 from kappaskin.bases.product import ProductBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -57,32 +58,46 @@ class SineBasis(ProductBasis):
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
         k = _wavenumbers(length, count)
         kx = np.multiply.outer(x, k)
+        if derivative == 0:
+            return np.sin(kx)
         end = np.cos(k * length)
         if derivative == -2:
             tilt = np.multiply.outer(x - length / 2, (1 + end) / (2 * k))
             return tilt - np.sin(kx) / k**2 + (1 - end) / (k**3 * length)
         if derivative == -1:
             return ((1 + end) / 2 - np.cos(kx)) / k
-        if derivative == 0:
-            return np.sin(kx)
         return k * np.cos(kx) if derivative == 1 else -(k**2) * np.sin(kx)
 
-    def _jet(self, x: float, length: float, count: int) -> Array:
-        jet, kx = np.empty((3, count)), _wavenumbers(length, count) * x
-        jet[2] = np.sin(kx, out=jet[0])
-        np.cos(kx, out=jet[1])
-        jet *= _factors(length, count)
-        return jet
+    @cached_property
+    def _waves(self) -> "_Waves":
+        return _Waves(*self.wavenumbers)
+
+    def _factors(self, x: float, y: float) -> tuple[Array, Array]:
+        factors = self._waves(x, y)
+        return factors[:, : self.Ni], factors[:, self.Ni :]
+
+
+class _Waves:
+    """Sines of x and of y with their derivatives, all from one exponential."""
+
+    def __init__(self, ki: Array, kj: Array) -> None:
+        k = np.concatenate([ki, kj])
+        of_y = np.arange(len(k)) >= len(ki)
+        self._turns = 1j * np.stack([k * ~of_y, k * of_y])
+        along_x, along_y = np.array(ORDERS).T[:, :, None]
+        order = np.where(of_y, along_y, along_x)
+        odd, alike = order % 2 == 1, k == 0  # on a strip: one, which is the cosine of nothing
+        self._which = 2 * np.arange(len(k)) + ~(odd | alike)
+        self._times = k**order * np.where(order == 2, -1, 1)
+
+    def __call__(self, x: float, y: float) -> Array:
+        """Derivatives (6, Ni + Nj) along x and y, in the order of `ORDERS`."""
+        values = np.exp(np.dot((x, y), self._turns)).view(float).take(self._which)
+        values *= self._times
+        return values
 
 
 @lru_cache(64)
 def _wavenumbers(length: float, count: int) -> Array:
     """The wave numbers i pi/length (count,) in rad/m, from i = 1 on."""
     return np.arange(1.0, count + 1) * np.pi / length
-
-
-@lru_cache(64)
-def _factors(length: float, count: int) -> Array:
-    """What the derivatives of orders 0 to 2 multiply sines and cosines by, (3, count)."""
-    k = _wavenumbers(length, count)
-    return np.stack([np.ones(count), k, -k * k])

@@ -11,6 +11,7 @@ from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Compliance
 
 _SECOND = (2, 0), (0, 2), (1, 1)  # orders of the derivatives that flat skins read (Eqs. 3-5)
+_ROUNDING = 1e-15  # of the largest: a part as small is none
 
 Modal = Callable[[Array], Array]
 """Readings K (3 P,) in 1/m, zero where there is none, to M'K (N,)."""
@@ -43,12 +44,25 @@ def _is_grid(layout: SensorLayout) -> bool:
 class _OnGrid:
     def __init__(self, layout: SensorLayout, basis: SineBasis, compliance: Array) -> None:
         maps = [basis.on_grid(*_sides(layout), *order) for order in _SECOND]
-        self._X, self._Y = np.stack([one.X for one in maps]), np.stack([one.Y.T for one in maps])
-        gain = multipliers(basis, layout.gage_length) * compliance.reshape(basis.shape)
-        self._gain = np.ascontiguousarray(gain.swapaxes(1, 2))
-        self._cells = 3, self._Y.shape[2], self._X.shape[1]
+        terms = _products(multipliers(basis, layout.gage_length))
+        self._X = np.hstack([(maps[c].X * along_x).T for c, along_x, _ in terms])
+        self._Y = np.stack([maps[c].Y * along_y for c, _, along_y in terms])
+        self._compliance = compliance.reshape(basis.shape)
+        self._cells = 3, len(maps[0].Y), len(maps[0].X)
+        components = [c for c, _, _ in terms]
+        self._components = ... if components == [0, 1, 2] else components
 
     def __call__(self, readings: Array) -> Array:
-        parts = np.matmul(np.matmul(self._Y, readings.reshape(self._cells)), self._X)
-        parts *= self._gain
-        return np.add.reduce(parts).T.ravel()
+        K = readings.reshape(self._cells)[self._components]
+        along_y = np.matmul(K.mT, self._Y)
+        H = self._X.dot(along_y.reshape(-1, along_y.shape[2]))
+        H *= self._compliance
+        return H.ravel()
+
+
+def _products(factors: Array) -> list[tuple[int, Array, Array]]:
+    """Factors (3, Ni, Nj) as sums of products of one in x and one in y, with their component."""
+    terms: list[tuple[int, Array, Array]] = []
+    for c, (U, s, Vt) in enumerate(np.linalg.svd(one) for one in factors):
+        terms += [(c, U[:, r] * s[r], Vt[r]) for r in np.flatnonzero(s > _ROUNDING * s[0])]
+    return terms

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -73,7 +74,8 @@ class PointContact:
         points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
         self._still = np.flatnonzero(~self.patch.moves(points))
         self._remembered = Remembered[_Tables]()
-        self._remembered(self._live, self._tables)
+        self._whole = self._remembered(self._live, self._tables)
+        self._all_live = bool(self._live.all())
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
@@ -83,31 +85,39 @@ class PointContact:
 
     def __call__(self, curvature: Array, fit: Fit) -> Touch:
         """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
-        used = self._live & np.isfinite(curvature).ravel()
-        K = np.where(used, curvature.ravel(), 0.0)
-        tables = self._remembered(used, self._tables)
-        readings = _Readings(self._modal(K), float(K.dot(K)), tables.spare)
-        explained = self._map(readings.h.reshape(self.basis.shape)) ** 2
+        K, tables, power = self._used(curvature.ravel())
+        readings = _Readings(self._modal(K), power, tables.spare)
+        explained = self._map(readings.h.reshape(self.basis.shape))
+        explained *= explained
         explained /= tables.norm
-        np.put(explained, self._still, 0.0)
+        explained.put(self._still, 0.0)
         row, column = divmod(int(explained.argmax()), len(self._x))
-        least = _threshold(float(np.asarray(fit.spare))) * float(fit.noise) ** 2
+        least = _threshold(float(cast("float", fit.spare))) * float(fit.noise) ** 2
         if not explained[row, column] > least:
             return NO_TOUCH
         x = _highest(self._x, explained[row], column)
         y = _highest(self._y, explained[:, column], row)
         return self._refined(*self.patch.inward(x, y), readings, tables.loads, fit)
 
+    def _used(self, K: Array) -> tuple[Array, _Tables, float]:
+        """The readings that are there, zero for the others, their tables and sum of squares."""
+        power = float(K.dot(K))
+        if self._all_live and math.isfinite(power):
+            return K, self._whole, power
+        used = self._live & np.isfinite(K)
+        K = np.where(used, K, 0.0)
+        return K, self._remembered(used, self._tables), float(K.dot(K))
+
     def _refined(self, x: float, y: float, readings: _Readings, loads: Loads, fit: Fit) -> Touch:
         x, y, place = self._climbed(x, y, readings.h, loads)
         # What a point load leaves of the readings: the noise, or more where it is none.
         spread = math.sqrt(max(readings.power - place.explained, 0.0) / readings.spare)
-        sd_x, sd_y, force_sd = (spread * sd for sd in place.unit_sd)
+        sd_x, sd_y, sd_force = place.unit_sd
         return Touch(
             np.array([x, y]),
-            np.array([sd_x, sd_y]),
+            np.array([spread * sd_x, spread * sd_y]),
             place.force,
-            force_sd,
+            spread * sd_force,
             *self._displacement(fit, x, y, place),
             readings.spare,
             spread < _AS_WELL * float(fit.noise),

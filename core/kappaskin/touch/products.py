@@ -96,6 +96,7 @@ class _Sines:
 
         self._squares = tt = table(ss_x, G, ss_y)
         p, q = np.arange(2.0 * Ni + 1)[:, None], np.arange(2.0 * Nj + 1)
+        # Times the sines of y, and times its cosines.
         self._of_sines = np.vstack(
             [tt, p * tt, table(cc_x, G, ss_y), table(cs_x, G, sc_y), table(ss_x, C, ss_y)]
         )
