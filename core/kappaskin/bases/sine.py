@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kappaskin.bases.basis import ORDERS
 from kappaskin.bases.product import ProductBasis
@@ -84,11 +85,10 @@ class _Waves:
         k = np.concatenate([ki, kj])
         of_y = np.arange(len(k)) >= len(ki)
         self._turns = 1j * np.stack([k * ~of_y, k * of_y])
-        along_x, along_y = np.array(ORDERS).T[:, :, None]
-        order = np.where(of_y, along_y, along_x)
-        odd, alike = order % 2 == 1, k == 0  # on a strip: one, which is the cosine of nothing
-        self._which = 2 * np.arange(len(k)) + ~(odd | alike)
-        self._times = k**order * np.where(order == 2, -1, 1)
+        order = np.array([[dx] * len(ki) + [dy] * len(kj) for dx, dy in ORDERS], np.intp)
+        cosines = (order % 2 == 1) | (k == 0)  # on a strip: one, which is the cosine of nothing
+        self._which: NDArray[np.intp] = 2 * np.arange(len(k)) + ~cosines
+        self._times: Array = k**order * np.where(order == 2, -1, 1)
 
     def __call__(self, x: float, y: float) -> Array:
         """Derivatives (6, Ni + Nj) along x and y, in the order of `ORDERS`."""

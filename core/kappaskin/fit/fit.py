@@ -83,7 +83,7 @@ class Fit:
     estimator: "Estimator"
     curvature: Array
     coefficients: Array
-    spreads: "Spread | list[Spread]"
+    spreads: "Spread | Sequence[Spread]"
     spare: ArrayLike
     told_noise: Array | None = None
     steps: ArrayLike = 0
@@ -115,7 +115,7 @@ class Fit:
 
     def _each(self, told: Callable[[Spread], Array], shape: tuple[int, ...]) -> Array:
         """What is `told` of the spread, of this `shape`, for each frame when there are several."""
-        if not isinstance(self.spreads, list):
+        if not isinstance(self.spreads, Sequence):
             return told(self.spreads).reshape(shape)
         once = {id(spread): spread for spread in self.spreads}
         known = {number: told(spread) for number, spread in once.items()}
@@ -150,7 +150,7 @@ class Fit:
         With several frames `rows` are those of all of them, (R, N).
         """
         noise, spreads = self.noise, self.spreads
-        if isinstance(spreads, list):
+        if isinstance(spreads, Sequence):
             unit = self._each(lambda spread: spread.of(rows), (*rows.shape[:-1], rows.shape[-2]))
             noise = noise.reshape(noise.shape + (1,) * (unit.ndim - noise.ndim))
         else:
@@ -198,7 +198,7 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
     spreads: list[Spread] = []
     for fit in fits:
         own = fit.spreads
-        spreads.extend(own if isinstance(own, list) else [own] * len(fit.curvature))
+        spreads.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
     told = [fit.told_noise for fit in fits if fit.told_noise is not None]
     suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
     return Fit(

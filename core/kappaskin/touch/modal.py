@@ -23,8 +23,8 @@ def modal(layout: SensorLayout, basis: Basis, compliance: Compliance, M: Array) 
     Where the elements stand on a grid, and the functions are sines that a load does not mix, M is
     for each component a matrix for x times one for y: a hundredth of the numbers.
     """
-    flat = isinstance(basis, SineBasis) and not basis.patch.base_curvature
-    if flat and _is_grid(layout) and compliance.values.ndim == 1 and compliance.volume is None:
+    unmixed = compliance.values.ndim == 1 and compliance.volume is None
+    if isinstance(basis, SineBasis) and unmixed and _is_grid(layout):
         return _OnGrid(layout, basis, compliance.values)
     return lambda K: K @ M
 
@@ -55,9 +55,9 @@ class _OnGrid:
     def __call__(self, readings: Array) -> Array:
         K = readings.reshape(self._cells)[self._components]
         along_y = np.matmul(K.mT, self._Y)
-        H = self._X.dot(along_y.reshape(-1, along_y.shape[2]))
-        H *= self._compliance
-        return H.ravel()
+        modes: Array = self._X.dot(along_y.reshape(-1, along_y.shape[2]))
+        modes *= self._compliance
+        return modes.ravel()
 
 
 def _products(factors: Array) -> list[tuple[int, Array, Array]]:

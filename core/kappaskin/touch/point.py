@@ -105,8 +105,8 @@ class PointContact:
         if self._all_live and math.isfinite(power):
             return K, self._whole, power
         used = self._live & np.isfinite(K)
-        K = np.where(used, K, 0.0)
-        return K, self._remembered(used, self._tables), float(K.dot(K))
+        known = np.where(used, K, 0.0)
+        return known, self._remembered(used, self._tables), float(known.dot(known))
 
     def _refined(self, x: float, y: float, readings: _Readings, loads: Loads, fit: Fit) -> Touch:
         x, y, place = self._climbed(x, y, readings.h, loads)

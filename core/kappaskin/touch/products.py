@@ -68,7 +68,8 @@ class _Dense:
         GF = np.array([blas.dsymv(1.0, self._G, f) for f in F])
         (tt, tx, ty), (_, xx, xy), (_, _, yy) = (GF @ F.T).tolist()
         gives = float(F[0] @ blas.dsymv(1.0, self._C, F[0]))
-        return Products(tt, tx, ty, xx, xy, yy, *(F @ h).tolist(), gives)
+        hh, hx, hy = (F @ h).tolist()
+        return Products(tt, tx, ty, xx, xy, yy, hh, hx, hy, gives)
 
 
 # Products of two sines are sums of few waves: with t = pi x/a,
@@ -101,7 +102,8 @@ class _Sines:
             [tt, p * tt, table(cc_x, G, ss_y), table(cs_x, G, sc_y), table(ss_x, C, ss_y)]
         )
         self._of_cosines = np.vstack([q * tt, table(ss_x, G, cc_y)])
-        self._turn_x, self._turn_y = 1j * kx * p.ravel(), 1j * ky * q
+        self._turns = np.zeros((2, p.size + q.size), complex)
+        self._turns[0, : p.size], self._turns[1, p.size :] = 1j * kx * p.ravel(), 1j * ky * q
         self._jet_x, self._jet_y = (
             np.stack([k * np.arange(1.0, count + 1), np.ones(count)], axis=-1)
             for k, count in ((kx, Ni), (ky, Nj))
@@ -116,8 +118,8 @@ class _Sines:
     def at(self, x: float, y: float, h: Array) -> Products:
         Ni, Nj = self._shape
         # Cosine and sine (..., 2) of each wave.
-        X = np.exp(self._turn_x * x).view(float).reshape(-1, 2)
-        Y = np.exp(self._turn_y * y).view(float).reshape(-1, 2)
+        waves = np.exp(np.dot((x, y), self._turns)).view(float).reshape(-1, 2)
+        X, Y = waves[: 2 * Ni + 1], waves[2 * Ni + 1 :]
         by_sines = self._of_sines.dot(Y[:, 1]).reshape(5, -1).dot(X).tolist()
         by_cosines = self._of_cosines.dot(Y[:, 0]).reshape(2, -1).dot(X).tolist()
         (_, tt), (p_tt, _), (xx, _), (_, xy), (_, gives) = by_sines
