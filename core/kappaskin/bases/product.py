@@ -111,9 +111,7 @@ class JetProductBasis(ProductBasis):
     def _factors(self, x: float, y: float) -> tuple[Array, Array]:
         X = self._jet(x, self.patch.a, self.Ni)
         Y = _ALIKE if self.patch.strip else self._jet(y, self.patch.b, self.Nj)
-        in_x: Array = X.take(_IN_X, axis=0)
-        in_y: Array = Y.take(_IN_Y, axis=0)
-        return in_x, in_y
+        return X[_IN_X], Y[_IN_Y]
 
 
 def gauss(length: float, count: int) -> tuple[Array, Array]:
