@@ -83,7 +83,7 @@ class Touch:
 
     @property
     def present(self) -> bool:
-        return bool(np.isfinite(self.force))
+        return math.isfinite(self.force)
 
     @property
     def position_95(self) -> Array:

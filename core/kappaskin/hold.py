@@ -24,10 +24,22 @@ class Hold(Remembering):
         self._age = age
         self._values = np.full(channels, np.nan)
         self._times = np.full(channels, -np.inf)
+        self._listed, self._listed_whole = np.empty(0, np.intp), False
+
+    def is_whole(self, frame: Frame) -> bool:
+        """Whether every channel was read; scans of one list share it, so it is seldom counted."""
+        if frame.channels is not self._listed:
+            counts = np.bincount(frame.channels, minlength=len(self._values))
+            self._listed, self._listed_whole = frame.channels, bool((counts == 1).all())
+        return self._listed_whole
 
     def __call__(self, frame: Frame, curvature: Array) -> tuple[Array, Mask]:
         """The `curvature` (3, P) of `frame` with held readings, and which of it is fresh (3, P)."""
         flat = curvature.ravel()
+        if self.is_whole(frame):
+            np.copyto(self._values, flat)
+            self._times.fill(frame.device_time)
+            return curvature, np.isfinite(curvature)
         self._values[frame.channels] = flat[frame.channels]
         self._times[frame.channels] = frame.device_time
         age = frame.device_time - self._times

@@ -87,6 +87,7 @@ class Pipeline:
         self._whole = self.fit.at_rest()
         loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
         self._loosest = math.inf if self.fit.has_prior else loosest
+        self._judged, self._decided = self._whole.spreads, True
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         points = np.stack(np.meshgrid(self._x, self._y), axis=-1).reshape(-1, 2)
         on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
@@ -96,7 +97,6 @@ class Pipeline:
         self.left_out = LeftOut.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
-        self._listed, self._listed_whole = np.empty(0, np.intp), False
         self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
 
     def _ideal(self) -> Fit:
@@ -160,17 +160,28 @@ class Pipeline:
         self.left_out = leave_out(self.left_out, self.fit, kinds, badness, self._loosest)
 
     def _followed(self, frame: Frame, curvature: Array, held: Array) -> Fit:
+        if not self.fit.remembers:
+            return self.fit(held)
         times = np.full(curvature.size, np.nan)
         times[frame.channels] = frame.device_time + self._read_at[: len(frame.channels)]
         return self.fit.follow(curvature, times.reshape(curvature.shape), held)
 
     def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
-        with suppress(RankDeficient):
+        try:
             fit = self._followed(frame, curvature, held)
-            if np.linalg.norm(fit.unit_sd) <= self._loosest:
+            if self._is_decided(fit):
                 return fit
+        except RankDeficient:
+            pass
         unknown = np.full_like(held, np.nan)
         return Fit(self.fit, unknown, self._no_shape, self._whole.spreads, 0, np.array(math.nan))
+
+    def _is_decided(self, fit: Fit) -> bool:
+        """Whether a shape's error bars are told; fits to the same channels mostly share them."""
+        if fit.spreads is not self._judged:
+            self._judged, norm = fit.spreads, np.linalg.norm(fit.unit_sd)
+            self._decided = bool(norm <= self._loosest)
+        return self._decided
 
     def __call__(self, frame: Frame) -> Estimate:
         nominal = self.sensor.nominal(frame)
@@ -246,7 +257,7 @@ class Pipeline:
         """Remember the readings of a frame of which nobody waits for the estimate."""
         if self.past.correct is None and not self.fit.remembers:
             # Of those, what a later scan of every channel replaces need never be worked out.
-            if self._is_whole(frame):
+            if self.past.hold.is_whole(frame):
                 self.past.passed.clear()
             self.past.passed.append(frame)
             return
@@ -258,17 +269,10 @@ class Pipeline:
                 out = self.left_out
                 self._followed(frame, out(curvature), out(held))
 
-    def _is_whole(self, frame: Frame) -> bool:
-        """Whether every channel was read; scans of one list share it, so it is seldom counted."""
-        if frame.channels is not self._listed:
-            counts = np.bincount(frame.channels, minlength=self.sensor.channels)
-            self._listed, self._listed_whole = frame.channels, bool((counts == 1).all())
-        return self._listed_whole
-
     def _catch_up(self, frame: Frame) -> None:
         """Remember the frames passed over, where `frame` does not replace all their readings."""
         passed = self.past.passed
-        if passed and not self._is_whole(frame):
+        if passed and not self.past.hold.is_whole(frame):
             for earlier in passed:
                 self.past.hold(earlier, self.curvature(earlier))
         passed.clear()
@@ -285,12 +289,10 @@ class Pipeline:
             self._truths[key] = basis, basis.on_grid(self._x, self._y)
         basis, true_map = self._truths[key]
         true_surface = true_map(truth.coefficients)
-        rms = math.sqrt(float(np.mean((surface - true_surface)[self._skin] ** 2)))
+        off = (surface - true_surface)[self._skin].ravel()
+        rms = math.sqrt(float(off.dot(off)) / off.size)
         x, y = truth.contact.tolist()
-        at_load = float(
-            self.basis.jet(x, y)[0] @ coefficients.ravel()
-            - basis.jet(x, y)[0] @ truth.coefficients.ravel()
-        )
+        at_load = self.basis.value(x, y, coefficients) - basis.value(x, y, truth.coefficients)
         return true_surface, truth.contact, at_load, rms
 
 

@@ -8,6 +8,7 @@ writer makes odd, or changes, while it writes, and a reader that saw it change r
 import pickle
 from collections.abc import Callable
 from multiprocessing.shared_memory import SharedMemory
+from operator import attrgetter
 from typing import Any, cast
 
 import numpy as np
@@ -93,6 +94,24 @@ def _estimate(record: Any) -> Estimate:
     return Estimate(*(read(record, name) for name in names))
 
 
+_Column = tuple[Callable[[Estimate], Any], Any]
+
+
+def _columns(slots: Any) -> list[_Column]:
+    """For each number or array of an estimate how to get it, and where it goes in all `slots`.
+
+    To look for a field by its name in one slot takes longer than to write it.
+    """
+    columns: list[_Column] = []
+    for name in slots.dtype.names[1:-1]:
+        parts = slots[name].dtype.names if name in _RECORDS else None
+        if parts is None:
+            columns.append((attrgetter(name), slots[name]))
+        else:
+            columns += [(attrgetter(f"{name}.{part}"), slots[name][part]) for part in parts]
+    return columns
+
+
 class Ring:
     """The block of memory: one process writes, another reads and owns it."""
 
@@ -107,6 +126,9 @@ class Ring:
             buffer, np.uint8, offset=_HEADER + _STATUS_SIZE
         )
         self._slots: Any = None
+        self._opened: Any = None
+        self._closed: Any = None
+        self._columns: list[_Column] = []
         self._generation = 0
 
     # The header: status count, status length, generation of the slots, slots written.
@@ -157,21 +179,20 @@ class Ring:
         """Writer: begin anew with slots for estimates of `generation` (above zero)."""
         self._header[self._GENERATION] = 0
         self._map(slot)
-        self._slots["opened"] = self._slots["closed"] = 0
+        self._opened, self._closed = self._slots["opened"], self._slots["closed"]
+        self._columns = _columns(self._slots)
+        self._opened[:] = self._closed[:] = 0
         self._header[self._WRITTEN] = 0
         self._header[self._GENERATION] = generation
 
     def write(self, estimate: Estimate) -> None:
         """Writer: put one estimate into the next slot."""
         written = int(self._header[self._WRITTEN])
-        slot = self._slots[written % len(self._slots)]
-        slot["opened"] = written + 1
-        for name in slot.dtype.names[1:-1]:
-            value = getattr(estimate, name)
-            if name in _RECORDS:
-                value = tuple(getattr(value, part) for part in slot.dtype[name].names)
-            slot[name] = value
-        slot["closed"] = written + 1
+        place = written % len(self._slots)
+        self._opened[place] = written + 1
+        for value_of, column in self._columns:
+            column[place] = value_of(estimate)
+        self._closed[place] = written + 1
         self._header[self._WRITTEN] = written + 1
 
     def read(self, generation: int, slot: np.dtype[np.void]) -> Estimate | None:
@@ -198,6 +219,7 @@ class Ring:
     def close(self) -> None:
         """Let go of the memory."""
         del self._header, self._status, self._area, self._slots
+        del self._opened, self._closed, self._columns
         self._memory.close()
 
     def destroy(self) -> None:

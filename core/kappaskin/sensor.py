@@ -78,7 +78,8 @@ class Sensor:
 
     def nominal(self, frame: Frame) -> Array:
         """Curvature (3 P,) in 1/m as Eq. 8 reads it; NaN where dead, unscanned or on a rail."""
-        flat = np.full(self.channels, np.nan)
+        flat = np.empty(self.channels)
+        flat.fill(np.nan)
         flat[frame.channels] = self.transduction.curvature(frame.counts)
         if self._dead is not None:
             flat[self._dead] = np.nan

@@ -360,6 +360,27 @@ def test_the_error_bars_are_the_scatter_of_noisy_shapes(name):
     np.testing.assert_allclose(values.mean(axis=0), getattr(exact, name), atol=0.1 * told.min())
 
 
+@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+def test_the_error_bars_are_those_of_how_the_curvature_changes_with_each_coefficient(patch):
+    basis, c = sine_surface(patch)
+    step = 1e-7
+
+    def form(shape):
+        unsure = DenseSpread(lambda: np.zeros((12, 12))).of
+        K = surface_geometry(basis, shape, HERE[:3], unsure).curvature_form
+        return np.stack([K[:, 0, 0], K[:, 1, 1], K[:, 0, 1]], axis=-1)
+
+    changes = [
+        (form(c + step * one.reshape(4, 3)) - form(c - step * one.reshape(4, 3))) / (2 * step)
+        for one in np.eye(12)
+    ]
+    told = surface_geometry(basis, c, HERE[:3], DenseSpread(lambda: np.eye(12)).of).covariance
+
+    expected = np.einsum("npi,npj->pij", changes, changes)
+    np.testing.assert_allclose(told, expected, rtol=1e-6, atol=1e-6 * expected.max())
+    assert np.abs(form(c)).max() > 10  # steep enough for every term to count
+
+
 def test_readings_that_are_missing_widen_the_error_bars():
     patch = Patch(0.1, 0.1)
     layout = SensorLayout.regular(patch, 10, 10)

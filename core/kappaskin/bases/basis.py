@@ -62,6 +62,10 @@ class Basis(Protocol):
         """Every function's derivatives at one point, (6, N), in the order of `ORDERS`."""
         ...
 
+    def value(self, x: float, y: float, coefficients: Array) -> float:
+        """The value at one point of the shape with `coefficients` (Ni, Nj)."""
+        ...
+
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> ValueMap:
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""
         ...

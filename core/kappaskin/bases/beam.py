@@ -5,13 +5,13 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from kappaskin.bases.product import ProductBasis
+from kappaskin.bases.product import JetProductBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
 
 @dataclass(frozen=True)
-class ClampedBasis(ProductBasis):
+class ClampedBasis(JetProductBasis):
     """The Ni x Nj products of the modes of clamped beams: zero along the edges, with their slope.
 
     Between the edges they are nearly sines, so that elements at cell centres tell them apart as

@@ -5,13 +5,13 @@ from functools import cached_property
 
 import numpy as np
 
-from kappaskin.bases.product import ProductBasis, gauss
+from kappaskin.bases.product import JetProductBasis, gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
 
 @dataclass(frozen=True)
-class ElasticBasis(ProductBasis):
+class ElasticBasis(JetProductBasis):
     """The Ni x Nj products of 1, 2x/a - 1, sin(pi x/a), sin(2 pi x/a) ... and the same along y.
 
     Every shape with finite bending energy is a sum of them: along x, what is left of a function

@@ -46,3 +46,7 @@ class FunctionBasis(ABC):
             self._last.clear()
             self._last[x, y] = self._place(x, y)
         return self._last[x, y]
+
+    def value(self, x: float, y: float, coefficients: Array) -> float:
+        """The value at one point of the shape with `coefficients` (Ni, Nj)."""
+        return float(self.jet(x, y)[0].dot(coefficients.ravel()))

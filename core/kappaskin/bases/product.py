@@ -53,8 +53,8 @@ class ProductBasis(FunctionBasis):
         """
 
     @abstractmethod
-    def _jet(self, x: float, length: float, count: int) -> Array:
-        """Values, slopes and second derivatives (3, count) of the same at one place."""
+    def _factors(self, x: float, y: float) -> tuple[Array, Array]:
+        """What every derivative at one point is a product of: in x (6, Ni), and in y (6, Nj)."""
 
     def _along_x(self, x: Array, derivative: int) -> Array:
         if derivative not in (-2, -1, 0, 1, 2):
@@ -69,10 +69,12 @@ class ProductBasis(FunctionBasis):
         return self._along(y, self.patch.b, self.Nj, derivative)
 
     def _place(self, x: float, y: float) -> Array:
-        X = self._jet(x, self.patch.a, self.Ni)
-        Y = _ALIKE if self.patch.strip else self._jet(y, self.patch.b, self.Nj)
-        in_x, in_y = np.take(X, _IN_X, axis=0), np.take(Y, _IN_Y, axis=0)
+        in_x, in_y = self._factors(x, y)
         return (in_x[:, :, None] * in_y[:, None, :]).reshape(6, self.size)
+
+    def value(self, x: float, y: float, coefficients: Array) -> float:
+        in_x, in_y = self._factors(x, y)
+        return float(in_x[0].dot(coefficients).dot(in_y[0]))
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
         """Every function's derivative of order `dx`, `dy`, (P, Ni Nj), at `positions` (P, 2)."""
@@ -97,6 +99,19 @@ class ProductBasis(FunctionBasis):
         """
         along_x: Array = np.vstack([-means[1:] / means[0], np.eye(self.Ni - 1)])
         return np.kron(along_x, np.eye(self.Nj)).astype(float)
+
+
+class JetProductBasis(ProductBasis):
+    """Products of functions that are told at one place of a side at a time."""
+
+    @abstractmethod
+    def _jet(self, x: float, length: float, count: int) -> Array:
+        """Values, slopes and second derivatives (3, count) of the same at one place."""
+
+    def _factors(self, x: float, y: float) -> tuple[Array, Array]:
+        X = self._jet(x, self.patch.a, self.Ni)
+        Y = _ALIKE if self.patch.strip else self._jet(y, self.patch.b, self.Nj)
+        return X[_IN_X], Y[_IN_Y]
 
 
 def gauss(length: float, count: int) -> tuple[Array, Array]:

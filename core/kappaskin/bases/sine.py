@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
+from kappaskin.bases.basis import ORDERS
 from kappaskin.bases.product import ProductBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -57,23 +59,42 @@ class SineBasis(ProductBasis):
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
         k = _wavenumbers(length, count)
         kx = np.multiply.outer(x, k)
+        if derivative == 0:
+            return np.sin(kx)
         end = np.cos(k * length)
         if derivative == -2:
             tilt = np.multiply.outer(x - length / 2, (1 + end) / (2 * k))
             return tilt - np.sin(kx) / k**2 + (1 - end) / (k**3 * length)
         if derivative == -1:
             return ((1 + end) / 2 - np.cos(kx)) / k
-        if derivative == 0:
-            return np.sin(kx)
         return k * np.cos(kx) if derivative == 1 else -(k**2) * np.sin(kx)
 
-    def _jet(self, x: float, length: float, count: int) -> Array:
-        k, jet = _wavenumbers(length, count), np.empty((3, count))
-        kx = k * x
-        np.sin(kx, out=jet[0])
-        np.multiply(k, np.cos(kx), out=jet[1])
-        np.multiply(-k * k, jet[0], out=jet[2])
-        return jet
+    @cached_property
+    def _waves(self) -> "_Waves":
+        return _Waves(*self.wavenumbers)
+
+    def _factors(self, x: float, y: float) -> tuple[Array, Array]:
+        factors = self._waves(x, y)
+        return factors[:, : self.Ni], factors[:, self.Ni :]
+
+
+class _Waves:
+    """Sines of x and of y with their derivatives, all from one exponential."""
+
+    def __init__(self, ki: Array, kj: Array) -> None:
+        k = np.concatenate([ki, kj])
+        of_y = np.arange(len(k)) >= len(ki)
+        self._turns = 1j * np.stack([k * ~of_y, k * of_y])
+        order = np.array([[dx] * len(ki) + [dy] * len(kj) for dx, dy in ORDERS], np.intp)
+        cosines = (order % 2 == 1) | (k == 0)  # on a strip: one, which is the cosine of nothing
+        self._which: NDArray[np.intp] = 2 * np.arange(len(k)) + ~cosines
+        self._times: Array = k**order * np.where(order == 2, -1, 1)
+
+    def __call__(self, x: float, y: float) -> Array:
+        """Derivatives (6, Ni + Nj) along x and y, in the order of `ORDERS`."""
+        values = np.exp(np.dot((x, y), self._turns)).view(float).take(self._which)
+        values *= self._times
+        return values
 
 
 @lru_cache(64)

@@ -29,12 +29,14 @@ class LeftOut:
     ideal: Fit
     fit: Fit
     _out: Mask | None
+    _worst: Kinds
 
     @classmethod
     def none(cls, sensor: Sensor, fit: Fit, ideal: Fit) -> "LeftOut":
         """Nothing left out but what `sensor` itself calls dead."""
         shape = sensor.layout.live.shape
-        return cls(np.zeros(shape, np.uint8), np.zeros(shape, bool), ideal, fit, None)
+        kinds = np.zeros(shape, np.uint8)
+        return cls(kinds, np.zeros(shape, bool), ideal, fit, None, kinds[0])
 
     def __call__(self, curvature: Array) -> Array:
         """The `curvature` (3, P) to fit: NaN where it is left out."""
@@ -42,7 +44,7 @@ class LeftOut:
 
     def words(self, suspect: Kinds | None) -> Kinds:
         """What is wrong with each element (P,), of which the fit itself may `suspect` some."""
-        found: Kinds = self.kinds.max(axis=0)
+        found = self._worst
         return found if suspect is None else np.where(found > 0, found, suspect)
 
     @property
@@ -80,9 +82,9 @@ def leave_out(
     fit, count = _most(estimator, worst, loosest)
     out = np.isin(np.arange(kinds.size), worst[:count]).reshape(shape)
     kept = np.isin(np.arange(kinds.size), worst[count:]).reshape(shape)
-    return replace(
-        was, kinds=kinds.reshape(shape).copy(), kept=kept, fit=fit, _out=out if count else None
-    )
+    own = kinds.reshape(shape).copy()
+    worst_of: Kinds = own.max(axis=0)
+    return replace(was, kinds=own, kept=kept, fit=fit, _out=out if count else None, _worst=worst_of)
 
 
 def _most(estimator: Estimator, worst: NDArray[np.intp], loosest: float) -> tuple[Fit, int]:

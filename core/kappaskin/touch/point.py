@@ -2,9 +2,9 @@
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
-from scipy.linalg import blas
 
 from kappaskin.bases import basis_for
 from kappaskin.fit import Fit
@@ -12,6 +12,8 @@ from kappaskin.fit.remembered import Remembered
 from kappaskin.frames import Array, Mask, Touch
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
+from kappaskin.touch.modal import modal
+from kappaskin.touch.products import Loads, Products, loads_on
 
 _SIGNIFICANT = 30.0  # drop of chi-squared below which a contact may be noise found by searching
 _SEARCHED = 49  # points searched along each side
@@ -31,19 +33,20 @@ NO_TOUCH = Touch(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Readings:
-    """Readings K as the contact needs them: M'K (N,), K'K, and how many there are."""
+    """Readings K as the contact needs them: M'K (N,), K'K, and `spare` more than it takes."""
 
     h: Array
     power: float
-    count: int
+    spare: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tables:
-    """What depends on which readings are used: G = M'M (N, N), and T'T (ny, nx) on the grid."""
+    """What depends on which readings are used: T'T everywhere, and on the grid (ny, nx)."""
 
-    G: Array
+    loads: Loads
     norm: Array
+    spare: int
 
 
 class PointContact:
@@ -60,79 +63,81 @@ class PointContact:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
         self.patch, strip = plate.patch, plate.patch.strip
         self.basis = basis_for(self.patch, edge, _FUNCTIONS, 1 if strip else _FUNCTIONS)
-        self._compliance = plate.compliance(self.basis)
-        self._M = self._compliance.after(layout.curvature_operator(self.basis))
+        compliance = plate.compliance(self.basis)
+        self._gives = compliance.after(np.eye(self.basis.size))
+        self._M = compliance.after(layout.curvature_operator(self.basis))
+        self._modal = modal(layout, self.basis, compliance, self._M)
         self._live = layout.live.ravel()
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
         self._map = self.basis.on_grid(self._x, self._y)
         points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
-        self._still = ~self.patch.moves(points).reshape(len(self._y), -1)
-        self._functions = np.where(self._still.reshape(-1, 1), 0.0, self.basis.at(points))
+        self._still = np.flatnonzero(~self.patch.moves(points))
         self._remembered = Remembered[_Tables]()
-        self._remembered(self._live, self._tables)
+        self._whole = self._remembered(self._live, self._tables)
+        self._all_live = bool(self._live.all())
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
         M = self._M[used]
-        G: Array = np.asfortranarray(M.T @ M)
-        squares = np.vecdot(self._functions @ G, self._functions).reshape(self._still.shape)
-        return _Tables(G, np.where(self._still, 1.0, squares))
+        loads = loads_on(self.basis, M.T @ M, self._gives)
+        return _Tables(loads, loads.on_grid(self._x, self._y), max(len(M) - 3, 1))
 
     def __call__(self, curvature: Array, fit: Fit) -> Touch:
         """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
-        used = self._live & np.isfinite(curvature).ravel()
-        K = np.where(used, curvature.ravel(), 0.0)
-        tables = self._remembered(used, self._tables)
-        readings = _Readings(K @ self._M, float(K @ K), int(used.sum()))
-        explained = self._map(readings.h.reshape(self.basis.shape)) ** 2 / tables.norm
-        explained[self._still] = 0.0
+        K, tables, power = self._used(curvature.ravel())
+        readings = _Readings(self._modal(K), power, tables.spare)
+        explained = self._map(readings.h.reshape(self.basis.shape))
+        explained *= explained
+        explained /= tables.norm
+        explained.put(self._still, 0.0)
         row, column = divmod(int(explained.argmax()), len(self._x))
-        least = _threshold(float(np.asarray(fit.spare))) * float(fit.noise) ** 2
+        least = _threshold(float(cast("float", fit.spare))) * float(fit.noise) ** 2
         if not explained[row, column] > least:
             return NO_TOUCH
         x = _highest(self._x, explained[row], column)
         y = _highest(self._y, explained[:, column], row)
-        return self._refined(*self.patch.inward(x, y), readings, tables.G, fit)
+        return self._refined(*self.patch.inward(x, y), readings, tables.loads, fit)
 
-    def _refined(self, x: float, y: float, readings: _Readings, G: Array, fit: Fit) -> Touch:
-        x, y, place = self._climbed(x, y, readings.h, G)
-        spare = max(readings.count - 3, 1)
+    def _used(self, K: Array) -> tuple[Array, _Tables, float]:
+        """The readings that are there, zero for the others, their tables and sum of squares."""
+        power = float(K.dot(K))
+        if self._all_live and math.isfinite(power):
+            return K, self._whole, power
+        used = self._live & np.isfinite(K)
+        known = np.where(used, K, 0.0)
+        return known, self._remembered(used, self._tables), float(known.dot(known))
+
+    def _refined(self, x: float, y: float, readings: _Readings, loads: Loads, fit: Fit) -> Touch:
+        x, y, place = self._climbed(x, y, readings.h, loads)
         # What a point load leaves of the readings: the noise, or more where it is none.
-        spread = math.sqrt(max(readings.power - place.explained, 0.0) / spare)
-        sd = spread * place.unit_sd
+        spread = math.sqrt(max(readings.power - place.explained, 0.0) / readings.spare)
+        sd_x, sd_y, sd_force = place.unit_sd
         return Touch(
             np.array([x, y]),
-            sd[:2],
+            np.array([spread * sd_x, spread * sd_y]),
             place.force,
-            float(sd[2]),
+            spread * sd_force,
             *self._displacement(fit, x, y, place),
-            spare,
+            readings.spare,
             spread < _AS_WELL * float(fit.noise),
-            self._near_rim(x, y, readings.h, G, place.explained - (_REACH * spread) ** 2),
+            self._near_rim(x, y, readings.h, loads, place.explained - (_REACH * spread) ** 2),
         )
 
-    def _climbed(self, x: float, y: float, h: Array, G: Array) -> "tuple[float, float, _Place]":
+    def _climbed(self, x: float, y: float, h: Array, loads: Loads) -> "tuple[float, float, _Place]":
         """The best position from (x, y) on, and what holds at the last step to it."""
         a, b = self.patch.a, self.patch.b
-        place = self._place(x, y, h, G)
+        place = _Place(loads.at(x, y, h))
         for _ in range(_STEPS):
             dx, dy = place.step
             x, y = x + _between(-a / 50, dx, a / 50), y + _between(-b / 50, dy, b / 50)
             x, y = self.patch.inward(x, y)
             if abs(dx) < _CONVERGED * a and abs(dy) < _CONVERGED * b:
                 break
-            place = self._place(x, y, h, G)
+            place = _Place(loads.at(x, y, h))
         return x, y, place
 
-    def _place(self, x: float, y: float, h: Array, G: Array) -> "_Place":
-        # With F the functions and their slopes along x and y, A = F G F' holds the products of T
-        # and its slopes, and F h their products with K.
-        F = self.basis.jet(x, y)[:3]
-        GF = np.array([_times(G, f) for f in F])  # faster than one thin product
-        return _Place(F[0], (GF @ F.T).tolist(), (F @ h).tolist())
-
-    def _near_rim(self, x: float, y: float, h: Array, G: Array, least: float) -> bool:
+    def _near_rim(self, x: float, y: float, h: Array, loads: Loads, least: float) -> bool:
         """Whether the contact is within the shortest half wave of the functions from a held edge.
 
         Or whether a load on the rim beside it explains `least` or more of the readings, as well as
@@ -143,8 +148,8 @@ class PointContact:
         for x_rim, y_rim, share in self.patch.near_rim(x, y, _DOUBTFUL):
             if share < 1 / _FUNCTIONS:
                 return True
-            t = self.basis.jet(x_rim, y_rim)[0]
-            if float(h @ t) ** 2 > least * float(t @ _times(G, t)):
+            there = loads.at(x_rim, y_rim, h)
+            if there.h**2 > least * there.tt:
                 return True
         return False
 
@@ -154,41 +159,33 @@ class PointContact:
         Besides the noise, by as much as the point load's own shape disagrees: what lies between is
         finer than the fit's functions.
         """
-        b = fit.estimator.basis.jet(x, y)[0]
-        fitted = float(b @ fit.coefficients.ravel())
-        seen = float(fit.sd_of(b[None])[0])
-        t = place.functions
-        loaded = place.force * float(t @ self._compliance.after(t[None])[0])
-        return fitted, math.hypot(seen, fitted - loaded)
+        shape, covariance = fit.jet(x, y)
+        fitted, seen = float(shape[0]), float(covariance[0, 0])
+        seen = math.sqrt(seen) if seen >= 0 else math.nan
+        return fitted, math.hypot(seen, fitted - place.force * place.gives)
 
 
 class _Place:
     """The best force at a place, the Gauss-Newton step from there, and the error bars.
 
-    `A` (3, 3) are the products of T, T_x and T_y with each other, `h` (3,) with the readings.
-    `force` is the one after the step.
+    `force` is the one after the step, `gives` how far the skin does there, in m/N.
     """
 
-    def __init__(self, functions: Array, A: list[list[float]], h: list[float]) -> None:
-        (tt, tx, ty), (_, xx, xy), (_, _, yy) = A
-        force, u, v = h[0] / tt, tx / tt, ty / tt
+    def __init__(self, of: Products) -> None:
+        tt, tx, ty, xx, xy, yy, h, hx, hy, self.gives = of
+        force, u, v = h / tt, tx / tt, ty / tt
         # The slopes without what T itself explains of them: S, with the gradient g.
         Sxx, Sxy = xx - u * tx, xy - u * ty
         Syy = yy - v * ty if yy else math.inf  # a strip is alike along y: no step, no error
-        gx, gy = h[1] - u * h[0], h[2] - v * h[0]
+        gx, gy = hx - u * h, hy - v * h
         Cx = max(Sxx - Sxy**2 / Syy, _RIDGE * xx)
         Cy = max(Syy - Sxy**2 / max(Sxx, _RIDGE * xx), _RIDGE * yy)
         dx, dy = (gx - gy * Sxy / Syy) / (Cx * force), (gy - gx * Sxy / Sxx) / (Cy * force)
-        self.functions, self.step, self.explained = functions, (dx, dy), h[0] * force
+        self.step, self.explained = (dx, dy), h * force
         self.force = force * (1 - u * dx - v * dy)
         of_force = math.sqrt(1 / tt + (u - v * Sxy / Syy) ** 2 / Cx + v**2 / Syy)
-        self.unit_sd = np.array([1 / math.sqrt(Cx), 1 / math.sqrt(Cy), of_force * abs(force)])
-        self.unit_sd /= abs(force)
-
-
-def _times(G: Array, f: Array) -> Array:
-    """G f, of which a symmetric G in Fortran's order is read only half."""
-    return blas.dsymv(1.0, G, f)
+        strength = abs(force)
+        self.unit_sd = 1 / math.sqrt(Cx) / strength, 1 / math.sqrt(Cy) / strength, of_force
 
 
 def _between(low: float, value: float, high: float) -> float:
