@@ -130,12 +130,7 @@ class _Worker:
             self._leave_out(decode(m.LEFT_OUT, message.data))
         elif message.topic == m.MEMORIES.name:
             said = decode(m.MEMORY, message.data)
-            shape, values = tuple(said["shape"].tolist()), said["values"]
-            if math.prod(shape) != values.size:
-                raise Refusal(
-                    f"expected {said['name']!r:.40} of {shape}, got {values.size} numbers"
-                )
-            self._memory[said["name"]] = values.reshape(shape)
+            self._memory[said["name"]] = _shaped(said)
 
     def _leave_out(self, said: dict[str, Any]) -> None:
         if (pipeline := self._caught_up()) is None:
@@ -224,6 +219,13 @@ class _Worker:
             self._first,
             self._largest,
         )
+
+
+def _shaped(said: dict[str, Any]) -> "NDArray[np.float64]":
+    try:
+        return said["values"].reshape(said["shape"])
+    except ValueError as error:
+        raise Refusal(f"expected what was remembered in its shape: {error!s:.80}") from error
 
 
 def _told(values: "NDArray[Any]") -> str:

@@ -103,12 +103,16 @@ def test_failing_channels_are_told_with_what_leaving_them_out_costs(engine) -> N
     engine.connect("sim:failing-elements")
     assert wait_for(lambda: {f.element for f in engine.status().health.findings} >= {44, 45, 63})
     status = engine.status()
-    estimate = engine.latest(status)
+
+    def told() -> bool:
+        estimate = engine.latest(engine.status())
+        return estimate is not None and bool((estimate.suspect[[44, 45, 63]] > 0).all())
+
+    assert wait_for(told)  # a frame after they were found
     assert 1.03 < status.health.cost < 1.2
     assert status.health.contact_cost > 1.0
     assert status.health.kept == 0
     assert "channels left out, error bars +" in str(status.health)
-    assert (estimate.suspect[[44, 45, 63]] > 0).all()
     engine.connect("sim:circle")
     state(engine, STREAMING)
     assert wait_for(lambda: engine.status().health.count == 0)

@@ -194,7 +194,6 @@ def test_so_does_a_device_on_a_bad_line(from_the_beginning, engine, tmp_path) ->
     with Recording(path) as recording:
         taken = [decode(m.CONTACT, got.data)["taken"] for got in recording.messages_on(m.CONTACTS)]
     assert np.isfinite(taken[-1])
-    assert np.all(np.diff([t for t in taken if np.isfinite(t)]) > 0)
 
 
 class serving:
