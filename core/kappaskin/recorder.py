@@ -18,7 +18,7 @@ from kappaskin.sources.clock import Known
 _CONTACTS = 1000.0  # a second at most
 _HEAVY = 50.0  # a second at most, of what is as large as a frame
 _BYTES = 4e6  # a second at most, of that
-_SLACK = 0.5  # of an interval, by which one may come early
+_BURST = 5  # that may come at once, as frames do
 _INFO = 20  # what a log calls what is no warning
 _FLOAT32 = 7  # what a point cloud calls it
 _NO_TRUTH = Truth(np.empty((0, 0)), np.full(2, math.nan), "")
@@ -37,7 +37,7 @@ class Recorder:
         self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)  # told last, and its layout
         self._attached: set[str] = set()
         self._views: _Views | None = None
-        self._contact = self._heavy = -math.inf
+        self._contacts = _Room(_CONTACTS)
 
     @property
     def written(self) -> Written:
@@ -142,11 +142,9 @@ class Recorder:
         views, time = self._views, estimate.host_time
         if views is None:
             return
-        if time - self._contact >= (1 - _SLACK) / _CONTACTS:
-            self._contact = time
+        if self._contacts(time):
             self._file.put(m.CONTACTS, time, _contact(estimate, self._file.stamp(time)))
-        if time - self._heavy >= views.interval:
-            self._heavy = time
+        if views.room(time):
             for topic, data in views.heavy(frame, estimate, self._file.stamp(time)):
                 self._file.put(topic, time, data)
 
@@ -161,6 +159,19 @@ def _same(a: Truth, b: Truth) -> bool:
         return False
     shapes = a.coefficients.shape, b.coefficients.shape
     return shapes[0] == shapes[1] and a.coefficients.tobytes() == b.coefficients.tobytes()
+
+
+class _Room:
+    """Says of each time whether there is room for something that is wanted at a `rate` at most."""
+
+    def __init__(self, rate: float) -> None:
+        self._period, self._next = 1 / rate, -math.inf
+
+    def __call__(self, time: float) -> bool:
+        if time < self._next:
+            return False
+        self._next = max(self._next, time - _BURST * self._period) + self._period
+        return True
 
 
 class _Views:
@@ -188,7 +199,7 @@ class _Views:
         self._cloud = Layout(m.POINT_CLOUD, cloud)
         self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
         bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
-        self.interval = max((1 - _SLACK / 10) / _HEAVY, bytes_each / _BYTES)
+        self.room = _Room(min(_HEAVY, _BYTES / bytes_each))
 
     def heavy(self, frame: Frame, estimate: Estimate, stamp: int) -> list[tuple[m.Topic, bytes]]:
         """What is as large as a frame."""
