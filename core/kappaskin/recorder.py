@@ -140,10 +140,9 @@ class Recorder:
     def take(self, frame: Frame, estimate: Estimate) -> None:
         """Take down what a frame came to, as often as there is room for it."""
         views, time = self._views, estimate.host_time
-        if views is None:
+        if views is None or not self._contacts(time):
             return
-        if self._contacts(time):
-            self._file.put(m.CONTACTS, time, _contact(estimate, self._file.stamp(time)))
+        self._file.put(m.CONTACTS, time, _contact(estimate, self._file.stamp(time)))
         if views.room(time):
             for topic, data in views.heavy(frame, estimate, self._file.stamp(time)):
                 self._file.put(topic, time, data)
