@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -170,7 +170,7 @@ def encode(kind: MessageType, values: Mapping[str, Any]) -> bytes:
         if isinstance(value, str):
             fixed[path] = value
         elif isinstance(value, Sequence | np.ndarray):
-            fixed[path] = len(value)
+            fixed[path] = len(cast("Sequence[object]", value))
     others = {
         path: value
         for path, value in values.items()

@@ -10,9 +10,9 @@ from collections import Counter
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import IO, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
-import lz4.frame
+import lz4.frame  # pyright: ignore[reportMissingTypeStubs]
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -84,15 +84,18 @@ class ChunkAt(NamedTuple):
     channels: frozenset[int]
 
 
-class _Read(Protocol):
-    @staticmethod
-    def read(stream: ReadDataStream) -> object: ...
+class Bytes(Protocol):
+    """A file, or what is in memory like one."""
+
+    def seek(self, pos: int, /) -> object: ...
+
+    def read(self, n: int = -1, /) -> bytes: ...
 
 
 _Kind = TypeVar("_Kind")
 
 
-def record_at(file: IO[bytes], at: int, size: int) -> Record:
+def record_at(file: Bytes, at: int, size: int) -> Record:
     """The record at the byte `at` of a `file` of `size` bytes."""
     if not 0 <= at <= size:
         raise Spoilt("it is said to begin beyond the end")
@@ -135,7 +138,8 @@ def decompressed(compression: str, data: bytes) -> bytes:
             with zstandard.ZstdDecompressor().stream_reader(data) as reader:
                 return reader.read(LARGEST + 1)
         if compression == "lz4":
-            return lz4.frame.LZ4FrameDecompressor().decompress(data, LARGEST + 1)
+            unpacker: Any = lz4.frame.LZ4FrameDecompressor()
+            return unpacker.decompress(data, LARGEST + 1)
     except _FAULTS as error:
         raise Spoilt(f"a chunk cannot be decompressed ({error!s:.80})") from error
     if compression:
@@ -157,7 +161,7 @@ def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
         at += length
 
 
-def summary_of(file: IO[bytes], size: int) -> Iterator[Record]:
+def summary_of(file: Bytes, size: int) -> Iterator[Record]:
     """The records at the end of a `file` of `size` bytes that say what is in it.
 
     None where it has no such end; a `Spoilt` where that is damaged.

@@ -90,7 +90,7 @@ class _Repair:
     def run(self, told: Callable[[float], object]) -> Repaired:
         disk = Disk(part_of(self._out))
         try:
-            self._writer = Writer(disk, _CHUNK, CompressionType.LZ4)
+            self._writer = Writer(disk.stream, _CHUNK, CompressionType.LZ4)
             self._begin()
             for at in self._through():
                 told(at / self._size)

@@ -69,7 +69,7 @@ class RecordingFile:
         self.written = Written(str(path), active=True)
         self._lost = 0
         self._closing = threading.Event()
-        self._writer = Writer(self._disk, _CHUNK, CompressionType.LZ4)
+        self._writer = Writer(self._disk.stream, _CHUNK, CompressionType.LZ4)
         self._begin()
         self._threads = [
             threading.Thread(target=self._work, name="recorder", daemon=True),
