@@ -70,7 +70,12 @@ class RecordingFile:
         self._lost = 0
         self._closing = threading.Event()
         self._writer = Writer(self._disk.stream, _CHUNK, CompressionType.LZ4)
-        self._begin()
+        try:
+            self._begin()
+        except OSError as error:
+            self._disk.close()
+            self.part.unlink(missing_ok=True)
+            raise Refusal(f"{path}: cannot be written ({error.strerror or error})") from error
         self._threads = [
             threading.Thread(target=self._work, name="recorder", daemon=True),
             threading.Thread(target=self._sync, name="recorder-sync", daemon=True),

@@ -272,9 +272,16 @@ def test_a_disk_that_fills_leaves_a_whole_recording(small_disk) -> None:
 
 
 def test_without_room_to_end_it_none_is_begun(small_disk) -> None:
-    Full.room = 2**20 - 1
-    with pytest.raises(Refusal, match="room for 1 MiB"):
-        RecordingFile(small_disk)
+    for room, why in ((2**20 - 1, "room for 1 MiB"), (2**20, None)):
+        Full.room = room
+        if why:
+            with pytest.raises(Refusal, match=why):
+                RecordingFile(small_disk)
+            continue
+        file = RecordingFile(small_disk)
+        file.close()
+        assert "No space left" in file.written.trouble
+        small_disk.unlink()
     assert not part_of(small_disk).exists()
 
 
