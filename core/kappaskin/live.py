@@ -17,10 +17,11 @@ from kappaskin.health import Health, Monitor
 from kappaskin.health.leaving_out import Kinds
 from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.publish import Publishing, State
 from kappaskin.recorder import Recorder
 from kappaskin.recording.writing import Written
 from kappaskin.region import Region
-from kappaskin.requests import Compare, Connect, Note, Record, Request, Seek, Step, TakeTare
+from kappaskin.requests import Compare, Connect, Note, Publish, Record, Request, Seek, Step, TakeTare
 from kappaskin.ring import Ring
 from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
@@ -58,6 +59,7 @@ class Loop:
         self._other = Side(beside, self._builder, status.beside or Computed())
         self._compares = self._changing = False
         self._taking = TareTaking(self._builder, self._status.tare)
+        self._publishing, self._told = Publishing(), self._status.happened
         self._gaps: deque[float] = deque(maxlen=_GAPS)
         self._times: deque[float] = deque(maxlen=_GAPS)
         self._pace = Pace()
@@ -82,6 +84,7 @@ class Loop:
                     self._report()
         self._close()
         self.end_recording()
+        self._publishing.close()
         self._builder.shutdown(wait=False, cancel_futures=True)
 
     def _take(self, request: Request) -> None:
@@ -108,6 +111,8 @@ class Loop:
             self._record(request.path)
         elif isinstance(request, Note):
             self._happen(Event(time.monotonic(), "note", request.text))
+        elif isinstance(request, Publish):
+            self._publishing.ask(request.targets)
         else:
             self._close()
             self._status = replace(
@@ -253,7 +258,10 @@ class Loop:
             self._times.append(frame.host_time)
         began = time.monotonic()
         for frame in frames[late:]:
-            estimate = self._side.compute(frame, pipeline)
+            begun = time.monotonic()
+            estimate = pipeline(frame)
+            self._publishing.send(estimate, pipeline, begun)
+            self._side.ring.write(estimate)
             self._taking.receive(estimate)
             self._times.append(frame.host_time)
             self._place = estimate.touch.position
@@ -398,6 +406,7 @@ class Loop:
                 health=self._health(),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
             )
+        self._publish(status)
         told = self._side.told
         self._status = replace(
             status,
@@ -408,6 +417,15 @@ class Loop:
             slot=told.slot,
             refusal=told.refusal,
             computing=told.computing or self._changing,
+            publishing=self._publishing.news,
             beside=self._other.told if self._compares else None,
         )
         self._ring.write_status(self._status)
+
+    def _publish(self, status: Status) -> None:
+        """Tell the receivers how the source is doing, and what happened since that was told."""
+        fresh = min(status.happened - self._told, len(status.events))
+        events = status.events[len(status.events) - fresh :]
+        self._told = status.happened
+        told = status.state, status.message, status.sensor, status.rate, status.last_frame
+        self._publishing.tell(State(*told, events))
