@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from kappaskin.fit import Fit
 from kappaskin.frames import Estimate
 
@@ -68,21 +66,27 @@ def _in_space(estimate: Estimate, fit: Fit) -> list[float]:
 
     To first order, from what the readings' noise makes of the displacement f and its slopes there,
     and of the place x, y itself, as if these were independent:
-        dr = r_x dx + r_y dy - n0 df,    dn = -(f's slopes' change) - K [metric] (dx, dy).
+        dr = r_x dx + r_y dy - n0 df,    |dn| = |d(f_x, f_y) + K [metric] (dx, dy)|,
+    where [r_x r_y] = [t e] [metric] and n0 is the normal of the skin at rest.
     """
-    touch, geometry = estimate.touch, estimate.geometry
-    basis = fit.estimator.basis
-    f_sd, *slopes_sd = fit.sd_of(basis.jet(*touch.position.tolist())[:3]).tolist()
-    sd = touch.position_sd
-    _, n0 = basis.patch.at_rest(touch.position)
-    along = geometry.metric.T @ geometry.frame[:2]  # r_x and r_y
-    spread = [*(along * sd[:, None]), n0 * f_sd]
-    tilt = (geometry.curvature_form @ geometry.metric) * sd
+    geometry, patch = estimate.geometry, fit.estimator.basis.patch
+    x, y = estimate.touch.position.tolist()
+    x_sd, y_sd = estimate.touch.position_sd.tolist()
+    f_sd, *slopes_sd = fit.sd_of(fit.estimator.basis.jet(x, y)[:3]).tolist()
+    t, e, normal = geometry.frame.tolist()
+    (L, m), (_, k) = geometry.metric.tolist()
+    (xx, xy), (_, yy) = geometry.curvature_form.tolist()
+    angle = (x - patch.a / 2) * patch.base_curvature
+    n0 = math.sin(angle), 0.0, math.cos(angle)
+    spread = [
+        math.hypot(L * t[i] * x_sd, (m * t[i] + k * e[i]) * y_sd, n0[i] * f_sd) for i in range(3)
+    ]
+    tilt = L * xx * x_sd, L * xy * x_sd, (m * xx + k * xy) * y_sd, (m * xy + k * yy) * y_sd
     return [
         *geometry.position.tolist(),
-        *np.sqrt(np.square(spread).sum(axis=0)).tolist(),
-        *geometry.normal.tolist(),
-        math.hypot(*slopes_sd, *tilt.ravel().tolist()),
+        *spread,
+        *normal,
+        math.hypot(*slopes_sd, *tilt),
     ]
 
 

@@ -95,7 +95,7 @@ class Foxglove:
                 client.offer(CONTACT, message.timestamp, message.contact)
             if POSE in wanted and message.estimate.touch.present:
                 client.offer(POSE, message.timestamp, pose(message))
-            if SHAPE in wanted:
+            if SHAPE in wanted and message.with_shape:
                 client.offer(SHAPE, message.timestamp, message.shape)
 
     def tell(self, state: State) -> None:

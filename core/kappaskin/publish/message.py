@@ -118,11 +118,15 @@ def kind_of(sensor: Sensor | None) -> str:
 class Message:
     """What one frame has to say, encoded once for all who send it, when the first one asks.
 
-    The `pipeline` made the `estimate` just now, from this `fit`; `number` counts messages.
+    The `pipeline` made the `estimate` just now, from this `fit`; `number` counts messages. The
+    coefficients go with it if it is `with_shape`.
     """
 
-    def __init__(self, estimate: Estimate, fit: Fit, pipeline: Pipeline, number: int) -> None:
+    def __init__(
+        self, estimate: Estimate, fit: Fit, pipeline: Pipeline, number: int, with_shape: bool
+    ) -> None:
         self.estimate, self.fit, self.pipeline, self.number = estimate, fit, pipeline, number
+        self.with_shape = with_shape
         known = math.isfinite(estimate.taken)
         self._began = estimate.taken if known else estimate.host_time
         # What a machine's clock is at goes with it when somebody sets it.
@@ -147,9 +151,9 @@ class Message:
         ]
 
     @property
-    def shape_fits(self) -> bool:
-        """Whether the coefficients go into one datagram."""
-        return self.estimate.coefficients.size <= MOST_FUNCTIONS
+    def shape_follows(self) -> bool:
+        """Whether there are coefficients to go with it, and they fit into one datagram."""
+        return self.with_shape and self.estimate.coefficients.size <= MOST_FUNCTIONS
 
     @cached_property
     def contact(self) -> bytes:
@@ -158,7 +162,7 @@ class Message:
         text = (
             f'{{"kind":"contact","version":{VERSION},"source":"{kind_of(self.pipeline.sensor)}",'
             f'"present":{_yes(touch.present)},"single":{_yes(touch.single)},'
-            f'"near_rim":{_yes(touch.near_rim)},"shape_follows":{_yes(self.shape_fits)},'
+            f'"near_rim":{_yes(touch.near_rim)},"shape_follows":{_yes(self.shape_follows)},'
             f"{_numbers(self.values)}}}"
         )
         return text.encode()

@@ -17,6 +17,9 @@ from kappaskin.publish.message import Message, State
 from kappaskin.publish.publisher import Publisher, Receiver
 from kappaskin.publish.target import Target, opened, targets_of
 
+SHAPES = 0.01
+"""Seconds between two messages of kind shape at least: they are long, and change slowly."""
+
 _PATIENCE = 5.0  # s that finding a host and binding a port may take
 _KEPT = 4096  # messages that the percentiles are taken over
 _EVERY = 1.0  # s between two looks at them
@@ -119,7 +122,7 @@ class Publishing:
     def __init__(self, how: Opened = opened, clock: Callable[[], float] = time.monotonic) -> None:
         self._how, self._clock = how, clock
         self._places: list[_Place] = []
-        self._number = 0
+        self._number, self._next_shape = 0, -math.inf
         self._parts: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
         self._latency, self._next_look = Latency(), -math.inf
 
@@ -144,7 +147,10 @@ class Publishing:
         fit = pipeline.fitted
         if not senders or fit is None:
             return
-        message = Message(estimate, fit, pipeline, self._number)
+        with_shape = began >= self._next_shape
+        if with_shape:
+            self._next_shape = began + SHAPES
+        message = Message(estimate, fit, pipeline, self._number, with_shape)
         self._number += 1
         for sender in senders:
             sender.send(message)

@@ -69,7 +69,7 @@ class Udp:
 
     def send(self, message: Message) -> None:
         self._put(message.contact)
-        if message.shape_fits:
+        if message.shape_follows:
             self._put(message.shape)
 
     def tell(self, state: State) -> None:
