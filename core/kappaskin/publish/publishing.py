@@ -21,7 +21,7 @@ SHAPES = 0.01
 """Seconds between two messages of kind shape at least: they are long, and change slowly."""
 
 _PATIENCE = 5.0  # s that finding a host and binding a port may take
-_KEPT = 4096  # messages that the percentiles are taken over
+_KEPT = 1024  # messages that the percentiles are taken over
 _EVERY = 1.0  # s between two looks at them
 
 Opened = Callable[[Target], Publisher]
@@ -140,6 +140,11 @@ class Publishing:
         if not wanted:
             self._parts.clear()
             self._latency = Latency()
+
+    @property
+    def active(self) -> bool:
+        """Whether anything is to be published."""
+        return bool(self._places)
 
     def send(self, estimate: Estimate, pipeline: Pipeline, began: float) -> None:
         """Send what was estimated by the `pipeline` just now, which `began` at a monotonic time."""
