@@ -30,12 +30,12 @@ _SERVER_INFO = {
 _ADVERTISED = {"op": "advertise", "channels": [channel.advertised for channel in CHANNELS]}
 _BY_NUMBER = {channel.number: channel for channel in CHANNELS}
 
-_LARGEST = 65536  # bytes of what a client says
-_PER_SECOND = 2**18  # bytes that a client may say in a second: more is no viewer
+LARGEST = 65536  # bytes of what a client says
+PER_SECOND = 2**18  # bytes that a client may say in a second: more is no viewer
 _WAITING = 2**18  # bytes in the socket that the client has not taken yet
 _REST = 2**20  # bytes besides, of answers to a client that asks and asks and takes nothing
 _PATIENCE = 5.0  # s for a handshake
-_STUCK = 30.0  # s for which a client may take nothing
+STUCK = 30.0  # s for which a client may take nothing
 _MOMENT = 1e-3  # s that the other thread may have the socket
 _WARNING = 1
 _HEADER = struct.Struct("<BIQ")  # opcode of data, subscription, time in ns
@@ -57,7 +57,7 @@ class Client:
         made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING)
         made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._protocol = ServerProtocol(
-            subprotocols=[Subprotocol(name) for name in PROTOCOLS], max_size=_LARGEST
+            subprotocols=[Subprotocol(name) for name in PROTOCOLS], max_size=LARGEST
         )
         self.subscribed: dict[Channel, int] = {}  # replaced whole: two threads read it
         self.sent = self.dropped = 0
@@ -116,7 +116,7 @@ class Client:
             if not self._rest:
                 self._moved = now
                 self.ended = self.ended or self._last_shut
-            stuck = now - self._moved > _STUCK or len(self._rest) > _REST
+            stuck = now - self._moved > STUCK or len(self._rest) > _REST
         if self._protocol.state is State.CONNECTING and now - self._since > _PATIENCE:
             stuck = True
         self.ended = self.ended or stuck
@@ -124,7 +124,7 @@ class Client:
     def read(self) -> None:
         """Take in what came, and answer it."""
         try:
-            data = self.socket.recv(_LARGEST)
+            data = self.socket.recv(LARGEST)
         except BlockingIOError:
             return
         except OSError:
@@ -144,7 +144,7 @@ class Client:
         if now - self._second > 1.0:
             self._second, self._heard = now, 0
         self._heard += count
-        return self._heard > _PER_SECOND
+        return self._heard > PER_SECOND
 
     def _answer(self) -> None:
         for data in self._protocol.data_to_send():

@@ -24,7 +24,7 @@ from kappaskin.publish.target import Target
 MOST_CLIENTS = 16
 """So many clients at most are served at the same time."""
 
-_FRAME = 1 / 30  # s between two pictures of the skin
+FRAME = 1 / 30  # s between two pictures of the skin
 _TICK = 0.1  # s between two looks at clients that say nothing
 _READ = 65536
 
@@ -127,7 +127,7 @@ class Foxglove:
     def _turn(self) -> bool:
         """Wait for something to be done, and do it; True at the end."""
         watched = any(SKIN in client.subscribed for client in self._clients)
-        for key, _ in self._selector.select(_FRAME if watched else _TICK):
+        for key, _ in self._selector.select(FRAME if watched else _TICK):
             if key.fileobj is self._ending:
                 return True
             if key.fileobj is self._server:
@@ -164,7 +164,7 @@ class Foxglove:
         now, message = time.monotonic(), self._latest
         if message is None or message is self._drawn or now < self._next_cloud:
             return
-        self._next_cloud, self._drawn = now + _FRAME, message
+        self._next_cloud, self._drawn = now + FRAME, message
         if (data := self._cloud(message)) is not None:
             for client in self._clients:
                 client.offer(SKIN, message.timestamp, data)

@@ -12,7 +12,7 @@ from kappaskin.publish.publisher import Publisher
 MOST_TARGETS = 8
 """So many targets at most are published to at the same time."""
 
-_PORTS = {"udp": 9870, "foxglove": 8765}  # PlotJuggler's and Foxglove's own
+PORTS = {"udp": 9870, "foxglove": 8765}  # PlotJuggler's and Foxglove's own
 _HOSTS = {"udp": "", "foxglove": "127.0.0.1"}
 _FORM = re.compile(
     r"(\w+)://(?:\[([0-9a-fA-F:.]+(?:%[\w.-]+)?)\]|([\w.-]*))(?::([^:/]*))?/?"  # IPv6, or a name
@@ -37,7 +37,7 @@ def target_of(text: str) -> Target:
     """The target called `text`, refused where it is none."""
     found = _FORM.fullmatch(text.strip())
     scheme = found[1].lower() if found else ""
-    if found is None or scheme not in _PORTS:
+    if found is None or scheme not in PORTS:
         raise Refusal(
             f"expected a target such as udp://127.0.0.1:9870 or foxglove://, got {text[:99]!r}"
         )
@@ -46,7 +46,7 @@ def target_of(text: str) -> Target:
         raise Refusal(
             f"expected a host in front of the port, such as udp://127.0.0.1:9870, got {text[:99]!r}"
         )
-    return Target(scheme, host, _port(found[4], _PORTS[scheme]))
+    return Target(scheme, host, _port(found[4], PORTS[scheme]))
 
 
 def _port(text: str | None, usual: int) -> int:
