@@ -29,7 +29,7 @@ def publish(
 
     Prints a line a second: frames/s, messages sent and dropped, and the 99th percentile of the
     time from the arrival of a frame until it was sent. The messages are explained in
-    `publishing/messages.md` among the resources. Exit code 1 if nothing was sent.
+    `publishing/messages.md` among the resources. Exit code 1 if there was nothing to send.
 
     Example: `kappaskin publish /dev/ttyACM0 --udp 192.168.1.20:9870 --foxglove`
 
@@ -59,13 +59,13 @@ def publish(
     with Engine() as engine:
         engine.publish(targets)
         engine.connect(source)
-        sent = _watched(engine, time.monotonic() + seconds, stopped)
-    return 0 if sent else FAILED
+        told = _watched(engine, time.monotonic() + seconds, stopped)
+    return FAILED if math.isnan(told.publishing.latency.whole) else 0
 
 
-def _watched(engine: Engine, end: float, stopped: list[int]) -> int:
-    """Tell how it goes until the `end`; how many messages were sent."""
-    said, line = -math.inf, ""
+def _watched(engine: Engine, end: float, stopped: list[int]) -> Status:
+    """Tell how it goes until the `end`; how it went."""
+    said, line = time.monotonic(), ""
     status = engine.status()
     while not stopped and time.monotonic() < end:
         time.sleep(_LOOK)
@@ -79,7 +79,7 @@ def _watched(engine: Engine, end: float, stopped: list[int]) -> int:
             print(line, flush=True)
     if (last := _line(status)) != line:
         print(last)
-    return sum(target.sent for target in status.publishing.targets)
+    return status
 
 
 def _line(status: Status) -> str:

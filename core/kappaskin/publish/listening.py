@@ -14,6 +14,7 @@ from kappaskin.publish.message import VERSION
 _SHOWN = 0.1  # s between two contacts that are shown: nobody reads a thousand lines a second
 _BUFFER = 2**20  # bytes that may wait while this process sleeps
 _LARGEST = 65536
+_ENDLESS = 1e300  # no quantity of ours
 _AT_ONCE = 1000  # datagrams read without a look at anything else
 
 Told = dict[str, Any]
@@ -121,7 +122,9 @@ def _plain(line: str) -> str:
 
 def _figure(message: Told, key: str, scale: float, how: str) -> str:
     value = message.get(key)
-    return f"{scale * value:{how}}" if isinstance(value, int | float) else "?"
+    if not isinstance(value, int | float) or not abs(value) < _ENDLESS:
+        return "?"
+    return f"{scale * value:{how}}"
 
 
 def _words(message: Told) -> str:
