@@ -2,6 +2,7 @@
 
 import errno
 import json
+import os
 import socket
 import threading
 import time
@@ -165,7 +166,7 @@ class Failing:
         self.number, self.connected = number, 0
 
     def send(self, data: bytes) -> int:
-        raise OSError(self.number, "")
+        raise OSError(self.number, os.strerror(self.number))
 
     def connect(self, address: object) -> None:
         self.connected += 1

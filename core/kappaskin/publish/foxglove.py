@@ -19,7 +19,7 @@ from kappaskin.publish.client import Client
 from kappaskin.publish.cloud import Cloud, pose
 from kappaskin.publish.message import Message, State
 from kappaskin.publish.publisher import Receiver
-from kappaskin.publish.target import Target
+from kappaskin.publish.target import Target, reason
 
 MOST_CLIENTS = 16
 """So many clients at most are served at the same time."""
@@ -37,8 +37,8 @@ def opened(target: Target) -> "Foxglove":
         )
     except (OSError, UnicodeError) as error:
         raise Refusal(
-            f"{target}: the host {target.host} is not known ({error}); give an address of this "
-            "machine, or 0.0.0.0 for all of them"
+            f"{target}: the host {target.host} is not known ({reason(error)}); give an "
+            "address of this machine, or 0.0.0.0 for all of them"
         ) from error
     family, _, _, _, address = min(found, key=lambda each: each[0] != socket.AF_INET)
     server = socket.socket(family, socket.SOCK_STREAM)
@@ -50,8 +50,8 @@ def opened(target: Target) -> "Foxglove":
     except OSError as error:
         server.close()
         raise Refusal(
-            f"{target}: cannot be listened on ({error}); choose another port, or an address of "
-            "this machine"
+            f"{target}: cannot be listened on ({reason(error)}); choose another port, or "
+            "an address of this machine"
         ) from error
     server.setblocking(False)
     return Foxglove(server)

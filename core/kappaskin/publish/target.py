@@ -68,6 +68,11 @@ def targets_of(texts: Sequence[str]) -> tuple[Target, ...]:
     return targets
 
 
+def reason(error: OSError | UnicodeError) -> str:
+    """What the system said, without its number."""
+    return getattr(error, "strerror", None) or str(error)
+
+
 def opened(target: Target) -> Publisher:
     """What sends to `target`; a `Refusal` says why nothing can. This may take a while."""
     try:  # by name: a transport is imported when somebody asks for it

@@ -1,7 +1,6 @@
 """Messages to datagrams of JSON, for anybody who listens: PlotJuggler's UDP server as it is."""
 
 import errno
-import os
 import socket
 import time
 from contextlib import suppress
@@ -9,7 +8,7 @@ from contextlib import suppress
 from kappaskin.errors import Refusal
 from kappaskin.publish.message import LARGEST, Message, State
 from kappaskin.publish.publisher import Receiver
-from kappaskin.publish.target import Target
+from kappaskin.publish.target import Target, reason
 
 _AGAIN = 1.0  # s between two tries to find a way to a network that was gone
 
@@ -20,20 +19,20 @@ def opened(target: Target) -> "Udp":
         found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:
         raise Refusal(
-            f"{target}: the host {target.host} is not known ({error}); give another name, or its "
-            "address"
+            f"{target}: the host {target.host} is not known ({reason(error)}); give another "
+            "name, or its address"
         ) from error
     # Of a name with both, most who receive listen on the older kind of address.
     found.sort(key=lambda each: each[0] != socket.AF_INET)
-    trouble: OSError | None = None
+    trouble = ""
     for family, _, _, _, address in found:
         try:
             return Udp(str(target), _connected(family, address), address)
         except OSError as error:
-            trouble = error
+            trouble = reason(error)
     raise Refusal(
-        f"{target}: cannot be sent to ({trouble}); connect this machine to that network, then "
-        "switch it on again"
+        f"{target}: cannot be sent to ({trouble}); connect this machine to that network, then switch "
+        "it on again"
     )
 
 
@@ -89,7 +88,7 @@ class Udp:
                 self._socket.send(data)
                 self._sent += 1
         except OSError as error:
-            self._drop(os.strerror(error.errno) if error.errno else str(error))
+            self._drop(reason(error))
             if error.errno not in (errno.EAGAIN, errno.ENOBUFS):
                 self._find_way()
         else:
