@@ -31,8 +31,8 @@ def opened(target: Target) -> "Udp":
         except OSError as error:
             trouble = reason(error)
     raise Refusal(
-        f"{target}: cannot be sent to ({trouble}); connect this machine to that network, then switch "
-        "it on again"
+        f"{target}: cannot be sent to ({trouble}); connect this machine to that network, then "
+        "switch it on again"
     )
 
 
