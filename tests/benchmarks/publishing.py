@@ -8,9 +8,8 @@ from urllib.parse import urlsplit
 
 import numpy as np
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.window import MainWindow
+from kappaskin_app.launch import opened
 
 SETTLE = 6.0
 PARTS = ("whole", "wait", "compute", "send")
@@ -32,12 +31,9 @@ def deafened(target: str) -> socket.socket:
     return made
 
 
-def published(
-    application: QApplication, port: str, seconds: float, deaf: bool, targets: list[str]
-) -> dict[str, float]:
+def published(port: str, seconds: float, deaf: bool, targets: list[str]) -> dict[str, float]:
     """99th percentiles in ms, and messages a second."""
-    window = MainWindow(port)
-    window.show()
+    application, window = opened(port)
     window.session.engine.publish(targets)
     made: list[socket.socket] = []
     if deaf:
@@ -77,8 +73,6 @@ def published(
 
 
 if __name__ == "__main__":
-    application = QApplication([])
-    application.setStyle("Fusion")
     port, seconds, deaf, *targets = sys.argv[1:]
-    told = published(application, port, float(seconds), deaf == "deaf", targets)
+    told = published(port, float(seconds), deaf == "deaf", targets)
     print(json.dumps(told))

@@ -21,7 +21,9 @@ from kappaskin.publish.publisher import Receiver
 PROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 """Names of the protocol, which are two of one thing."""
 
-_SERVER_INFO = {
+_Answer = dict[str, Any]
+
+_SERVER_INFO: _Answer = {
     "op": "serverInfo",
     "name": "kappaskin",
     "capabilities": [],
@@ -41,8 +43,6 @@ _WARNING = 1
 _HEADER = struct.Struct("<BIQ")  # opcode of data, subscription, time in ns
 _DATA = 1
 _MOST_IDS = 2**32
-
-_Answer = dict[str, Any]
 
 
 class Client:
