@@ -21,7 +21,17 @@ from kappaskin.publish import Publishing, State
 from kappaskin.recorder import Recorder
 from kappaskin.recording.writing import Written
 from kappaskin.region import Region
-from kappaskin.requests import Compare, Connect, Note, Publish, Record, Request, Seek, Step, TakeTare
+from kappaskin.requests import (
+    Compare,
+    Connect,
+    Note,
+    Publish,
+    Record,
+    Request,
+    Seek,
+    Step,
+    TakeTare,
+)
 from kappaskin.ring import Ring
 from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
@@ -430,8 +440,17 @@ class Loop:
         fresh = min(status.happened - self._told, len(status.events))
         events = status.events[len(status.events) - fresh :]
         self._told = status.happened
-        told = status.state, status.message, status.sensor, status.rate, status.last_frame
-        self._publishing.tell(State(*told, events))
+        told = status.message, status.sensor, status.rate, status.last_frame
+        self._publishing.tell(State(status.state, _kind(status), *told, events))
+
+
+def _kind(status: Status) -> str:
+    """Where readings come from, as receivers are told; nothing without a sensor."""
+    if status.sensor is None:
+        return ""
+    if status.replay is not None:
+        return "replay"
+    return "sim" if status.sensor.simulated else "live"
 
 
 def _stale(frames: list[Frame]) -> int:

@@ -115,7 +115,7 @@ def messages_of() -> Callable[..., list[Message]]:
             estimate = pipeline(replace(frame, taken=frame.host_time, taken_sd=1e-4))
             estimate = change(estimate) if change else estimate
             assert pipeline.fitted is not None
-            told.append(Message(estimate, pipeline.fitted, pipeline, sequence, True))
+            told.append(Message(estimate, pipeline.fitted, pipeline, "sim", sequence, True))
         return told
 
     return made

@@ -26,7 +26,7 @@ from kappaskin.publish.target import opened, target_of
 
 PRESSED = load_scene("off-centre")
 EVENT = Event(0.0, "gap", "3 messages lost")
-STATE = State("streaming", "", PRESSED.sensor(), 500.0, 0.0, (EVENT,))
+STATE = State("streaming", "sim", "", PRESSED.sensor(), 500.0, 0.0, (EVENT,))
 TOPICS = {channel.topic: channel.number for channel in CHANNELS}
 
 Told = dict[str, Any]

@@ -21,7 +21,7 @@ from kappaskin.publish.target import MOST_TARGETS, Target, opened, target_of
 from kappaskin.publish.udp import Udp
 
 PRESSED = load_scene("off-centre")
-STATE = State("streaming", "", None, 0.0, 0.0)
+STATE = State("streaming", "", "", None, 0.0, 0.0)
 
 
 def free_port(family: int = socket.AF_INET) -> int:
@@ -311,7 +311,7 @@ def test_losses_are_told_by_gaps(listener) -> None:
 
 
 def test_a_state_is_told_once_and_cannot_speak_to_the_terminal(listener) -> None:
-    state = State("lost", "unplugged\x1b[2J\n", None, 0.0, 0.0).encoded()
+    state = State("lost", "live", "unplugged\x1b[2J\n", None, 0.0, 0.0).encoded()
     said = send(listener, state, state)
     assert said.count("unplugged") == 1
     assert said.isprintable()

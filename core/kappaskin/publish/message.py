@@ -108,25 +108,24 @@ def _yes(value: bool) -> str:
     return "true" if value else "false"
 
 
-def kind_of(sensor: Sensor | None) -> str:
-    """Where the readings come from: live or sim; empty without a sensor."""
-    if sensor is None:
-        return ""
-    return "sim" if sensor.simulated else "live"
-
-
 class Message:
     """What one frame has to say, encoded once for all who send it, when the first one asks.
 
-    The `pipeline` made the `estimate` just now, from this `fit`; `number` counts messages. The
-    coefficients go with it if it is `with_shape`.
+    The `pipeline` made the `estimate` just now, from this `fit`, of readings of the `source`, live,
+    sim or replay; `number` counts messages. The coefficients go with it if it is `with_shape`.
     """
 
     def __init__(
-        self, estimate: Estimate, fit: Fit, pipeline: Pipeline, number: int, with_shape: bool
+        self,
+        estimate: Estimate,
+        fit: Fit,
+        pipeline: Pipeline,
+        source: str,
+        number: int,
+        with_shape: bool,
     ) -> None:
-        self.estimate, self.fit, self.pipeline, self.number = estimate, fit, pipeline, number
-        self.with_shape = with_shape
+        self.estimate, self.fit, self.pipeline = estimate, fit, pipeline
+        self.source, self.number, self.with_shape = source, number, with_shape
         known = math.isfinite(estimate.taken)
         self._began = estimate.taken if known else estimate.host_time
         # What a machine's clock is at goes with it when somebody sets it.
@@ -160,7 +159,7 @@ class Message:
         """The message about the contact, as JSON."""
         touch = self.estimate.touch
         text = (
-            f'{{"kind":"contact","version":{VERSION},"source":"{kind_of(self.pipeline.sensor)}",'
+            f'{{"kind":"contact","version":{VERSION},"source":"{self.source}",'
             f'"present":{_yes(touch.present)},"single":{_yes(touch.single)},'
             f'"near_rim":{_yes(touch.near_rim)},"shape_follows":{_yes(self.shape_follows)},'
             f"{_numbers(self.values)}}}"
@@ -186,10 +185,12 @@ class Message:
 class State:
     """How the source is doing, and the `events` since that was last told.
 
-    `last_frame` in s on the monotonic clock, `rate` in frames/s.
+    `source` is live, sim or replay, empty while there is no sensor; `last_frame` in s on the
+    monotonic clock, `rate` in frames/s.
     """
 
     state: str
+    source: str
     message: str
     sensor: Sensor | None
     rate: float
@@ -210,7 +211,7 @@ class State:
             "version": VERSION,
             "timestamp": round(time.time(), 6),
             "state": self.state,
-            "source": kind_of(sensor),
+            "source": self.source,
             "message": self.message[:_LONGEST],
             "sensor": sensor.name[:_LONGEST] if sensor else "",
             **dict(zip(STATUS_NUMBERS, numbers, strict=True)),

@@ -122,7 +122,7 @@ class Publishing:
     def __init__(self, how: Opened = opened, clock: Callable[[], float] = time.monotonic) -> None:
         self._how, self._clock = how, clock
         self._places: list[_Place] = []
-        self._number, self._next_shape = 0, -math.inf
+        self._source, self._number, self._next_shape = "", 0, -math.inf
         self._parts: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
         self._latency, self._next_look = Latency(), -math.inf
 
@@ -155,7 +155,7 @@ class Publishing:
         with_shape = began >= self._next_shape
         if with_shape:
             self._next_shape = began + SHAPES
-        message = Message(estimate, fit, pipeline, self._number, with_shape)
+        message = Message(estimate, fit, pipeline, self._source, self._number, with_shape)
         self._number += 1
         for sender in senders:
             sender.send(message)
@@ -164,6 +164,7 @@ class Publishing:
 
     def tell(self, state: State) -> None:
         """Say how the source is doing, and see which targets have been opened."""
+        self._source = state.source
         for place in self._places:
             place.look()
             if place.publisher is not None:
