@@ -23,7 +23,7 @@ from kappaskin import (
     edges_of,
 )
 from kappaskin.cli import main
-from kappaskin.publish import Message
+from kappaskin.publish.message import Mark, Message, epoch
 
 HEXAGON = [(0, 1), (0.5, 0), (1.5, 0), (2, 1), (1.5, 2), (0.5, 2)] * np.array(
     [0.05, 0.05 * math.sqrt(3) / 2]
@@ -115,7 +115,9 @@ def messages_of() -> Callable[..., list[Message]]:
             estimate = pipeline(replace(frame, taken=frame.host_time, taken_sd=1e-4))
             estimate = change(estimate) if change else estimate
             assert pipeline.fitted is not None
-            told.append(Message(estimate, pipeline.fitted, pipeline, "sim", sequence, True))
+            told.append(
+                Message(estimate, pipeline.fitted, pipeline, Mark("sim", epoch(), sequence, True))
+            )
         return told
 
     return made

@@ -29,6 +29,12 @@ EVENT = Event(0.0, "gap", "3 messages lost")
 STATE = State("streaming", "sim", "", PRESSED.sensor(), 500.0, 0.0, (EVENT,))
 TOPICS = {channel.topic: channel.number for channel in CHANNELS}
 
+HELLO = (
+    b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+    b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
+)
+
 Told = dict[str, Any]
 
 
@@ -234,7 +240,13 @@ def test_a_client_that_floods_is_let_go(client, server) -> None:
     until(lambda: not server.receivers)
 
 
-@pytest.mark.parametrize("data", [b"\x00" * 300, b"GET / HTTP/1.1\r\n\r\n", b"x" * 20000, b""])
+@pytest.mark.parametrize(
+    "data",
+    [
+        *(b"\x00" * 300, b"GET / HTTP/1.1\r\n\r\n", b"x" * 20000, b""),
+        *(HELLO + b"\xff" * 20, HELLO + b"\x88\x80" + bytes(4), HELLO + b"\x81\x05hello"),
+    ],
+)
 def test_garbage_in_place_of_a_handshake_ends_the_connection(server, data: bytes) -> None:
     with socket.create_connection(place(server)) as one:
         one.sendall(data)
@@ -273,11 +285,7 @@ def test_a_client_that_vanishes_is_forgotten_and_its_counts_are_not(
 def deaf(server) -> Iterator[socket.socket]:
     """A client that asks for shapes, and reads nothing."""
     with socket.create_connection(place(server)) as made:
-        made.sendall(
-            b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
-            b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
-        )
+        made.sendall(HELLO)
         pair = {"id": 1, "channelId": TOPICS["/shape"]}
         words = json.dumps({"op": "subscribe", "subscriptions": [pair]})
         made.sendall(b"\x81" + bytes([0x80 | len(words)]) + bytes(4) + words.encode())

@@ -1,5 +1,6 @@
 """What is published of a frame: true numbers, honest error bars, and JSON that anybody reads."""
 
+import base64
 import json
 import math
 import re
@@ -13,6 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    METHODS,
+    Disk,
     GaussianNoise,
     Patch,
     Plate,
@@ -75,7 +78,7 @@ def test_a_contact_says_what_the_estimate_says(messages_of, scene: Scene) -> Non
 def test_error_bars_are_what_noise_does_to_the_geometry(messages_of, scene: Scene) -> None:
     (made,) = messages_of(scene)
     told, basis, touch = read(made.contact), made.pipeline.basis, made.estimate.touch
-    rng, count = np.random.default_rng(1), 1500
+    rng, count = np.random.default_rng(1), 1000
     shapes = rng.multivariate_normal(made.fit.coefficients.ravel(), made.fit.covariance, count)
     places = rng.normal(touch.position, touch.position_sd, (count, 2))
 
@@ -168,6 +171,35 @@ def test_as_many_functions_as_promised_fit_in_a_datagram(messages_of) -> None:
     (larger,) = messages_of(PRESSED, setup=Setup(10, 10))
     assert not larger.shape_follows
     assert read(larger.contact)["shape_follows"] is False
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_estimator_has_something_to_say(messages_of, method: str) -> None:
+    scene = replace(PRESSED, layout=PRESSED.layout.without([12, 55]))
+    if method == "fast":
+        scene = PRESSED  # whole grids only
+    told = messages_of(scene, 3, Setup(6, 6, method=method))[-1]
+    assert read(told.contact)["normal_sd_rad"] > 0
+    assert all(sd > 0 for sd in read(told.shape)["coefficients_sd_m"])
+
+
+@pytest.mark.parametrize("patch", [Patch(0.1, 0.02, strip=True), Disk(0.05)], ids=["strip", "disk"])
+def test_skins_of_other_shapes_have_something_to_say(messages_of, patch: Patch) -> None:
+    if patch.strip:
+        layout = SensorLayout.regular(patch, 12, 1)
+    else:
+        places = np.random.default_rng(0).uniform(0.02, 0.08, (30, 2))
+        layout = SensorLayout.scattered(patch, places)
+    reference = (15, 1) if patch.strip else (15, 15)
+    scene = Scene("other", Plate(patch), layout, reference=reference)
+    scene = scene.touched_by(PointLoad(0.05, patch.b / 2, 0.1))
+    (told,) = messages_of(scene, 1, Setup(4, 4))
+    assert read(told.contact)["number"] == 0
+    assert read(told.shape)["functions_x"] == 4
+    points = json.loads(cloud.Cloud()(told))
+    data = np.frombuffer(base64.b64decode(points["data"]), "<f4").reshape(-1, len(cloud.NAMES))
+    assert np.isfinite(data).all()
+    assert (len(data) < cloud.POINTS**2) == isinstance(patch, Disk)
 
 
 @given(st.lists(FLOATS, max_size=20))

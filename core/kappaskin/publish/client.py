@@ -55,7 +55,6 @@ class Client:
         self.socket, self.name = made, name
         made.setblocking(False)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING)
-        made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._protocol = ServerProtocol(
             subprotocols=[Subprotocol(name) for name in PROTOCOLS], max_size=LARGEST
         )
@@ -154,6 +153,8 @@ class Client:
 
     def _take(self, event: object) -> None:
         if isinstance(event, Request):
+            if self._protocol.close_expected():
+                return  # what came right behind it was wrong
             self._protocol.send_response(self._protocol.accept(event))
             if self._protocol.state is State.OPEN:
                 self._say(_SERVER_INFO)

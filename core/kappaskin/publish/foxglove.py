@@ -95,7 +95,7 @@ class Foxglove:
                 client.offer(CONTACT, message.timestamp, message.contact)
             if POSE in wanted and message.estimate.touch.present:
                 client.offer(POSE, message.timestamp, pose(message))
-            if SHAPE in wanted and message.with_shape:
+            if SHAPE in wanted and message.mark.with_shape:
                 client.offer(SHAPE, message.timestamp, message.shape)
 
     def tell(self, state: State) -> None:
@@ -148,6 +148,7 @@ class Foxglove:
             if len(self._clients) >= MOST_CLIENTS:
                 made.close()
                 return
+            made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             client = Client(made, f"{address[0]}:{address[1]}")
             self._clients = (*self._clients, client)
             self._selector.register(made, selectors.EVENT_READ, client)

@@ -87,6 +87,15 @@ def text_of(numbers: Iterable[float], form: str) -> str:
     return ",".join(form % v if math.isfinite(v) else "null" for v in values)
 
 
+def epoch() -> float:
+    """When this machine's monotonic clock began, in s since 1970, as its other clock tells now."""
+    best = math.inf, 0.0
+    for _ in range(3):  # of which the system interrupts one at most
+        before, now, after = time.monotonic(), time.time(), time.monotonic()
+        best = min(best, (after - before, now - (before + after) / 2))
+    return best[1]
+
+
 def _template(fields: Iterable[Field]) -> str:
     return ",".join(f'"{field.key}":{field.form}' for field in fields)
 
@@ -108,33 +117,37 @@ def _yes(value: bool) -> str:
     return "true" if value else "false"
 
 
+@dataclass(frozen=True)
+class Mark:
+    """What a message has from who sends it, besides the estimate.
+
+    `source` is where the readings come from, live, sim or replay; `epoch` in s since 1970 when this
+    machine's monotonic clock began; `number` counts messages. The coefficients go with it if it is
+    `with_shape`.
+    """
+
+    source: str
+    epoch: float
+    number: int
+    with_shape: bool
+
+
 class Message:
     """What one frame has to say, encoded once for all who send it, when the first one asks.
 
-    The `pipeline` made the `estimate` just now, from this `fit`, of readings of the `source`, live,
-    sim or replay; `number` counts messages. The coefficients go with it if it is `with_shape`.
+    The `pipeline` made the `estimate` just now, from this `fit`.
     """
 
-    def __init__(
-        self,
-        estimate: Estimate,
-        fit: Fit,
-        pipeline: Pipeline,
-        source: str,
-        number: int,
-        with_shape: bool,
-    ) -> None:
-        self.estimate, self.fit, self.pipeline = estimate, fit, pipeline
-        self.source, self.number, self.with_shape = source, number, with_shape
+    def __init__(self, estimate: Estimate, fit: Fit, pipeline: Pipeline, mark: Mark) -> None:
+        self.estimate, self.fit, self.pipeline, self.mark = estimate, fit, pipeline, mark
         known = math.isfinite(estimate.taken)
         self._began = estimate.taken if known else estimate.host_time
-        # What a machine's clock is at goes with it when somebody sets it.
-        self.timestamp = time.time() - time.monotonic() + self._began
+        self.timestamp = mark.epoch + self._began
         """When the scan began, or was read, in s since 1970."""
 
     def _head(self) -> tuple[float, int, int, int]:
         estimate = self.estimate
-        return self.timestamp, self.number, estimate.sequence, estimate.generation
+        return self.timestamp, self.mark.number, estimate.sequence, estimate.generation
 
     @cached_property
     def values(self) -> list[float]:
@@ -152,14 +165,14 @@ class Message:
     @property
     def shape_follows(self) -> bool:
         """Whether there are coefficients to go with it, and they fit into one datagram."""
-        return self.with_shape and self.estimate.coefficients.size <= MOST_FUNCTIONS
+        return self.mark.with_shape and self.estimate.coefficients.size <= MOST_FUNCTIONS
 
     @cached_property
     def contact(self) -> bytes:
         """The message about the contact, as JSON."""
         touch = self.estimate.touch
         text = (
-            f'{{"kind":"contact","version":{VERSION},"source":"{self.source}",'
+            f'{{"kind":"contact","version":{VERSION},"source":"{self.mark.source}",'
             f'"present":{_yes(touch.present)},"single":{_yes(touch.single)},'
             f'"near_rim":{_yes(touch.near_rim)},"shape_follows":{_yes(self.shape_follows)},'
             f"{_numbers(self.values)}}}"

@@ -13,7 +13,7 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import Pipeline
-from kappaskin.publish.message import Message, State
+from kappaskin.publish.message import Mark, Message, State, epoch
 from kappaskin.publish.publisher import Publisher, Receiver
 from kappaskin.publish.target import Target, opened, targets_of
 
@@ -122,7 +122,8 @@ class Publishing:
     def __init__(self, how: Opened = opened, clock: Callable[[], float] = time.monotonic) -> None:
         self._how, self._clock = how, clock
         self._places: list[_Place] = []
-        self._source, self._number, self._next_shape = "", 0, -math.inf
+        self._source, self._epoch = "", epoch()
+        self._number, self._next_shape = 0, -math.inf
         self._parts: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
         self._latency, self._next_look = Latency(), -math.inf
 
@@ -155,7 +156,8 @@ class Publishing:
         with_shape = began >= self._next_shape
         if with_shape:
             self._next_shape = began + SHAPES
-        message = Message(estimate, fit, pipeline, self._source, self._number, with_shape)
+        mark = Mark(self._source, self._epoch, self._number, with_shape)
+        message = Message(estimate, fit, pipeline, mark)
         self._number += 1
         for sender in senders:
             sender.send(message)
@@ -164,7 +166,7 @@ class Publishing:
 
     def tell(self, state: State) -> None:
         """Say how the source is doing, and see which targets have been opened."""
-        self._source = state.source
+        self._source, self._epoch = state.source, epoch()
         for place in self._places:
             place.look()
             if place.publisher is not None:

@@ -79,20 +79,22 @@ class Udp:
             self._drop(f"a message of {len(data)} bytes is too large for a datagram")
             return
         try:
-            self._socket.send(data)
-        except ConnectionRefusedError:
-            # Told of the last one, which nobody received, in the place of sending this one.
-            self._sent -= 1
-            self._drop("nobody receives there")
-            with suppress(OSError):
-                self._socket.send(data)
-                self._sent += 1
+            self._send(data)
         except OSError as error:
             self._drop(reason(error))
             if error.errno not in (errno.EAGAIN, errno.ENOBUFS):
                 self._find_way()
         else:
             self._sent += 1
+
+    def _send(self, data: bytes) -> None:
+        try:
+            self._socket.send(data)
+        except ConnectionRefusedError:
+            # Told of the last one, which nobody received, in the place of sending this one.
+            self._sent -= 1
+            self._drop("nobody receives there")
+            self._socket.send(data)
 
     def _drop(self, why: str) -> None:
         self._dropped += 1
