@@ -49,7 +49,7 @@ def opened(source: str) -> "tuple[QApplication, MainWindow]":
 def _stand_behind() -> None:
     """Let this process, which draws, give way to the engine's, which must be in time."""
     if sys.platform.startswith("linux"):
-        os.setpriority(os.PRIO_PROCESS, 0, max(_BEHIND, os.getpriority(os.PRIO_PROCESS, 0)))
+        os.nice(_BEHIND)
 
 
 def _connected(source: str) -> Engine:
