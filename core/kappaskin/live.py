@@ -45,7 +45,7 @@ from kappaskin.tare_taking import TareTaking
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
-_FRESH = 1e-3  # s that a frame may have waited where receivers wait for the newest
+_FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
 _GAPS = 4096  # gaps between reads that the percentile is taken over
 
 
@@ -258,9 +258,8 @@ class Loop:
 
     def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:
         """Work out the newest frames, as many as there is time for."""
-        late = len(frames) - self._pace.affordable(len(frames))
-        if self._publishing.active:
-            late = max(late, _stale(frames))
+        within = (_FRESH,) if self._publishing.active else ()
+        late = len(frames) - self._pace.affordable(len(frames), *within)
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
         beside = self._other.pipeline
@@ -451,9 +450,3 @@ def _kind(status: Status) -> str:
     if status.replay is not None:
         return "replay"
     return "sim" if status.sensor.simulated else "live"
-
-
-def _stale(frames: list[Frame]) -> int:
-    """How many of the first of these frames waited for too long while the newest came."""
-    latest = time.monotonic() - _FRESH
-    return sum(frame.host_time < latest for frame in frames[:-1])
