@@ -6,6 +6,7 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from itertools import takewhile
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -46,6 +47,7 @@ _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
 _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
+_GAP = 0.5  # s between two looks at the gaps
 _GAPS = 4096  # gaps between reads that the percentile is taken over
 
 
@@ -72,6 +74,7 @@ class Loop:
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
         self._gaps: deque[float] = deque(maxlen=_GAPS)
+        self._gap, self._next_gap = math.nan, -math.inf
         self._times: deque[float] = deque(maxlen=_GAPS)
         self._pace = Pace()
         self._last_read = self._again = math.inf
@@ -202,6 +205,7 @@ class Loop:
             side.forget()
         self._steering = self._monitor = self._out = None
         self._gaps.clear()
+        self._gap = math.nan
         self._times.clear()
         self._last_read = self._again = math.inf
 
@@ -402,15 +406,17 @@ class Loop:
         now, source, status = time.monotonic(), self._source, self._status
         if source is not None:
             watch = self._side.pipeline.drift if self._side.pipeline else None
-            gaps = np.array(self._gaps)
-            recent = [t for t in self._times if t > now - 1.0]
+            if self._gaps and now >= self._next_gap:
+                self._next_gap = now + _GAP
+                self._gap = float(np.percentile(self._gaps, 99))
+            recent = list(takewhile(lambda t: t > now - 1.0, reversed(self._times)))
             status = replace(
                 status,
                 accounting=source.accounting(),
                 temperature=source.temperature,
                 drift=watch.tell() if watch else None,
-                rate=len(recent) / min(1.0, max(now - recent[0], 1e-3)) if recent else 0.0,
-                reader_gap=float(np.percentile(gaps, 99)) if len(gaps) else math.nan,
+                rate=len(recent) / min(1.0, max(now - recent[-1], 1e-3)) if recent else 0.0,
+                reader_gap=self._gap,
                 last_frame=self._times[-1] if self._times else -math.inf,
                 playing=source.playing
                 if isinstance(source, SimulatedSource)
