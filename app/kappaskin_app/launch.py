@@ -1,5 +1,6 @@
 """Starts the engine, Qt and the window, and ends them in order."""
 
+import os
 import signal
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +13,9 @@ if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
     from kappaskin_app.window import MainWindow
+
+
+_BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want a core
 
 
 def opened(source: str) -> "tuple[QApplication, MainWindow]":
@@ -27,6 +31,7 @@ def opened(source: str) -> "tuple[QApplication, MainWindow]":
             starting.result().close()
             raise
     engine = starting.result()
+    _stand_behind()
     try:
         application = QApplication.instance() or QApplication(sys.argv[:1])
         if not isinstance(application, QApplication):
@@ -39,6 +44,12 @@ def opened(source: str) -> "tuple[QApplication, MainWindow]":
         raise
     window.show()
     return application, window
+
+
+def _stand_behind() -> None:
+    """Let this process, which draws, give way to the engine's, which must be in time."""
+    if sys.platform.startswith("linux"):
+        os.nice(_BEHIND)
 
 
 def _connected(source: str) -> Engine:

@@ -32,7 +32,7 @@ from kappaskin import (
 from kappaskin_app.ahead import Ahead
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
-from kappaskin_app.settings import Scanning, SceneSettings, Settings, Written, part
+from kappaskin_app.settings import Scanning, SceneSettings, Sending, Settings, Written, part
 from kappaskin_app.simulation import named, played, region_of, scene_of
 from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE, WAITING
 
@@ -75,11 +75,13 @@ class Session(QObject):
     `scene` is the one that is simulated, `running` whether it goes on; `playing` says when it
     becomes another one, `refused` and `refusal` why it is not the one the settings describe now,
     with nothing to say when it is, and `preparing` whether that takes a while to be computed.
+    `unsent` says why nothing is published, with nothing to say when it is.
     """
 
     refused = Signal(str)
     preparing = Signal(bool)
     playing = Signal(Scene)
+    unsent = Signal(str)
     estimated = Signal(Estimate)
     reported = Signal(Status)
 
@@ -154,6 +156,8 @@ class Session(QObject):
             self._scan()
         if self.inside and part(settings, SceneSettings) != part(was, SceneSettings):
             self._play()
+        if part(settings, Sending) != part(was, Sending):
+            self._publish()
 
     def _set_up(self) -> None:
         """Have the engine compute with what is asked for now, if that is something else."""
@@ -173,6 +177,16 @@ class Session(QObject):
     def _scan(self) -> None:
         """Scan the region asked for, or everything while the skin lies on cylinders."""
         self.engine.scan(Region() if self._laid else region_of(self._settings))
+
+    def _publish(self) -> None:
+        """Send to whom it is asked for, or to nobody and say why."""
+        why = ""
+        try:
+            self.engine.publish(self._settings.targets)
+        except Refusal as refusal:
+            why = str(refusal)
+            self.engine.publish([])
+        self.unsent.emit(why)
 
     def lay(self, step: Step | None) -> None:
         """Lay the simulated skin on the cylinder of `step`.

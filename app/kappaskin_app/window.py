@@ -270,6 +270,7 @@ class MainWindow(QMainWindow):
         self.stability.show_undo(self.history.stack.canUndo())
         session.refused.connect(guarded(panels.shape.show_refusal))
         session.refused.connect(guarded(panels.load.show_refusal))
+        session.unsent.connect(guarded(panels.publish.show_refusal))
         session.preparing.connect(guarded(panels.shape.show_preparing))
         # Queued: the next look comes after the picture is out, and need not wait for the timer.
         self.membrane.drawn.connect(session.tick, Qt.ConnectionType.QueuedConnection)

@@ -1,7 +1,7 @@
 """What a person wants, as undoable changes of the settings."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
 from kappaskin_app.scene_text import forced, shifted
 from kappaskin_app.session import Session
-from kappaskin_app.settings import Settings, Written, ask_of
+from kappaskin_app.settings import Sending, Settings, Written, ask_of
 from kappaskin_app.simulation import (
     NO_ELEMENTS,
     OWN,
@@ -90,7 +90,8 @@ class Wishes:
     def reset(self) -> None:
         now = self._history.settings
         kept = Settings(calibration=now.calibration, tare=now.tare)  # no matter of taste
-        self._history.change("Reset settings", -1, **vars(kept))
+        sending = {field.name: getattr(now, field.name) for field in fields(Sending)}  # nor this
+        self._history.change("Reset settings", -1, **vars(kept) | sending)
 
     # Scenes as they are written.
 

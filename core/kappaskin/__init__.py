@@ -86,6 +86,10 @@ from kappaskin.press import Phase as Phase
 from kappaskin.press import PressTest as PressTest
 from kappaskin.press import Verdict as Verdict
 from kappaskin.press import elements_to_press as elements_to_press
+from kappaskin.publish import Latency as Latency
+from kappaskin.publish import Published as Published
+from kappaskin.publish import PublishNews as PublishNews
+from kappaskin.publish import Receiver as Receiver
 from kappaskin.recording.reading import Recording as Recording
 from kappaskin.recording.writing import Written as Written
 from kappaskin.region import Bargain as Bargain

@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -18,6 +19,7 @@ from kappaskin.frames import Estimate, Event
 from kappaskin.live import Loop
 from kappaskin.pipeline import Setup
 from kappaskin.processes import beginning_processes
+from kappaskin.publish import targets_of
 from kappaskin.recording.writing import part_of
 from kappaskin.region import Region
 from kappaskin.requests import (
@@ -25,6 +27,7 @@ from kappaskin.requests import (
     Connect,
     Disconnect,
     Note,
+    Publish,
     Record,
     Request,
     Seek,
@@ -95,6 +98,7 @@ class Engine:
         self._setup = setup or Setup()
         self._compared: Setup | None = None
         self._region = Region()
+        self._targets: tuple[str, ...] = ()
         # What was asked for last, for a process that takes over.
         self._source: str | None = None
         self._scene: Scene | None = None
@@ -123,6 +127,8 @@ class Engine:
         self._send(self._region)
         if self._compared is not None:
             self._send(Compare(self._compared))
+        if self._targets:
+            self._send(Publish(self._targets))
 
     def _start_again(self, *events: Event) -> None:
         """Let another process take over; it goes on counting, so that no generation comes twice."""
@@ -224,6 +230,15 @@ class Engine:
         """Let every frame scan `region`; where it cannot, `status` says why."""
         self._region = region
         self._send(region)
+
+    def publish(self, targets: Sequence[str]) -> None:
+        """Send estimates to `targets` from now on, such as udp://127.0.0.1:9870 or foxglove://.
+
+        Those asked for before get no more; `status` tells how each is doing. Raises a `Refusal`
+        where one is no target.
+        """
+        self._targets = tuple(str(target) for target in targets_of(targets))
+        self._send(Publish(self._targets))
 
     def tare(self) -> None:
         """Take a tare; `status` tells what came of it, and a setup with it uses it."""

@@ -6,6 +6,7 @@ from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from itertools import takewhile
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -17,10 +18,21 @@ from kappaskin.health import Health, Monitor
 from kappaskin.health.leaving_out import Kinds
 from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.publish import Publishing, State
 from kappaskin.recorder import Recorder
 from kappaskin.recording.writing import Written
 from kappaskin.region import Region
-from kappaskin.requests import Compare, Connect, Note, Record, Request, Seek, Step, TakeTare
+from kappaskin.requests import (
+    Compare,
+    Connect,
+    Note,
+    Publish,
+    Record,
+    Request,
+    Seek,
+    Step,
+    TakeTare,
+)
 from kappaskin.ring import Ring
 from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
@@ -34,6 +46,8 @@ from kappaskin.tare_taking import TareTaking
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
+_FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
+_GAP = 0.5  # s between two looks at the gaps
 _GAPS = 4096  # gaps between reads that the percentile is taken over
 
 
@@ -58,7 +72,9 @@ class Loop:
         self._other = Side(beside, self._builder, status.beside or Computed())
         self._compares = self._changing = False
         self._taking = TareTaking(self._builder, self._status.tare)
+        self._publishing, self._told = Publishing(), self._status.happened
         self._gaps: deque[float] = deque(maxlen=_GAPS)
+        self._gap, self._next_gap = math.nan, -math.inf
         self._times: deque[float] = deque(maxlen=_GAPS)
         self._pace = Pace()
         self._last_read = self._again = math.inf
@@ -82,6 +98,7 @@ class Loop:
                     self._report()
         self._close()
         self.end_recording()
+        self._publishing.close()
         self._builder.shutdown(wait=False, cancel_futures=True)
 
     def _take(self, request: Request) -> None:
@@ -108,6 +125,8 @@ class Loop:
             self._record(request.path)
         elif isinstance(request, Note):
             self._happen(Event(time.monotonic(), "note", request.text))
+        elif isinstance(request, Publish):
+            self._publishing.ask(request.targets)
         else:
             self._close()
             self._status = replace(
@@ -186,6 +205,7 @@ class Loop:
             side.forget()
         self._steering = self._monitor = self._out = None
         self._gaps.clear()
+        self._gap = math.nan
         self._times.clear()
         self._last_read = self._again = math.inf
 
@@ -242,7 +262,8 @@ class Loop:
 
     def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:
         """Work out the newest frames, as many as there is time for."""
-        late = len(frames) - self._pace.affordable(len(frames))
+        within = (_FRESH,) if self._publishing.active else ()
+        late = len(frames) - self._pace.affordable(len(frames), *within)
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
         beside = self._other.pipeline
@@ -253,7 +274,10 @@ class Loop:
             self._times.append(frame.host_time)
         began = time.monotonic()
         for frame in frames[late:]:
-            estimate = self._side.compute(frame, pipeline)
+            begun = time.monotonic()
+            estimate = pipeline(frame)
+            self._publishing.send(estimate, pipeline, begun)
+            self._side.ring.write(estimate)
             self._taking.receive(estimate)
             self._times.append(frame.host_time)
             self._place = estimate.touch.position
@@ -382,15 +406,17 @@ class Loop:
         now, source, status = time.monotonic(), self._source, self._status
         if source is not None:
             watch = self._side.pipeline.drift if self._side.pipeline else None
-            gaps = np.array(self._gaps)
-            recent = [t for t in self._times if t > now - 1.0]
+            if self._gaps and now >= self._next_gap:
+                self._next_gap = now + _GAP
+                self._gap = float(np.percentile(self._gaps, 99))
+            recent = list(takewhile(lambda t: t > now - 1.0, reversed(self._times)))
             status = replace(
                 status,
                 accounting=source.accounting(),
                 temperature=source.temperature,
                 drift=watch.tell() if watch else None,
-                rate=len(recent) / min(1.0, max(now - recent[0], 1e-3)) if recent else 0.0,
-                reader_gap=float(np.percentile(gaps, 99)) if len(gaps) else math.nan,
+                rate=len(recent) / min(1.0, max(now - recent[-1], 1e-3)) if recent else 0.0,
+                reader_gap=self._gap,
                 last_frame=self._times[-1] if self._times else -math.inf,
                 playing=source.playing
                 if isinstance(source, SimulatedSource)
@@ -398,6 +424,7 @@ class Loop:
                 health=self._health(),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
             )
+        self._publish(status)
         told = self._side.told
         self._status = replace(
             status,
@@ -408,6 +435,24 @@ class Loop:
             slot=told.slot,
             refusal=told.refusal,
             computing=told.computing or self._changing,
+            publishing=self._publishing.news,
             beside=self._other.told if self._compares else None,
         )
         self._ring.write_status(self._status)
+
+    def _publish(self, status: Status) -> None:
+        """Tell the receivers how the source is doing, and what happened since that was told."""
+        fresh = min(status.happened - self._told, len(status.events))
+        events = status.events[len(status.events) - fresh :]
+        self._told = status.happened
+        told = status.message, status.sensor, status.rate, status.last_frame
+        self._publishing.tell(State(status.state, _kind(status), *told, events))
+
+
+def _kind(status: Status) -> str:
+    """Where readings come from, as receivers are told; nothing without a sensor."""
+    if status.sensor is None:
+        return ""
+    if status.replay is not None:
+        return "replay"
+    return "sim" if status.sensor.simulated else "live"

@@ -24,8 +24,11 @@ class Pace:
         self._credit, self._cost, self._rate = _SAVED, 0.0, 0.0
         self._then, self._seen = clock(), -math.inf
 
-    def affordable(self, waiting: int) -> int:
-        """How many of so many frames are to be computed now."""
+    def affordable(self, waiting: int, within: float = _AT_ONCE) -> int:
+        """How many of so many frames are to be computed now; more than one only `within` so many s.
+
+        The last of those that arrived together is as late as all of them take.
+        """
         now = self._clock()
         passed, self._then = now - self._then, now
         if passed:
@@ -36,7 +39,8 @@ class Pace:
         if not self._cost:
             return min(waiting, least)
         allowed = _AT_ONCE if self._rate * self._cost <= _ALL else self._credit
-        return min(waiting, max(int(allowed / self._cost), least))
+        soon = max(1, int(within / self._cost))
+        return min(waiting, soon, max(int(allowed / self._cost), least))
 
     def spend(self, count: int, seconds: float) -> None:
         """Take note that `count` frames were computed in so many s."""

@@ -97,6 +97,8 @@ class Pipeline:
         self.left_out = LeftOut.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
+        self.fitted: Fit | None = None
+        """The fit that the last estimate rests on."""
         self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
 
     def _ideal(self) -> Fit:
@@ -190,7 +192,7 @@ class Pipeline:
         curvature, fresh = self.past.hold(frame, scanned)
         out = self.left_out
         began = time.perf_counter()
-        fit = self._fitted(frame, out(scanned), out(curvature))
+        fit = self.fitted = self._fitted(frame, out(scanned), out(curvature))
         fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)

@@ -63,6 +63,24 @@ class Note:
     text: str
 
 
+@dataclass(frozen=True)
+class Publish:
+    """Publish to these targets, and to no others."""
+
+    targets: tuple[str, ...]
+
+
 Request = (
-    Connect | Disconnect | Setup | Compare | Scene | Seek | Step | Region | TakeTare | Record | Note
+    Connect
+    | Disconnect
+    | Setup
+    | Compare
+    | Scene
+    | Seek
+    | Step
+    | Region
+    | TakeTare
+    | Record
+    | Note
+    | Publish
 )

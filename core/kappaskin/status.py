@@ -9,6 +9,7 @@ import numpy as np
 from kappaskin.frames import Event
 from kappaskin.health import Health
 from kappaskin.pipeline import Setup
+from kappaskin.publish import PublishNews
 from kappaskin.recording.writing import Written
 from kappaskin.region import Region
 from kappaskin.scene import FROM_THE_BEGINNING, Playing
@@ -37,9 +38,9 @@ class Status:
     `playing` tells where a simulated scene is at a device time. `events` are the last of those that
     `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
     tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
-    tells which channels are not to be trusted, `recording` what is being written,
-    `replay` where in a recording the source is, None for any other, and `beside` what else is
-    computed of the same frames, None where nothing is.
+    tells which channels are not to be trusted, `publishing` where estimates are sent to,
+    `recording` what is being written, `replay` where in a recording the source is, None for any
+    other, and `beside` what else is computed of the same frames, None where nothing is.
     """
 
     state: str = OFF
@@ -67,6 +68,7 @@ class Status:
     tare: TareNews = field(default_factory=TareNews)
     drift: Drift | None = None
     health: Health = field(default_factory=Health)
+    publishing: PublishNews = field(default_factory=PublishNews)
     recording: Written = field(default_factory=Written)
     replay: Replay | None = None
     beside: Computed | None = None

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDockWidget,
+    QLineEdit,
     QPushButton,
 )
 
@@ -547,6 +548,9 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
                 was, index = window.history.settings, window.history.stack.index()
                 key = Qt.Key.Key_Space if isinstance(editor, QCheckBox) else Qt.Key.Key_Down
                 editor.setFocus()
+                if isinstance(editor, QLineEdit):
+                    qtbot.keyClicks(editor, "1")
+                    key = Qt.Key.Key_Return
                 qtbot.keyClick(editor, key)
                 if window.history.settings == was:
                     qtbot.keyClick(editor, Qt.Key.Key_Up)

@@ -2,12 +2,11 @@
 
 import json
 import math
-import shutil
 import subprocess
 import sys
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,34 +16,7 @@ from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.wire import encode_samples
 
 _LOADING = Path(__file__).with_name("loading.py")
-_FIRMWARE = Path(__file__).parents[2] / "resources" / "kappaskin_resources" / "firmware"
 _MEMORY = 20.0  # MB that may be added
-
-Play = Callable[..., str]
-
-
-@pytest.fixture
-def play(tmp_path: Path) -> Iterator[Play]:
-    """Starts the firmware as a program of this machine, which costs little; gives its port."""
-    if not shutil.which("gcc"):
-        pytest.skip("no C compiler: apt-get install -y gcc libc6-dev")
-    program, files = tmp_path / "host", [*_FIRMWARE.glob("*.c"), *_FIRMWARE.glob("host/*.c")]
-    command = ["gcc", "-std=c99", "-O2", f"-I{_FIRMWARE}", *map(str, files), "-o", str(program)]
-    subprocess.run(command, check=True)
-    running: list[subprocess.Popen[str]] = []
-
-    def start(*options: object) -> str:
-        command = [str(program), *map(str, options)]
-        device = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
-        running.append(device)
-        return json.loads(device.stdout.readline())["port"]
-
-    yield start
-    for device in running:
-        device.terminate()
-        device.communicate()
 
 
 @pytest.fixture

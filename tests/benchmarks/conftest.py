@@ -1,10 +1,18 @@
 """Benchmarks: each figure is a ratio to a named baseline of the same run, printed at the end."""
 
+import json
+import shutil
 import statistics
+import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
+
+_FIRMWARE = Path(__file__).parents[2] / "resources" / "kappaskin_resources" / "firmware"
+
+Play = Callable[..., str]
 
 Figures = list[str]
 _figures: Figures = []
@@ -71,3 +79,27 @@ def spaced() -> Callable[..., list[float]]:
         return [statistics.median(times) for times in taken]
 
     return measure
+
+
+@pytest.fixture
+def play(tmp_path: Path) -> Iterator[Play]:
+    """Starts the firmware as a program of this machine, which costs little; gives its port."""
+    if not shutil.which("gcc"):
+        pytest.skip("no C compiler: apt-get install -y gcc libc6-dev")
+    program, files = tmp_path / "host", [*_FIRMWARE.glob("*.c"), *_FIRMWARE.glob("host/*.c")]
+    command = ["gcc", "-std=c99", "-O2", f"-I{_FIRMWARE}", *map(str, files), "-o", str(program)]
+    subprocess.run(command, check=True)
+    running: list[subprocess.Popen[str]] = []
+
+    def start(*options: object) -> str:
+        command = [str(program), *map(str, options)]
+        device = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        running.append(device)
+        return json.loads(device.stdout.readline())["port"]
+
+    yield start
+    for device in running:
+        device.terminate()
+        device.communicate()

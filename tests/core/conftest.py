@@ -1,15 +1,29 @@
 """What several tests of the core use: commands, and skins held in every way that they can be."""
 
 import math
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from kappaskin import Basis, Disk, Patch, Polygon, basis_for, edges_of
+from kappaskin import (
+    Basis,
+    Disk,
+    Estimate,
+    Patch,
+    Pipeline,
+    Polygon,
+    Scene,
+    Setup,
+    Simulator,
+    basis_for,
+    edges_of,
+)
 from kappaskin.cli import main
+from kappaskin.publish.message import Mark, Message, epoch
 
 HEXAGON = [(0, 1), (0.5, 0), (1.5, 0), (2, 1), (1.5, 2), (0.5, 2)] * np.array(
     [0.05, 0.05 * math.sqrt(3) / 2]
@@ -82,3 +96,28 @@ def run(capsys) -> Callable[..., tuple[int, str, str]]:
         return code, *capsys.readouterr()
 
     return run_one
+
+
+@pytest.fixture
+def messages_of() -> Callable[..., list[Message]]:
+    """Makes the messages about the first frames of a scene; `change` makes another estimate."""
+
+    def made(
+        scene: Scene,
+        count: int = 1,
+        setup: Setup | None = None,
+        change: Callable[[Estimate], Estimate] | None = None,
+    ) -> list[Message]:
+        pipeline = Pipeline(scene.sensor(), setup or Setup())
+        simulator, told = Simulator(scene), list[Message]()
+        for sequence in range(count):
+            frame = simulator.frame(sequence, time.monotonic)
+            estimate = pipeline(replace(frame, taken=frame.host_time, taken_sd=1e-4))
+            estimate = change(estimate) if change else estimate
+            assert pipeline.fitted is not None
+            told.append(
+                Message(estimate, pipeline.fitted, pipeline, Mark("sim", epoch(), sequence, True))
+            )
+        return told
+
+    return made

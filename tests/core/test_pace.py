@@ -77,3 +77,11 @@ def test_nothing_waiting_costs_nothing() -> None:
     assert pace.affordable(0) == 0
     pace.spend(0, 0.0)
     assert pace.affordable(5) == 1
+
+
+def test_of_frames_that_came_together_only_so_many_are_computed_as_are_not_late() -> None:
+    pace = Played(500, 0.5e-3).go(2.0).pace
+    assert pace.affordable(20) > 3
+    assert pace.affordable(20, 1.6e-3) == 3
+    assert pace.affordable(20, 1e-4) == 1  # the newest, however long it takes
+    assert pace.affordable(0, 1e-4) == 0

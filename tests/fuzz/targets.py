@@ -1,6 +1,7 @@
 """What is read from elsewhere: for each reader, how bytes are given to it, and some it likes."""
 
 import io
+import socket
 import tomllib
 from collections.abc import Callable
 from contextlib import closing, suppress
@@ -30,6 +31,8 @@ from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.calibration.file import from_toml, to_toml
 from kappaskin.effects import SECOND_GENERATION_LOOPS, Creep
 from kappaskin.mechanics import HeightMap, Mesh
+from kappaskin.publish.channels import CHANNELS
+from kappaskin.publish.client import Client
 from kappaskin.recorder import Recorder
 from kappaskin.recording.messages import TOPICS
 from kappaskin.recording.repair import repair
@@ -71,6 +74,42 @@ SCENE_FOLDER = Path(str(files("kappaskin_resources"))) / "scenes"
 _NUMBERS = tuple(b"0 -1 1 2 0.5 -0.0 1e308 1e-308 nan inf 65535 4294967296 99999999999".split())
 _TOML = (*_NUMBERS, b"true", b'""', b"[]", b"{}", b"[[", b"]]", b"=", b"\n", b'"""', b"2026-01-01")
 _JSON = (*_NUMBERS, b"null", b"NaN", b"Infinity", b"{}", b"[]", b'""', b":", b",", b"\\ud800")
+
+
+# A client of the WebSocket server
+
+_HELLO = (
+    b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+    b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
+)
+
+
+def _text(words: bytes) -> bytes:
+    """A masked frame of text."""
+    return b"\x81" + bytes([0x80 | len(words)]) + bytes(4) + words
+
+
+_ASKED = (
+    _text(b'{"op":"subscribe","subscriptions":[{"id":7,"channelId":1}]}'),
+    _text(b'{"op":"unsubscribe","subscriptionIds":[7]}'),
+)
+
+
+def _client(data: bytes, _: Path) -> None:
+    """In pieces, as they come; messages are offered meanwhile."""
+    ours, theirs = socket.socketpair()
+    client = Client(ours, "somebody")
+    with ours, theirs:
+        theirs.setblocking(False)
+        for at in range(0, len(data), 4096):
+            with suppress(OSError):  # it hung up
+                theirs.send(data[at : at + 4096])
+            client.read()
+            client.offer(CHANNELS[0], 1.8e9, b"{}")
+            client.go_on()
+            with suppress(OSError):
+                theirs.recv(2**20)
 
 
 # The wire
@@ -291,6 +330,12 @@ def _recorded() -> tuple[bytes, bytes]:
 _FILE, _MESSAGES = _recorded()
 
 TARGETS = (
+    Target(
+        "client",
+        _client,
+        (_HELLO, _HELLO + b"".join(_ASKED)),
+        (*_JSON, *_ASKED, _HELLO, b"\x89\x80" + bytes(4), b"\x88\x80" + bytes(4), b"\x81\xff"),
+    ),
     Target("wire", _wire, (b"".join(_PIECES), _SCAN * 3), (b"\x4b\xa7", _SCAN[:22], _SCAN)),
     Target(
         "content",

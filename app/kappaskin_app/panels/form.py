@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.panels.panel import Panel
-from kappaskin_app.settings import Choice, Range, Settings, Switch, ask_of
+from kappaskin_app.settings import Choice, Range, Settings, Switch, Text, ask_of
 
 _LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
 
@@ -177,8 +177,16 @@ def _switch(how: Switch, said: Callable[[Any], None]) -> _Editor:
     return _Editor(box, box.setChecked)
 
 
+def _text(said: Callable[[Any], None]) -> _Editor:
+    box = QLineEdit()
+    box.editingFinished.connect(lambda: said(box.text().strip()))
+    return _Editor(box, box.setText)
+
+
 def _editor(name: str, said: Callable[[Any], None]) -> _Editor:
     how = ask_of(name)
+    if isinstance(how, Text):
+        return _text(said)
     if isinstance(how, Range):
         return _range(how, said)
     return _choice(how, said) if isinstance(how, Choice) else _switch(how, said)

@@ -13,6 +13,7 @@ from kappaskin_app.panels.calibration.in_use import InUsePanel
 from kappaskin_app.panels.connection import ConnectionPanel
 from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.panel import Panel
+from kappaskin_app.panels.publish import PublishPanel
 from kappaskin_app.panels.sensor import ElectronicsPanel, RegionPanel, SpoilsPanel
 from kappaskin_app.panels.skin import ElementsPanel, ShapePanel, SupportPanel
 from kappaskin_app.panels.tare import TarePanel
@@ -38,6 +39,7 @@ class Panels(QTabWidget):
         self.noise = self._add(_LIVE, NoisePanel())
         self.basis = self._add(_LIVE, BasisPanel())
         self.view = self._add(_LIVE, ViewPanel())
+        self.publish = self._add(_LIVE, PublishPanel())
         self.shape = self._add(_SKIN, ShapePanel())
         self.elements = self._add(_SKIN, ElementsPanel())
         self.support = self._add(_SKIN, SupportPanel())

@@ -8,6 +8,7 @@ from kappaskin_app.settings.asks import Ask as Ask
 from kappaskin_app.settings.asks import Choice as Choice
 from kappaskin_app.settings.asks import Range as Range
 from kappaskin_app.settings.asks import Switch as Switch
+from kappaskin_app.settings.asks import Text as Text
 from kappaskin_app.settings.load import FREE_CASES as FREE_CASES
 from kappaskin_app.settings.load import LOAD_CASES as LOAD_CASES
 from kappaskin_app.settings.load import READY_CASES as READY_CASES
@@ -16,6 +17,7 @@ from kappaskin_app.settings.load import SPREAD_CASES as SPREAD_CASES
 from kappaskin_app.settings.load import TABLE_1_CASES as TABLE_1_CASES
 from kappaskin_app.settings.load import TWO_ENDED as TWO_ENDED
 from kappaskin_app.settings.load import Load, Noise
+from kappaskin_app.settings.publishing import Sending as Sending
 from kappaskin_app.settings.scene import Own
 from kappaskin_app.settings.scene import Written as Written
 from kappaskin_app.settings.sensor import Electronics as Electronics
@@ -35,7 +37,7 @@ class SceneSettings(Skin, Load, Noise, Electronics, Spoils, Own):
 
 
 @dataclass(frozen=True)
-class Settings(SceneSettings, Fit, View, Scanning):
+class Settings(SceneSettings, Fit, View, Scanning, Sending):
     """Everything a person may change, in SI units; a change is a new `Settings`.
 
     `calibration` and `tare` are in use whenever the sensor that they are of is connected.
@@ -45,7 +47,10 @@ class Settings(SceneSettings, Fit, View, Scanning):
     tare: Tare | None = None
 
 
-def part(settings: Settings, kind: type[SceneSettings | Fit | View | Scanning]) -> tuple[Any, ...]:
+Kind = type[SceneSettings | Fit | View | Scanning | Sending]
+
+
+def part(settings: Settings, kind: Kind) -> tuple[Any, ...]:
     """The values of the settings that belong to `kind`."""
     return tuple(getattr(settings, field.name) for field in fields(kind))
 

@@ -38,7 +38,15 @@ class Switch:
     tip: str
 
 
-Ask = Range | Choice | Switch
+@dataclass(frozen=True)
+class Text:
+    """How a line of text is asked for."""
+
+    label: str
+    tip: str
+
+
+Ask = Range | Choice | Switch | Text
 
 
 def asked(default: Any, how: Ask) -> Any:

@@ -1,0 +1,49 @@
+"""What somebody publishes, as readable lines."""
+
+import math
+import signal
+import time
+
+from kappaskin.cli.common import FAILED, Switch, print_json
+from kappaskin.errors import Refusal
+from kappaskin.publish.listening import Listener
+
+_READ = 0.1  # s
+
+
+def listen(*, udp: int = 9870, seconds: float = math.inf, json: Switch = False) -> int:
+    """Print what is published to a UDP port of this machine, until stopped (Ctrl+C).
+
+    Contacts (ten a second) with their error bars and their age when sent, every loss on the
+    network, how the source is doing, and a summary. Exit code 1 if no contact came.
+
+    Example: `kappaskin listen --udp 9870`
+
+    Parameters
+    ----------
+    udp
+        The port.
+    seconds
+        How long to listen; until stopped when left out.
+    json
+        Print every message as it came, one a line.
+    """
+    if not seconds > 0:
+        raise Refusal(f"expected a time above 0 s to listen, got {seconds:g}")
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda got, _: stopped.append(got))
+    listener, end = Listener(udp), time.monotonic() + seconds
+    try:
+        while not stopped and time.monotonic() < end:
+            for message in listener.read(_READ):
+                lines = listener.lines(message)
+                if json:
+                    print_json(message)
+                else:
+                    print(*lines, sep="\n", end="\n" if lines else "", flush=bool(lines))
+    finally:
+        listener.close()
+    if not json:
+        print(listener.summary)
+    return 0 if listener.contacts else FAILED

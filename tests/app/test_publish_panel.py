@@ -1,0 +1,115 @@
+"""The panel that publishes: off until asked, what each receiver gets, and what cannot be."""
+
+import json
+import socket
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QLineEdit
+
+from kappaskin import Latency, Published, PublishNews, Receiver, Status
+from kappaskin_app.panels.publish import PublishPanel
+from kappaskin_app.settings import Settings
+
+FINE = Published("udp://127.0.0.1:9870", receivers=(Receiver("udp://127.0.0.1:9870", 12345, 6),))
+DEAD = Receiver("udp://robot:1", 0, 7, "nobody receives there")
+VIEWER = Receiver("127.0.0.1:50000", 90, 2, "too slow")
+SERVED = Published("foxglove://127.0.0.1:8765", sent=100, dropped=2, receivers=(VIEWER,))
+
+
+@pytest.fixture
+def panel(qtbot) -> PublishPanel:
+    made = PublishPanel()
+    qtbot.addWidget(made)
+    made.show_settings(Settings())
+    made.show()
+    return made
+
+
+def told(panel: PublishPanel, *targets: Published, late: float = float("nan")) -> str:
+    panel.show_refusal("")
+    news = PublishNews(targets, Latency(late, late, late, late))
+    panel.show_status(replace(Status(), publishing=news), True)
+    return panel.counts.text()
+
+
+def test_nothing_is_sent_before_it_is_asked_for(panel: PublishPanel) -> None:
+    assert Settings().targets == []
+    assert not any(box.isChecked() for box in panel.findChildren(QCheckBox))
+    assert told(panel) == ""
+    assert not panel.counts.isVisible()
+    assert not panel.late.isVisible()
+
+
+def test_settings_name_the_targets() -> None:
+    both = Settings(send_udp=True, udp_to="robot:1, [::1]:2", serve_foxglove=True)
+    assert both.targets == ["udp://robot:1", "udp://[::1]:2", "foxglove://127.0.0.1:8765"]
+    assert replace(both, send_udp=False).targets == ["foxglove://127.0.0.1:8765"]
+
+
+def test_every_receiver_is_told_with_what_it_got(panel: PublishPanel) -> None:
+    text = told(panel, FINE, Published("udp://robot:1", receivers=(DEAD,)), SERVED, late=2.4e-3)
+    assert "127.0.0.1:9870\n    12,345 sent, 6 dropped" in text
+    assert "0 sent, 7 dropped, nobody receives there" in text
+    assert "8765, 1 connected\n    127.0.0.1:50000: 90 sent, 2 dropped, too slow" in text
+    assert panel.late.text() == "99 % within 2.4 ms"
+
+
+def test_what_is_looked_for_or_refused_says_so(panel: PublishPanel) -> None:
+    text = told(panel, Published("udp://robot:1", opening=True))
+    assert text.startswith("udp://robot:1: looking for it")
+    text = told(panel, FINE, Published("udp://a:1", refusal="udp://a:1: not known"))
+    assert "udp://a:1" not in text
+    assert panel.message.text() == "udp://a:1: not known."
+
+
+def test_an_address_is_wished_once_it_is_typed(panel: PublishPanel, qtbot) -> None:
+    wishes: list[tuple[str, object]] = []
+    panel.wished.connect(lambda *wish: wishes.append(wish))
+    line = panel.editor("udp_to")
+    assert isinstance(line, QLineEdit)
+    line.selectAll()
+    qtbot.keyClicks(line, " robot:9870 ")
+    assert wishes == []
+    qtbot.keyClick(line, Qt.Key.Key_Return)
+    assert wishes[-1] == ("udp_to", "robot:9870")
+
+
+def test_the_window_publishes_when_asked_and_undo_ends_it(window, until) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(5)
+        panel = window.panels.publish
+        window.wishes.wish("udp_to", f"127.0.0.1:{receiver.getsockname()[1]}")
+        assert window.session.status.publishing.targets == ()
+        panel.editor("send_udp").click()
+        until(lambda: "sent" in panel.counts.text())
+        until(lambda: json.loads(receiver.recv(9999))["kind"] == "contact")
+        window.history.stack.undo()
+        until(lambda: panel.counts.text() == "")
+        assert not panel.editor("send_udp").isChecked()
+        assert window.session.status.publishing.targets == ()
+
+
+def test_what_is_no_address_is_refused_in_the_panel_and_nothing_is_sent(window, until) -> None:
+    panel = window.panels.publish
+    window.wishes.wish("send_udp", True)
+    until(lambda: window.session.status.publishing.targets)
+    window.wishes.wish("udp_to", "robot:70000")
+    until(lambda: "Nothing is sent: expected a port" in panel.message.text())
+    until(lambda: window.session.status.publishing.targets == ())
+    window.wishes.wish("udp_to", "nowhere.invalid:1")
+    until(lambda: "nowhere.invalid is not known" in panel.message.text())
+    window.wishes.wish("send_udp", False)
+    until(lambda: panel.message.text() == "")
+
+
+def test_resetting_settings_leaves_receivers_alone(window) -> None:
+    window.wishes.wish("serve_foxglove", True)
+    window.wishes.wish("functions_x", 5)
+    window.wishes.reset()
+    assert (window.history.settings.functions_x, window.history.settings.serve_foxglove) == (
+        8,
+        True,
+    )

@@ -1,0 +1,266 @@
+"""Publishing from the live process: off until asked, through its death, and by the commands."""
+
+import json
+import os
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from importlib.resources import as_file, files
+
+import pytest
+
+from kappaskin import Engine, Refusal, Setup
+from kappaskin.publish import Published
+
+RECEIVERS = files("kappaskin_resources") / "publishing"
+
+
+@pytest.fixture
+def receiver() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        made.bind(("127.0.0.1", 0))
+        made.settimeout(10)
+        yield made
+
+
+@pytest.fixture
+def port(receiver) -> int:
+    return receiver.getsockname()[1]
+
+
+@pytest.fixture
+def engine() -> Iterator[Engine]:
+    with Engine(Setup(4, 4)) as made:
+        yield made
+
+
+def free_port() -> int:
+    with socket.socket() as made:
+        made.bind(("127.0.0.1", 0))
+        return made.getsockname()[1]
+
+
+def heard(receiver: socket.socket, kind: str, **wanted: object) -> dict[str, object]:
+    """The next message of a kind that says what is wanted."""
+    end = time.monotonic() + 10
+    while time.monotonic() < end:
+        told = json.loads(receiver.recv(9999))
+        if told["kind"] == kind and all(told[key] == value for key, value in wanted.items()):
+            return told
+    raise AssertionError(f"no {kind} with {wanted}")
+
+
+def target(engine: Engine, within: float = 10.0) -> Published:
+    """How the first target is doing, once that is known."""
+    end = time.monotonic() + within
+    while time.monotonic() < end:
+        engine.revive()
+        told = engine.status().publishing.targets
+        if told and not told[0].opening:
+            return told[0]
+        time.sleep(0.02)
+    raise AssertionError(engine.status())
+
+
+# The engine
+
+
+def test_nothing_is_sent_before_it_is_asked_for_nor_after(engine, receiver, port) -> None:
+    engine.connect("sim:centre")
+    receiver.settimeout(1.0)
+    with pytest.raises(TimeoutError):
+        receiver.recv(9999)
+    assert engine.status().publishing.targets == ()
+    engine.publish([f"udp://127.0.0.1:{port}"])
+    receiver.settimeout(10)
+    told = heard(receiver, "contact", present=True)
+    assert (told["source"], told["version"]) == ("sim", 1)
+    assert told["x_m"] == pytest.approx(0.05, abs=1e-3)
+    assert heard(receiver, "shape")["functions_x"] == 4
+    engine.publish([])
+    time.sleep(0.5)
+    receiver.setblocking(False)
+    with suppress(BlockingIOError):
+        while receiver.recv(9999):
+            pass  # what was sent before
+    receiver.settimeout(0.5)
+    with pytest.raises(TimeoutError):
+        receiver.recv(9999)
+    assert engine.status().publishing.targets == ()
+
+
+def test_status_tells_what_was_sent_and_how_late(engine, receiver, port) -> None:
+    engine.connect("sim:centre")
+    engine.publish([f"udp://127.0.0.1:{port}"])
+    heard(receiver, "contact")
+    time.sleep(1.5)
+    told, latency = target(engine), engine.status().publishing.latency
+    assert told.target == f"udp://127.0.0.1:{port}"
+    assert told.sent > 50
+    assert (told.dropped, told.refusal) == (0, "")
+    assert 0 < latency.send < latency.whole < 1
+    assert 0 <= latency.wait < 1
+
+
+def test_a_target_that_is_none_is_refused_before_anything_changes(engine, receiver, port) -> None:
+    engine.connect("sim:centre")
+    engine.publish([f"udp://127.0.0.1:{port}"])
+    heard(receiver, "contact")
+    for wrong in (["udp://a:0"], ["carrier-pigeon://home"], ["udp://a", "udp://a:9870"]):
+        with pytest.raises(Refusal):
+            engine.publish(wrong)
+    heard(receiver, "contact")
+    assert len(engine.status().publishing.targets) == 1
+
+
+def test_a_host_that_is_not_known_and_a_port_in_use_are_told_and_the_rest_goes_on(
+    engine, receiver, port
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        taken = f"foxglove://127.0.0.1:{other.getsockname()[1]}"
+        engine.connect("sim:centre")
+        engine.publish(["udp://nowhere.invalid:9870", taken, f"udp://127.0.0.1:{port}"])
+        heard(receiver, "contact")
+        target(engine)
+        unknown, busy, fine = engine.status().publishing.targets
+    assert "nowhere.invalid is not known" in unknown.refusal
+    assert "cannot be listened on" in busy.refusal
+    assert fine.refusal == ""
+
+
+def test_a_lost_source_is_told_to_the_receivers(engine, receiver, port) -> None:
+    engine.connect("/dev/nowhere")
+    engine.publish([f"udp://127.0.0.1:{port}"])
+    told = heard(receiver, "status", state="lost")
+    assert "no such port" in told["message"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="kills as POSIX does")
+def test_an_engine_that_takes_over_goes_on_publishing(engine, receiver, port) -> None:
+    engine.connect("sim:centre")
+    engine.publish([f"udp://127.0.0.1:{port}", f"foxglove://:{free_port()}"])
+    heard(receiver, "contact", generation=1)
+    os.kill(engine.pid, signal.SIGKILL)
+    end = time.monotonic() + 10
+    while "started again" not in str(engine.status().events) and time.monotonic() < end:
+        engine.revive()
+        time.sleep(0.02)
+    heard(receiver, "contact", generation=2)
+    target(engine)
+    assert [told.refusal for told in engine.status().publishing.targets] == ["", ""]
+
+
+# The commands
+
+
+def start(*words: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-u", "-m", "kappaskin", *map(str, words)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, **pipes)
+
+
+def test_publish_sends_what_listen_tells() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
+        found.bind(("127.0.0.1", 0))
+        port = found.getsockname()[1]
+    listening = start("listen", "--udp", port, "--seconds", 6)
+    publishing = start("publish", "sim:centre", "--udp", f"127.0.0.1:{port}", "--seconds", 3)
+    said, _ = publishing.communicate(timeout=30)
+    assert publishing.returncode == 0
+    assert re.search(r"streaming +\d+ frames/s +udp://127.0.0.1:\d+: \d+ sent, \d+ dropped", said)
+    assert "99 % within" in said
+    told, _ = listening.communicate(timeout=30)
+    assert listening.returncode == 0
+    assert "status    streaming  Simulated skin" in told
+    assert re.search(r"contact +#\d+ +x 4?5?\d*\.\d+ \+- ", told)
+    assert re.search(r"\d+ contacts came, \d+ were lost", told.splitlines()[-1])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
+def test_both_end_quietly_when_stopped(receiver, port) -> None:
+    publishing = start("publish", "sim:centre", "--udp", f"127.0.0.1:{port}")
+    heard(receiver, "contact")
+    listening, there = start("listen", "--udp", (free := free_port())), ("127.0.0.1", free)
+    while not select.select([listening.stdout], [], [], 0.05)[0]:
+        receiver.sendto(b'{"kind":"contact","version":1,"number":1}', there)
+    for process in (publishing, listening):
+        process.send_signal(signal.SIGINT)
+        _, complaint = process.communicate(timeout=10)
+        assert (process.returncode, complaint) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["sim:"], "expected somebody to send to"),
+        (["sim:nothing", "--udp", "127.0.0.1:1"], "nothing"),
+        (["sim:", "--udp", "127.0.0.1:0"], "port from 1 to 65535"),
+        (["sim:", "--udp", "127.0.0.1:many"], "port from 1 to 65535"),
+        (["sim:", "--udp", ":9870"], "expected a host"),
+        (["sim:", "--udp", "nowhere.invalid:9870"], "is not known"),
+        (["sim:", "--foxglove", "nowhere.invalid:1"], "is not known"),
+        (["sim:", "--udp", "a:1", "--udp", "A:1"], "twice"),
+        (["sim:", "--foxglove", "--seconds", "0"], "above 0 s"),
+    ],
+)
+def test_what_cannot_be_published_is_refused(run, words: list[str], reason: str) -> None:
+    code, said, complaint = run("publish", *words)
+    assert (code, said) == (2, "")
+    assert reason in complaint
+
+
+def test_publish_fails_where_there_is_nothing_to_send(run, port) -> None:
+    code, said, _ = run("publish", "/dev/nowhere", "--udp", f"127.0.0.1:{port}", "--seconds", 1)
+    assert code == 1
+    assert "no such port" in said
+
+
+def test_listen_refuses_what_is_no_port_or_no_time(run) -> None:
+    assert run("listen", "--udp", 0)[0] == 2
+    assert run("listen", "--seconds", "nan")[0] == 2
+
+
+def test_listen_fails_where_nothing_came_and_prints_json_if_asked(run, messages_of) -> None:
+    port = free_port()
+    assert run("listen", "--udp", port, "--seconds", 0.2)[0] == 1
+    listening = start("listen", "--udp", port, "--seconds", 5, "--json")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        while listening.poll() is None:
+            sender.sendto(b'{"kind":"contact","version":1,"number":1}', ("127.0.0.1", port))
+            time.sleep(0.05)
+    said, _ = listening.communicate()
+    assert json.loads(said.splitlines()[0]) == {"kind": "contact", "version": 1, "number": 1}
+
+
+# The receivers that are given away
+
+
+def given_away(name: str, *words: object) -> subprocess.Popen[str]:
+    with as_file(RECEIVERS / name) as path:
+        command = [sys.executable, "-u", str(path), *map(str, words)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        return subprocess.Popen(command, **pipes)
+
+
+@pytest.mark.parametrize("name", ["receive_udp.py", "receive_foxglove.py"])
+def test_a_receiver_of_twenty_lines_prints_contacts(engine, name: str) -> None:
+    port = free_port()
+    engine.connect("sim:centre")
+    if name == "receive_udp.py":
+        engine.publish([f"udp://127.0.0.1:{port}"])
+        process = given_away(name, port)
+    else:
+        engine.publish([f"foxglove://:{port}"])
+        assert target(engine).refusal == ""
+        process = given_away(name, f"ws://127.0.0.1:{port}")
+    line = process.stdout.readline()
+    process.terminate()
+    _, complaint = process.communicate()
+    assert re.match(r"0\.0\d+ m 0\.0\d+ m 0\.\d+ \+- 0\.\d+ N", line), complaint
+    assert len((RECEIVERS / name).read_text("utf-8").splitlines()) == 20

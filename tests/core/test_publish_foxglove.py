@@ -1,0 +1,361 @@
+"""The WebSocket server: its protocol, and clients that are slow, dead, many, or mean no good."""
+
+import base64
+import json
+import socket
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from kappaskin import Event, Refusal, load_scene
+from kappaskin.publish import Message, State, foxglove
+from kappaskin.publish.channels import CHANNELS
+from kappaskin.publish.client import LARGEST, PER_SECOND, PROTOCOLS, Client
+from kappaskin.publish.cloud import NAMES, POINTS
+from kappaskin.publish.foxglove import MOST_CLIENTS, Foxglove
+from kappaskin.publish.target import opened, target_of
+
+PRESSED = load_scene("off-centre")
+EVENT = Event(0.0, "gap", "3 messages lost")
+STATE = State("streaming", "sim", "", PRESSED.sensor(), 500.0, 0.0, (EVENT,))
+TOPICS = {channel.topic: channel.number for channel in CHANNELS}
+
+HELLO = (
+    b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+    b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
+)
+
+Told = dict[str, Any]
+
+
+@pytest.fixture
+def server() -> Iterator[Foxglove]:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port = found.getsockname()[1]
+    made = foxglove.opened(target_of(f"foxglove://:{port}"))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def message(messages_of) -> Message:
+    (made,) = messages_of(PRESSED)
+    return made
+
+
+def place(server: Foxglove) -> tuple[str, int]:
+    return server._server.getsockname()  # noqa: SLF001
+
+
+@pytest.fixture
+def client(server: Foxglove) -> Iterator[Callable[..., ClientConnection]]:
+    """Connects, and takes in what the server says first."""
+    with ExitStack() as stack:
+
+        def connected(*topics: str, protocol: str = PROTOCOLS[0]) -> ClientConnection:
+            url = "ws://{}:{}".format(*place(server))
+            one = stack.enter_context(connect(url, subprotocols=[protocol], compression=None))
+            one.first = [json.loads(one.recv(2)), json.loads(one.recv(2))]
+            if topics:
+                subscribe(one, *topics)
+                until(lambda: any(len(c.subscribed) == len(topics) for c in clients(server)))
+            return one
+
+        yield connected
+
+
+def subscribe(one: ClientConnection, *topics: str) -> None:
+    pairs = [{"id": 70 + TOPICS[topic], "channelId": TOPICS[topic]} for topic in topics]
+    one.send(json.dumps({"op": "subscribe", "subscriptions": pairs}))
+
+
+def clients(server: Foxglove) -> Sequence[Client]:
+    return server._clients  # noqa: SLF001
+
+
+def until(holds: Callable[[], object], within: float = 5.0) -> None:
+    end = time.monotonic() + within
+    while not holds():
+        assert time.monotonic() < end, "it never came to hold"
+        time.sleep(0.005)
+
+
+def parsed(data: str | bytes) -> tuple[int, float, Told]:
+    """Subscription, time in s and content of a message with data."""
+    assert isinstance(data, bytes)
+    code, number, nanoseconds = struct.unpack("<BIQ", data[:13])
+    assert code == 1
+    return number, nanoseconds * 1e-9, json.loads(data[13:])
+
+
+def obeys(value: object, schema: Told) -> bool:
+    """Whether a value is as the part of JSON schema that is used here says."""
+    kinds = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int}
+    if schema["type"] == "number":
+        return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
+    if not isinstance(value, kinds[schema["type"]]):
+        return False
+    if isinstance(value, dict):
+        inside = schema["properties"]
+        return value.keys() <= inside.keys() and all(obeys(value[k], inside[k]) for k in value)
+    return not isinstance(value, list) or all(obeys(v, schema["items"]) for v in value)
+
+
+# The protocol
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_a_client_is_told_who_serves_and_what_there_is(client, protocol: str) -> None:
+    one = client(protocol=protocol)
+    information, advertised = one.first
+    assert one.subprotocol == protocol
+    assert (information["op"], information["name"]) == ("serverInfo", "kappaskin")
+    assert information["capabilities"] == []
+    assert {channel["topic"]: channel["id"] for channel in advertised["channels"]} == TOPICS
+    for channel in advertised["channels"]:
+        assert (channel["encoding"], channel["schemaEncoding"]) == ("json", "jsonschema")
+        assert json.loads(channel["schema"])["type"] == "object"
+
+
+def test_a_client_of_another_protocol_is_refused(server) -> None:
+    url = "ws://{}:{}".format(*place(server))
+    for protocols in (None, ["chat"]):
+        with pytest.raises(InvalidStatus, match="400"):
+            connect(url, subprotocols=protocols)
+    until(lambda: not server.receivers)
+
+
+def test_every_channel_holds_what_its_schema_says(client, server, message) -> None:
+    one = client(*TOPICS)
+    schemas = {c["id"]: json.loads(c["schema"]) for c in one.first[1]["channels"]}
+    server.send(message)
+    server.tell(STATE)
+    told: dict[int, Told] = {}
+    while len(told) < len(TOPICS):
+        number, when, content = parsed(one.recv(2))
+        told[number - 70] = content
+        assert abs(when - time.time()) < 10 or number - 70 == TOPICS["/log"]
+    for number, content in told.items():
+        assert obeys(content, schemas[number]), content
+        if content.get("kind"):
+            assert content.keys() == schemas[number]["properties"].keys()
+    assert told[TOPICS["/contact"]] == json.loads(message.contact)
+    assert told[TOPICS["/shape"]] == json.loads(message.shape)
+    assert told[TOPICS["/log"]]["message"] == "gap: 3 messages lost"
+
+
+def test_the_skin_is_a_cloud_of_points_on_the_deflected_surface(client, server, message) -> None:
+    one = client("/skin")
+    server.send(message)
+    _, _, cloud = parsed(one.recv(2))
+    assert [field["name"] for field in cloud["fields"]] == list(NAMES)
+    assert [field["offset"] for field in cloud["fields"]] == list(range(0, 28, 4))
+    data = np.frombuffer(base64.b64decode(cloud["data"]), "<f4").reshape(-1, len(NAMES))
+    x, y, z, displacement, xx, yy, xy = data.T.reshape(len(NAMES), POINTS, POINTS)
+    surface = message.estimate.surface[::2, ::2]  # 65 points have those 33 among them
+    assert displacement == pytest.approx(surface, abs=1e-8)
+    assert z == pytest.approx(-surface, abs=1e-8)
+    assert (x[0, -1], y[-1, 0]) == pytest.approx((0.1, 0.1))
+    step = float(x[0, 1])
+    assert xx[5:-5, 5:-5] == pytest.approx(
+        (surface[:, 2:] - 2 * surface[:, 1:-1] + surface[:, :-2])[5:-5, 4:-4] / step**2, abs=0.8
+    )
+    assert np.isfinite(yy).all()
+    assert np.abs(xy).max() > 1
+
+
+def test_the_pose_stands_on_the_skin_along_its_normal(client, server, message) -> None:
+    one = client("/contact/pose")
+    server.send(message)
+    _, _, told = parsed(one.recv(2))
+    position, (x, y, z, w) = told["pose"]["position"], told["pose"]["orientation"].values()
+    geometry = message.estimate.geometry
+    assert list(position.values()) == pytest.approx(list(geometry.position))
+    up = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
+    assert up == pytest.approx(list(geometry.normal), abs=1e-9)
+
+
+def test_who_unsubscribes_gets_no_more(client, server, message) -> None:
+    one = client("/contact", "/shape")
+    one.send(json.dumps({"op": "unsubscribe", "subscriptionIds": [70 + TOPICS["/contact"]]}))
+    until(lambda: len(clients(server)[0].subscribed) == 1)
+    server.send(message)
+    number, _, _ = parsed(one.recv(2))
+    assert number == 70 + TOPICS["/shape"]
+
+
+# Clients that do not do as they should
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("", "{", "[]", "1", '"op"', "{}", '{"op": "advertise"}', '{"op": "subscribe"}'),
+        '{"op": "subscribe", "subscriptions": 5}',
+        '{"op": "subscribe", "subscriptions": [{"id": -1, "channelId": 1}]}',
+        '{"op": "subscribe", "subscriptions": [{"id": 4294967296, "channelId": 1}]}',
+        '{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": [1]}]}',
+        '{"op": "unsubscribe", "subscriptionIds": [[1]]}',
+        "[" * 50000,
+        b"\x01\x00\x00",
+    ],
+)
+def test_what_is_not_understood_is_answered_with_what_was_expected(client, words) -> None:
+    one = client()
+    one.send(words)
+    answer = json.loads(one.recv(2))
+    assert (answer["op"], answer["level"]) == ("status", 1)
+    assert "expected" in answer["message"]
+
+
+def test_a_message_without_end_is_cut_off(client, server) -> None:
+    one = client()
+    one.send("x" * (LARGEST + 1))
+    with pytest.raises(ConnectionClosed, match="1009"):
+        one.recv(2)
+    until(lambda: not server.receivers)
+
+
+def test_a_client_that_floods_is_let_go(client, server) -> None:
+    one = client()
+
+    def flood() -> None:
+        for _ in range(200):
+            one.send("x" * (PER_SECOND // 50))
+            time.sleep(0.001)
+
+    with pytest.raises(ConnectionClosed):
+        flood()
+    until(lambda: not server.receivers)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        *(b"\x00" * 300, b"GET / HTTP/1.1\r\n\r\n", b"x" * 20000, b""),
+        *(HELLO + b"\xff" * 20, HELLO + b"\x88\x80" + bytes(4), HELLO + b"\x81\x05hello"),
+    ],
+)
+def test_garbage_in_place_of_a_handshake_ends_the_connection(server, data: bytes) -> None:
+    with socket.create_connection(place(server)) as one:
+        one.sendall(data)
+        one.shutdown(socket.SHUT_WR)
+        one.settimeout(5)
+        try:
+            while one.recv(4096):
+                pass
+        except ConnectionResetError:
+            pass
+    until(lambda: not server.receivers)
+
+
+def test_who_connects_and_says_nothing_is_let_go(server, monkeypatch) -> None:
+    monkeypatch.setattr("kappaskin.publish.client._PATIENCE", 0.2)
+    with socket.create_connection(place(server)) as one:
+        one.settimeout(5)
+        assert one.recv(10) == b""
+    until(lambda: not server.receivers)
+
+
+def test_a_client_that_vanishes_is_forgotten_and_its_counts_are_not(
+    client, server, message
+) -> None:
+    one = client("/contact")
+    server.send(message)
+    parsed(one.recv(2))
+    one.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    one.socket.close()
+    until(lambda: not server.receivers)
+    server.send(message)
+    assert server.counts == (1, 0)
+
+
+@pytest.fixture
+def deaf(server) -> Iterator[socket.socket]:
+    """A client that asks for shapes, and reads nothing."""
+    with socket.create_connection(place(server)) as made:
+        made.sendall(HELLO)
+        pair = {"id": 1, "channelId": TOPICS["/shape"]}
+        words = json.dumps({"op": "subscribe", "subscriptions": [pair]})
+        made.sendall(b"\x81" + bytes([0x80 | len(words)]) + bytes(4) + words.encode())
+        until(lambda: any(each.subscribed for each in clients(server)))
+        yield made
+
+
+def test_a_client_that_never_reads_holds_nobody_up(client, server, message, deaf) -> None:
+    hearing, slowest, heard = client("/shape", "/contact"), 0.0, 0
+    for _ in range(4000):
+        began = time.perf_counter()
+        server.send(message)
+        slowest = max(slowest, time.perf_counter() - began)
+        heard += len({parsed(hearing.recv(2))[0] for _ in range(2)})
+    lost, fine = server.receivers
+    assert (heard, fine.sent, fine.dropped) == (8000, 8000, 0)
+    assert lost.dropped > 500
+    assert lost.sent + lost.dropped == 4000
+    assert lost.trouble == "too slow"
+    assert slowest < 0.5  # a wait for the deaf one would last for good
+
+
+def test_a_client_that_takes_nothing_for_long_is_let_go(server, message, deaf, monkeypatch) -> None:
+    monkeypatch.setattr("kappaskin.publish.client.STUCK", 0.3)
+    end = time.monotonic() + 10
+    while server.receivers and time.monotonic() < end:
+        server.send(message)
+    assert not server.receivers
+    assert server.counts[1] > 0
+
+
+def test_only_so_many_clients_are_served(server) -> None:
+    many = [socket.create_connection(place(server)) for _ in range(3 * MOST_CLIENTS)]
+    until(lambda: len(server.receivers) == MOST_CLIENTS)
+    closed = [one for one in many[MOST_CLIENTS:] if one.recv(1) == b""]
+    assert len(closed) == 2 * MOST_CLIENTS
+    assert len(server.receivers) == MOST_CLIENTS
+    for one in many:
+        one.close()
+    until(lambda: not server.receivers)
+
+
+# Opening
+
+
+def test_a_port_in_use_is_refused(server) -> None:
+    with pytest.raises(Refusal, match=r"cannot be listened on .* choose another port"):
+        foxglove.opened(target_of("foxglove://{}:{}".format(*place(server))))
+
+
+@pytest.mark.parametrize("host", ["nowhere.invalid", "192.0.2.1"])
+def test_a_host_that_is_not_this_machine_is_refused(host: str) -> None:
+    with pytest.raises(Refusal, match="address of"):
+        opened(target_of(f"foxglove://{host}:8765"))
+
+
+def test_only_this_machine_is_served_if_nothing_else_is_said(server) -> None:
+    assert place(server)[0] == "127.0.0.1"
+
+
+def test_without_the_extra_it_says_what_to_install(monkeypatch) -> None:
+    for name in [n for n in sys.modules if n.startswith("kappaskin.publish.")]:
+        if name.endswith(("foxglove", "client")):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "websockets.server", None)
+    with pytest.raises(Refusal, match=r"pip install 'kappaskin\[foxglove\]'"):
+        opened(target_of("foxglove://:8765"))
+
+
+def test_what_serves_it_is_not_imported_before_it_is_asked_for() -> None:
+    words = "import sys, kappaskin, kappaskin.cli; print('websockets' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
