@@ -2,25 +2,22 @@
 
 import math
 import time
-from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
-from itertools import takewhile
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
 
+from kappaskin.arrivals import Arrivals
 from kappaskin.errors import Refusal, SourceError
-from kappaskin.frames import Array, Event, Frame
+from kappaskin.frames import Event, Frame
 from kappaskin.health import Health, Monitor
-from kappaskin.health.leaving_out import Kinds
+from kappaskin.keeping import Keeping
 from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.publish import Publishing, State
-from kappaskin.recorder import Recorder
-from kappaskin.recording.writing import Written
 from kappaskin.region import Region
 from kappaskin.requests import (
     Compare,
@@ -47,8 +44,6 @@ _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
 _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
-_GAP = 0.5  # s between two looks at the gaps
-_GAPS = 4096  # gaps between reads that the percentile is taken over
 
 
 class Loop:
@@ -60,8 +55,7 @@ class Loop:
         self._monitor: Monitor | None = None
         self._place = np.full(2, math.nan)  # of the last contact, in m
         self._spoilt: object = None  # by what, in a simulated scene
-        self._out: tuple[Kinds, Array] | None = None  # what the pipeline leaves out of its fits
-        self._recorder: Recorder | None = None
+        self._keeping = Keeping()
         self._status: Status = ring.read_status() or Status()
         self._steering: Steering | Following | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.
@@ -73,11 +67,8 @@ class Loop:
         self._compares = self._changing = False
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
-        self._gaps: deque[float] = deque(maxlen=_GAPS)
-        self._gap, self._next_gap = math.nan, -math.inf
-        self._times: deque[float] = deque(maxlen=_GAPS)
-        self._pace = Pace()
-        self._last_read = self._again = math.inf
+        self._arrivals, self._pace = Arrivals(), Pace()
+        self._again = math.inf
 
     def run(self) -> None:
         """Serve until the parent closes its end, or is gone."""
@@ -154,8 +145,7 @@ class Loop:
         self._again = math.inf
         try:
             self._source = open_source(name)
-            self._source.record(self._recorder)
-            self._record_scene()
+            self._keeping.listen(self._source)
             self._status = replace(self._status, state=WAITING, source=name, message="")
         except SourceError as error:
             self._again = time.monotonic() + _AGAIN
@@ -171,7 +161,7 @@ class Loop:
         try:
             self._source.play(scene)
             self._spoil(scene)
-            self._record_scene()
+            self._keeping.plays(self._source)
         except Refusal as refusal:
             message = str(refusal)
         self._changing = False
@@ -198,16 +188,13 @@ class Loop:
         self._taking.give_up("the connection ended; connect again, then tare")
         if self._source is not None:
             self._source.close()
-            if self._recorder is not None:
-                self._recorder.ended(time.monotonic())
+            self._keeping.ended()
         self._source = None
         for side in (self._side, self._other):
             side.forget()
-        self._steering = self._monitor = self._out = None
-        self._gaps.clear()
-        self._gap = math.nan
-        self._times.clear()
-        self._last_read = self._again = math.inf
+        self._steering = self._monitor = None
+        self._arrivals.clear()
+        self._again = math.inf
 
     def _compare(self, setup: Setup | None) -> None:
         """Compute with another setup beside, or no more."""
@@ -223,10 +210,8 @@ class Loop:
         """Go over to what has been built."""
         was = self._side.pipeline
         if self._side.swap():
-            if (pipeline := self._side.pipeline) is not None and pipeline is not was:
-                self._out = None
-                if self._recorder is not None:
-                    self._recorder.set_up(pipeline)
+            if self._side.pipeline is not was:
+                self._keeping.set_up(self._side)
                 self._leave_out(self._side)
             self._report()
         if self._other.swap():
@@ -250,10 +235,7 @@ class Loop:
             self._report()
             return
         self._follow(source)
-        for frame in frames:
-            if frame.host_time > self._last_read:
-                self._gaps.append(frame.host_time - self._last_read)
-            self._last_read = frame.host_time
+        self._arrivals.read(frames)
         if self._side.pipeline is not None:
             self._compute(frames, self._side.pipeline)
         # Afterwards: what is left out is left out from the next frame that is read.
@@ -271,7 +253,7 @@ class Loop:
             pipeline.pass_over(frame)
             if beside is not None:
                 beside.pass_over(frame)
-            self._times.append(frame.host_time)
+            self._arrivals.used(frame)
         began = time.monotonic()
         for frame in frames[late:]:
             begun = time.monotonic()
@@ -279,12 +261,11 @@ class Loop:
             self._publishing.send(estimate, pipeline, begun)
             self._side.ring.write(estimate)
             self._taking.receive(estimate)
-            self._times.append(frame.host_time)
+            self._arrivals.used(frame)
             self._place = estimate.touch.position
             if self._steering is not None:
                 self._steering(estimate.touch, pipeline.fit)
-            if self._recorder is not None:
-                self._recorder.take(frame, estimate)
+            self._keeping.take(frame, estimate)
             if beside is not None:
                 self._other.compute(frame, beside)
         self._pace.spend(len(frames) - late, time.monotonic() - began)
@@ -313,65 +294,23 @@ class Loop:
             self._leave_out(self._other)
 
     def _leave_out(self, side: Side) -> None:
-        monitor = self._monitor
-        if monitor is None or not side.leave_out(monitor) or side is not self._side:
-            return
-        self._out = monitor.kinds.copy(), monitor.badness.copy()
-        if self._recorder is not None:
-            self._recorder.left_out(*self._out)
+        if self._monitor is not None and side.leave_out(self._monitor) and side is self._side:
+            self._keeping.leave_out(side)
 
     def _happen(self, event: Event) -> None:
         """Tell of something that happened."""
         self._status = self._status.after([event])
-        if self._recorder is not None:
-            self._recorder.happened(event)
-
-    # What is recorded.
+        self._keeping.happened(event)
 
     def _record(self, path: Path | None) -> None:
-        """Begin to record to `path`, or end; what was recorded until now is ended."""
-        self.end_recording()
         if path is None:
-            return
-        try:
-            if isinstance(self._source, ReplayedSource):
-                raise Refusal("expected a live source to record, got a recording; copy its file")
-            recorder = self._recorder = Recorder(path, time.monotonic())
-        except Refusal as refusal:
-            failed = Written(str(path), trouble=str(refusal))
-            self._status = replace(self._status, recording=failed)
-            return
-        if self._source is not None:
-            self._source.record(recorder)
-        self._record_scene()
-        if (pipeline := self._side.pipeline) is not None:
-            recorder.set_up(pipeline)
-            recorder.remembered(pipeline.remembered())
-            if self._out is not None:
-                recorder.left_out(*self._out)
-
-    def _record_scene(self) -> None:
-        if self._recorder is not None and isinstance(self._source, SimulatedSource):
-            self._recorder.plays(self._source.scene)
+            self._keeping.end(self._source)
+        else:
+            self._keeping.begin(path, self._source, self._side)
 
     def end_recording(self) -> None:
-        """End the file, if one is recorded to; until it is on the disk."""
-        recorder, self._recorder = self._recorder, None
-        if recorder is not None:
-            if self._source is not None:
-                self._source.record(None)
-            recorder.close()
-            self._status = replace(self._status, recording=recorder.written)
-
-    def _look_after_recording(self) -> None:
-        """Say how the recording does; one that ended by itself is over, and that is told."""
-        if self._recorder is None:
-            return
-        written = self._recorder.written
-        self._status = replace(self._status, recording=written)
-        if not written.active:
-            self.end_recording()
-            self._happen(Event(time.monotonic(), "recording", written.trouble))
+        """End the file, if one is recorded to, and wait until it is on the disk."""
+        self._keeping.close()
 
     def _health(self) -> Health:
         pipeline = self._side.pipeline
@@ -402,22 +341,19 @@ class Loop:
             self._steer()
 
     def _report(self) -> None:
-        self._look_after_recording()
+        if trouble := self._keeping.look(self._source):
+            self._happen(Event(time.monotonic(), "recording", trouble))
         now, source, status = time.monotonic(), self._source, self._status
         if source is not None:
             watch = self._side.pipeline.drift if self._side.pipeline else None
-            if self._gaps and now >= self._next_gap:
-                self._next_gap = now + _GAP
-                self._gap = float(np.percentile(self._gaps, 99))
-            recent = list(takewhile(lambda t: t > now - 1.0, reversed(self._times)))
             status = replace(
                 status,
                 accounting=source.accounting(),
                 temperature=source.temperature,
                 drift=watch.tell() if watch else None,
-                rate=len(recent) / min(1.0, max(now - recent[-1], 1e-3)) if recent else 0.0,
-                reader_gap=self._gap,
-                last_frame=self._times[-1] if self._times else -math.inf,
+                rate=self._arrivals.rate(now),
+                reader_gap=self._arrivals.gap(now),
+                last_frame=self._arrivals.last,
                 playing=source.playing
                 if isinstance(source, SimulatedSource)
                 else FROM_THE_BEGINNING,
@@ -436,6 +372,7 @@ class Loop:
             refusal=told.refusal,
             computing=told.computing or self._changing,
             publishing=self._publishing.news,
+            recording=self._keeping.written,
             beside=self._other.told if self._compares else None,
         )
         self._ring.write_status(self._status)

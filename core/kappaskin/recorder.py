@@ -43,8 +43,12 @@ class Recorder:
     def written(self) -> Written:
         return self._file.written
 
+    def end(self) -> None:
+        """Let what waits be written, and the file ended."""
+        self._file.end()
+
     def close(self) -> None:
-        """Write what waits, and end the file."""
+        """End the file, and wait until it is on the disk."""
         self._file.close()
 
     # What the source tells.

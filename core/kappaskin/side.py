@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Estimate, Frame
+from kappaskin.frames import Array, Estimate, Frame
 from kappaskin.health import Monitor
+from kappaskin.health.leaving_out import Kinds
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.ring import Ring, slot_type
 from kappaskin.sensor import Sensor
@@ -31,6 +32,8 @@ class Computed:
 class Side:
     """Computes with the setup asked for last, as far as a sensor can; one ring of estimates.
 
+    `left` is what the pipeline in use leaves out: the kinds and badness of its channels.
+
     `pipeline` is the one in use, None without a sensor; `told` says how it is. Pipelines are made
     by `builder`, and those that are overtaken meanwhile are dropped.
     """
@@ -41,6 +44,7 @@ class Side:
         self._sensor: Sensor | None = None
         self._asked = told.setup
         self._building: Future[_Built] | None = None
+        self.left: tuple[Kinds, Array] | None = None
 
     def ask(self, setup: Setup) -> None:
         """Begin to build a pipeline for another setup, beside the running one."""
@@ -90,7 +94,7 @@ class Side:
             return
         if self.pipeline is not None:
             pipeline.go_on_from(self.pipeline)
-        self.pipeline = pipeline
+        self.pipeline, self.left = pipeline, None
         self.told = replace(
             self.told, setup=pipeline.setup, generation=pipeline.generation, slot=slot
         )
@@ -101,7 +105,10 @@ class Side:
             return False
         was = self.pipeline.left_out
         self.pipeline.leave_out(monitor.kinds, monitor.badness)
-        return self.pipeline.left_out is not was
+        if self.pipeline.left_out is was:
+            return False
+        self.left = monitor.kinds.copy(), monitor.badness.copy()
+        return True
 
     def compute(self, frame: Frame, pipeline: Pipeline) -> Estimate:
         """The estimate that the `pipeline` in use makes of a frame, also in the ring."""

@@ -172,9 +172,13 @@ class RecordingFile:
             except (OSError, ValueError):  # closed meanwhile
                 return
 
-    def close(self) -> None:
-        """Write what waits, and end the file."""
+    def end(self) -> None:
+        """Let what waits be written, and the file ended."""
         self._closing.set()
+
+    def close(self) -> None:
+        """End the file, and wait until it is on the disk."""
+        self.end()
         for thread in self._threads:
             thread.join()
 

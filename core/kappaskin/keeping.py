@@ -1,0 +1,101 @@
+"""What is live to a recording, while one is asked for."""
+
+import time
+from pathlib import Path
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate, Event, Frame
+from kappaskin.recorder import Recorder
+from kappaskin.recording.writing import Written
+from kappaskin.side import Side
+from kappaskin.sources import ReplayedSource, SimulatedSource, Source
+
+
+class Keeping:
+    """Keeps what a source brings and what one side makes of it; `written` tells how that does.
+
+    Nothing is kept, and no call does anything, until `begin`. Only `close` waits for the disk.
+    """
+
+    def __init__(self) -> None:
+        self._recorder: Recorder | None = None
+        self._ending: list[Recorder] = []
+        self.written = Written()
+
+    def begin(self, path: Path, source: Source | None, side: Side) -> None:
+        """Record to `path` from now on, instead of to where it was."""
+        self.end(source)
+        try:
+            if isinstance(source, ReplayedSource):
+                raise Refusal("expected a live source to record, got a recording; copy its file")
+            recorder = self._recorder = Recorder(path, time.monotonic())
+        except Refusal as refusal:
+            self.written = Written(str(path), trouble=str(refusal))
+            return
+        self.listen(source)
+        if side.pipeline is not None:
+            recorder.set_up(side.pipeline)
+            recorder.remembered(side.pipeline.remembered())
+            if side.left is not None:
+                recorder.left_out(*side.left)
+
+    def listen(self, source: Source | None) -> None:
+        """Take down what `source` brings, from now on."""
+        if self._recorder is not None and source is not None:
+            source.record(self._recorder)
+            self.plays(source)
+
+    def plays(self, source: Source) -> None:
+        """Another scene may be simulated from now on."""
+        if self._recorder is not None and isinstance(source, SimulatedSource):
+            self._recorder.plays(source.scene)
+
+    def ended(self) -> None:
+        """The source brings nothing more."""
+        if self._recorder is not None:
+            self._recorder.ended(time.monotonic())
+
+    def set_up(self, side: Side) -> None:
+        """Another pipeline is in use."""
+        if self._recorder is not None and side.pipeline is not None:
+            self._recorder.set_up(side.pipeline)
+
+    def leave_out(self, side: Side) -> None:
+        """Other channels are left out."""
+        if self._recorder is not None and side.left is not None:
+            self._recorder.left_out(*side.left)
+
+    def happened(self, event: Event) -> None:
+        if self._recorder is not None:
+            self._recorder.happened(event)
+
+    def take(self, frame: Frame, estimate: Estimate) -> None:
+        if self._recorder is not None:
+            self._recorder.take(frame, estimate)
+
+    def end(self, source: Source | None) -> None:
+        """Begin to end the file."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            if source is not None:
+                source.record(None)
+            recorder.end()
+            self._ending.append(recorder)
+
+    def look(self, source: Source | None) -> str:
+        """Why it ended by itself, when it did since the last look; `written` is new."""
+        if self._recorder is not None:
+            self.written = self._recorder.written
+            if not self.written.active:
+                self.end(source)
+                return self.written.trouble
+        elif self._ending:
+            self.written = self._ending[-1].written
+            self._ending = [one for one in self._ending if one.written.active]
+        return ""
+
+    def close(self) -> None:
+        """End what is kept, and wait until it is on the disk."""
+        self.end(None)
+        for recorder in self._ending:
+            recorder.close()
