@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from importlib.resources import as_file, files
 
@@ -159,13 +159,26 @@ def test_an_engine_that_takes_over_goes_on_publishing(engine, receiver, port) ->
 # The commands
 
 
-def start(*words: object) -> subprocess.Popen[str]:
-    command = [sys.executable, "-u", "-m", "kappaskin", *map(str, words)]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command, **pipes)
+@pytest.fixture
+def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts a command, or a file of Python; whatever happens, it does not stay."""
+    running: list[subprocess.Popen[str]] = []
+
+    def begin(*words: object) -> subprocess.Popen[str]:
+        begun = [] if str(words[0]).endswith(".py") else ["-m", "kappaskin"]
+        command = [sys.executable, "-u", *begun, *map(str, words)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        running.append(subprocess.Popen(command, **pipes))
+        return running[-1]
+
+    yield begin
+    for process in running:
+        if process.poll() is None:
+            process.terminate()
+            process.communicate(timeout=30)
 
 
-def test_publish_sends_what_listen_tells() -> None:
+def test_publish_sends_what_listen_tells(start) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
         found.bind(("127.0.0.1", 0))
         port = found.getsockname()[1]
@@ -183,7 +196,7 @@ def test_publish_sends_what_listen_tells() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
-def test_both_end_quietly_when_stopped(receiver, port) -> None:
+def test_both_end_quietly_when_stopped(start, receiver, port) -> None:
     publishing = start("publish", "sim:centre", "--udp", f"127.0.0.1:{port}")
     heard(receiver, "contact")
     listening, there = start("listen", "--udp", (free := free_port())), ("127.0.0.1", free)
@@ -191,7 +204,7 @@ def test_both_end_quietly_when_stopped(receiver, port) -> None:
         receiver.sendto(b'{"kind":"contact","version":1,"number":1}', there)
     for process in (publishing, listening):
         process.send_signal(signal.SIGINT)
-        _, complaint = process.communicate(timeout=10)
+        _, complaint = process.communicate(timeout=30)
         assert (process.returncode, complaint) == (0, "")
 
 
@@ -226,7 +239,7 @@ def test_listen_refuses_what_is_no_port_or_no_time(run) -> None:
     assert run("listen", "--seconds", "nan")[0] == 2
 
 
-def test_listen_fails_where_nothing_came_and_prints_json_if_asked(run, messages_of) -> None:
+def test_listen_fails_where_nothing_came_and_prints_json_if_asked(run, start) -> None:
     port = free_port()
     assert run("listen", "--udp", port, "--seconds", 0.2)[0] == 1
     listening = start("listen", "--udp", port, "--seconds", 5, "--json")
@@ -241,24 +254,15 @@ def test_listen_fails_where_nothing_came_and_prints_json_if_asked(run, messages_
 # The receivers that are given away
 
 
-def given_away(name: str, *words: object) -> subprocess.Popen[str]:
-    with as_file(RECEIVERS / name) as path:
-        command = [sys.executable, "-u", str(path), *map(str, words)]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return subprocess.Popen(command, **pipes)
-
-
 @pytest.mark.parametrize("name", ["receive_udp.py", "receive_foxglove.py"])
-def test_a_receiver_of_twenty_lines_prints_contacts(engine, name: str) -> None:
+def test_a_receiver_of_twenty_lines_prints_contacts(engine, start, name: str) -> None:
     port = free_port()
     engine.connect("sim:centre")
-    if name == "receive_udp.py":
-        engine.publish([f"udp://127.0.0.1:{port}"])
-        process = given_away(name, port)
-    else:
-        engine.publish([f"foxglove://:{port}"])
-        assert target(engine).refusal == ""
-        process = given_away(name, f"ws://127.0.0.1:{port}")
+    scheme, where = ("udp", port) if "udp" in name else ("foxglove", f"ws://127.0.0.1:{port}")
+    engine.publish([f"{scheme}://127.0.0.1:{port}"])
+    assert target(engine).refusal == ""
+    with as_file(RECEIVERS / name) as path:
+        process = start(path, where)
     line = process.stdout.readline()
     process.terminate()
     _, complaint = process.communicate()
