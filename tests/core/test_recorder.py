@@ -67,8 +67,15 @@ def streaming(engine: Engine, frames: int = 50) -> Status:
         return status.state == STREAMING and not status.computing and latest is not None
 
     assert wait_for(ask), engine.status()
-    first = engine.status().accounting.accepted
-    assert wait_for(lambda: engine.status().accounting.accepted >= first + frames)
+    first, seen = engine.status().accounting.accepted, set[int]()
+
+    def enough() -> bool:
+        status = engine.status()
+        latest = engine.latest(status)
+        seen.update([latest.sequence] if latest is not None else [])
+        return status.accounting.accepted >= first + frames and len(seen) > 10
+
+    assert wait_for(enough, 30.0)
     return engine.status()
 
 
