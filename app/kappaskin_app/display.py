@@ -105,7 +105,7 @@ class Display:
         if now < self._next_numbers:
             return
         self._next_numbers = now + _NUMBERS
-        recent = [age for when, age in self.membrane.ages if when > now - 1.0 and not lost]
+        recent = [] if lost else self._ages(now)
         counts = status.accounting
         self.readouts.show_health(
             Health(
@@ -123,6 +123,16 @@ class Display:
         self._warn(estimate)
         for row, heatmap in enumerate(self.heatmaps.values()):
             heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
+
+    def _ages(self, now: float) -> list[float]:
+        """How old in s what was drawn within the last second was."""
+        return [age for when, age in self.membrane.ages if when > now - 1.0]
+
+    def age(self) -> tuple[float, bool]:
+        """How old in s what is drawn is, and whether that is only the least."""
+        recent = self._ages(time.monotonic())
+        known = math.isfinite(self.membrane.age_sd)
+        return (float(np.median(recent)) if recent else math.nan), not known
 
     def _warn(self, estimate: Estimate | None) -> None:
         there = self._session.inside and estimate is not None and self._session.scene.stimuli
