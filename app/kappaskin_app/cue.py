@@ -56,8 +56,8 @@ def cue_of(estimate: Estimate, found: Found | None = None) -> Cue | None:
     """What is felt in `estimate`; None where nothing touches.
 
     A point load explains a small contact. Of a large one it bears too little, and of a pipe it
-    lies at one of the ends. An object explains both, but is found a few times a second only: what
-    it told of force and place a moment ago corrects the point load of now.
+    lies at one of the ends. An object explains both, but is found a few times a second only: how
+    much more than a point load it bore a moment ago corrects the point load of now.
     """
     touch = estimate.touch
     if not touch.present:
@@ -67,8 +67,8 @@ def cue_of(estimate: Estimate, found: Found | None = None) -> Cue | None:
     if found is not None and 0 < found.what.force / found.touch.force < _MOST:
         more = touch.force / found.touch.force
         force, force_95 = more * found.what.force, abs(more) * found.what.force_95
-        place = touch.position + found.what.position - found.touch.position
-        place_95 = float(np.max(found.what.position_95))
+        if not touch.single:
+            place, place_95 = found.what.position, float(np.max(found.what.position_95))
     elif not touch.single:
         force_95 = place_95 = math.nan
     displacement, displacement_95 = touch.displacement, touch.displacement_95

@@ -40,6 +40,8 @@ class Display:
         self.ranges = Ranges()
         self._settings = Settings()
         self._mode: Array | None = None
+        self.alarming = True
+        """Whether the skin's picture says why nothing comes in, as nothing else does."""
         self._met, self._asked = 0, -1
         self._out = np.empty(0, np.intp)  # elements that are left out
         self._colours: object = None
@@ -84,7 +86,7 @@ class Display:
             self._meet(status)
         state = self._session.badge()
         self.badge.show_state(state)
-        self.membrane.alarm.show(self._session.alarm())
+        self.membrane.alarm.show(self._session.alarm() if self.alarming else "")
         lost = state in (LOST, OFF, STALE, WAITING)
         for view in (self.membrane, *self.heatmaps.values()):
             view.show_lost(lost)

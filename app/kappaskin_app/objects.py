@@ -28,8 +28,8 @@ class Thing:
 
 
 THINGS = (
-    Thing("Ball 20 mm", "A ball of 20 mm radius.", {"what": "sphere", "radius": 0.02}),
     Thing("Ball 40 mm", "A ball of 40 mm radius.", {"what": "sphere", "radius": 0.04}),
+    Thing("Ball 60 mm", "A ball of 60 mm radius.", {"what": "sphere", "radius": 0.06}),
     Thing("Ball 80 mm", "A ball of 80 mm radius.", {"what": "sphere", "radius": 0.08}),
     Thing(
         "Pipe 80 mm",

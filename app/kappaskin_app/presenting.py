@@ -76,6 +76,7 @@ class Presenting(QObject):
         self._before = _Before(window.saveState(), window.saveGeometry(), window.windowState())
         for part in self._around():
             part.hide()
+        self._display.alarming = False
         self.stage.present(True)
         self._show_hand()
         window.showFullScreen()
@@ -88,6 +89,7 @@ class Presenting(QObject):
         window, before = self._window, self._before
         self._before = None
         self.stage.operator.pad.let_go()
+        self._display.alarming = True
         self.stage.present(False)
         window.setWindowState(before.state)
         window.restoreGeometry(before.geometry)
@@ -136,7 +138,8 @@ class Presenting(QObject):
             self.stage.show_trouble("", "", "")
         else:
             age = age_in_words(silent)
-            self.stage.show_trouble(state, "", status.message)
+            since = self._session.alarm().partition("\n")[0].removeprefix(state).strip()
+            self.stage.show_trouble(state, since, status.message.replace("`", ""))
             self._feel(None, now)
         self.stage.strip.show_state(state, _called(status), age)
         if status.sensor is not None:
