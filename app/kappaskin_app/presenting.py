@@ -4,7 +4,7 @@ import math
 import time
 from dataclasses import dataclass
 
-from PySide6.QtCore import QByteArray, QObject, Qt
+from PySide6.QtCore import QByteArray, QObject, QRect, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar
 
 from kappaskin import ContactObject, Estimate, Status
@@ -33,7 +33,7 @@ class _Before:
     """How the window was before it was filled."""
 
     layout: QByteArray
-    geometry: QByteArray
+    place: QRect
     state: Qt.WindowState
 
 
@@ -73,7 +73,7 @@ class Presenting(QObject):
         if self.on:
             return
         window = self._window
-        self._before = _Before(window.saveState(), window.saveGeometry(), window.windowState())
+        self._before = _Before(window.saveState(), window.geometry(), window.windowState())
         for part in self._around():
             part.hide()
         self._display.alarming = False
@@ -92,10 +92,15 @@ class Presenting(QObject):
         self._display.alarming = True
         self.stage.present(False)
         window.setWindowState(before.state)
-        window.restoreGeometry(before.geometry)
+        if before.state == Qt.WindowState.WindowNoState:
+            window.setGeometry(before.place)
         window.menuBar().show()
         window.statusBar().show()
         window.restoreState(before.layout)
+
+    def close(self) -> None:
+        """Before the window goes: let nothing be let go later."""
+        self.stage.operator.pad.give_up()
 
     def _around(self) -> list[QDockWidget | QToolBar]:
         window = self._window
@@ -142,8 +147,6 @@ class Presenting(QObject):
             self.stage.show_trouble(state, since, status.message.replace("`", ""))
             self._feel(None, now)
         self.stage.strip.show_state(state, _called(status), age)
-        if status.sensor is not None:
-            self.stage.operator.pad.show_skin(status.sensor.layout.patch)
         self._show_hand()
 
     def _show_hand(self) -> None:
@@ -155,6 +158,7 @@ class Presenting(QObject):
         if there:
             load = there[0].load
             x, y = (float(value) for value in load.centre())
+            self.stage.operator.pad.show_skin(scene.plate.patch)
             self.stage.operator.show_hand(Hand(x, y, load.force))
             things = [number for number, thing in enumerate(THINGS) if thing.is_in(scene)]
             self.stage.operator.show_choice(may_choose(scene.stimuli), (things or [-1])[0])

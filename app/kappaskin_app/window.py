@@ -428,6 +428,7 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.session.closed:
             guard.forget(self._tell)
+            self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
             self.plugs.close()
             self.costing.close()

@@ -178,6 +178,13 @@ class Pad(Board):
             self.holding = False
             self.released.emit()
 
+    def give_up(self) -> None:
+        """Put back what is held, if anything is."""
+        self._timer.stop()
+        if self.holding:
+            self.holding = False
+            self.given_up.emit()
+
     def _press(self, times: float) -> None:
         self._times *= times
         self.pressed.emit(self._times)
@@ -222,9 +229,7 @@ class Pad(Board):
         key = Qt.Key(event.key())
         others = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier
         if key == Qt.Key.Key_Escape and self.holding:
-            self._timer.stop()
-            self.holding = False
-            self.given_up.emit()
+            self.give_up()
         elif key in _KEYS and not event.modifiers() & others and self._hold():
             self._step(*_KEYS[key])
         elif key in _HARDER and not event.modifiers() & others and self._hold():

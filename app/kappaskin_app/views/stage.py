@@ -31,7 +31,7 @@ class Stage(QWidget):
         self.force, self.bar = Figure("Force"), ForceBar()
         self.depth, self.place = Figure("Displacement"), Figure("Contact at x, y")
         self.radius, self.round = Figure("Radius of what touches"), RoundView()
-        self._boards: list[Board] = [
+        self.boards: list[Board] = [
             *(self.strip, self.banner, self.force, self.bar),
             *(self.depth, self.place, self.radius, self.round),
         ]
@@ -43,7 +43,7 @@ class Stage(QWidget):
     def _arrange(self, skin: QWidget) -> None:
         self._figures = QWidget()
         column = QVBoxLayout(self._figures)
-        for board in self._boards[2:]:
+        for board in self.boards[2:]:
             column.addWidget(board)
         self.pages = QStackedWidget()
         for page in (self._figures, self.banner):
@@ -87,7 +87,7 @@ class Stage(QWidget):
     def _fit(self) -> None:
         if not self.presenting:
             return
-        for part in (*self._boards, self.operator):
+        for part in (*self.boards, self.operator):
             part.show_unit(self.unit)
         edge = round(_EDGE * self.unit)
         self._column.setContentsMargins(edge, 0, edge, edge)
@@ -125,7 +125,7 @@ class Stage(QWidget):
         self.pages.setCurrentWidget(self.banner if state else self._figures)
 
     def show_theme(self, theme: Theme) -> None:
-        for part in (*self._boards, self.operator):
+        for part in (*self.boards, self.operator):
             part.show_theme(theme)
 
 
@@ -142,6 +142,8 @@ def radius_in_words(cue: Cue) -> tuple[str, str, str]:
 
 def _radius(round_: Roundness) -> tuple[str, str]:
     low, high = (_digits(1e3 * radius) for radius in round_.between)
+    if round_.between[0] == math.inf:
+        return "flat", ""
     if round_.between[1] == math.inf:
         return (f"> {low} mm", "") if round_.between[0] > 0 else (NONE, "unknown")
     if not round_.between[0] > 0:
