@@ -5,7 +5,7 @@ import time
 from dataclasses import dataclass
 
 from PySide6.QtCore import QByteArray, QObject, QRect, Qt
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
 
 from kappaskin import ContactObject, Estimate, Status
 from kappaskin_app.cue import Cue, Found, cue_of
@@ -13,6 +13,7 @@ from kappaskin_app.display import Display
 from kappaskin_app.guard import guarded
 from kappaskin_app.objects import THINGS, may_choose
 from kappaskin_app.session import Session
+from kappaskin_app.sound import Sound
 from kappaskin_app.theme import Theme
 from kappaskin_app.touching import touches_at
 from kappaskin_app.views.badge import LIVE, SIM
@@ -22,6 +23,7 @@ from kappaskin_app.views.strip import age_in_words
 from kappaskin_app.wishes import Wishes
 
 TIP = "Fill the screen with what is felt, to be read from three metres; Escape leaves"
+SOUND_TIP = "A tone that rises and swells with the force, while the presenter is shown"
 NAMED = 0.25  # s between two looks at what touches, while it is felt
 _READ = 0.15  # s between two readings of the figures: faster cannot be read
 _FELT = 0.03  # s between two drawings of the bar
@@ -48,6 +50,7 @@ class Presenting(QObject):
         self._display, self._wishes = display, wishes
         self._before: _Before | None = None
         self.cue: Cue | None = None
+        self.sound = Sound(self)
         self._found: Found | None = None
         self._found_at = -math.inf
         self._next_figures = self._next_felt = 0.0
@@ -90,6 +93,7 @@ class Presenting(QObject):
         self._before = None
         self.stage.operator.pad.let_go()
         self._display.alarming = True
+        self.sound.follow(math.nan)
         self.stage.present(False)
         window.setWindowState(before.state)
         if before.state == Qt.WindowState.WindowNoState:
@@ -99,10 +103,11 @@ class Presenting(QObject):
         window.restoreState(before.layout)
 
     def close(self) -> None:
-        """Before the window goes: let nothing be let go later."""
+        """Before the window goes: let nothing be let go later, nor go on sounding."""
         self.stage.operator.pad.give_up()
+        self.sound.close()
 
-    def _around(self) -> list[QDockWidget | QToolBar]:
+    def _around(self) -> list[QWidget]:
         window = self._window
         docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
         bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
@@ -127,6 +132,7 @@ class Presenting(QObject):
         found = self._found if now - self._found_at < _OLD else None
         self.cue = None if estimate is None else cue_of(estimate, found)
         self.stage.show_felt(self.cue, now)
+        self.sound.follow(self.stage.bar.share)
         if now >= self._next_figures:
             self._next_figures = now + _READ
             self.stage.show_cue(self.cue)

@@ -39,7 +39,7 @@ from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
 from kappaskin_app.planning import Planning
 from kappaskin_app.plugs import Plugs
-from kappaskin_app.presenting import NAMED, TIP, Presenting
+from kappaskin_app.presenting import NAMED, SOUND_TIP, TIP, Presenting
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
@@ -207,6 +207,9 @@ class MainWindow(QMainWindow):
             add(words.lower().replace(" ", "-"), view, words, self._look(direction), key)
         add("pause", view, "&Pause or go on", self.staging.pause, "Ctrl+P")
         add("present", view, "&Presenter", self.presenting.turn, "F11", TIP)
+        sound = add("sound", view, "S&ound of the force", self._turn_sound, "F12", SOUND_TIP)
+        sound.setCheckable(True)
+        self.presenting.sound.ended.connect(guarded(self._show_sound))
         add("theme", view, "Light or &dark", wishes.switch_theme, "Ctrl+T")
         add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
@@ -389,6 +392,13 @@ class MainWindow(QMainWindow):
         action.setStatusTip(why_not or "Tare")
 
     # Small things.
+
+    def _turn_sound(self) -> None:
+        self._show_sound(self.presenting.sound.turn())
+
+    def _show_sound(self, why_not: str) -> None:
+        self._tell(why_not)
+        self.actions_by_name["sound"].setChecked(self.presenting.sound.on)
 
     def _tell(self, text: str) -> None:
         self.statusBar().showMessage(text, 10_000)

@@ -79,7 +79,7 @@ def test_every_text_fits_and_is_not_made_smaller(size, qtbot) -> None:
         for words in board.words():
             assert words.fits, words.text
             assert board.rect().toRectF().adjusted(-1, -1, 1, 1).contains(words.place), words.text
-    for figure in (stage.force, stage.depth, stage.place, stage.radius):
+    for figure in (stage.force, stage.displacement, stage.place, stage.radius):
         value = next(words for words in figure.words() if words.text == figure.value)
         assert value.font.pixelSize() == figure.letters(PRIMARY, bold=True).pixelSize()
     for button in stage.operator.things.buttons():
@@ -106,7 +106,7 @@ def test_figures_are_read_from_three_metres(qtbot) -> None:
     stage = stage_of((1920, 1080), qtbot)
     stage.show_cue(LONGEST)
     stage.strip.show_state(SIM, "Simulated skin", "12 ms old")
-    large = [stage.force, stage.depth, stage.place, stage.radius]
+    large = [stage.force, stage.displacement, stage.place, stage.radius]
     texts = {figure.value for figure in large} | {SIM, "12 ms old"}
     for board in (*large, stage.strip):
         for words in board.words():
@@ -342,8 +342,8 @@ def test_the_estimate_drives_the_cue_and_not_the_truth(demo, until) -> None:
     until(lambda: demo.session.estimate.coefficients.shape == (fewer, fewer))
     demo.presenting.cue = None
     until(lambda: demo.presenting.cue is not None)
-    deepest = 1e-3 * float(demo.presenting.stage.depth.value.removesuffix(" mm"))
-    until(lambda: demo.presenting.stage.depth.value != "\N{EN DASH}")
+    deepest = 1e-3 * float(demo.presenting.stage.displacement.value.removesuffix(" mm"))
+    until(lambda: demo.presenting.stage.displacement.value != "\N{EN DASH}")
     assert deepest == pytest.approx(demo.session.estimate.surface.max(), rel=0.05)
 
 

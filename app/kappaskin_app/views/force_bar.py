@@ -39,6 +39,11 @@ class ForceBar(Board):
         side = width_of(self.letters(CAPTION), "0.00 N") / 2
         return QRectF(0, 0, max(self.width() - side, 1.0), _BAR * self.unit)
 
+    @property
+    def share(self) -> float:
+        """How much of the scale the force is; NaN of none."""
+        return self.force / self._range.limit
+
     def at(self, force: float) -> float:
         """Where in px a force in N is on the scale, its end for more."""
         return self.scale.width() * min(max(force / self._range.limit, 0.0), 1.0)

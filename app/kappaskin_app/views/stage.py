@@ -29,11 +29,11 @@ class Stage(QWidget):
         super().__init__()
         self.strip, self.operator, self.banner = Strip(), Operator(), Banner()
         self.force, self.bar = Figure("Force"), ForceBar()
-        self.depth, self.place = Figure("Displacement"), Figure("Contact at x, y")
+        self.displacement, self.place = Figure("Displacement"), Figure("Contact at x, y")
         self.radius, self.round = Figure("Radius of what touches"), RoundView()
         self.boards: list[Board] = [
             *(self.strip, self.banner, self.force, self.bar),
-            *(self.depth, self.place, self.radius, self.round),
+            *(self.displacement, self.place, self.radius, self.round),
         ]
         self.presenting = False
         self._theme = LIGHT
@@ -100,13 +100,13 @@ class Stage(QWidget):
         """Write what is felt, as often as it can be read."""
         self.operator.pad.show_cue(cue)
         if cue is None:
-            for figure in (self.force, self.depth, self.place):
+            for figure in (self.force, self.displacement, self.place):
                 figure.show_figure(NONE, "nothing touches" if figure is self.force else "")
             self.radius.show_figure(NONE)
             return
         self.force.show_figure(f"{_number(cue.force, 3)} N", _off(cue.force_95, 3, "N"))
         off = _off(1e3 * cue.displacement_95, 2, "mm") or "at its deepest"
-        self.depth.show_figure(f"{_number(1e3 * cue.displacement, 2)} mm", off)
+        self.displacement.show_figure(f"{_number(1e3 * cue.displacement, 2)} mm", off)
         x, y = (_number(1e3 * value, 1) for value in cue.position)
         where = "near the rim: not sure" if cue.near_rim else _off(1e3 * cue.position_95, 1, "mm")
         self.place.show_figure(f"{x}, {y} mm", where)
