@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from kappaskin import Indenter, Scene, Stimulus
+from kappaskin import Indenter, Scene
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ THINGS = (
     Thing("Ball 60 mm", "A ball of 60 mm radius.", {"what": "sphere", "radius": 0.06}),
     Thing("Ball 80 mm", "A ball of 80 mm radius.", {"what": "sphere", "radius": 0.08}),
     Thing(
-        "Pipe 80 mm",
-        "A pipe of 80 mm radius and 60 mm length that lies along x.",
-        {"what": "cylinder", "radius": 0.08, "length": 0.06},
+        "Pipe 150 mm",
+        "A pipe of 150 mm radius and 50 mm length that lies along x.",
+        {"what": "cylinder", "radius": 0.15, "length": 0.05},
     ),
     Thing(
         "Edge",
@@ -45,6 +45,10 @@ THINGS = (
 )
 
 
-def may_choose(stimuli: tuple[Stimulus, ...]) -> bool:
-    """Whether another object can take the place of what touches: one alone, and at rest."""
-    return len(stimuli) == 1 and stimuli[0].motion is None
+def may_choose(scene: Scene) -> bool:
+    """Whether another object can take the place of what touches: one alone, and at rest.
+
+    A strip is alike along y, as only a load can be.
+    """
+    alone = len(scene.stimuli) == 1 and not scene.moves
+    return alone and not scene.plate.patch.strip

@@ -167,7 +167,7 @@ class Presenting(QObject):
             self.stage.operator.pad.show_skin(scene.plate.patch)
             self.stage.operator.show_hand(Hand(x, y, load.force))
             things = [number for number, thing in enumerate(THINGS) if thing.is_in(scene)]
-            self.stage.operator.show_choice(may_choose(scene.stimuli), (things or [-1])[0])
+            self.stage.operator.show_choice(may_choose(scene), (things or [-1])[0])
 
     def _choose(self, number: int) -> None:
         hand = self.stage.operator.pad.hand

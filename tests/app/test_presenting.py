@@ -365,7 +365,7 @@ def test_a_lost_line_says_what_to_do_and_what_is_felt_comes_back(demo, until) ->
 def test_nothing_that_touches_is_said_to_be_nothing(demo, until) -> None:
     text = demo.history.settings.written.text
     demo.wishes.write(text[: text.index("[[touch]]")])
-    until(lambda: demo.presenting.stage.force.note == "nothing touches")
+    until(lambda: demo.presenting.stage.force.note == "nothing felt")
     assert not demo.presenting.stage.operator.isVisible()
 
 

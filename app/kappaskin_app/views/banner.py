@@ -19,6 +19,7 @@ REMEDIES = {
 """What to do in each state in which nothing new is shown."""
 
 _MARGIN = 36.0  # units
+_WHY = 0.45  # of the height below the word that the reason has at most
 _TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
 
 
@@ -46,7 +47,7 @@ class Banner(Board):
         return "#ffffff"
 
     def words(self) -> list[Words]:
-        """The word, the reason and the remedy, each in its share of the height."""
+        """The word, the reason in at most its share of the height, and the remedy below it."""
         edge = _MARGIN * self.unit
         inside = QRectF(self.rect()).adjusted(edge, edge, -edge, -edge)
         head, rest = 2 * PRIMARY * self.unit, inside.height() - 2 * PRIMARY * self.unit

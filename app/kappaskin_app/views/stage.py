@@ -101,7 +101,7 @@ class Stage(QWidget):
         self.operator.pad.show_cue(cue)
         if cue is None:
             for figure in (self.force, self.displacement, self.place):
-                figure.show_figure(NONE, "nothing touches" if figure is self.force else "")
+                figure.show_figure(NONE, "nothing felt" if figure is self.force else "")
             self.radius.show_figure(NONE)
             return
         self.force.show_figure(f"{_number(cue.force, 3)} N", _off(cue.force_95, 3, "N"))
