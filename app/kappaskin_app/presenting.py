@@ -16,7 +16,8 @@ from kappaskin_app.session import Session
 from kappaskin_app.sound import Sound
 from kappaskin_app.theme import Theme
 from kappaskin_app.touching import touches_at
-from kappaskin_app.views.badge import LIVE, SIM
+from kappaskin_app.views.badge import SIM
+from kappaskin_app.views.banner import REMEDIES
 from kappaskin_app.views.pad import Hand
 from kappaskin_app.views.stage import Stage
 from kappaskin_app.views.strip import age_in_words
@@ -142,13 +143,11 @@ class Presenting(QObject):
         if not self.on:
             return
         state, now = self._session.badge(), time.monotonic()
-        live = state in (SIM, LIVE)
-        silent = now - status.last_frame
-        if live:
+        if state not in REMEDIES:
             age = age_in_words(*self._display.age())
             self.stage.show_trouble("", "", "")
         else:
-            age = age_in_words(silent)
+            age = age_in_words(now - status.last_frame)
             since = self._session.alarm().partition("\n")[0].removeprefix(state).strip()
             self.stage.show_trouble(state, since, status.message.replace("`", ""))
             self._feel(None, now)
@@ -165,9 +164,11 @@ class Presenting(QObject):
             load = there[0].load
             x, y = (float(value) for value in load.centre())
             self.stage.operator.pad.show_skin(scene.plate.patch)
-            self.stage.operator.show_hand(Hand(x, y, load.force))
+            self.stage.operator.show_hand(Hand(x, y, load.force), session.refusal)
             things = [number for number, thing in enumerate(THINGS) if thing.is_in(scene)]
-            self.stage.operator.show_choice(may_choose(scene), (things or [-1])[0])
+            self.stage.operator.show_choice(
+                may_choose(scene) and not session.refusal, (things or [-1])[0]
+            )
 
     def _choose(self, number: int) -> None:
         hand = self.stage.operator.pad.hand

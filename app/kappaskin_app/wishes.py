@@ -33,6 +33,7 @@ class Wishes:
         self._gesture, self._grabbed_end = -1, False
         self._held: Held | None = None
         self._grabbed_load: Load | None = None
+        self._place = (0.0, 0.0)
         self._grabbed_in: Written | None = None
         self._begun: tuple[Demonstration, int, Settings] | None = None
 
@@ -149,6 +150,7 @@ class Wishes:
         writes = settings.written is not None and not session.refusal  # what is seen is in it
         self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
         self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
+        self._place = x, y
 
     @property
     def _there(self) -> bool:
@@ -162,6 +164,7 @@ class Wishes:
         if self._held is not None:
             self._session.move(self._held.moved_to(x, y))
         elif settings.written is None:
+            self._place = x, y
             moved = dragged(settings, scene, x, y, self._grabbed_end)
             self._history.change("Drag the load", self._gesture, **moved)
 
@@ -172,12 +175,12 @@ class Wishes:
             return
         if self._held is not None:
             self._session.move(self._held.pressed(times))
-        elif settings.written is None and scene.loads:
-            load = self._grabbed_load or scene.loads[0]
-            times = min(times, max(most_times(scene, load), 1.0))
-            x, y = scene.loads[0].centre()
-            moved = dragged(settings, scene, x, y, False) | {"force": load.force * times}
-            self._history.change("Press harder", self._gesture, **moved)
+        elif settings.written is None and self._grabbed_load is not None:
+            times = min(times, max(most_times(scene, self._grabbed_load), 1.0))
+            moved = dragged(settings, scene, *self._place, self._grabbed_end)
+            # Two points share their force.
+            whole = self._grabbed_load.force * max(len(scene.loads), 1)
+            self._history.change("Press harder", self._gesture, **moved | {"force": whole * times})
 
     def release(self) -> None:
         held, written = self._held, self._history.settings.written

@@ -396,3 +396,27 @@ def test_the_3d_arrow_is_still_dragged_while_presenting(demo, until, qtbot) -> N
     assert demo.presenting.on
     until(lambda: demo.session.scene.stimuli[0].what.x == 0.05)
     qtbot.mouseRelease(view.plotter, LEFT, pos=start)
+
+
+def test_a_scene_that_is_refused_says_so_beside_the_pad_until_it_is_taken_back(
+    demo, until, qtbot
+) -> None:
+    told, things = demo.presenting.stage.operator.told, demo.presenting.stage.operator.things
+    until(lambda: things.button(0).isVisible())
+    demo.wishes.write(demo.history.settings.written.text.replace("radius", "radios"))
+    until(lambda: "expected radius" in told.words()[1].text)
+    assert "Ctrl+Z" in told.words()[1].text
+    assert told.words()[1].fits
+    assert not things.button(0).isVisible()
+    qtbot.keyClick(demo, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    until(lambda: "expected" not in told.words()[1].text)
+
+
+def test_two_points_pressed_harder_keep_their_share(window, until, qtbot) -> None:
+    window.history.change("Two", -1, load_case="two-points", force=0.1)
+    window.presenting.enter()
+    pad = window.presenting.stage.operator.pad
+    until(lambda: pad.hand is not None and pad.hand.force == pytest.approx(0.05))
+    qtbot.keyClick(pad, Qt.Key.Key_PageUp)
+    until(lambda: window.history.settings.force == pytest.approx(0.108))
+    until(lambda: not pad.holding)

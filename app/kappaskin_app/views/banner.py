@@ -52,25 +52,16 @@ class Banner(Board):
         inside = QRectF(self.rect()).adjusted(edge, edge, -edge, -edge)
         head, rest = 2 * PRIMARY * self.unit, inside.height() - 2 * PRIMARY * self.unit
         title = f"{self.state} {self.since}".strip()
-        shown = [self._lines(title, PRIMARY, inside.left(), inside.top(), inside.width(), head)]
-        top, share = inside.top() + head, 0.0
+        shown, share = [self._lines(title, PRIMARY, inside.adjusted(0, 0, 0, -rest))], 0.0
         if self.why:
-            share = 0.42 * rest
-            shown.append(
-                self._lines(self.why, SECONDARY, inside.left(), top, inside.width(), share)
-            )
-        shown.append(
-            self._lines(
-                self.remedy,
-                1.2 * SECONDARY,
-                inside.left(),
-                top + share,
-                inside.width(),
-                rest - share,
-            )
-        )
+            share = _WHY * rest
+            why = self._lines(self.why, SECONDARY, inside.adjusted(0, head, 0, share - rest))
+            shown.append(why)
+            share = min(why.needed.height() + SECONDARY * self.unit, share)
+        below = inside.adjusted(0, head + share, 0, 0)
+        shown.append(self._lines(self.remedy, 1.2 * SECONDARY, below))
         return shown
 
-    def _lines(self, text: str, capital: float, x: float, y: float, w: float, h: float) -> Words:
+    def _lines(self, text: str, capital: float, place: QRectF) -> Words:
         font = self.letters(capital, bold=capital != SECONDARY)
-        return shrunk(Words(text, font, QRectF(x, y, w, h), align=_TOP, lines=True))
+        return shrunk(Words(text, font, place, align=_TOP, lines=True))

@@ -23,6 +23,7 @@ _HINT = (
     "Drag on the pad to move it; wheel, or Shift and drag, to press harder. The ring is your hand, "
     "the dot where the skin feels it."
 )
+_BACK = "Ctrl+Z takes it back."
 _COLUMNS = 3
 _BUTTON = 15.0  # units that a capital on a button is high
 _TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
@@ -34,10 +35,11 @@ class _Told(Board):
     def __init__(self) -> None:
         super().__init__()
         self.hand: Hand | None = None
+        self.refusal = ""
 
-    def show_hand(self, hand: Hand | None) -> None:
-        if hand != self.hand:
-            self.hand = hand
+    def show_hand(self, hand: Hand | None, refusal: str) -> None:
+        if (hand, refusal) != (self.hand, self.refusal):
+            self.hand, self.refusal = hand, refusal
             self.update()
 
     def words(self) -> list[Words]:
@@ -48,10 +50,11 @@ class _Told(Board):
         told = f"Your hand: {force:.2f} N at {x:.0f}, {y:.0f} mm"
         above = place.adjusted(0, 0, 0, -2 * third)
         below = place.adjusted(0, third, 0, 0)
+        hint = f"{self.refusal}. {_BACK}" if self.refusal else _HINT
         large, small = self.letters(CAPTION, bold=True), self.letters(0.8 * CAPTION)
         return [
             shrunk(Words(told, large, above, align=_TOP)),
-            shrunk(Words(_HINT, small, below, faint=True, align=_TOP, lines=True)),
+            shrunk(Words(hint, small, below, faint=True, align=_TOP, lines=True)),
         ]
 
 
@@ -95,9 +98,10 @@ class Operator(QWidget):
         for button in self.things.buttons():
             button.setFont(letters(self.font(), _BUTTON * unit))
 
-    def show_hand(self, hand: Hand | None) -> None:
+    def show_hand(self, hand: Hand | None, refusal: str = "") -> None:
+        """What the hand holds, and why the scene is not the one that was asked for last."""
         self.pad.show_hand(hand)
-        self.told.show_hand(hand)
+        self.told.show_hand(hand, refusal)
 
     def show_choice(self, there: bool, number: int) -> None:
         """Which of `THINGS` touches, -1 for none of them; not `there`, none can be chosen."""

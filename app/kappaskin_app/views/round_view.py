@@ -10,7 +10,7 @@ from kappaskin_app.scale import SteadyRange
 from kappaskin_app.views.board import Board
 from kappaskin_app.views.lettering import CAPTION, LEFT, Words
 
-_LEAST, _MOST = 0.02, 0.15  # m of radius that fill the picture: a larger circle leaves it
+_LEAST, _MOST = 0.02, 0.2  # m of radius that fill the picture: a larger circle leaves it
 _MARGIN = 0.04  # of the picture's height
 _BAR = 0.3  # of the picture's width that the scale bar takes at most
 _SHARP = 0.6  # of the picture's height that an edge is drawn high
