@@ -4,6 +4,7 @@ import math
 import os
 import subprocess
 import sys
+from importlib.resources import files
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -420,3 +421,11 @@ def test_two_points_pressed_harder_keep_their_share(window, until, qtbot) -> Non
     qtbot.keyClick(pad, Qt.Key.Key_PageUp)
     until(lambda: window.history.settings.force == pytest.approx(0.108))
     until(lambda: not pad.holding)
+
+
+def test_the_page_on_the_demonstration_names_what_is_there(demo) -> None:
+    page = (files("kappaskin_resources") / "demonstration" / "demonstration.md").read_text("utf-8")
+    for button in demo.presenting.stage.operator.things.buttons():
+        assert button.text() in page
+    assert demo.actions_by_name["present"].shortcut().toString() == "F11"
+    assert demo.actions_by_name["sound"].shortcut().toString() == "F12"
