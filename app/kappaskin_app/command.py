@@ -1,4 +1,4 @@
-"""`kappaskin app`: opens the window. Nothing heavy is imported before it is asked for."""
+"""`kappaskin app` and `demo`: open the window. Nothing heavy is imported before it is asked for."""
 
 import os
 import sys
@@ -9,7 +9,9 @@ from cyclopts import App
 from kappaskin import Recording, Refusal
 
 app = App(name="app", help_format="markdown")
+demo = App(name="demo", help_format="markdown")
 
+_LONGEST = 1e6  # s, which Qt's timers can still count
 _SETTLE = 5.0  # s before a picture is taken when no time is given
 
 
@@ -39,15 +41,42 @@ def run(
     screenshot
         Save a picture of the window just before it closes by itself.
     """
-    if seconds is not None and not seconds > 0:
-        raise Refusal(f"expected seconds above zero, got {seconds}")
+    _open(source, seconds, screenshot)
+
+
+@demo.default
+def present(*, seconds: float | None = None, screenshot: Path | None = None) -> None:
+    """Demonstrate telemanipulation with no hardware: a hand presses and rolls an object.
+
+    Your mouse is the hand. What the simulated skin reads comes back as a force, a radius and a
+    place, each with its error bar, in letters that are read from three metres. Drag on the pad
+    moves the object, the wheel presses harder, the buttons choose another one; Esc shows the
+    whole window, F11 comes back.
+
+    Example: `kappaskin demo`
+
+    Parameters
+    ----------
+    seconds
+        Close by itself after so long.
+    screenshot
+        Save a picture of the window just before it closes by itself.
+    """
+    _open("sim:demo", seconds, screenshot, presenting=True)
+
+
+def _open(
+    source: str, seconds: float | None, screenshot: Path | None, presenting: bool = False
+) -> None:
+    if seconds is not None and not 0 < seconds <= _LONGEST:
+        raise Refusal(f"expected seconds above zero, {_LONGEST:g} at most, got {seconds}")
     _require_display()
     if screenshot is not None and seconds is None:
         seconds = _SETTLE
     from kappaskin_app.launch import launch
 
     try:
-        launch(source, seconds, screenshot)
+        launch(source, seconds, screenshot, presenting)
     except ImportError as error:
         raise Refusal(
             f"the desktop app needs {error.name}; install it with: pip install 'kappaskin[app]'"

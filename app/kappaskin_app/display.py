@@ -40,6 +40,8 @@ class Display:
         self.ranges = Ranges()
         self._settings = Settings()
         self._mode: Array | None = None
+        self.alarming = True
+        """Whether the skin's picture says why nothing comes in, as nothing else does."""
         self._met, self._asked = 0, -1
         self._out = np.empty(0, np.intp)  # elements that are left out
         self._colours: object = None
@@ -84,7 +86,7 @@ class Display:
             self._meet(status)
         state = self._session.badge()
         self.badge.show_state(state)
-        self.membrane.alarm.show(self._session.alarm())
+        self.membrane.alarm.show(self._session.alarm() if self.alarming else "")
         lost = state in (LOST, OFF, STALE, WAITING)
         for view in (self.membrane, *self.heatmaps.values()):
             view.show_lost(lost)
@@ -105,7 +107,7 @@ class Display:
         if now < self._next_numbers:
             return
         self._next_numbers = now + _NUMBERS
-        recent = [age for when, age in self.membrane.ages if when > now - 1.0 and not lost]
+        recent = [] if lost else self._ages(now)
         counts = status.accounting
         self.readouts.show_health(
             Health(
@@ -123,6 +125,16 @@ class Display:
         self._warn(estimate)
         for row, heatmap in enumerate(self.heatmaps.values()):
             heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
+
+    def _ages(self, now: float) -> list[float]:
+        """How old in s what was drawn within the last second was."""
+        return [age for when, age in self.membrane.ages if when > now - 1.0]
+
+    def age(self) -> tuple[float, bool]:
+        """How old in s what is drawn is, and whether that is only the least."""
+        recent = self._ages(time.monotonic())
+        known = math.isfinite(self.membrane.age_sd)
+        return (float(np.median(recent)) if recent else math.nan), not known
 
     def _warn(self, estimate: Estimate | None) -> None:
         there = self._session.inside and estimate is not None and self._session.scene.stimuli

@@ -58,14 +58,24 @@ def _connected(source: str) -> Engine:
     return engine
 
 
-def launch(source: str, seconds: float | None = None, screenshot: Path | None = None) -> None:
-    """Show the window on `source`; after `seconds` save `screenshot`, if any, and close."""
+def launch(
+    source: str,
+    seconds: float | None = None,
+    screenshot: Path | None = None,
+    presenting: bool = False,
+) -> None:
+    """Show the window on `source`; after `seconds` save `screenshot`, if any, and close.
+
+    While it is `presenting`, what is felt fills the screen.
+    """
     # A signal may come in the middle of loading or of a drawing, where closing or raising would
     # leave things behind: it is only noted, and the loop closes the window.
     asked: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: asked.append(got))
     application, window = opened(source)
+    if presenting:
+        window.presenting.enter()
     from PySide6.QtCore import QTimer
 
     watch = QTimer(window, interval=50)  # pyright: ignore[reportCallIssue]

@@ -4,7 +4,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Estimate, ObjectFinder, Refusal, Status
+from kappaskin import NO_OBJECT, ContactObject, Estimate, ObjectFinder, Refusal, Status
 
 _LEARNING = "computing what objects read like on this skin\N{HORIZONTAL ELLIPSIS}"
 
@@ -25,15 +25,17 @@ def curved(estimate: Estimate) -> str:
 class Naming(QObject):
     """Names what touches the skin, at the rate of the display, in a thread of its own.
 
-    `named` brings the words. One estimate at a time: those that come meanwhile are passed over.
+    `named` brings the words, `found` the object that they tell of and the estimate that it was
+    found in. One estimate at a time: those that come meanwhile are passed over.
     """
 
     named = Signal(str)
+    found = Signal(ContactObject, Estimate)
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._thread = ThreadPoolExecutor(1, "object-naming")
-        self._busy: Future[str] | None = None
+        self._busy: Future[tuple[str, ContactObject, Estimate]] | None = None
         self._key: tuple[int, str] | None = None
         self._finder: ObjectFinder | str = ""
         self._learning = False
@@ -47,18 +49,21 @@ class Naming(QObject):
                 return
             # Forgotten first: what failed once is told once, and the next estimate is named.
             done, self._busy = self._busy, None
-            self.named.emit(done.result())
+            words, *found = done.result()
+            self.named.emit(words)
+            self.found.emit(*found)
         if estimate is None or status.sensor is None:
             self.named.emit("")
         elif estimate.generation == status.generation:
-            self._busy = self._thread.submit(self._words, status, estimate)
+            self._busy = self._thread.submit(self._look, status, estimate)
 
-    def _words(self, status: Status, estimate: Estimate) -> str:
+    def _look(self, status: Status, estimate: Estimate) -> tuple[str, ContactObject, Estimate]:
         self._meet(status)
-        if isinstance(self._finder, str):
-            return "; ".join(filter(None, [self._finder, curved(estimate)]))
-        found = self._finder(estimate.curvature, estimate.noise, estimate.touch)
-        return "; ".join(filter(None, [found.describe(), curved(estimate)]))
+        found, what = NO_OBJECT, self._finder
+        if not isinstance(what, str):
+            found = what(estimate.curvature, estimate.noise, estimate.touch)
+            what = found.describe()
+        return "; ".join(filter(None, [what, curved(estimate)])), found, estimate
 
     def _meet(self, status: Status) -> None:
         """Make what depends on the sensor and how its edge is held, or keep why it cannot be."""

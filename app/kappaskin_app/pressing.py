@@ -76,6 +76,14 @@ def compliance_of(plate: Plate, edge: str) -> Compliance:
     return found
 
 
+@lru_cache(_REMEMBERED)
+def yielding(plate: Plate, edge: str) -> float:
+    """How far in m the middle of the skin moves under a point load of 1 N there."""
+    patch = plate.patch
+    basis = basis_for(patch, edge, *reference_on(patch))
+    return abs(_moved(PointLoad(patch.a / 2, patch.b / 2), basis, compliance_of(plate, edge)))
+
+
 def _moved(load: Load, basis: Basis, compliance: Compliance) -> float:
     """How far the skin moves in m where the load presses."""
     return float(basis.at(load.centre()[None])[0] @ compliance(load.modal(basis)).ravel())

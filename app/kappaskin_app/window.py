@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QCloseEvent, QResizeEvent
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
@@ -39,6 +39,7 @@ from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
 from kappaskin_app.planning import Planning
 from kappaskin_app.plugs import Plugs
+from kappaskin_app.presenting import NAMED, SOUND_TIP, TIP, Presenting
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
@@ -48,6 +49,7 @@ from kappaskin_app.taring import Taring
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
+from kappaskin_app.views.stage import Stage
 from kappaskin_app.views.timeline import Timeline
 from kappaskin_app.wishes import Wishes
 
@@ -97,7 +99,9 @@ class MainWindow(QMainWindow):
         self.statusBar().addPermanentWidget(self.object, 1)
         # What it takes of the bar, all that the rest leaves, a passing message needs.
         self.statusBar().messageChanged.connect(lambda text: self.object.setHidden(bool(text)))
-        self.setCentralWidget(self._centre())
+        stage = Stage(self._centre())
+        self.setCentralWidget(stage)
+        self.presenting = Presenting(self, stage, self.session, self.display, self.wishes)
         self._make_header()
         area = Qt.DockWidgetArea
         left, right, below = (
@@ -128,6 +132,7 @@ class MainWindow(QMainWindow):
         self.panels.connection.show_source(source)
         self.naming = Naming(self)
         self.naming.named.connect(guarded(self.object.show_text))
+        self.naming.found.connect(guarded(self.presenting.find))
         self.session.connect_to(source, already=engine is not None)
 
     def _centre(self) -> QWidget:
@@ -201,6 +206,10 @@ class MainWindow(QMainWindow):
             words = f"Look {direction.words}"
             add(words.lower().replace(" ", "-"), view, words, self._look(direction), key)
         add("pause", view, "&Pause or go on", self.staging.pause, "Ctrl+P")
+        add("present", view, "&Presenter", self.presenting.turn, "F11", TIP)
+        sound = add("sound", view, "S&ound of the force", self._turn_sound, "F12", SOUND_TIP)
+        sound.setCheckable(True)
+        self.presenting.sound.ended.connect(guarded(self._show_sound))
         add("theme", view, "Light or &dark", wishes.switch_theme, "Ctrl+T")
         add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
@@ -239,6 +248,8 @@ class MainWindow(QMainWindow):
         self.history.changed.connect(guarded(self._follow))
         session.estimated.connect(guarded(self.display.show_estimate))
         session.reported.connect(guarded(self._show_status))
+        session.estimated.connect(guarded(self.presenting.receive))
+        session.reported.connect(guarded(self.presenting.follow))
         self.calibrating.laid.connect(guarded(session.lay))
         session.reported.connect(guarded(self.calibrating.follow))
         session.estimated.connect(guarded(self.calibrating.receive))
@@ -347,6 +358,7 @@ class MainWindow(QMainWindow):
         self.stability.show_theme(theme)
         self.health.show_theme(theme)
         self.display.show_theme(theme)
+        self.presenting.show_theme(theme)
 
     def _show_shape(self) -> None:
         """Draw the shape that is looked at on the skin, while somebody looks and wants it."""
@@ -365,7 +377,7 @@ class MainWindow(QMainWindow):
         simulating = self.session.simulating and status.state == "streaming"
         now = time.monotonic()
         if now >= self._next_words:
-            self._next_words = now + _WORDS
+            self._next_words = now + (NAMED if self.presenting.on else _WORDS)
             self.naming.look(status, self.display.estimate_shown())
         if now >= self._next_bargain:
             self._next_bargain = now + _BARGAIN
@@ -380,6 +392,13 @@ class MainWindow(QMainWindow):
         action.setStatusTip(why_not or "Tare")
 
     # Small things.
+
+    def _turn_sound(self) -> None:
+        self._show_sound(self.presenting.sound.turn())
+
+    def _show_sound(self, why_not: str) -> None:
+        self._tell(why_not)
+        self.actions_by_name["sound"].setChecked(self.presenting.sound.on)
 
     def _tell(self, text: str) -> None:
         self.statusBar().showMessage(text, 10_000)
@@ -406,6 +425,12 @@ class MainWindow(QMainWindow):
         self._shortcuts.show()
         self._shortcuts.raise_()
 
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape and self.presenting.on:
+            self.presenting.leave()
+        else:
+            super().keyPressEvent(event)
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         widen(self, self._docks[1], event)
@@ -413,6 +438,7 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.session.closed:
             guard.forget(self._tell)
+            self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
             self.plugs.close()
             self.costing.close()

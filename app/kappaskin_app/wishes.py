@@ -1,16 +1,17 @@
 """What a person wants, as undoable changes of the settings."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from kappaskin import Setting, Status
+from kappaskin import Load, Setting, Status
 from kappaskin_app.demonstrations import Demonstration
 from kappaskin_app.effects import called
 from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
-from kappaskin_app.scene_text import forced, shifted
+from kappaskin_app.scene_text import forced, instead, pressed, shifted
 from kappaskin_app.session import Session
 from kappaskin_app.settings import Sending, Settings, Written, ask_of
 from kappaskin_app.simulation import (
@@ -21,7 +22,7 @@ from kappaskin_app.simulation import (
     text_of,
     with_consequences,
 )
-from kappaskin_app.touching import Held
+from kappaskin_app.touching import Held, most_times
 
 
 class Wishes:
@@ -31,6 +32,8 @@ class Wishes:
         self._history, self._session = history, session
         self._gesture, self._grabbed_end = -1, False
         self._held: Held | None = None
+        self._grabbed_load: Load | None = None
+        self._place = (0.0, 0.0)
         self._grabbed_in: Written | None = None
         self._begun: tuple[Demonstration, int, Settings] | None = None
 
@@ -124,6 +127,18 @@ class Wishes:
         if written is not None:
             self._history.change(f"Force {called(effect).lower()}", -1, written=written)
 
+    def touch_with(self, said: Mapping[str, Any], x: float, y: float, force: float) -> None:
+        """Let the object that is `said` touch instead of what does, at its place, as hard."""
+        written = self._written_anew(
+            instead(
+                text_of(self._history.settings),
+                0,
+                {**said, "x": round(x, 6), "y": round(y, 6), "force": float(f"{force:.4g}")},
+            )
+        )
+        if written is not None:
+            self._history.change("Choose what touches", -1, written=written)
+
     # Loads that are dragged.
 
     def grab(self, x: float, y: float) -> None:
@@ -134,6 +149,8 @@ class Wishes:
         self._gesture, self._grabbed_in = self._history.new_gesture(), settings.written
         writes = settings.written is not None and not session.refusal  # what is seen is in it
         self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
+        self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
+        self._place = x, y
 
     @property
     def _there(self) -> bool:
@@ -147,14 +164,30 @@ class Wishes:
         if self._held is not None:
             self._session.move(self._held.moved_to(x, y))
         elif settings.written is None:
+            self._place = x, y
             moved = dragged(settings, scene, x, y, self._grabbed_end)
             self._history.change("Drag the load", self._gesture, **moved)
+
+    def press(self, times: float) -> None:
+        """Let what was grabbed press so many `times` as hard as it did then."""
+        settings, scene = self._history.settings, self._session.scene
+        if not self._there:
+            return
+        if self._held is not None:
+            self._session.move(self._held.pressed(times))
+        elif settings.written is None and self._grabbed_load is not None:
+            times = min(times, max(most_times(scene, self._grabbed_load), 1.0))
+            moved = dragged(settings, scene, *self._place, self._grabbed_end)
+            # Two points share their force.
+            whole = self._grabbed_load.force * max(len(scene.loads), 1)
+            self._history.change("Press harder", self._gesture, **moved | {"force": whole * times})
 
     def release(self) -> None:
         held, written = self._held, self._history.settings.written
         self._gesture, self._held = -1, None
         if self._there and held is not None and written is not None and held.moved:
             text = shifted(written.text, held.number, *held.by)
+            text = pressed(text, held.number, held.times) if held.times != 1 else text
             self._history.change("Drag the load", -1, written=replace(written, text=text))
 
     def give_up(self) -> None:

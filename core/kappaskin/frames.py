@@ -96,6 +96,11 @@ class Touch:
         return self._reach * self.force_sd
 
     @property
+    def displacement_95(self) -> float:
+        """Half width in m of the 95 % interval of the displacement, by Student's t."""
+        return self._reach * self.displacement_sd
+
+    @property
     def _reach(self) -> float:
         return float(special.stdtrit(max(self.spare, 1), 0.975))
 

@@ -61,3 +61,27 @@ def test_asking_for_help_loads_no_qt() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
     )
     assert done.stdout.strip() == "False"
+
+
+def demo(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "kappaskin", "demo", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_the_demonstration_opens_fills_the_picture_and_closes(tmp_path: Path) -> None:
+    picture = tmp_path / "demo.png"
+    done = demo("--seconds", "4", "--screenshot", str(picture))
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    shown = QImage(str(picture))
+    strip = {shown.pixel(x, shown.height() // 25) for x in range(shown.width() // 8)}
+    assert 0xFF1F6FB2 in strip  # the badge, where else the menus are
+
+
+@pytest.mark.parametrize(
+    "bad", [("--seconds", "0"), ("--seconds", "nan"), ("--seconds", "1e300"), ("--source", "sim:")]
+)
+def test_a_demonstration_that_cannot_be_is_refused(bad: tuple[str, ...]) -> None:
+    done = demo(*bad)
+    assert done.returncode == 2
+    assert done.stderr.startswith("kappaskin: ")
+    assert "Traceback" not in done.stderr

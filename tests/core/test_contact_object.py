@@ -211,6 +211,14 @@ def test_the_intervals_of_axis_and_length_cover_them():
     assert np.mean(longer) > 0.87
 
 
+def test_the_intervals_of_the_force_cover_it():
+    pairs = [(r, one) for r in BALLS + RODS + BLADES for one in PAPER.finds(curvature(r), 10)]
+
+    covered = [abs(one.force - rigid.force) < one.force_95 for rigid, one in pairs]
+    assert 0.9 < np.mean(covered) <= 1.0
+    assert max(one.force_95 / rigid.force for rigid, one in pairs) < 0.03
+
+
 def random_object(rng):
     kind = ("sphere", "cylinder", "edge")[rng.integers(3)]
     return Rigid(

@@ -22,7 +22,8 @@ from kappaskin_app.views.card import PICTURE, PLAYING, CardPainter, picture_size
 
 # What is pleasant to watch, then what the paper has, then what one effect does.
 _WATCHED = (
-    "sphere pencil coin bolt tapping two-contacts fingertip circle exploring cylinder edge slipping"
+    "sphere pencil coin bolt tapping two-contacts fingertip circle exploring cylinder edge "
+    "slipping demo"
 )
 _PAPER = "centre off-centre line calibration"
 _EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam hot-room hum"

@@ -43,11 +43,43 @@ def shifted(text: str, touch: int, dx: float, dy: float) -> str:
     Raises `Refusal` for a text that is no TOML, or has no such touch.
     """
     document = parsed(text)
+    said = _touch(document, touch)
+    for key, by in (("x", dx), ("y", dy), ("x0", dx), ("y0", dy), ("x1", dx), ("y1", dy)):
+        if key in said:
+            said[key] = round(float(said[key]) + by, 6)
+    return tomlkit.dumps(document)
+
+
+def pressed(text: str, touch: int, times: float) -> str:
+    """The text with a touch, counted from zero, pressing so many `times` as hard.
+
+    Raises `Refusal` for a text that is no TOML, or has no such touch.
+    """
+    document = parsed(text)
+    said = _touch(document, touch)
+    for key in ("force", "depth", "displacement"):
+        if key in said:
+            said[key] = float(f"{float(said[key]) * times:.4g}")
+    return tomlkit.dumps(document)
+
+
+def instead(text: str, touch: int, said: Mapping[str, Any]) -> str:
+    """The text with a touch, counted from zero, that says this and nothing else.
+
+    Raises `Refusal` for a text that is no TOML, or has no such touch.
+    """
+    document = parsed(text)
+    table = _touch(document, touch)
+    for key in list(table):
+        del table[key]
+    for key, value in said.items():
+        table[key] = value
+    return tomlkit.dumps(document)
+
+
+def _touch(document: Any, touch: int) -> Any:
     many = document.get("touch", ())
     each = [many] if isinstance(many, AbstractTable) else many  # one by itself is an array of one
     if not touch < len(each):
-        raise Refusal(f"expected a touch {touch + 1} to move, got a text with {len(each)}")
-    for key, by in (("x", dx), ("y", dy), ("x0", dx), ("y0", dy), ("x1", dx), ("y1", dy)):
-        if key in each[touch]:
-            each[touch][key] = round(float(each[touch][key]) + by, 6)
-    return tomlkit.dumps(document)
+        raise Refusal(f"expected a touch {touch + 1} to change, got a text with {len(each)}")
+    return each[touch]

@@ -53,16 +53,19 @@ class Badge(QLabel):
     def _paint(self) -> None:
         if self._theme is None or not self.state:
             return
-        theme = self._theme
-        colour = {
-            LIVE: theme.good,
-            SIM: theme.simulated,
-            WAITING: theme.off,
-            STALE: theme.warning,
-            LOST: theme.bad,
-            OFF: theme.off,
-        }[self.state]
         self.setStyleSheet(
-            f"background: {colour}; color: white; font-weight: 700; font-size: 20px;"
-            "border-radius: 6px; padding: 4px;"
+            f"background: {colour_of(self.state, self._theme)}; color: white; font-weight: 700;"
+            "font-size: 20px; border-radius: 6px; padding: 4px;"
         )
+
+
+def colour_of(state: str, theme: Theme) -> str:
+    """The ground on which a state is written in white."""
+    return {
+        LIVE: theme.good,
+        SIM: theme.simulated,
+        WAITING: theme.off,
+        STALE: theme.warning,
+        LOST: theme.bad,
+        OFF: theme.off,
+    }[state]

@@ -37,9 +37,11 @@ class LoadDrag(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind, left = event.type(), Qt.MouseButton.LeftButton
         if kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
-            if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape:
+            escapes = isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape
+            # For the window: VTK's own keys turn on stereo or wireframe for good.
+            event.setAccepted(escapes and self._dragging)
+            if escapes:
                 self._give_up()
-            event.ignore()  # for the window: VTK's own keys turn on stereo or wireframe for good
             return True
         if isinstance(event, QMouseEvent):
             presses = (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick)

@@ -39,17 +39,20 @@ class ContactObject:
     """What touches the skin, as far as the readings of one frame tell.
 
     `kind` is one of `KINDS`, or empty when they do not tell; `probability` has all of them, and is
-    empty without a contact. `radius` in m with its 95 % interval `radius_95`: from 0 when only an
-    upper bound is known, up to infinity when it may be flat. `axis` is the angle in rad from x of a
-    cylinder's axis or of an edge, `length` its length in m, both with 95 % half widths. What does
-    not apply is NaN. A flat face on a flat skin touches at its rim alone and looks like the sphere
-    or cylinder that touches there; two points look like the edge that joins them.
+    empty without a contact. `position` (2,) in m and `force` in N have 95 % half widths. `radius`
+    in m with its 95 % interval `radius_95`: from 0 when only an upper bound is known, up to
+    infinity when it may be flat. `axis` is the angle in rad from x of a cylinder's axis or of an
+    edge, `length` its length in m, both with 95 % half widths. What does not apply is NaN. A flat
+    face on a flat skin touches at its rim alone and looks like the sphere or cylinder that touches
+    there; two points look like the edge that joins them.
     """
 
     kind: str
     probability: dict[str, float]
     position: Array
+    position_95: Array
     force: float
+    force_95: float
     radius: float
     radius_95: tuple[float, float]
     axis: float
@@ -99,6 +102,8 @@ NO_OBJECT = ContactObject(
     "",
     {},
     np.full(2, np.nan),
+    np.full(2, np.nan),
+    math.nan,
     math.nan,
     math.nan,
     (math.nan, math.nan),
@@ -162,7 +167,9 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
         kind if known else "",
         probability,
         found.best.parameters[:2],
+        reach * np.sqrt(np.diag(found.best.covariance)[:2]),
         float(found.best.parameters[2]),
+        reach * math.sqrt(found.best.covariance[2, 2]),
         radius,
         radius_95,
         *_axis(found, radius_95, reach),
