@@ -97,10 +97,14 @@ def test_start_needs_the_standard_library_alone():
     assert imported <= sys.stdlib_module_names
 
 
-@pytest.mark.parametrize(("source", "extra"), [("core", "plots"), ("app", "app")])
-def test_what_is_imported_is_declared(source, extra):
+@pytest.mark.parametrize(
+    ("source", "extras"), [("core", ["plots", "foxglove"]), ("app", ["app"])], ids=["core", "app"]
+)
+def test_what_is_imported_is_declared(source, extras):
     project, wheels = PROJECT["project"], metadata.packages_distributions()
-    asked = [*project["dependencies"], *project["optional-dependencies"][extra]]
+    asked = list(project["dependencies"])
+    for extra in extras:
+        asked += project["optional-dependencies"][extra]
     declared = {canonicalize_name(Requirement(text).name) for text in asked}
     own = {".", "kappaskin", "kappaskin_app"}
 
