@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from itertools import takewhile
 
 import numpy as np
 
@@ -14,7 +13,7 @@ _AGAIN = 0.5  # s between two times that the percentile is worked out
 
 
 class Arrivals:
-    """Keeps when frames came since the last `clear`."""
+    """Keeps when frames came since the last `clear`; `last` is when the last that was used did."""
 
     def __init__(self) -> None:
         self._gaps: deque[float] = deque(maxlen=_KEPT)
@@ -24,6 +23,7 @@ class Arrivals:
     def clear(self) -> None:
         self._gaps.clear()
         self._times.clear()
+        self.last = -math.inf
         self._last, self._gap, self._next = math.inf, math.nan, -math.inf
 
     def read(self, frames: list[Frame]) -> None:
@@ -36,16 +36,14 @@ class Arrivals:
     def used(self, frame: Frame) -> None:
         """It has been worked out, or passed over."""
         self._times.append(frame.host_time)
-
-    @property
-    def last(self) -> float:
-        """When the last one that was used came."""
-        return self._times[-1] if self._times else -math.inf
+        self.last = frame.host_time
 
     def rate(self, now: float) -> float:
         """How many a second are used."""
-        recent = list(takewhile(lambda t: t > now - _RATE, reversed(self._times)))
-        return len(recent) / min(_RATE, max(now - recent[-1], 1e-3)) if recent else 0.0
+        times = self._times
+        while times and times[0] <= now - _RATE:
+            times.popleft()
+        return len(times) / min(_RATE, max(now - times[0], 1e-3)) if times else 0.0
 
     def gap(self, now: float) -> float:
         """The 99th percentile of the time between two arrivals in s."""

@@ -55,10 +55,12 @@ class LeftOut:
     def cost_at(self, place: Array) -> float:
         """How many times as wide the error bar of the displacement at `place` (2,) is.
 
-        NaN where there is no place, and where the edge holds the skin.
+        NaN where there is no place, and where the edge holds the skin; 1 where nothing is left out.
         """
         if not np.isfinite(place).all():
             return math.nan
+        if self.fit is self.ideal:
+            return 1.0
         row = self.fit.estimator.basis.at(place[None])
         without, with_all = (
             float(cast("Spread", fit.spreads).sd_of(row)[0]) for fit in (self.fit, self.ideal)
