@@ -20,6 +20,7 @@ class Keeping:
     def __init__(self) -> None:
         self._recorder: Recorder | None = None
         self._ending: list[Recorder] = []
+        self._live = True  # what a recording brings is not recorded again
         self.written = Written()
 
     def begin(self, path: Path, source: Source | None, side: Side) -> None:
@@ -40,7 +41,8 @@ class Keeping:
                 recorder.left_out(*side.left)
 
     def listen(self, source: Source | None) -> None:
-        """Take down what `source` brings, from now on."""
+        """Take down what `source` brings, from now on; nothing of a recording."""
+        self._live = not isinstance(source, ReplayedSource)
         if self._recorder is not None and source is not None:
             source.record(self._recorder)
             self.plays(source)
@@ -57,12 +59,12 @@ class Keeping:
 
     def set_up(self, side: Side) -> None:
         """Another pipeline is in use."""
-        if self._recorder is not None and side.pipeline is not None:
+        if self._recorder is not None and side.pipeline is not None and self._live:
             self._recorder.set_up(side.pipeline)
 
     def leave_out(self, side: Side) -> None:
         """Other channels are left out."""
-        if self._recorder is not None and side.left is not None:
+        if self._recorder is not None and side.left is not None and self._live:
             self._recorder.left_out(*side.left)
 
     def happened(self, event: Event) -> None:
@@ -70,7 +72,7 @@ class Keeping:
             self._recorder.happened(event)
 
     def take(self, frame: Frame, estimate: Estimate) -> None:
-        if self._recorder is not None:
+        if self._recorder is not None and self._live:
             self._recorder.take(frame, estimate)
 
     def end(self, source: Source | None) -> None:

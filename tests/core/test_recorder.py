@@ -432,6 +432,24 @@ def test_a_replay_is_not_recorded_again(engine, recorded, tmp_path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_recording_goes_on_over_a_replay_of_which_it_has_nothing(
+    engine, recorded, tmp_path
+) -> None:
+    path = tmp_path / "a.mcap"
+    engine.connect("sim:centre")
+    streaming(engine)
+    engine.record(path)
+    streaming(engine)
+    engine.connect(f"replay:{recorded}")
+    wait_for(lambda: engine.status().replay is not None)
+    wait_for(lambda: engine.latest(engine.status()))
+    engine.connect("sim:circle")
+    streaming(engine)
+    ended(engine)
+    verdict = verdict_of(path)
+    assert verdict.same, verdict.words
+
+
 # Played again
 
 

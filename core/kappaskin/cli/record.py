@@ -13,6 +13,7 @@ from kappaskin.engine import Engine
 from kappaskin.errors import Refusal
 from kappaskin.pipeline import Setup
 from kappaskin.sensor import Sensor
+from kappaskin.sources import REPLAY
 from kappaskin.status import LOST, STREAMING, Status
 
 _LOOK = 0.05  # s
@@ -40,6 +41,8 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     """
     if not seconds > 0:
         raise Refusal(f"expected a time above 0 s to record, got {seconds:g}")
+    if source.startswith(REPLAY):
+        raise Refusal(f"expected a live source to record, got {source}; copy its file")
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: stopped.append(got))
@@ -47,7 +50,13 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
         # Before there is a source, so that nothing of it is missed.
         engine.record(out)
         engine.connect(source)
-        status = _recorded(engine, seconds, stopped)
+        try:
+            status = _recorded(engine, seconds, stopped)
+        except Refusal:
+            engine.record(None)
+            if not _ended(engine, engine.status()).recording.trouble:
+                out.unlink(missing_ok=True)  # ours, with nothing in it
+            raise
         engine.record(None)
         written = _ended(engine, status).recording
     print(

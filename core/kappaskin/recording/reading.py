@@ -180,6 +180,12 @@ def summary_of(file: Bytes, size: int) -> Iterator[Record]:
         at = record.end
 
 
+def check_file(path: Path) -> None:
+    """Refuse what is there but is no file, as a pipe that nobody writes to: opening it may wait."""
+    if path.exists() and not path.is_file():
+        raise Refusal(f"{path}: cannot be read; expected a file")
+
+
 class Recording:
     """The recording at `path`, open until `close`; a `Refusal` when it is none.
 
@@ -190,6 +196,7 @@ class Recording:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        check_file(path)
         try:
             self._file = path.open("rb")
             self._size = self._file.seek(0, 2)

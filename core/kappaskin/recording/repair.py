@@ -20,6 +20,7 @@ from kappaskin.recording.reading import (
     MAGIC,
     Record,
     Spoilt,
+    check_file,
     decompressed,
     parsed,
     record_at,
@@ -64,6 +65,7 @@ def repair(path: Path, out: Path, told: Callable[[float], object] = lambda share
     """
     if out.exists() or part_of(out).exists():
         raise Refusal(f"{out}: is there already; choose another name")
+    check_file(path)
     try:
         with path.open("rb") as file:
             if not path.stat().st_size:
