@@ -1,0 +1,111 @@
+"""`record`, `info`, `verify` and `repair`, as they are typed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from kappaskin.cli import main
+from kappaskin.recording.reading import Recording
+from kappaskin.recording.writing import part_of
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("commands") / "press.mcap"
+    command = [sys.executable, "-m", "kappaskin", "record", "sim:circle", str(path)]
+    done = subprocess.run([*command, "--seconds", "1.5"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert f"{path}: " in done.stdout
+    assert "messages in" in done.stdout
+    return path
+
+
+def test_stopped_it_ends_its_file(tmp_path) -> None:
+    path = tmp_path / "a.mcap"
+    command = [sys.executable, "-m", "kappaskin", "record", "sim:circle", str(path)]
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            end = time.monotonic() + 20
+            while time.monotonic() < end:
+                if part_of(path).exists() and part_of(path).stat().st_size > 50_000:
+                    break
+                time.sleep(0.02)
+            process.send_signal(number)
+            told, _ = process.communicate(timeout=20)
+            assert process.returncode == 0
+        assert "0 of" in told
+        with Recording(path) as recording:
+            assert recording.whole
+        path.unlink()
+
+
+@pytest.mark.parametrize(
+    ("source", "seconds", "why"),
+    [
+        ("sim:", "0", "expected a time above 0 s"),
+        ("sim:", "nan", "expected a time above 0 s"),
+        ("sim:none", "1", "expected a scene among"),
+        ("replay:x.mcap", "1", "expected a live source"),
+        ("/dev/there/is/none", "1", "there is no such port"),
+    ],
+)
+def test_what_cannot_be_recorded_leaves_nothing(source, seconds, why, tmp_path, capsys) -> None:
+    out = tmp_path / "a.mcap"
+    assert main(["record", source, str(out), "--seconds", seconds]) == 2
+    assert why in capsys.readouterr().err
+    assert os.listdir(tmp_path) == []
+
+
+def test_no_file_is_written_over(tmp_path, capsys) -> None:
+    out = tmp_path / "a.mcap"
+    out.write_bytes(b"mine")
+    assert main(["record", "sim:", str(out), "--seconds", "1"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert out.read_bytes() == b"mine"
+
+
+def test_info_tells_what_is_in_it(recorded, capsys) -> None:
+    assert main(["info", str(recorded)]) == 0
+    told = capsys.readouterr().out
+    for words in ("Simulated skin SIM-0001", "scene-0.toml", "/kappaskin/line", "kappaskin "):
+        assert words in told
+    assert main(["info", str(recorded), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["whole"]
+    assert 1.0 < said["seconds"] < 5.0
+    assert said["messages"]["/kappaskin/line"] > 100
+
+
+def test_verify_says_that_all_are_the_same(recorded, capsys) -> None:
+    assert main(["verify", str(recorded)]) == 0
+    assert "the same bit for bit" in capsys.readouterr().out
+
+
+def test_repair_tells_by_its_exit_code_what_was_lost(recorded, tmp_path, capsys) -> None:
+    part, data = tmp_path / "press.mcap.part", recorded.read_bytes()
+    with Recording(recorded) as recording:
+        place = recording.chunks[len(recording.chunks) // 2].at
+    cases = (
+        (data, 0, "nothing was lost"),
+        (data[:place], 0, "nothing was lost"),
+        (data[: place + 500], 1, "bytes could not be read"),
+        (data[:60], 3, "no message could be saved"),
+        (b"something else", 2, "expected a recording"),
+    )
+    for n, (left, code, words) in enumerate(cases):
+        part.write_bytes(left)
+        out = tmp_path / f"{n}.mcap"
+        assert main(["repair", str(part), "--out", str(out)]) == code
+        told = capsys.readouterr()
+        assert words in told.out + told.err
+        assert out.exists() == (code < 2)
+        if code < 2:
+            assert main(["info", str(out)]) == 0
+            assert "not ended" not in capsys.readouterr().out
+    assert main(["info", str(recorded.with_name("none.mcap"))]) == 2
