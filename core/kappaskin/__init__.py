@@ -97,6 +97,7 @@ from kappaskin.region import Region as Region
 from kappaskin.region import Scanner as Scanner
 from kappaskin.region import bargain as bargain
 from kappaskin.region import contact_bound as contact_bound
+from kappaskin.rim import onto_rim as onto_rim
 from kappaskin.scan import Scan as Scan
 from kappaskin.scene import SCENES as SCENES
 from kappaskin.scene import Choice as Choice

@@ -1,0 +1,32 @@
+"""Rows to a CSV file, with lines before its head that say what it is."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from kappaskin.export.tables import Block, Table
+
+
+class CsvTable(Table):
+    """Numbers as short as they come back bit for bit; 0 or 1 for what is so or not."""
+
+    def begin(self, room: Path) -> None:
+        self._file = self.path.open("w", encoding="utf-8", newline="\n")
+        said = self.about.said | {"columns": {c.name: c.said for c in self.columns}}
+        for name, value in said.items():
+            self._file.write(f"# {name}: {json.dumps(value)}\n")
+        heads = [head for column in self.columns for head in column.heads()]
+        self._file.write(",".join(heads) + "\n")
+
+    def write(self, block: Block) -> None:
+        flat = [values.reshape(len(values), -1) for values in block.values()]
+        told = [v.astype(np.uint8).tolist() if v.dtype == bool else v.tolist() for v in flat]
+        for row in zip(*told, strict=True):
+            self._file.write(",".join(repr(one) for part in row for one in part) + "\n")
+
+    def end(self) -> None:
+        self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
