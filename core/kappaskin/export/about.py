@@ -76,7 +76,7 @@ def about(recording: Recording, wanted: Wanted) -> About:
 
 def another(at: float) -> str:
     """What is said of a device that came `at` s after the beginning, as another one."""
-    before, after = math.floor(1e3 * at) / 1e3, math.ceil(1e3 * at) / 1e3
+    before, after = math.ceil(1e3 * at - 1) / 1e3, math.floor(1e3 * at + 1) / 1e3
     return (
         f"another device, or another skin, came at {at:.6g} s, and a file is of one: export the "
         f"time until {before:.3f} s (--until), or from {after:.3f} s on (--from)"
