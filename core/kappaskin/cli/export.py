@@ -47,29 +47,8 @@ def export(
     """
     try:
         with Exporting(Wanted(recording, to, begin, until, every, at)) as exporting:
-            with progress() as show:
-                for now in exporting.wait():
-                    show(now.share, _counted(now))
-            for place in exporting.files:
-                print(place)
-            print(_told(exporting.now), file=sys.stderr)
+            done = progress(exporting.wait(), Exported)
     except KeyboardInterrupt:
         raise Refusal("stopped before the end; nothing was written") from None
-
-
-def _counted(now: Exported) -> str:
-    return f"{now.written} frame{'s' * (now.written != 1)}"
-
-
-def _told(now: Exported) -> str:
-    """What was written, and what was not."""
-    told = [_counted(now)]
-    if now.unsettled:
-        told.append(f"{now.unsettled} that came before there were settings are left out")
-    if now.shapeless:
-        told.append(f"{now.shapeless} whose readings decide no shape are left out")
-    if not now.whole:
-        told.append(
-            "the recording was not ended as it should be: this is up to where it breaks off"
-        )
-    return "; ".join(told)
+    print(*exporting.files, sep="\n")
+    print(done.words, file=sys.stderr)

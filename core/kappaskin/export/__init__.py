@@ -2,5 +2,4 @@
 
 from kappaskin.export.exporting import Exporting as Exporting
 from kappaskin.export.wanted import Wanted as Wanted
-from kappaskin.export.writing import FORMATS as FORMATS
 from kappaskin.export.writing import Exported as Exported

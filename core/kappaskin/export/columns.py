@@ -48,7 +48,19 @@ def _several(
     name: str, unit: str, said: str, labels: Iterable[str], of: Callable[[Estimate], Array]
 ) -> Column:
     told = tuple(f"_{label}" for label in labels)
-    return Column(name, unit, "<f8", (len(told),), told, said, lambda m: of(m.estimate))
+
+    def value(moment: Moment) -> Array:
+        return of(moment.estimate)
+
+    return Column(name, unit, "<f8", (len(told),), told, said, value)
+
+
+def _matrix(
+    name: str, unit: str, said: str, labels: tuple[str, str], of: Callable[[Estimate], Array]
+) -> Column:
+    """Of rows and columns that are labelled by characters."""
+    value = _several(name, unit, said, (), of).of
+    return Column(name, unit, "<f8", (len(labels[0]), len(labels[1])), _pairs(*labels), said, value)
 
 
 def _pairs(rows: Iterable[str], across: Iterable[str]) -> tuple[str, ...]:
@@ -56,7 +68,10 @@ def _pairs(rows: Iterable[str], across: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"_{row}_{column}" for row in rows for column in columns)
 
 
-_AXES = ("along", "across", "normal")
+def _covariance(moment: Moment) -> Array:
+    return moment.estimate.geometry.covariance
+
+
 _ONE, _OF_SKIN = "Student's t, half width of the 95 % interval", "of the skin at the contact"
 
 _WHEN = (
@@ -88,26 +103,36 @@ _CONTACT = (
 )
 _GEOMETRY = (
     _several("point", "m", "the contact in space", "xyz", lambda e: e.geometry.position),
-    Column(
-        *("frame", "", "<f8", (3, 3), _pairs(_AXES, "xyz")),
-        "unit vectors, row by row: along x, across it, outward normal",
-        lambda m: m.estimate.geometry.frame,
+    _matrix(
+        "frame",
+        "",
+        "unit vectors, row by row: along x (t), across it (s), outward normal (n)",
+        ("tsn", "xyz"),
+        lambda e: e.geometry.frame,
     ),
-    Column(
-        *("metric", "", "<f8", (2, 2), _pairs("xy", "xy")),
+    _matrix(
+        "metric",
+        "",
         "what a step along x, y is along the frame",
-        lambda m: m.estimate.geometry.metric,
+        ("ts", "xy"),
+        lambda e: e.geometry.metric,
     ),
-    Column(
-        *("curvature_form", "1/m", "<f8", (2, 2), _pairs("xy", "xy")),
+    _matrix(
+        "curvature_form",
+        "1/m",
         f"{_OF_SKIN}, along the frame",
-        lambda m: m.estimate.geometry.curvature_form,
+        ("ts", "ts"),
+        lambda e: e.geometry.curvature_form,
     ),
-    _several("torsion_form", "1/m", _OF_SKIN, "xy", lambda e: e.geometry.torsion_form),
+    _several("torsion_form", "1/m", _OF_SKIN, "ts", lambda e: e.geometry.torsion_form),
     Column(
-        *("covariance", "1/m^2", "<f8", (3, 3), _pairs(COMPONENTS, COMPONENTS)),
+        "covariance",
+        "1/m^2",
+        "<f8",
+        (3, 3),
+        _pairs(COMPONENTS, COMPONENTS),
         "of xx, yy, xy of the curvature form",
-        lambda m: m.estimate.geometry.covariance,
+        _covariance,
     ),
     _several("principal", "1/m", "principal curvatures", "12", lambda e: e.geometry.principal),
     _several("principal_sd", "1/m", "standard deviation", "12", lambda e: e.geometry.principal_sd),
@@ -135,6 +160,9 @@ def columns(about: About) -> tuple[Column, ...]:
         found[:Ni, :Nj] = moment.estimate.coefficients
         return found
 
+    def suspect(moment: Moment) -> "NDArray[np.uint8]":
+        return moment.estimate.suspect
+
     def counts(moment: Moment) -> Array:
         found = np.full(3 * P, np.nan)
         found[moment.frame.channels] = moment.frame.counts
@@ -149,9 +177,13 @@ def columns(about: About) -> tuple[Column, ...]:
         readings("fresh", "", "whether the frame brought it", lambda m: m.estimate.fresh, "?"),
         readings("residual", "1/m", "reading less fit", lambda m: m.estimate.residual, "<f8"),
         Column(
-            *("suspect", "", "|u1", (P,), tuple(f"_{n}" for n in range(P))),
+            "suspect",
+            "",
+            "|u1",
+            (P,),
+            tuple(f"_{n}" for n in range(P)),
             "why an element is left out, 0 if it is not",
-            lambda m: m.estimate.suspect,
+            suspect,
         ),
         Column("coefficients", "m", "<f8", N, functions, shape, coefficients),
         *_CONTACT,

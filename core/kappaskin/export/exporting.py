@@ -19,33 +19,34 @@ class Exporting:
     """
 
     def __init__(self, wanted: Wanted) -> None:
-        self.wanted, self.now = wanted, Exported()
+        self.wanted = wanted
         try:
             room = tempfile.mkdtemp(prefix=f".{wanted.to.name}.", dir=wanted.to.parent)
         except OSError as error:
             raise _unwritable(wanted.to, error) from error
         self._room = Path(room)
-        self._beside = Beside("kappaskin-export", exported, wanted, self._room)
+        self._beside = Beside[float | Exported]("kappaskin-export", exported, wanted, self._room)
 
     @property
     def done(self) -> bool:
         return self._beside.done
 
-    def poll(self) -> Exported:
-        """How far it is; a `Refusal` once it has failed."""
-        over = self.done
-        for now in self._beside.poll():
-            self.now = now
+    def poll(self) -> list[float | Exported]:
+        """The shares that are done since the last call, and in the end what came of it.
+
+        A `Refusal` where that is nothing.
+        """
+        over, told = self.done, self._beside.poll()
         if self.done and not over:
             self._give()
-        return self.now
+        return told
 
-    def wait(self) -> Generator[Exported]:
-        """How far it is, now and then, to the end."""
-        for now in self._beside.wait():
-            self.now = now
-            yield now
-        self._give()
+    def wait(self) -> Generator[float | Exported]:
+        """Each share as soon as it is done, and in the end what came of it."""
+        for told in self._beside.wait():
+            if isinstance(told, Exported):
+                self._give()
+            yield told
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -1,10 +1,8 @@
 """Rows to a CSV file, with lines before its head that say what it is."""
 
 import json
-from itertools import chain
 from pathlib import Path
-
-import numpy as np
+from typing import cast
 
 from kappaskin.export.tables import Block, Table
 
@@ -22,10 +20,13 @@ class CsvTable(Table):
 
     def write(self, block: Block) -> None:
         flat = [values.reshape(len(values), -1) for values in block.values()]
-        told = [v.astype(np.uint8).tolist() if v.dtype == bool else v.tolist() for v in flat]
-        for row in zip(*told, strict=True):
+        told = [cast("list[list[float]]", (v + 0 if v.dtype == bool else v).tolist()) for v in flat]
+        for n in range(len(flat[0])):
+            row: list[float] = []
+            for part in told:
+                row += part[n]
             # A list's own text, in a third of the time that joining the numbers' takes.
-            self._file.write(repr(list(chain(*row)))[1:-1].replace(" ", "") + "\n")
+            self._file.write(repr(row)[1:-1].replace(" ", "") + "\n")
 
     def end(self) -> None:
         self._file.flush()

@@ -2,14 +2,16 @@
 
 import base64
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kappaskin.export.moment import Moment
 from kappaskin.export.skin import Surface
 from kappaskin.export.surfaces import Surfaces
-from kappaskin.frames import COMPONENTS, Array
+from kappaskin.frames import COMPONENTS
 
 
 class VtpSurfaces(Surfaces):
@@ -61,9 +63,7 @@ _HEAD = (
 )
 
 
-def _array(
-    name: str, values: "Array | np.ndarray[tuple[int], np.dtype[np.int64]]", more: str = ""
-) -> str:
+def _array(name: str, values: "NDArray[Any]", more: str = "") -> str:
     kind, little = ("Int64", "<i8") if values.dtype.kind == "i" else ("Float64", "<f8")
     width = values.shape[1] if values.ndim > 1 else 1
     data = values.astype(little).tobytes()

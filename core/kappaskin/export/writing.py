@@ -37,22 +37,36 @@ _TOLD = 0.05  # s between two reports
 
 
 class Exported(NamedTuple):
-    """How far it is: the `share` of the time that is done, and the frames that are `written`.
+    """How many frames were `written`.
 
     `unsettled` frames came before there were settings to work them out with, and of `shapeless`
     ones the readings decide no surface: neither are written. `whole` is whether the recording was
     ended as it should be.
     """
 
-    share: float = 0.0
-    written: int = 0
-    unsettled: int = 0
-    shapeless: int = 0
-    whole: bool = True
+    written: int
+    unsettled: int
+    shapeless: int
+    whole: bool
+
+    @property
+    def words(self) -> str:
+        """What was written, and what was not."""
+        told = [f"{self.written:,} frame{'s' * (self.written != 1)}"]
+        if self.unsettled:
+            told.append(f"{self.unsettled:,} that came before there were settings are left out")
+        if self.shapeless:
+            told.append(f"{self.shapeless:,} whose readings decide no shape are left out")
+        if not self.whole:
+            told.append("the recording broke off, and this is up to there")
+        return "; ".join(told)
 
 
-def exported(wanted: Wanted, room: Path) -> Generator[Exported]:
-    """Write all that is `wanted` into the folder `room`, telling now and then how far it is."""
+def exported(wanted: Wanted, room: Path) -> Generator[float | Exported]:
+    """Write all that is `wanted` into the folder `room`.
+
+    Now and then the share that is done, and what came of it at the end.
+    """
     try:
         with Recording(wanted.recording) as recording:
             yield from _exported(recording, wanted, room)
@@ -65,7 +79,7 @@ def exported(wanted: Wanted, room: Path) -> Generator[Exported]:
         raise
 
 
-def _exported(recording: Recording, wanted: Wanted, room: Path) -> Generator[Exported]:
+def _exported(recording: Recording, wanted: Wanted, room: Path) -> Generator[float | Exported]:
     told = about(recording, wanted)
     with closing(FORMATS[wanted.format](room, wanted, told)) as writer:
         work, next_report = _Work(recording, wanted, told, writer), 0.0
@@ -74,7 +88,7 @@ def _exported(recording: Recording, wanted: Wanted, room: Path) -> Generator[Exp
                 break
             if time.monotonic() >= next_report:
                 next_report = time.monotonic() + _TOLD
-                yield work.done(message)
+                yield work.share(message)
         work.check()
         writer.finish()
     yield work.done()
@@ -144,15 +158,12 @@ class _Work:
             why = f"got none {span}; the last one came at {self._last:.6g} s"
         raise Refusal(f"{self._recording.path}: expected frames, {why}; choose another span")
 
-    def done(self, message: Message | None = None) -> Exported:
-        share = 1.0
-        if message is not None:
-            until = min(self._wanted.end, self._at_end())
-            if self._wanted.at is not None:
-                until = min(self._wanted.at, until)
-            share = min(max(self._at(message) / until, 0.0), 1.0) if until > 0 else 0.0
-        counts = self._written, self._unsettled, self._shapeless
-        return Exported(share, *counts, self._recording.whole)
+    def share(self, message: Message) -> float:
+        """What of the time that is wanted has passed with a message."""
+        end = self._wanted.end if self._wanted.at is None else self._wanted.at
+        until = min(end, (self._recording.last - self._recording.first) * 1e-9)
+        return min(max(self._at(message) / until, 0.0), 1.0) if until > 0 else 0.0
 
-    def _at_end(self) -> float:
-        return (self._recording.last - self._recording.first) * 1e-9
+    def done(self) -> Exported:
+        whole = self._recording.whole
+        return Exported(self._written, self._unsettled, self._shapeless, whole)
