@@ -1,0 +1,110 @@
+"""A view to a picture in a file, PNG or SVG, with a line below it that says what it shows."""
+
+from datetime import datetime
+from importlib import metadata
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QImage, QPainter
+from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from kappaskin import Refusal, Status
+
+_CAPTION = 26  # px
+_MARGIN = 8  # px
+
+
+def caption_of(status: Status, at: float, now: datetime) -> str:
+    """What was shown `now`, `at` s of the device's time: device, settings, version, in words."""
+    setup, sensor = status.setup, status.sensor
+    parts = [f"kappaskin {metadata.version('kappaskin')}", f"{now:%Y-%m-%d %H:%M:%S}"]
+    if sensor is not None:
+        parts += [f"{sensor.name} {sensor.serial_number}", f"{at:.3f} s"]
+        parts.append(f"{setup.Ni} x {setup.Nj} functions, {setup.method}")
+        for name, kept in (("calibration", setup.calibration), ("tare", setup.tare)):
+            if kept is not None:
+                parts.append(f"{name} of {kept.date:%Y-%m-%d %H:%M} ({kept.digest[:8]})")
+    return "  \N{MIDDLE DOT}  ".join(parts)
+
+
+def save_view(view: QWidget, path: Path, title: str, caption: str, flat: bool = True) -> None:
+    """Write `view` as a PNG, or if it is `flat` as an SVG; `title` and `caption` go into both.
+
+    A `Refusal` where that cannot be.
+    """
+    if path.suffix.lower() == ".png":
+        _save_png(view, path, title, caption)
+    elif path.suffix.lower() == ".svg" and flat:
+        _save_svg(view, path, title, caption)
+    else:
+        kinds = ".png or .svg" if flat else ".png, since it is in three dimensions"
+        raise Refusal(f"{path.name}: expected a file that ends in {kinds}")
+
+
+def _save_png(view: QWidget, path: Path, title: str, caption: str) -> None:
+    # What is drawn in three dimensions is in the window's picture alone.
+    seen = view.window().grab(QRect(view.mapTo(view.window(), QPoint(0, 0)), view.size()))
+    ratio = seen.devicePixelRatio()
+    image = QImage(_with_caption(view) * ratio, QImage.Format.Format_RGB32)
+    image.setDevicePixelRatio(ratio)
+    image.fill(view.palette().window().color())
+    painter = QPainter(image)
+    painter.drawPixmap(0, 0, seen)
+    _write(painter, view, caption)
+    painter.end()
+    for key, text in (("Title", title), ("Description", caption), ("Software", "kappaskin")):
+        image.setText(key, text)
+    if not image.save(str(path), "PNG"):
+        raise _unwritable(path)
+
+
+def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
+    try:
+        path.open("wb").close()  # Qt tells nobody why it could not
+    except OSError as error:
+        raise _unwritable(path) from error
+    drawing = QSvgGenerator()
+    drawing.setFileName(str(path))
+    size = _with_caption(view)
+    drawing.setSize(size)
+    drawing.setViewBox(QRect(QPoint(0, 0), size))
+    drawing.setTitle(title)
+    drawing.setDescription(caption)
+    painter = QPainter(drawing)
+    painter.fillRect(QRect(QPoint(0, 0), size), view.palette().window())
+    view.render(painter)
+    _write(painter, view, caption)
+    painter.end()
+
+
+def _with_caption(view: QWidget) -> QSize:
+    return QSize(view.width(), view.height() + _CAPTION)
+
+
+def _write(painter: QPainter, view: QWidget, caption: str) -> None:
+    """Write below the view, as large as the width lets it be."""
+    room = QRectF(_MARGIN, view.height(), view.width() - 2 * _MARGIN, _CAPTION)
+    painter.setPen(view.palette().windowText().color())
+    font = view.font()
+    font.setPixelSize(12)
+    painter.setFont(font)
+    wide = painter.fontMetrics().horizontalAdvance(caption)
+    if wide > room.width():
+        font.setPixelSize(max(int(12 * room.width() / wide), 5))
+        painter.setFont(font)
+    painter.drawText(room, int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter), caption)
+
+
+def _unwritable(path: Path) -> Refusal:
+    return Refusal(f"{path}: cannot be written; choose another place")
+
+
+def chosen_file(parent: QWidget, title: str, flat: bool) -> Path | None:
+    """The file that a person chooses for a picture, if any."""
+    kinds = "Picture (*.png);;Drawing (*.svg)" if flat else "Picture (*.png)"
+    name, kind = QFileDialog.getSaveFileName(parent, f"Export {title}", "", kinds)
+    if not name:
+        return None
+    path = Path(name)
+    return path if path.suffix else path.with_suffix(kind[-5:-1])
