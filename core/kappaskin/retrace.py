@@ -1,12 +1,11 @@
 """The messages of a recording to its estimates: what its frames went through, once more."""
 
-import math
 from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Estimate, Frame
+from kappaskin.frames import Array, Estimate, Frame
 from kappaskin.memory import Memory
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.recording import messages as m
@@ -60,13 +59,8 @@ class Retrace:
             text = decode(m.STRING, message.data)["data"]
             self._set_up(setup_from(text, self._recording.attachment))
         elif message.topic == m.MEMORIES.name:
-            self._remember(decode(m.MEMORY, message.data))
-
-    def _remember(self, said: dict[str, Any]) -> None:
-        shape, values = tuple(said["shape"].tolist()), said["values"]
-        if math.prod(shape) != values.size:
-            raise Refusal(f"expected {said['name']!r:.40} of {shape}, got {values.size} numbers")
-        self._memory[said["name"]] = values.reshape(shape)
+            said = decode(m.MEMORY, message.data)
+            self._memory[said["name"]] = _shaped(said)
 
     def _leave_out(self, said: dict[str, Any]) -> None:
         self._pass_over(len(self._waiting))
@@ -125,3 +119,10 @@ class Retrace:
         self._pass_over(place)
         self._last = self.pipeline(self._waiting.popleft())
         return self._last
+
+
+def _shaped(said: dict[str, Any]) -> Array:
+    try:
+        return said["values"].reshape(said["shape"])
+    except ValueError as error:
+        raise Refusal(f"expected what was remembered in its shape: {error!s:.80}") from error

@@ -146,12 +146,5 @@ class _Worker:
         )
 
 
-def _shaped(said: dict[str, Any]) -> "NDArray[np.float64]":
-    try:
-        return said["values"].reshape(said["shape"])
-    except ValueError as error:
-        raise Refusal(f"expected what was remembered in its shape: {error!s:.80}") from error
-
-
 def _told(values: "NDArray[Any]") -> str:
     return ", ".join(f"{value!r}" for value in values[:4].tolist()) + ", ..." * (len(values) > 4)

@@ -50,9 +50,7 @@ class Skin:
         """The surface with `coefficients` (Ni, Nj) in m."""
         step = max(_AT_ONCE // self._basis.size, 1)
         parts = [
-            surface_geometry(
-                self._basis, coefficients, self._positions[n : n + step], lambda rows: rows
-            )
+            surface_geometry(self._basis, coefficients, self._positions[n : n + step], _no_error)
             for n in range(0, len(self._positions), step)
         ]
         points = np.concatenate([part.position for part in parts])
@@ -61,6 +59,11 @@ class Skin:
         normals = np.concatenate([part.normal for part in parts])
         curvature = np.stack([K[:, 0, 0], K[:, 1, 1], K[:, 0, 1]], axis=-1)
         return Surface(points, normals, self.triangles, displacement, curvature)
+
+
+def _no_error(rows: Array) -> Array:
+    """The covariance (..., 6, 6) of the shape as it is given."""
+    return np.zeros((*rows.shape[:-1], rows.shape[-2]))
 
 
 def _triangles(on: NDArray[np.bool_]) -> Triangles:
