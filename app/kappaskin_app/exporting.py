@@ -1,6 +1,7 @@
 """A recording to a file that other programs read, asked for in a dialog and written beside it."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QTimer
@@ -30,7 +31,6 @@ _FORMATS = (
     "Surface for ParaView, PyVista (*.vtp);;Series of surfaces for ParaView (*.pvd);;"
     "Surface for CAD (*.stl)"
 )
-_SURFACES = (".vtp", ".stl")
 
 
 class ExportDialog(QDialog):
@@ -56,11 +56,11 @@ class ExportDialog(QDialog):
         self._timer.setInterval(_POLL)
         self._lay_out()
         self._timer.timeout.connect(guarded(self._follow))
-        self.export_button.clicked.connect(guarded(self._begin))
-        self.cancel_button.clicked.connect(guarded(self._cancel))
-        self.to.textChanged.connect(guarded(self._allow))
-        self.recording.textChanged.connect(guarded(self._allow))
-        self.every.valueChanged.connect(guarded(self._allow))
+        self.export_button.clicked.connect(guarded(lambda *_: self._begin()))
+        self.cancel_button.clicked.connect(guarded(lambda *_: self._cancel()))
+        self.to.textChanged.connect(guarded(lambda *_: self._allow()))
+        self.recording.textChanged.connect(guarded(lambda *_: self._allow()))
+        self.every.valueChanged.connect(guarded(lambda *_: self._allow()))
         self._allow()
 
     def _lay_out(self) -> None:
@@ -190,9 +190,9 @@ def _seconds(nothing: str) -> QDoubleSpinBox:
     return field
 
 
-def _chosen(line: QLineEdit, choose: "object") -> QHBoxLayout:
+def _chosen(line: QLineEdit, choose: Callable[[], None]) -> QHBoxLayout:
     button, layout = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}"), QHBoxLayout()
-    button.clicked.connect(guarded(lambda *_: choose()))  # type: ignore[operator]
+    button.clicked.connect(guarded(lambda *_: choose()))
     layout.addWidget(line, 1)
     layout.addWidget(button)
     return layout

@@ -49,10 +49,9 @@ def _save_png(view: QWidget, path: Path, title: str, caption: str) -> None:
     image = QImage(_with_caption(view) * ratio, QImage.Format.Format_RGB32)
     image.setDevicePixelRatio(ratio)
     image.fill(view.palette().window().color())
-    painter = QPainter(image)
-    painter.drawPixmap(0, 0, seen)
-    _write(painter, view, caption)
-    painter.end()
+    with QPainter(image) as painter:
+        painter.drawPixmap(0, 0, seen)
+        _write(painter, view, caption)
     for key, text in (("Title", title), ("Description", caption), ("Software", "kappaskin")):
         image.setText(key, text)
     if not image.save(str(path), "PNG"):
@@ -71,11 +70,10 @@ def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
     drawing.setViewBox(QRect(QPoint(0, 0), size))
     drawing.setTitle(title)
     drawing.setDescription(caption)
-    painter = QPainter(drawing)
-    painter.fillRect(QRect(QPoint(0, 0), size), view.palette().window())
-    view.render(painter)
-    _write(painter, view, caption)
-    painter.end()
+    with QPainter(drawing) as painter:
+        painter.fillRect(QRect(QPoint(0, 0), size), view.palette().window())
+        view.render(painter, QPoint(0, 0))
+        _write(painter, view, caption)
 
 
 def _with_caption(view: QWidget) -> QSize:
