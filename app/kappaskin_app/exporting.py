@@ -65,8 +65,10 @@ class ExportDialog(QDialog):
 
     def _lay_out(self) -> None:
         form, layout = QFormLayout(), QVBoxLayout(self)
-        form.addRow("&Recording", _chosen(self.recording, self._choose_recording))
-        form.addRow("&File", _chosen(self.to, self._choose_file))
+        form.addRow(
+            _named("&Recording", self.recording), _chosen(self.recording, self._choose_recording)
+        )
+        form.addRow(_named("&File", self.to), _chosen(self.to, self._choose_file))
         form.addRow("&Settings", self.settings)
         form.addRow("Fr&om", self.begin)
         form.addRow("&Until", self.until)
@@ -188,6 +190,12 @@ def _seconds(nothing: str) -> QDoubleSpinBox:
     field.setSuffix(" s")
     field.setSpecialValueText(nothing)
     return field
+
+
+def _named(words: str, line: QLineEdit) -> QLabel:
+    label = QLabel(words)
+    label.setBuddy(line)
+    return label
 
 
 def _chosen(line: QLineEdit, choose: Callable[[], None]) -> QHBoxLayout:

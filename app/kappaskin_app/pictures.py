@@ -4,15 +4,16 @@ from datetime import datetime
 from importlib import metadata
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QImage, QPainter
+from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtGui import QFont, QFontMetrics, QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin import Refusal, Status
 
-_CAPTION = 26  # px
-_MARGIN = 8  # px
+_MARGIN, _TEXT = 8, 11  # px
+_MOST = 1000  # px of a caption
+_WRAPPED = int(Qt.TextFlag.TextWordWrap)
 
 
 def caption_of(status: Status, at: float, now: datetime) -> str:
@@ -46,7 +47,7 @@ def _save_png(view: QWidget, path: Path, title: str, caption: str) -> None:
     # What is drawn in three dimensions is in the window's picture alone.
     seen = view.window().grab(QRect(view.mapTo(view.window(), QPoint(0, 0)), view.size()))
     ratio = seen.devicePixelRatio()
-    image = QImage(_with_caption(view) * ratio, QImage.Format.Format_RGB32)
+    image = QImage(_size(view, caption) * ratio, QImage.Format.Format_RGB32)
     image.setDevicePixelRatio(ratio)
     image.fill(view.palette().window().color())
     with QPainter(image) as painter:
@@ -65,7 +66,7 @@ def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
         raise _unwritable(path) from error
     drawing = QSvgGenerator()
     drawing.setFileName(str(path))
-    size = _with_caption(view)
+    size = _size(view, caption)
     drawing.setSize(size)
     drawing.setViewBox(QRect(QPoint(0, 0), size))
     drawing.setTitle(title)
@@ -76,22 +77,26 @@ def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
         _write(painter, view, caption)
 
 
-def _with_caption(view: QWidget) -> QSize:
-    return QSize(view.width(), view.height() + _CAPTION)
+def _size(view: QWidget, caption: str) -> QSize:
+    """Of the view, and of as many lines below it as the caption takes."""
+    return QSize(view.width(), view.height() + _lines(view, caption).height() + 2 * _MARGIN)
+
+
+def _font(view: QWidget) -> QFont:
+    font = view.font()
+    font.setPixelSize(_TEXT)
+    return font
+
+
+def _lines(view: QWidget, caption: str) -> QRect:
+    room = QRect(_MARGIN, view.height() + _MARGIN, view.width() - 2 * _MARGIN, _MOST)
+    return QFontMetrics(_font(view)).boundingRect(room, _WRAPPED, caption)
 
 
 def _write(painter: QPainter, view: QWidget, caption: str) -> None:
-    """Write below the view, as large as the width lets it be."""
-    room = QRectF(_MARGIN, view.height(), view.width() - 2 * _MARGIN, _CAPTION)
     painter.setPen(view.palette().windowText().color())
-    font = view.font()
-    font.setPixelSize(12)
-    painter.setFont(font)
-    wide = painter.fontMetrics().horizontalAdvance(caption)
-    if wide > room.width():
-        font.setPixelSize(max(int(12 * room.width() / wide), 5))
-        painter.setFont(font)
-    painter.drawText(room, int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter), caption)
+    painter.setFont(_font(view))
+    painter.drawText(_lines(view, caption), _WRAPPED, caption)
 
 
 def _unwritable(path: Path) -> Refusal:
