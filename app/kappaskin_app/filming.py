@@ -14,7 +14,6 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.views.membrane import MembraneView
 
 _RATE = 25  # pictures a second
-_SLOWEST = 8  # pictures that one stands for at most, where there was no time for others
 _EVEN = 2  # px: what the film's colours need sides to be a multiple of
 
 
@@ -61,7 +60,7 @@ class Filming(QObject):
         picture = self._picture()
         self._size = picture.shape[1], picture.shape[0]
         said = ["-metadata", "title=Kappaskin", "-metadata", f"comment={caption}"]
-        self._film = write_frames(
+        film = write_frames(
             str(self._part),
             self._size,
             fps=_RATE,
@@ -69,7 +68,8 @@ class Filming(QObject):
             ffmpeg_log_level="error",
             output_params=said,
         )
-        self._film.send(None)
+        film.send(None)  # until it waits for the first
+        self._film = film
         self.pictures, self._began = 0, time.monotonic()
         self._timer.start()
 
@@ -89,7 +89,7 @@ class Filming(QObject):
             return
         due = int((time.monotonic() - self._began) * _RATE) + 1 - self.pictures
         try:
-            for _ in range(min(due, _SLOWEST)):
+            for _ in range(due):  # one stands for all that there was no time for
                 self._film.send(picture)
         except OSError as error:
             self._give_up()

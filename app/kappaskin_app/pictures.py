@@ -55,7 +55,7 @@ def _save_png(view: QWidget, path: Path, title: str, caption: str) -> None:
         _write(painter, view, caption)
     for key, text in (("Title", title), ("Description", caption), ("Software", "kappaskin")):
         image.setText(key, text)
-    if not image.save(str(path), "PNG"):
+    if not image.save(str(path)):
         raise _unwritable(path)
 
 
