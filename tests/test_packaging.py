@@ -98,7 +98,9 @@ def test_start_needs_the_standard_library_alone():
 
 
 @pytest.mark.parametrize(
-    ("source", "extras"), [("core", ["plots", "foxglove"]), ("app", ["app"])], ids=["core", "app"]
+    ("source", "extras"),
+    [("core", ["plots", "foxglove"]), ("app", ["app", "film"])],
+    ids=["core", "app"],
 )
 def test_what_is_imported_is_declared(source, extras):
     project, wheels = PROJECT["project"], metadata.packages_distributions()

@@ -26,6 +26,7 @@ from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.columns import column, heighten, widen
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
+from kappaskin_app.exports import Exports
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.happenings import Happenings
@@ -124,6 +125,7 @@ class MainWindow(QMainWindow):
             dock.setAllowedAreas(area.TopDockWidgetArea | below)  # wider than a column beside it
             dock.hide()  # so that a small window is left to the skin until they are asked for
         self.actions_by_name = Actions(self)
+        self.exports = Exports(self.session, self.membrane, self)
         self._make_actions()
         self._wire()
         self._follow(self.history.settings)
@@ -223,6 +225,10 @@ class MainWindow(QMainWindow):
             dock.visibilityChanged.connect(action.setChecked)
         for name in FIGURES:
             add(name, figures, TITLES.get(name, name), partial(self._draw, name))
+        solid = {"the window": self, "the skin": self.centralWidget()}
+        maps = {f"curvature {name}": view for name, view in self.heatmaps.items()}
+        docks = {dock.windowTitle(): dock.widget() for dock in self._docks[2:]}
+        self.exports.register(self.actions_by_name, solid, maps | docks)
         add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
 
     def _turn(self, dock: QDockWidget) -> None:
@@ -273,6 +279,7 @@ class MainWindow(QMainWindow):
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
         self._attend_health()
         self.staging.told.connect(guarded(self._tell))
+        self.exports.told.connect(guarded(self._tell))
         self.staging.played.connect(guarded(panels.connection.show_source))
         session.reported.connect(guarded(wishes.follow))
         self.stability.back.connect(guarded(self.history.stack.undo))
@@ -440,6 +447,7 @@ class MainWindow(QMainWindow):
             guard.forget(self._tell)
             self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
+            self.exports.close()
             self.plugs.close()
             self.costing.close()
             self.planning.close()

@@ -37,6 +37,9 @@ from kappaskin.engine import Engine as Engine
 from kappaskin.errors import RankDeficient as RankDeficient
 from kappaskin.errors import Refusal as Refusal
 from kappaskin.errors import SourceError as SourceError
+from kappaskin.export import Exported as Exported
+from kappaskin.export import Exporting as Exporting
+from kappaskin.export import Wanted as Wanted
 from kappaskin.figures import FIGURES as FIGURES
 from kappaskin.figures import write_figures as write_figures
 from kappaskin.fit import METHODS as METHODS
@@ -97,6 +100,7 @@ from kappaskin.region import Region as Region
 from kappaskin.region import Scanner as Scanner
 from kappaskin.region import bargain as bargain
 from kappaskin.region import contact_bound as contact_bound
+from kappaskin.rim import onto_rim as onto_rim
 from kappaskin.scan import Scan as Scan
 from kappaskin.scene import SCENES as SCENES
 from kappaskin.scene import Choice as Choice

@@ -1,7 +1,6 @@
 """A recording to a verdict: whether its bytes come to the same estimates again, bit for bit."""
 
 import math
-from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,16 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.errors import Refusal
-from kappaskin.frames import Estimate, Frame
-from kappaskin.memory import Memory
-from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.frames import Estimate
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import Message, Recording
-from kappaskin.sensor import Sensor
-from kappaskin.setup_text import setup_from
-from kappaskin.sources.reenact import Reenactment
+from kappaskin.retrace import Retrace
 
 _COMPARED = {
     m.CONTACTS.name: m.CONTACT,
@@ -27,7 +21,6 @@ _COMPARED = {
     m.SHAPES.name: m.COEFFICIENTS,
 }
 _TOLD = 1000  # messages between two times that the share is told
-_WAITING = 2**14  # frames that wait for what was recorded of them, at most
 _NAMED_AS: dict[str, Callable[[Estimate], Any]] = {
     "present": lambda e: e.touch.present,
     "single": lambda e: e.touch.single,
@@ -104,13 +97,7 @@ class _Worker:
     """Takes the messages as they were written."""
 
     def __init__(self, recording: Recording) -> None:
-        self._recording = recording
-        self._reenact = Reenactment(str(recording.path))
-        self._sensor: Sensor | None = None
-        self._pipeline: Pipeline | None = None
-        self._memory: Memory = {}
-        self._waiting: deque[Frame] = deque(maxlen=_WAITING)
-        self._estimate: Estimate | None = None
+        self._retrace = Retrace(recording)
         self._frames = self._compared = self._missing = self._different = 0
         self._first, self._largest = "", 0.0
 
@@ -118,62 +105,12 @@ class _Worker:
         if kind := _COMPARED.get(message.topic):
             self._compare(decode(kind, message.data))
             return
-        for frame in self._reenact(message):
-            self._meet()
+        for _ in self._retrace(message):
             self._frames += 1
-            self._waiting.append(frame)
-        self._meet()
-        if message.topic == m.SETUP.name:
-            text = decode(m.STRING, message.data)["data"]
-            self._set_up(setup_from(text, self._recording.attachment))
-        elif message.topic == m.LEFT_OUTS.name:
-            self._leave_out(decode(m.LEFT_OUT, message.data))
-        elif message.topic == m.MEMORIES.name:
-            said = decode(m.MEMORY, message.data)
-            self._memory[said["name"]] = _shaped(said)
-
-    def _leave_out(self, said: dict[str, Any]) -> None:
-        if (pipeline := self._caught_up()) is None:
-            return
-        C, sizes = pipeline.sensor.channels, {said["kinds"].size, said["badness"].size}
-        if sizes != {C}:
-            raise Refusal(f"expected {C} channels of which some are left out, got {sizes}")
-        pipeline.leave_out(said["kinds"], said["badness"])
-
-    def _meet(self) -> None:
-        """Another device, if that is what the next frame is of, has no pipeline yet."""
-        if self._reenact.sensor is not self._sensor:
-            self._sensor, self._pipeline, self._estimate = self._reenact.sensor, None, None
-            self._waiting.clear()
-
-    def _caught_up(self) -> Pipeline | None:
-        """The pipeline, once it has seen every frame until now."""
-        if self._pipeline is not None:
-            self._recall(self._pipeline)
-            for frame in self._waiting:
-                self._pipeline.pass_over(frame)
-        self._waiting.clear()
-        return self._pipeline
-
-    def _recall(self, pipeline: Pipeline) -> None:
-        if self._memory:
-            pipeline.recall(self._memory)
-            self._memory = {}
-
-    def _set_up(self, setup: Setup) -> None:
-        if self._sensor is None:
-            raise Refusal(
-                f"{self._recording.path}: expected a device before a setup; `kappaskin repair` "
-                "saves what is whole"
-            )
-        was, made = self._caught_up(), Pipeline(self._sensor, setup)
-        if was is not None:
-            made.go_on_from(was)
-        self._pipeline = made
 
     def _compare(self, said: dict[str, Any]) -> None:
         """Work out the frame that a recorded estimate is of, and hold the two together."""
-        estimate = self._estimate_of(said["sequence"])
+        estimate = self._retrace.estimate(said["sequence"])
         if estimate is None:
             self._missing += 1
             return
@@ -198,18 +135,6 @@ class _Worker:
             f"{_told(was)}, and is {_told(now)} now"
         )
 
-    def _estimate_of(self, sequence: int) -> Estimate | None:
-        if self._estimate is not None and self._estimate.sequence == sequence:
-            return self._estimate
-        there = any(frame.sequence == sequence for frame in self._waiting)
-        if self._pipeline is None or not there:
-            return None
-        self._recall(self._pipeline)
-        while (frame := self._waiting.popleft()).sequence != sequence:
-            self._pipeline.pass_over(frame)
-        self._estimate = self._pipeline(frame)
-        return self._estimate
-
     def verdict(self) -> Verdict:
         return Verdict(
             self._frames,
@@ -219,13 +144,6 @@ class _Worker:
             self._first,
             self._largest,
         )
-
-
-def _shaped(said: dict[str, Any]) -> "NDArray[np.float64]":
-    try:
-        return said["values"].reshape(said["shape"])
-    except ValueError as error:
-        raise Refusal(f"expected what was remembered in its shape: {error!s:.80}") from error
 
 
 def _told(values: "NDArray[Any]") -> str:

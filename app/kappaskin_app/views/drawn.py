@@ -5,8 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import Patch
-from kappaskin_app.views.rim import onto_rim
+from kappaskin import Patch, onto_rim
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

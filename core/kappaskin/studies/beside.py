@@ -76,7 +76,7 @@ class Beside(Generic[_Item]):
             told = self._pipe.recv()
         except (EOFError, OSError):
             self.done = True
-            raise Refusal("the process that measures ended unexpectedly; measure again") from None
+            raise Refusal("the process that works on it ended unexpectedly; ask again") from None
         if isinstance(told, Refusal):
             self.done = True
             raise told

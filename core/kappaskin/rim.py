@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import Patch
+from kappaskin.patch import Patch
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

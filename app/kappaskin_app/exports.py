@@ -1,0 +1,93 @@
+"""What leaves the window as a file: recordings, pictures of its views, films."""
+
+import time
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from kappaskin import Refusal
+from kappaskin_app.actions import Actions
+from kappaskin_app.exporting import ExportDialog
+from kappaskin_app.filming import Filming
+from kappaskin_app.guard import guarded
+from kappaskin_app.pictures import caption_of, chosen_file, save_view
+from kappaskin_app.session import Session
+from kappaskin_app.views.membrane import MembraneView
+
+_MENU = "E&xport"
+_FILM = "Film (*.mp4)"
+
+
+class Exports(QObject):
+    """Writes files of what a `session` shows in a `window`; `told` says what came of it."""
+
+    told = Signal(str)
+
+    def __init__(self, session: Session, membrane: MembraneView, window: QWidget) -> None:
+        super().__init__(window)
+        self._session, self._window = session, window
+        self.dialog = ExportDialog(window)
+        self.filming = Filming(membrane, self)
+        self.filming.told.connect(guarded(self.told.emit))
+
+    def register(
+        self, actions: Actions, solid: dict[str, QWidget], flat: dict[str, QWidget]
+    ) -> None:
+        """Add actions for recordings, films, and for pictures of views by their names.
+
+        Those that are `solid` are in three dimensions, the others `flat`.
+        """
+        more = "\N{HORIZONTAL ELLIPSIS}"
+        actions.add("export", _MENU, f"&Recording{more}", self.ask, "Ctrl+Shift+E")
+        actions.add("film", _MENU, "&Film of the skin, begin or end", self.film, "Ctrl+Shift+F")
+        for is_flat, views in ((False, solid), (True, flat)):
+            for name, view in views.items():
+                act = partial(self.picture, view, name, is_flat)
+                actions.add(f"picture-of-{name.lower()}", _MENU, f"Picture of {name}{more}", act)
+
+    def ask(self) -> None:
+        """Ask what of a recording is to be written where."""
+        session, replay = self._session, self._session.status.replay
+        self.dialog.ask(session.source, replay.at if replay else 0.0, session.status.setup)
+
+    def caption(self) -> str:
+        """What the window shows now, in words."""
+        estimate = self._session.estimate
+        at = estimate.device_time if estimate is not None else float("nan")
+        return caption_of(self._session.status, at, datetime.now())
+
+    def picture(self, view: QWidget, title: str, flat: bool) -> None:
+        """Ask for a file, and write a picture of a view to it."""
+        if not view.isVisible():
+            self.told.emit(f"Show {title} first: what is hidden has no picture")
+            return
+        caption = self.caption()  # of now, and not of when the file is chosen
+        path = chosen_file(self._window, title, flat)
+        if path is None:
+            return
+        try:
+            save_view(view, path, title, caption, flat)
+            self.told.emit(f"Saved {path}")
+        except Refusal as refusal:
+            self.told.emit(str(refusal))
+
+    def film(self) -> None:
+        """Ask for a file and film into it; or end the film that is made."""
+        if self.filming.running:
+            self.filming.end()
+            return
+        proposed = time.strftime("kappaskin-%Y%m%d-%H%M%S.mp4")
+        file, _ = QFileDialog.getSaveFileName(self._window, "Film the skin", proposed, _FILM)
+        if file:
+            try:
+                self.filming.begin(Path(file).with_suffix(".mp4"), self.caption())
+            except Refusal as refusal:
+                self.told.emit(str(refusal))
+
+    def close(self) -> None:
+        """End what is being written: a film is whole, an export is not there."""
+        self.filming.end()
+        self.dialog.close()

@@ -1,0 +1,582 @@
+"""What is exported is what was recorded, and any other program reads it."""
+
+import csv
+import json
+import math
+import re
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import pyvista as pv
+import trimesh
+from scipy.spatial import KDTree
+
+from kappaskin import (
+    Estimate,
+    Frame,
+    Patch,
+    Pipeline,
+    Refusal,
+    Scene,
+    Setup,
+    Tare,
+    basis_for,
+    load_scene,
+)
+from kappaskin.bases.basis import curvature_at
+from kappaskin.calibration.calibration import fingerprint
+from kappaskin.export import Exporting, Wanted
+from kappaskin.export.skin import Skin, Surface
+from kappaskin.export.writing import Exported, exported
+from kappaskin.recorder import Recorder
+from kappaskin.recording.reading import Recording
+from kappaskin.sources.simulated import SimulatedSource
+from kappaskin.verify import Verdict, verifying
+
+RATE = 100.0
+SMALL = Setup(Ni=5, Nj=4, nx=9, ny=7)
+
+
+@dataclass
+class Told:
+    """A frame of a recording and what was made of it then."""
+
+    frame: Frame
+    estimate: Estimate
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+def recorded(
+    path: Path,
+    scene: Scene | None = None,
+    steps: tuple[Setup | Scene, ...] = (SMALL,),
+    seconds: float = 0.4,
+) -> list[Told]:
+    """Record a scene at `path`, so many `seconds` of each of the `steps`."""
+    clock, told = Clock(), list[Told]()
+    scene = replace(scene or load_scene("tapping"), rate=RATE)
+    source = SimulatedSource(scene, clock, clock.sleep)
+    pipeline: Pipeline | None = None
+    with closing(Recorder(path, clock())) as recorder:
+        source.record(recorder)
+        for step in steps:
+            if isinstance(step, Scene):
+                source.play(replace(step, rate=RATE))
+                setup = SMALL
+            else:
+                setup = step
+            made = Pipeline(source.sensor, setup)
+            if pipeline is not None and pipeline.sensor is source.sensor:
+                made.go_on_from(pipeline)
+            pipeline = made
+            recorder.set_up(pipeline)
+            end = clock.now + seconds
+            while clock.now < end:
+                for frame in source.read(0.1):
+                    told.append(Told(frame, pipeline(frame)))
+                    recorder.take(frame, told[-1].estimate)
+    return told
+
+
+def export(recording: Path, to: Path, **asked) -> Exported:
+    """Export in this process, which is sooner; into a folder that is made for it."""
+    to.parent.mkdir(exist_ok=True)
+    *shares, done = exported(Wanted(recording, to, **asked), to.parent)
+    assert isinstance(done, Exported)
+    assert shares == sorted(shares)
+    return done
+
+
+@pytest.fixture(scope="module")
+def taps(tmp_path_factory) -> tuple[Path, list[Told]]:
+    path = tmp_path_factory.mktemp("taps") / "taps.mcap"
+    return path, recorded(path)
+
+
+def text_or_json(value: str) -> object:
+    return json.loads(value) if value[:1] in "[{" or value in ("true", "false") else value
+
+
+def about_in(path: Path) -> dict:
+    """What a table says of itself, read as anybody would."""
+    if path.suffix == ".npz":
+        return json.loads(str(np.load(path)["about"]))
+    if path.suffix == ".h5":
+        with h5py.File(path) as file:
+            return {name: text_or_json(value) for name, value in file.attrs.items()}
+    said = [line for line in path.read_text().splitlines() if line.startswith("#")]
+    lines = [line[2:].split(": ", 1) for line in said]
+    return {name: json.loads(value) for name, value in lines}
+
+
+def columns_in(path: Path) -> dict[str, np.ndarray]:
+    if path.suffix == ".npz":
+        with np.load(path) as arrays:
+            return {name: arrays[name] for name in arrays.files if name != "about"}
+    with h5py.File(path) as file:
+        return {name: file[name][:] for name in file}
+
+
+OF_ESTIMATE: dict[str, Callable[[Estimate], object]] = {
+    "nominal": lambda e: e.nominal,
+    "curvature": lambda e: e.curvature,
+    "fresh": lambda e: e.fresh,
+    "residual": lambda e: e.residual,
+    "suspect": lambda e: e.suspect,
+    "coefficients": lambda e: e.coefficients,
+    "noise": lambda e: e.noise,
+    "converged": lambda e: e.converged,
+    "present": lambda e: e.touch.present,
+    "spare": lambda e: e.touch.spare,
+    "position": lambda e: e.touch.position,
+    "position_sd": lambda e: e.touch.position_sd,
+    "position_95": lambda e: e.touch.position_95,
+    "force": lambda e: e.touch.force,
+    "force_sd": lambda e: e.touch.force_sd,
+    "force_95": lambda e: e.touch.force_95,
+    "displacement": lambda e: e.touch.displacement,
+    "displacement_sd": lambda e: e.touch.displacement_sd,
+    "point": lambda e: e.geometry.position,
+    "frame": lambda e: e.geometry.frame,
+    "metric": lambda e: e.geometry.metric,
+    "curvature_form": lambda e: e.geometry.curvature_form,
+    "torsion_form": lambda e: e.geometry.torsion_form,
+    "covariance": lambda e: e.geometry.covariance,
+    "principal": lambda e: e.geometry.principal,
+    "principal_sd": lambda e: e.geometry.principal_sd,
+    "angle": lambda e: e.geometry.angle,
+    "device_time": lambda e: e.device_time,
+    "host_time": lambda e: e.host_time,
+    "taken": lambda e: e.taken,
+    "taken_sd": lambda e: e.taken_sd,
+    "sequence": lambda e: e.sequence,
+}
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".h5"])
+def test_a_table_has_every_frame_bit_for_bit_as_it_was_live(suffix: str, taps, tmp_path) -> None:
+    recording, told = taps
+    export(recording, tmp_path / f"out{suffix}")
+    found = columns_in(tmp_path / f"out{suffix}")
+    assert any(one.estimate.touch.present for one in told)
+    for name, of in OF_ESTIMATE.items():
+        was = np.array([of(one.estimate) for one in told])
+        assert found[name].tobytes() == was.astype(found[name].dtype).tobytes(), name
+    counts = np.array([one.frame.counts for one in told])
+    np.testing.assert_array_equal(found["counts"].reshape(len(told), -1), counts)
+    assert set(found) - set(OF_ESTIMATE) == {"counts", "time", "setup", "single", "near_rim"}
+    np.testing.assert_allclose(found["time"], found["host_time"] - 1000.0, atol=1e-6)
+
+
+def test_a_csv_has_the_same_numbers_as_an_npz(taps, tmp_path) -> None:
+    recording, _ = taps
+    export(recording, tmp_path / "out.csv")
+    export(recording, tmp_path / "out.npz")
+    with (tmp_path / "out.csv").open() as file:
+        head, *rows = csv.reader(line for line in file if not line.startswith("#"))
+    values = np.array(rows, float)
+    found = columns_in(tmp_path / "out.npz")
+    flat = np.concatenate([v.reshape(len(v), -1).astype(float) for v in found.values()], axis=1)
+    assert values.tobytes() == flat.tobytes()
+    assert head[0] == "time [s]"
+    assert "curvature_xy_3 [1/m]" in head
+    assert "coefficients_4_3 [m]" in head
+    assert "covariance_yy_xy [1/m^2]" in head
+    assert len(set(head)) == len(head)
+
+
+def test_a_verdict_finds_the_recording_the_same(taps) -> None:
+    *_, verdict = verifying(taps[0])
+    assert isinstance(verdict, Verdict)
+    assert verdict.same
+    assert verdict.compared > len(taps[1])
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".h5"])
+def test_a_table_tells_where_it_is_from(suffix: str, tmp_path) -> None:
+    scene = load_scene("fingertip")
+    sensor = scene.sensor()
+    zero = np.full(sensor.channels, 0.25)
+    place, date = fingerprint(sensor.layout), datetime(2026, 1, 2, 3, tzinfo=UTC)
+    about = (sensor.name, sensor.serial_number, place, date)
+    tare = Tare(*about, 21.5, 100, 1.0, zero, 0 * zero + 0.01)
+    told = recorded(tmp_path / "rec.mcap", scene, (replace(SMALL, tare=tare),), 0.1)
+    export(tmp_path / "rec.mcap", tmp_path / f"out{suffix}")
+    said = about_in(tmp_path / f"out{suffix}")
+    assert said["recording"] == "rec.mcap"
+    assert said["program"].startswith("kappaskin ")
+    assert said["device"]["serial_number"] == sensor.serial_number
+    assert said["settings"][0]["tare"]["digest"] == tare.digest
+    assert said["settings"][0]["tare"]["date"] == date.isoformat()
+    assert said["settings"][0]["calibration"] is None
+    assert (said["settings"][0]["Ni"], said["settings"][0]["method"]) == (5, SMALL.method)
+    began = datetime.fromisoformat(said["began"])
+    assert abs((datetime.now(UTC) - began).total_seconds() - 1000) < math.inf
+    np.testing.assert_array_equal(said["positions"], sensor.layout.positions)
+    assert said["ended_properly"] is True
+    assert len(told) > 5
+
+
+def test_an_hdf5_column_has_its_unit(taps, tmp_path) -> None:
+    export(taps[0], tmp_path / "out.h5")
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert file["curvature"].attrs["unit"] == "1/m"
+        assert file["force"].attrs["unit"] == "N"
+        assert all(file[name].attrs["description"] for name in file if name != "about")
+
+
+def test_settings_that_change_are_told_of_and_each_frame_says_which_it_had(tmp_path) -> None:
+    other = replace(SMALL, Ni=4, Nj=6, method="bayes")
+    told = recorded(tmp_path / "rec.mcap", steps=(SMALL, other), seconds=0.2)
+    export(tmp_path / "rec.mcap", tmp_path / "out.npz")
+    found, said = columns_in(tmp_path / "out.npz"), about_in(tmp_path / "out.npz")
+    assert [setup["number"] for setup in said["settings"]] == [0, 1]
+    assert said["settings"][1]["method"] == "bayes"
+    assert sorted(set(found["setup"])) == [0, 1]
+    assert found["coefficients"].shape == (len(told), 5, 6)
+    for one, setup, c in zip(told, found["setup"], found["coefficients"], strict=True):
+        Ni, Nj = one.estimate.coefficients.shape
+        assert (Ni, Nj) == ((5, 4), (4, 6))[setup]
+        np.testing.assert_array_equal(c[:Ni, :Nj], one.estimate.coefficients)
+        assert np.isnan(c[Ni:]).all()
+        assert np.isnan(c[:, Nj:]).all()
+
+
+def test_a_span_has_its_own_frames_with_the_memory_of_those_before(tmp_path) -> None:
+    setup = replace(SMALL, method="tracking")
+    told = recorded(tmp_path / "rec.mcap", steps=(setup,), seconds=0.5)
+    export(tmp_path / "rec.mcap", tmp_path / "out.npz", begin=0.195, end=0.305)
+    found = columns_in(tmp_path / "out.npz")
+    within = [one for one in told if 0.195 <= one.frame.host_time - 1000 <= 0.305]
+    assert len(within) >= 10
+    np.testing.assert_array_equal(found["sequence"], [one.frame.sequence for one in within])
+    was = np.array([one.estimate.coefficients for one in within])
+    assert found["coefficients"].tobytes() == was.tobytes()
+
+
+def test_every_so_many_seconds_one_row_is_written(taps, tmp_path) -> None:
+    export(taps[0], tmp_path / "out.npz", every=0.1)
+    times = columns_in(tmp_path / "out.npz")["time"]
+    assert len(times) == 5
+    assert (np.abs(np.diff(times) - 0.1) < 1.5 / RATE).all()
+
+
+def test_other_settings_give_what_a_pipeline_of_those_gives(taps, tmp_path) -> None:
+    recording, told = taps
+    other = replace(SMALL, Ni=6, Nj=3)
+    export(recording, tmp_path / "out.npz", setup=other)
+    found, said = columns_in(tmp_path / "out.npz"), about_in(tmp_path / "out.npz")
+    scene = replace(load_scene("tapping"), rate=RATE)
+    pipeline = Pipeline(SimulatedSource(scene).sensor, other)
+    was = np.array([pipeline(one.frame).coefficients for one in told])
+    assert found["coefficients"].tobytes() == was.tobytes()
+    assert [setup["Ni"] for setup in said["settings"]] == [6]
+
+
+def test_another_skin_in_between_is_refused_and_each_of_the_two_is_not(tmp_path) -> None:
+    told = recorded(tmp_path / "rec.mcap", steps=(SMALL, load_scene("fingertip")), seconds=0.2)
+    with pytest.raises(Refusal, match="another device, or another skin, came at") as refusal:
+        export(tmp_path / "rec.mcap", tmp_path / "all" / "out.csv")
+    before, after = (float(t) for t in re.findall(r"(?:until|from) ([\d.]+) s", str(refusal.value)))
+    export(tmp_path / "rec.mcap", tmp_path / "a" / "out.npz", end=before)
+    export(tmp_path / "rec.mcap", tmp_path / "b" / "out.npz", begin=after)
+    first, second = (columns_in(tmp_path / which / "out.npz") for which in "ab")
+    shapes = {one.estimate.curvature.shape for one in told}
+    assert {first["curvature"].shape[1:], second["curvature"].shape[1:]} == shapes
+    assert len(first["time"]) + len(second["time"]) >= len(told) - 2
+
+
+# The surface.
+
+
+def shape_on(held_skin, scale: float = 1e-5) -> tuple[Surface, np.ndarray]:
+    """A surface of 25 x 25 points, and its coefficients in m."""
+    basis = held_skin.basis()
+    c = scale * np.random.default_rng(0).standard_normal(basis.shape)
+    return Skin(basis, 25, 25)(c), c
+
+
+def test_the_surface_goes_through_the_skin_moved_along_its_normals(held_skin) -> None:
+    surface, c = shape_on(held_skin)
+    basis, patch = held_skin.basis(), held_skin.patch
+    x, y = patch.grid(25, 25)
+    f = basis.on_grid(x, y)(c).ravel()
+    rest, out = patch.at_rest(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
+    on = np.isfinite(f)
+    far, which = KDTree(surface.points).query((rest - out * f[:, None])[on])
+    assert far.max() < 1e-10
+    np.testing.assert_allclose(surface.displacement[which], f[on], atol=1e-10)
+
+
+def test_the_surface_is_as_large_as_the_skin_and_faces_outwards(held_skin) -> None:
+    surface, _ = shape_on(held_skin)
+    mesh = trimesh.Trimesh(surface.points, surface.triangles, process=False)
+    _, weights = held_skin.basis().quadrature()
+    assert mesh.area == pytest.approx(weights.sum(), rel=0.01)
+    there = mesh.area_faces > 1e-9 * mesh.area
+    outwards = surface.normals[surface.triangles].mean(axis=1)
+    assert (np.einsum("pi,pi->p", mesh.face_normals, outwards)[there] > 0.99).all()
+    assert len(np.unique(surface.triangles)) == len(surface.points)
+
+
+def test_a_skin_at_rest_has_its_base_curvature_everywhere(held_skin) -> None:
+    surface, _ = shape_on(held_skin, 0.0)
+    H = held_skin.patch.base_curvature
+    np.testing.assert_allclose(
+        surface.curvature, np.broadcast_to((H, 0.0, 0.0), surface.curvature.shape), atol=1e-9
+    )
+
+
+def test_the_curvature_of_a_flat_skin_is_that_of_equations_3_to_5() -> None:
+    basis = basis_for(Patch(0.1, 0.08), "hinged", 4, 3)
+    c = 1e-8 * np.arange(12.0).reshape(4, 3)
+    surface = Skin(basis, 11, 9)(c)
+    exact = curvature_at(basis, surface.points[:, :2]) @ c.ravel()
+    np.testing.assert_allclose(surface.curvature, exact.T, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["tapping", "fingertip"])
+def test_a_vtp_opens_in_pyvista_with_all_that_is_known_of_it(name: str, tmp_path) -> None:
+    setup = replace(SMALL, nx=33, ny=21)
+    told = recorded(tmp_path / "rec.mcap", load_scene(name), (setup,), 0.2)
+    export(tmp_path / "rec.mcap", tmp_path / "skin.vtp", at=0.1)
+    mesh = pv.read(tmp_path / "skin.vtp")
+    at = float(mesh.field_data["TimeValue"][0])
+    one = min(told, key=lambda one: abs(one.frame.host_time - 1000 - at))
+    assert 0.1 <= at < 0.1 + 1.5 / RATE
+    said = json.loads(mesh.field_data["about"][0])
+    assert said["sequence"] == one.frame.sequence
+    assert said["settings"][0]["nx"] == 33
+    assert mesh.is_all_triangles
+    assert mesh.n_cells == 2 * 32 * 20
+    np.testing.assert_allclose(mesh["displacement [m]"], one.estimate.surface.ravel(), atol=1e-12)
+    assert mesh["curvature [1/m]"].shape == (33 * 21, 3)
+    assert mesh.point_data.active_normals_name == "normals"
+
+
+def test_an_stl_is_the_same_surface_as_the_vtp(taps, tmp_path) -> None:
+    export(taps[0], tmp_path / "skin.vtp", at=0.2)
+    export(taps[0], tmp_path / "skin.stl", at=0.2)
+    one, other = pv.read(tmp_path / "skin.vtp"), trimesh.load(tmp_path / "skin.stl")
+    assert len(other.faces) == one.n_cells
+    assert other.area == pytest.approx(one.area, rel=1e-5)
+    corners = one.points[one.regular_faces]
+    np.testing.assert_allclose(np.asarray(other.triangles), corners, rtol=1e-6, atol=1e-9)
+    head = (tmp_path / "skin.stl").read_bytes()[:80]
+    assert b"kappaskin" in head
+    assert not head.startswith(b"solid")
+    said = json.loads((tmp_path / "skin.json").read_text())
+    assert said["lengths"] == "m"
+    assert said["device"]["name"] == "Simulated skin"
+    assert list(said["times"]) == ["skin.stl"]
+
+
+def test_a_series_is_one_surface_each_so_many_seconds(taps, tmp_path) -> None:
+    export(taps[0], tmp_path / "skin.pvd", every=0.1)
+    reader = pv.get_reader(tmp_path / "skin.pvd")
+    times = reader.time_values
+    assert len(times) == 5
+    assert (np.abs(np.diff(times) - 0.1) < 1.5 / RATE).all()
+    reader.set_active_time_value(times[-1])
+    last = reader.read()[0]
+    assert last.field_data["TimeValue"][0] == times[-1]
+    export(taps[0], tmp_path / "s" / "skin.stl", every=0.1)
+    said = json.loads((tmp_path / "s" / "skin.json").read_text())
+    assert list(said["times"].values()) == times
+    assert all((tmp_path / "s" / name).exists() for name in said["times"])
+    assert not (tmp_path / "s" / "skin.stl").exists()
+
+
+# What is refused, and what is left of it.
+
+
+def test_a_process_of_its_own_leaves_the_file_alone(taps, tmp_path) -> None:
+    with Exporting(Wanted(taps[0], tmp_path / "out.npz")) as exporting:
+        assert len(list(tmp_path.iterdir())) == 1
+        *shares, done = exporting.wait()
+    assert shares == sorted(shares)
+    assert isinstance(done, Exported)
+    assert done.written == len(taps[1])
+    assert list(tmp_path.iterdir()) == [tmp_path / "out.npz"]
+
+
+def test_a_cancelled_export_leaves_nothing(taps, tmp_path) -> None:
+    with Exporting(Wanted(taps[0], tmp_path / "skin.pvd", every=0.001)) as exporting:
+        next(exporting.wait())
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_export_that_nobody_waits_for_any_more_clears_up(taps, tmp_path) -> None:
+    room = tmp_path / "room"
+    room.mkdir()
+    work = exported(Wanted(taps[0], tmp_path / "out.csv"), room)
+    next(work)
+    assert list(room.iterdir())
+    work.close()
+    assert not room.exists()
+
+
+def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
+    with Exporting(Wanted(taps[0], tmp_path / "skin.stl", at=0.1)) as exporting:
+        (tmp_path / "skin.json").write_text("mine")
+        with pytest.raises(Refusal, match="appeared meanwhile"):
+            deque(exporting.wait(), 0)
+    assert list(tmp_path.iterdir()) == [tmp_path / "skin.json"]
+    assert (tmp_path / "skin.json").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "why"),
+    [
+        ("out.txt", {}, r"ends in one of \.csv"),
+        ("out", {}, r"ends in one of \.csv"),
+        ("out.csv", {"at": 0.1}, "a row for each frame"),
+        ("out.vtp", {}, "give it"),
+        ("out.vtp", {"every": 0.1}, "to a .pvd"),
+        ("out.pvd", {}, "between two surfaces"),
+        ("out.stl", {}, "at one moment"),
+        ("out.stl", {"at": 0.1, "every": 0.1}, "got both"),
+        ("out.csv", {"begin": math.nan}, "times in s"),
+        ("out.csv", {"begin": -1.0}, "times in s"),
+        ("out.csv", {"begin": math.inf}, "times in s"),
+        ("out.csv", {"begin": 2.0, "end": 1.0}, "times in s"),
+        ("out.csv", {"end": math.nan}, "times in s"),
+        ("out.csv", {"every": -0.1}, "times in s"),
+        ("out.csv", {"every": math.nan}, "times in s"),
+        ("out.stl", {"at": math.nan}, "times in s"),
+        ("out.csv", {"begin": 100.0}, "from 100 s on; the last one came at"),
+        ("out.stl", {"at": 100.0}, "from 100 s on; the last one came at"),
+        ("out.csv", {"begin": 0.1001, "end": 0.1002}, "until 0.1002 s"),
+        ("no/out.csv", {}, "cannot be written"),
+    ],
+)
+def test_what_makes_no_file_is_refused(name: str, asked: dict, why: str, taps, tmp_path) -> None:
+    with (
+        pytest.raises(Refusal, match=why),
+        Exporting(Wanted(taps[0], tmp_path / name, **asked)) as work,
+    ):
+        deque(work.wait(), 0)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("there", ["out.stl", "out.json", "out.pvd", "out"])
+def test_what_is_there_already_is_not_written_over(there: str, taps, tmp_path) -> None:
+    (tmp_path / there).write_text("mine")
+    asked = {"at": 0.1} if there in ("out.stl", "out.json") else {"every": 0.1}
+    with pytest.raises(Refusal, match="is there already"):
+        Wanted(taps[0], tmp_path / ("out.stl" if "at" in asked else "out.pvd"), **asked)
+    assert (tmp_path / there).read_text() == "mine"
+
+
+def test_a_recording_that_is_none_is_refused(tmp_path) -> None:
+    (tmp_path / "rec.mcap").write_bytes(b"no recording")
+    for path in (tmp_path / "rec.mcap", tmp_path / "nowhere.mcap"):
+        with pytest.raises(Refusal, match="expected a recording"):
+            export(path, tmp_path / "out.csv")
+
+
+def test_a_recording_without_settings_is_refused(tmp_path) -> None:
+    recorded(tmp_path / "rec.mcap", steps=())
+    with pytest.raises(Refusal, match="without settings"):
+        export(tmp_path / "rec.mcap", tmp_path / "out.csv")
+
+
+def test_damage_in_the_middle_is_refused_and_leaves_nothing(taps, tmp_path) -> None:
+    with Recording(taps[0]) as recording:
+        at = recording.chunks[len(recording.chunks) // 2].at
+    data = bytearray(taps[0].read_bytes())
+    data[at + 200] ^= 0xFF
+    (tmp_path / "rec.mcap").write_bytes(data)
+    with (
+        pytest.raises(Refusal, match=r"is damaged at byte \d+ .*repair"),
+        Exporting(Wanted(tmp_path / "rec.mcap", tmp_path / "out.npz")) as work,
+    ):
+        deque(work.wait(), 0)
+    assert [path.name for path in tmp_path.iterdir()] == ["rec.mcap"]
+
+
+def test_a_recording_that_breaks_off_is_exported_up_to_there(taps, tmp_path) -> None:
+    with Recording(taps[0]) as recording:
+        end = recording.chunks[-1].at
+    (tmp_path / "rec.mcap").write_bytes(taps[0].read_bytes()[: end + 50])
+    if len(recording.chunks) < 2:
+        pytest.skip("written as one chunk")
+    done = export(tmp_path / "rec.mcap", tmp_path / "out.npz")
+    assert not done.whole
+    assert 0 < done.written < len(taps[1])
+    assert about_in(tmp_path / "out.npz")["ended_properly"] is False
+
+
+def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
+    script = (
+        "import resource, sys; from pathlib import Path; from kappaskin import Refusal\n"
+        "from kappaskin.export import Wanted; from kappaskin.export.writing import exported\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))\n"
+        "recording, *places = map(Path, sys.argv[1:])\n"
+        "for to in places:\n"
+        "    at = 0.1 if to.suffix in ('.vtp', '.stl') else None\n"
+        "    try: list(exported(Wanted(recording, to, at=at), to.parent))\n"
+        "    except Refusal as refusal: print(refusal)\n"
+    )
+    places = [tmp_path / f"out{suffix}" for suffix in (".csv", ".npz", ".h5", ".vtp", ".stl")]
+    command = [sys.executable, "-c", script, *map(str, [taps[0], *places])]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    why = "cannot be written (File too large); choose another place"
+    assert found.stdout.splitlines() == [f"{place}: {why}" for place in places], found.stderr
+    assert (found.returncode, found.stderr) == (0, "")
+
+
+def test_without_h5py_the_line_that_installs_it_is_told(taps, tmp_path, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(Refusal, match=r'pip install "kappaskin\[hdf5\]"'):
+        export(taps[0], tmp_path / "out.h5")
+
+
+# The command.
+
+
+def test_the_command_names_what_it_wrote(taps, run, tmp_path) -> None:
+    span = ("--from", 0.1, "--until", 0.2)
+    code, out, err = run("export", taps[0], "--to", tmp_path / "out.csv", *span)
+    assert code == 0
+    assert out.split() == [str(tmp_path / "out.csv")]
+    assert re.fullmatch(r"1\d frames\n", err)
+    code, out, _ = run("export", taps[0], "--to", tmp_path / "skin.stl", "--every", 0.2)
+    assert out.split() == [str(tmp_path / "skin"), str(tmp_path / "skin.json")]
+
+
+def test_the_command_refuses_with_its_own_code(taps, run, tmp_path) -> None:
+    code, out, err = run("export", taps[0], "--to", tmp_path / "out.txt")
+    assert (code, out) == (2, "")
+    assert "ends in one of" in err
+
+
+def test_ctrl_c_stops_the_command_and_leaves_nothing(taps, run, tmp_path, monkeypatch) -> None:
+    def interrupted(self: Exporting):
+        yield 0.5
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Exporting, "wait", interrupted)
+    code, _, err = run("export", taps[0], "--to", tmp_path / "out.csv")
+    assert code == 2
+    assert "nothing was written" in err
+    assert not list(tmp_path.iterdir())
