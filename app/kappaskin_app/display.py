@@ -12,13 +12,14 @@ from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings
 from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, PULLED, SEQUENTIAL, Colours, Theme
 from kappaskin_app.touching import touches_at
-from kappaskin_app.views.badge import LOST, OFF, STALE, WAITING, Badge
+from kappaskin_app.views.badge import GAP, LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.views.colour_bar import SkinScale
 from kappaskin_app.views.heatmap import Array, Heatmap, Mask
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.notice import Notice, warnings
 from kappaskin_app.views.readouts import Health, Readouts
 
+_OLD = (LOST, OFF, STALE, WAITING, GAP)  # what is shown is not so now
 _HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
 _HEATMAPS = 0.06  # s between two drawings of the heatmaps
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
@@ -87,7 +88,7 @@ class Display:
         state = self._session.badge()
         self.badge.show_state(state)
         self.membrane.alarm.show(self._session.alarm() if self.alarming else "")
-        lost = state in (LOST, OFF, STALE, WAITING)
+        lost = state in _OLD
         for view in (self.membrane, *self.heatmaps.values()):
             view.show_lost(lost)
         self._show_numbers(status, lost)
@@ -147,7 +148,7 @@ class Display:
 
     def estimate_shown(self) -> Estimate | None:
         """The newest estimate, None while what it shows is not coming in any more."""
-        lost = self._session.badge() in (LOST, OFF, STALE, WAITING)
+        lost = self._session.badge() in _OLD
         return None if lost else self._session.estimate
 
     def show_estimate(self, estimate: Estimate) -> None:

@@ -8,6 +8,7 @@ from kappaskin_app.theme import Theme
 
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
+REPLAY, PAUSED, GAP = "REPLAY", "REPLAY \N{MIDDLE DOT} paused", "REPLAY \N{MIDDLE DOT} gap"
 
 TIPS = {
     LIVE: "Readings of a real sensor, as they come.",
@@ -17,9 +18,13 @@ TIPS = {
     LOST: "The connection ended or could not be made: what is shown is the last that came. "
     "A device that comes back is gone on with by itself.",
     OFF: "Nothing is connected.",
+    REPLAY: "A recording is played: what is shown was once so.",
+    PAUSED: "A recording stands still: what is shown was once so.",
+    GAP: "A recording, where nothing came for a while: what is shown is old.",
 }
 
 
+_SHORT = 8  # letters that fit in large
 _MORE = "Click it, or F4, to read what happened."
 
 
@@ -53,9 +58,10 @@ class Badge(QLabel):
     def _paint(self) -> None:
         if self._theme is None or not self.state:
             return
+        size = 20 if len(self.state) <= _SHORT else 13
         self.setStyleSheet(
             f"background: {colour_of(self.state, self._theme)}; color: white; font-weight: 700;"
-            "font-size: 20px; border-radius: 6px; padding: 4px;"
+            f"font-size: {size}px; border-radius: 6px; padding: 4px;"
         )
 
 
@@ -68,4 +74,7 @@ def colour_of(state: str, theme: Theme) -> str:
         STALE: theme.warning,
         LOST: theme.bad,
         OFF: theme.off,
+        REPLAY: theme.replayed,
+        PAUSED: theme.replayed,
+        GAP: theme.warning,
     }[state]
