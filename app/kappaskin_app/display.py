@@ -43,6 +43,8 @@ class Display:
         self._mode: Array | None = None
         self.alarming = True
         """Whether the skin's picture says why nothing comes in, as nothing else does."""
+        self.old = True
+        """Whether what is shown is not coming in any more."""
         self._met, self._asked = 0, -1
         self._out = np.empty(0, np.intp)  # elements that are left out
         self._colours: object = None
@@ -88,7 +90,7 @@ class Display:
         state = self._session.badge()
         self.badge.show_state(state)
         self.membrane.alarm.show(self._session.alarm() if self.alarming else "")
-        lost = state in _OLD
+        self.old = lost = state in _OLD
         for view in (self.membrane, *self.heatmaps.values()):
             view.show_lost(lost)
         self._show_numbers(status, lost)

@@ -290,9 +290,13 @@ class Replaying(QObject):
 
     def _manner(self) -> None:
         """Let the engine go on from where it is, as is chosen now."""
-        if self._replay is not None:
+        if self._replay is None:
+            return
+        if self._sought is not None:
+            self._send(self._go_there)
+        else:
             self._session.engine.seek(None, self._pace, self._looped)
-            self._show()
+        self._show()
 
     def seek(self, at: float) -> None:
         """Go to `at` s, and stand there while the mouse holds the handle."""

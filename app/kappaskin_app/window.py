@@ -24,6 +24,7 @@ from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.columns import column, heighten, widen
+from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
 from kappaskin_app.drops import Drops
@@ -33,6 +34,7 @@ from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.naming import Naming
+from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.panels import Panels
@@ -60,7 +62,7 @@ from kappaskin_app.wishes import Wishes
 
 _WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
-_HEIGHTS = {"scene": 0.38}
+_HEIGHTS = {"scene": 0.38, "compare": 0.36}
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -84,6 +86,8 @@ class MainWindow(QMainWindow):
         self.planning = Planning(self.session, self)
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
         self.health, self.testing = HealthPanel(), MapTesting(self)
+        self.compare = ComparePanel()
+        self.comparing = Comparing(self.history, self.session, self)
         self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
         self.taping = Taping(self.session.engine, self)
         self.replaying = Replaying(self.history, self.session, self.transport, self)
@@ -125,6 +129,7 @@ class MainWindow(QMainWindow):
             self._dock("stability", "Stability", self.stability, below),
             self._dock("scene", "Scene", self.scene, below),
             self._dock("health", "Health", self.health, below),
+            self._dock("compare", "Compare A and B", self.compare, below),
         ]
         for first, second in pairwise(self._docks[2:]):
             self.tabifyDockWidget(first, second)
@@ -231,7 +236,7 @@ class MainWindow(QMainWindow):
         for dock in self._docks[:2]:
             name = f"dock-{dock.objectName()}"
             self.actions_by_name.register(name, view, dock.toggleViewAction())
-        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2", "F3"), strict=True):
+        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2", "F3", "Ctrl+B"), strict=True):
             name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
             action = add(name, view, dock.windowTitle(), turn, key)
             action.setCheckable(True)
@@ -321,6 +326,10 @@ class MainWindow(QMainWindow):
         for news in (taping, replaying):
             news.told.connect(guarded(self._tell))
         self.panels.recording.attend(taping, replaying)
+        self._docks[6].visibilityChanged.connect(guarded(self.comparing.watch))
+        session.reported.connect(guarded(self.comparing.follow))
+        self.compare.form.wished.connect(guarded(self.wishes.wish))
+        self.compare.attend(self.comparing)
 
     def _show_mark(self) -> None:
         """Show in the header that something is recorded, or that it ended by itself."""
@@ -394,6 +403,8 @@ class MainWindow(QMainWindow):
         for view in (self.timeline, self.transport, self.mark):
             view.show_theme(theme)
         self.stability.show_settings(settings)
+        self.compare.show_settings(settings)
+        self.compare.show_theme(theme)
         self.stability.show_theme(theme)
         self.health.show_theme(theme)
         self.display.show_theme(theme)
@@ -424,6 +435,7 @@ class MainWindow(QMainWindow):
         self.panels.show_status(status, simulating)
         self.stability.show_status(status, self.session.inside)
         self.health.show_status(status, self.session.inside)
+        self.compare.show_status(status, self.display.old)
 
     def _allow_tare(self) -> None:
         action, why_not = self.actions_by_name["tare"], self.taring.why_not

@@ -8,7 +8,8 @@ from kappaskin_app.theme import Theme
 
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
-REPLAY, PAUSED, GAP = "REPLAY", "REPLAY \N{MIDDLE DOT} paused", "REPLAY \N{MIDDLE DOT} gap"
+_BESIDE = " \N{MIDDLE DOT} "  # parts a state from what more is true of it, below it
+REPLAY, PAUSED, GAP = "REPLAY", f"REPLAY{_BESIDE}paused", f"REPLAY{_BESIDE}gap"
 
 TIPS = {
     LIVE: "Readings of a real sensor, as they come.",
@@ -24,7 +25,6 @@ TIPS = {
 }
 
 
-_SHORT = 8  # letters that fit in large
 _MORE = "Click it, or F4, to read what happened."
 
 
@@ -43,7 +43,8 @@ class Badge(QLabel):
     def show_state(self, state: str) -> None:
         if state != self.state:
             self.state = state
-            self.setText(state)
+            self.setText(state.replace(_BESIDE, "\n"))
+            self.setAccessibleName(state)
             self.setToolTip(f"{TIPS[state]}\n{_MORE}")
             self._paint()
 
@@ -58,10 +59,10 @@ class Badge(QLabel):
     def _paint(self) -> None:
         if self._theme is None or not self.state:
             return
-        size = 20 if len(self.state) <= _SHORT else 13
+        size, padding = (14, 0) if _BESIDE in self.state else (20, 4)
         self.setStyleSheet(
             f"background: {colour_of(self.state, self._theme)}; color: white; font-weight: 700;"
-            f"font-size: {size}px; border-radius: 6px; padding: 4px;"
+            f"font-size: {size}px; border-radius: 6px; padding: {padding}px;"
         )
 
 
