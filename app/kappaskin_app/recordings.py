@@ -1,6 +1,7 @@
 """The user's folder of recordings: what is in it, and what the next one is called."""
 
 import itertools
+import shlex
 from datetime import datetime
 from pathlib import Path
 
@@ -34,6 +35,13 @@ def newest(folder: Path) -> list[Path]:
 def unfinished(folder: Path) -> list[Path]:
     """Recordings in a folder that were never ended, the newest first."""
     return _found(folder, f"*.mcap{_PART}")
+
+
+def repairing(file: Path) -> str:
+    """The command that makes the recording `file` whole, as another one beside it."""
+    name = file.name.removesuffix(_PART)
+    out = file.with_name(f"{Path(name).stem}-repaired.mcap")
+    return f"kappaskin repair {shlex.quote(str(file))} --out {shlex.quote(str(out))}"
 
 
 def _found(folder: Path, pattern: str) -> list[Path]:

@@ -15,7 +15,7 @@ from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.newest import Newest
-from kappaskin_app.recordings import newest, recordings_folder
+from kappaskin_app.recordings import newest, recordings_folder, repairing
 from kappaskin_app.session import RECORDED, Session
 from kappaskin_app.views.landmarks import minutes
 from kappaskin_app.views.transport import SPEEDS, Transport
@@ -403,8 +403,9 @@ def _told_of(found: Seen) -> str:
     told: list[str] = []
     if not found.whole:
         told.append(
-            f"{found.path.name} was never ended: it is played up to {minutes(found.length)}, where "
-            f"it breaks off; `kappaskin repair` makes it whole."
+            f"The recording {found.path.name} was never ended: it is played up to "
+            f"{minutes(found.length)}, where it breaks off. To make it whole: "
+            f"`{repairing(found.path)}`."
         )
     if found.trouble:
         told.append(f"The settings recorded cannot be used: {found.trouble}")

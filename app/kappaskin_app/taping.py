@@ -1,16 +1,15 @@
 """Recordings as a person begins, annotates and ends them; the engine writes them."""
 
-import shlex
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QWidget
 
 from kappaskin import LONGEST_NOTE, Engine, Status, Written
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
-from kappaskin_app.recordings import proposed, recordings_folder, unfinished
+from kappaskin_app.recordings import proposed, recordings_folder, repairing, unfinished
 from kappaskin_app.views.recording_mark import duration_of, size_of
 
 FILES = "Recording (*.mcap)"
@@ -73,7 +72,7 @@ class Taping(QObject):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            self._say(f"{path.parent}: cannot be made ({error.strerror}); choose another folder")
+            self.told.emit(f"{path.parent}: cannot be made ({error.strerror}); choose another")
             path = Path(path.name)
         option = QFileDialog.Option.DontConfirmOverwrite  # never done: the engine refuses
         chosen, _ = QFileDialog.getSaveFileName(
@@ -93,10 +92,11 @@ class Taping(QObject):
         dialog.setWindowTitle("Note")
         dialog.setLabelText("What happened just now, for the list and for the recording:")
         dialog.setMinimumWidth(420)
-        for line in dialog.findChildren(QLineEdit):
-            line.setMaxLength(LONGEST_NOTE)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.textValueSelected.connect(guarded(self.write_down))
         dialog.open()
+        for line in dialog.findChildren(QLineEdit):  # made only now
+            line.setMaxLength(LONGEST_NOTE)
 
     def write_down(self, text: str) -> None:
         """Let `text` be among what happened, unless there is none."""
@@ -115,14 +115,12 @@ class Taping(QObject):
         if not left:
             return
         file, more = left[0], f" There are {len(left)} in all." if len(left) > 1 else ""
-        out = file.with_suffix("").with_stem(f"{Path(file.stem).stem}-repaired")
-        command = f"kappaskin repair {shlex.quote(str(file))} --out {shlex.quote(str(out))}"
         self._say(
-            f"{file.name} was never ended. What is in it can be opened as it is, or repaired: "
-            f"`{command}`.{more}",
+            f"The recording {file.name} was never ended. What is in it can be opened as it is, or "
+            f"repaired: `{repairing(file)}`.{more}",
             alarming=False,
         )
-        self.told.emit(f"{file.name} was never ended: see Recording on the page Live")
+        self.told.emit(f"The recording {file.name} was never ended: see Recording on the page Live")
 
     # News.
 

@@ -84,7 +84,7 @@ class Transport(QWidget):
         for name, way in (("previous", -1), ("next", 1)):
             buttons[name].clicked.connect(guarded(partial(self._jump, way)))
         self.play.clicked.connect(guarded(lambda *_: self.play_wanted.emit(not self._playing)))
-        self.loop.clicked.connect(guarded(self.loop_wanted.emit))
+        self.loop.clicked.connect(guarded(lambda *_: self.loop_wanted.emit(self.loop.isChecked())))
         self.speed.activated.connect(
             guarded(lambda index: self.speed_wanted.emit(self.speed.itemData(index)))
         )
