@@ -15,8 +15,6 @@ from kappaskin_app.settings import Settings
 
 Array = NDArray[np.float64]
 
-_TRIES = 8  # to read both of the same frame
-
 
 @dataclass(frozen=True)
 class Figure:
@@ -155,13 +153,9 @@ class Comparing(QObject):
     def _read(self, status: Status) -> Pair | None:
         """The newest frame that was computed with both."""
         engine = self._session.engine
-        for _ in range(_TRIES):
-            b, a = engine.beside(status), engine.latest(status)
-            if a is None or b is None:
-                return None
-            if a.sequence == b.sequence:
-                return Pair(a, b)
-        return None
+        b = engine.beside(status)
+        a = None if b is None else engine.latest(status, b.sequence)
+        return None if a is None or b is None else Pair(a, b)
 
     @property
     def told(self) -> Computed | None:

@@ -275,11 +275,14 @@ class Engine:
             return replace(self._seen, state=LOST, rate=0.0, message=message)
         return self._seen
 
-    def latest(self, status: Status) -> Estimate | None:
-        """The newest estimate of the generation that `status` tells of."""
+    def latest(self, status: Status, sequence: int | None = None) -> Estimate | None:
+        """The newest estimate of the generation that `status` tells of, or of one frame before.
+
+        The frame with this `sequence` may be gone: the last 64 are there at most.
+        """
         if status.slot is None:
             return None
-        return self._ring.read(status.generation, status.slot)
+        return self._ring.read(status.generation, status.slot, sequence)
 
     def beside(self, status: Status) -> Estimate | None:
         """The newest estimate with the setup that is compared with."""

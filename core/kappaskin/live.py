@@ -44,6 +44,7 @@ _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
 _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
+_LOOKED_AT = 1 / 60  # s between two frames that are computed with the setup compared with
 
 
 class Loop:
@@ -65,6 +66,7 @@ class Loop:
         # What is computed beside it, while that is asked for.
         self._other = Side(beside, self._builder, status.beside or Computed())
         self._compares = self._changing = False
+        self._seen_beside = -math.inf
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
         self._arrivals, self._pace = Arrivals(), Pace()
@@ -293,8 +295,18 @@ class Loop:
                 self._steering(estimate.touch, pipeline.fit)
             self._keeping.take(frame, estimate)
             if beside is not None:
-                self._other.compute(frame, beside)
+                self._compute_beside(frame, beside)
         self._pace.spend(len(frames) - late, time.monotonic() - began)
+
+    def _compute_beside(self, frame: Frame, pipeline: Pipeline) -> None:
+        """Work out a frame with the other setup too, as often as it is looked at."""
+        source = self._source
+        stands = isinstance(source, ReplayedSource) and source.stands
+        if stands or frame.host_time - self._seen_beside >= _LOOKED_AT:
+            self._seen_beside = frame.host_time
+            self._other.compute(frame, pipeline)
+        else:
+            pipeline.pass_over(frame)
 
     def _follow(self, source: Source) -> None:
         """Say how the source is doing, and who is on it."""

@@ -11,7 +11,7 @@ from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QFileDialog
 
-from kappaskin import Tare
+from kappaskin import Recording, Tare
 from kappaskin_app.window import MainWindow
 
 KEYS = Qt.Key
@@ -296,8 +296,10 @@ def test_one_of_a_later_version_is_refused(
 def test_one_never_ended_is_played_up_to_where_it_breaks_off(
     window: MainWindow, recording: Path, tmp_path: Path, until
 ) -> None:
-    part, data = tmp_path / "broken.mcap.part", recording.read_bytes()
-    part.write_bytes(data[: len(data) // 2])
+    with Recording(recording) as whole:
+        within_the_last = whole.chunks[-1].at + 100
+    part = tmp_path / "broken.mcap.part"
+    part.write_bytes(recording.read_bytes()[:within_the_last])
     window.replaying.open_file(part)
     until(lambda: window.badge.state.startswith("REPLAY"))
     assert "was never ended" in window.panels.recording.message.text()

@@ -6,11 +6,12 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.panels.calibration.parts import button, in_a_row, sentence, text_label
+from kappaskin_app.panels.calibration.parts import button, in_a_row, sentence
 from kappaskin_app.panels.connection import COMMAND
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.replaying import Replaying
 from kappaskin_app.taping import Taping
+from kappaskin_app.views.line import Line
 from kappaskin_app.views.recording_mark import duration_of, size_of
 
 _RECORD = "Write all that comes in to a file, or end that (Ctrl+Shift+R)."
@@ -27,7 +28,7 @@ class RecordingPanel(Panel):
         self.record = button(f"Record{_DOTS}", "record-button", _RECORD)
         self.note = button(f"Note{_DOTS}", "note-button", _NOTE)
         self.open = button(f"Open{_DOTS}", "open-button", _OPEN)
-        self.what = text_label()
+        self.what = Line()
         self.copy_button = button(
             "Copy the command", "copy-repair", "Copy what the message above says to type."
         )
@@ -57,13 +58,10 @@ class RecordingPanel(Panel):
         self.record.setText("Stop" if taping.recording else f"Record{_DOTS}")
         self.record.setEnabled(not taping.why_not)
         self.record.setToolTip(taping.why_not or _RECORD)
-        name, how = Path(written.path).name, f"{duration_of(written.seconds)}"
-        begun = f"{name}: {how}, {size_of(written.size)}" if written.messages else ""
-        text = f"{'Recording' if taping.recording else 'Recorded'} {begun}" if begun else ""
-        if text != self.what.text():
-            self.what.setText(text)
-            self.what.setToolTip(written.path)
-        self.what.setVisible(bool(text))
+        how = f"{duration_of(written.seconds)}, {size_of(written.size)}"
+        self.what.show_text(f"{how}: {Path(written.path).name}" if written.messages else "")
+        self.what.setToolTip(written.path)
+        self.what.setVisible(bool(written.messages))
         message = replaying.message or taping.message
         alarm = bool(replaying.alarming if replaying.message else taping.alarming)
         self.show_message(sentence(message), hint=not alarm)

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from kappaskin import Written
 from kappaskin_app.theme import LIGHT, Theme
 
-_WIDTH = 108  # px
+_WIDTH = 92  # px
 _UNITS = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 
 
@@ -46,12 +46,11 @@ class RecordingMark(QWidget):
     def show_written(self, written: Written, trouble: str) -> None:
         """Show what is being written, or why it ended by itself."""
         if written.active:
-            lost = f", {written.lost} lost" if written.lost else ""
-            self._show(
-                f"REC {duration_of(written.seconds)}", size_of(written.size) + lost, bool(lost)
-            )
+            head, size = f"REC {duration_of(written.seconds)}", size_of(written.size)
+            self._show(head, f"{written.lost} lost" if written.lost else size, written.lost > 0)
             self.setToolTip(
-                f"Recording to {written.path}.\nLost: what found too much waiting for the disk."
+                f"Recording to {written.path}: {size}, {written.lost} messages lost.\n"
+                "Lost is what found too much waiting for the disk."
             )
         else:
             self._show("REC ended", "by itself", True)

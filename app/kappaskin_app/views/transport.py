@@ -60,6 +60,7 @@ class Transport(QWidget):
         before = [self.buttons[name] for name in names]
         for widget in (*before, self.course, self.clock, self.speed, self.loop):
             row.addWidget(widget, int(widget is self.course))
+        row.insertSpacing(row.indexOf(self.speed), 6)
         self._shown: tuple[object, ...] = ()
         self._playing, self._theme, self.there = True, LIGHT, False
         self._wire()

@@ -166,9 +166,14 @@ class ReplayedSource:
             self._go_back(-frames)
         self._steps, self._moves = max(frames, 1), True
 
+    @property
+    def stands(self) -> bool:
+        """Whether no frame follows by itself."""
+        return not self._speed or self._next is None
+
     def again(self) -> None:
         """Give the frame that is shown once more, where none follows it by itself."""
-        if self._last is not None and not self._steps and not (self._speed and self._next):
+        if self._last is not None and not self._steps and self.stands:
             self._ready.appendleft(self._last)
             self._steps, self._moves = 1, False
 
