@@ -127,11 +127,12 @@ class Taping(QObject):
     def follow(self, status: Status) -> None:
         """Take note of how the engine is doing."""
         was, self.written = self.written, status.recording
-        self._replays = status.replay is not None
+        turned, self._replays = self._replays, status.replay is not None
         self._show_actions()
-        if self.written == was:
+        if (now := self.written) == was:
+            if self._replays != turned:
+                self.changed.emit()
             return
-        now = self.written
         if now.trouble and now.trouble != was.trouble:
             self.ended = now.trouble if was.active else ""
             self._say(now.trouble)

@@ -206,6 +206,7 @@ def test_calibration_and_tare_are_the_live_ones_again(
 def test_nothing_is_recorded_of_a_recording(player: MainWindow, until) -> None:
     until(lambda: not player.actions_by_name["record"].isEnabled())
     assert "copy its file" in player.panels.recording.record.toolTip()
+    assert not player.panels.recording.record.isEnabled()
 
 
 # Opening.

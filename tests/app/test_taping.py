@@ -200,3 +200,5 @@ def test_what_is_lost_is_shown_in_the_header(qtbot) -> None:
     assert (mark.head, mark.below) == ("REC 1:05", "7 lost")
     assert mark.accessibleName() == "REC 1:05, 7 lost"
     assert "5.0 MB, 7 messages lost" in mark.toolTip()
+    mark.show_written(Written("x.mcap", True, 3723.0, 5_000_000, 100, 0), "")
+    assert (mark.head, mark.below) == ("1:02:03", "5.0 MB")

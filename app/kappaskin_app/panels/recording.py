@@ -65,7 +65,7 @@ class RecordingPanel(Panel):
         message = replaying.message or taping.message
         alarm = bool(replaying.alarming if replaying.message else taping.alarming)
         self.show_message(sentence(message), hint=not alarm)
-        self.copy_button.setVisible(bool(COMMAND.search(message)))
+        self.copy_button.setVisible("`kappaskin repair " in message)
 
     def _copy(self) -> None:
         if command := COMMAND.search(self.message.text()):

@@ -59,7 +59,7 @@ class Badge(QLabel):
     def _paint(self) -> None:
         if self._theme is None or not self.state:
             return
-        size, padding = (14, 0) if _BESIDE in self.state else (20, 4)
+        size, padding = (13, 0) if _BESIDE in self.state else (20, 4)
         self.setStyleSheet(
             f"background: {colour_of(self.state, self._theme)}; color: white; font-weight: 700;"
             f"font-size: {size}px; border-radius: 6px; padding: {padding}px;"

@@ -7,7 +7,8 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from kappaskin import Written
 from kappaskin_app.theme import LIGHT, Theme
 
-_WIDTH = 92  # px
+_WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin
+_HOUR = 3600.0  # s, from which there is room for the time alone
 _UNITS = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 
 
@@ -39,14 +40,15 @@ class RecordingMark(QWidget):
         self._theme = LIGHT
 
     def sizeHint(self) -> QSize:
-        return QSize(_WIDTH, 2 * self.fontMetrics().height() + 6)
+        return QSize(_WIDTH, 2 * self.fontMetrics().height())
 
     minimumSizeHint = sizeHint
 
     def show_written(self, written: Written, trouble: str) -> None:
         """Show what is being written, or why it ended by itself."""
         if written.active:
-            head, size = f"REC {duration_of(written.seconds)}", size_of(written.size)
+            head, size = duration_of(written.seconds), size_of(written.size)
+            head = head if written.seconds >= _HOUR else f"REC {head}"
             self._show(head, f"{written.lost} lost" if written.lost else size, written.lost > 0)
             self.setToolTip(
                 f"Recording to {written.path}: {size}, {written.lost} messages lost.\n"
@@ -77,13 +79,13 @@ class RecordingMark(QWidget):
         top = (self.height() - 2 * line) / 2
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.alert))
-        painter.drawEllipse(QPointF(14, top + line / 2), 5, 5)
+        painter.drawEllipse(QPointF(12, top + line / 2), 5, 5)
         left = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         bold = painter.font()
         bold.setWeight(QFont.Weight.DemiBold)
         painter.setFont(bold)
         painter.setPen(QColor(theme.alert))
-        painter.drawText(QRectF(26, top, self.width() - 26, line), left, self.head)
+        painter.drawText(QRectF(_TEXT, top, self.width() - _TEXT, line), left, self.head)
         painter.setFont(self.font())
         painter.setPen(QColor(theme.alert if self._bad else theme.text))
-        painter.drawText(QRectF(26, top + line, self.width() - 26, line), left, self.below)
+        painter.drawText(QRectF(_TEXT, top + line, self.width() - _TEXT, line), left, self.below)
