@@ -167,11 +167,12 @@ class Loop:
         """Go on from another place of the source."""
         source = self._source
         try:
-            if isinstance(source, ReplayedSource) and isinstance(request, Step):
-                source.step(request.frames)
+            if isinstance(request, Step):
+                if isinstance(source, ReplayedSource):
+                    source.step(request.frames)
             elif isinstance(source, ReplayedSource):
                 source.seek(request.at, request.speed, request.looped)
-            elif isinstance(source, SimulatedSource) and isinstance(request, Seek):
+            elif isinstance(source, SimulatedSource):
                 source.seek(request.at, request.speed)
         except Refusal as refusal:  # a file that is damaged there, or gone
             self._lose(str(refusal))

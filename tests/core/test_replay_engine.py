@@ -1,4 +1,4 @@
-"""Recordings as sources, and as the live process plays them."""
+"""Recordings as the live process plays them, and what is told of them."""
 
 import os
 import time
@@ -10,6 +10,7 @@ import pytest
 
 from kappaskin import LONGEST_NOTE, Engine, Recording, Refusal, Setup, Status, setups_of
 from kappaskin.sources import ReplayedSource
+from kappaskin.verify import Verdict, verifying
 
 Clock = list[float]
 
@@ -177,9 +178,9 @@ def test_a_recording_goes_on_through_a_replay_which_is_not_recorded(
         time.sleep(0.5)
         engine.record(None)
         until(lambda: path.exists())
-    from kappaskin.verify import verify
-
-    assert verify(path).same
+    *_, verdict = verifying(path)
+    assert isinstance(verdict, Verdict)
+    assert verdict.same
     source = ReplayedSource(path)
     assert "meanwhile" in [event.text for event in source.replay.events]
     source.close()
