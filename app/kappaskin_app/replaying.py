@@ -302,6 +302,7 @@ class Replaying(QObject):
         """Go to `at` s, and stand there while the mouse holds the handle."""
         if self._replay is None:
             return
+        self._begins = False  # or what a person wishes meanwhile would be overruled
         self._sought, self._sought_at, self._steps = at, time.monotonic(), 0
         self._send(self._go_there)
         self._show()
@@ -319,7 +320,7 @@ class Replaying(QObject):
         """Stand so many frames further on, or back."""
         if self._replay is None:
             return
-        self._goes, self._sought = False, None
+        self._goes, self._begins, self._sought = False, False, None
         self._steps += frames
         self._send(self._go_by)
         self._show()
@@ -344,7 +345,6 @@ class Replaying(QObject):
         """Take note of where the engine is in the recording."""
         self._replay = replay = status.replay if self._session.replaying else None
         if replay is not None and self._begins and not status.computing:
-            self._begins = False
             self.seek(0.0)
         if replay is not None and self._sought is not None:
             passed = time.monotonic() - self._sought_at

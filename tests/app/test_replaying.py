@@ -28,6 +28,7 @@ def documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def player(opened: Callable[[str], MainWindow], recording: Path, until) -> MainWindow:
     """The window on the recording, playing."""
     window = opened(f"replay:{recording}")
+    until(lambda: window.replaying.seen is not None)
     until(lambda: window.badge.state == "REPLAY")
     until(lambda: window.replaying.time > 0)
     return window
