@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
@@ -74,6 +75,50 @@ class ByFile(LoadFileScheduling):
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:
     return ByFile(config, log)
+
+
+@pytest.fixture(scope="session")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of 2.5 s, 100 frames/s: a note at 0.5 s, 6 x 7 functions from 0.7 s on.
+
+    Nothing came from 1 to 1.8 s.
+    """
+    from kappaskin import Event, Pipeline, Setup, load_scene
+    from kappaskin.recorder import Recorder
+    from kappaskin.sources import SimulatedSource
+
+    path, now = tmp_path_factory.mktemp("recordings") / "example.mcap", [time.monotonic()]
+    scene, begun = replace(load_scene("circle"), rate=100.0), now[0]
+    recorder = Recorder(path, begun)
+
+    def source() -> SimulatedSource:
+        recorder.goes_on(now[0])
+        made = SimulatedSource(scene, lambda: now[0])
+        made.record(recorder)
+        recorder.set_up(Pipeline(made.sensor, setups[-1]))
+        return made
+
+    def play(source: SimulatedSource, until: float) -> None:
+        pipeline = Pipeline(source.sensor, setups[-1])
+        while now[0] < begun + until:
+            now[0] += 0.01
+            for frame in source.read(0.0):
+                recorder.take(frame, pipeline(frame))
+
+    setups = [Setup()]
+    first = source()
+    play(first, 0.5)
+    recorder.happened(Event(now[0], "note", "the object is changed"))
+    play(first, 0.7)
+    setups.append(Setup(6, 7))
+    recorder.set_up(Pipeline(first.sensor, setups[-1]))
+    play(first, 1.0)
+    recorder.ended(now[0])
+    time.sleep(0.5)  # as long as it takes until what is there has gone to the file
+    now[0] += 0.8
+    play(source(), 2.5)
+    recorder.close()
+    return path
 
 
 @pytest.fixture(autouse=True)

@@ -12,13 +12,14 @@ from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings
 from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, PULLED, SEQUENTIAL, Colours, Theme
 from kappaskin_app.touching import touches_at
-from kappaskin_app.views.badge import LOST, OFF, STALE, WAITING, Badge
+from kappaskin_app.views.badge import GAP, LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.views.colour_bar import SkinScale
 from kappaskin_app.views.heatmap import Array, Heatmap, Mask
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.notice import Notice, warnings
 from kappaskin_app.views.readouts import Health, Readouts
 
+_OLD = (LOST, OFF, STALE, WAITING, GAP)  # what is shown is not so now
 _HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
 _HEATMAPS = 0.06  # s between two drawings of the heatmaps
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
@@ -42,6 +43,8 @@ class Display:
         self._mode: Array | None = None
         self.alarming = True
         """Whether the skin's picture says why nothing comes in, as nothing else does."""
+        self.old = True
+        """Whether what is shown is not coming in any more."""
         self._met, self._asked = 0, -1
         self._out = np.empty(0, np.intp)  # elements that are left out
         self._colours: object = None
@@ -87,7 +90,7 @@ class Display:
         state = self._session.badge()
         self.badge.show_state(state)
         self.membrane.alarm.show(self._session.alarm() if self.alarming else "")
-        lost = state in (LOST, OFF, STALE, WAITING)
+        self.old = lost = state in _OLD
         for view in (self.membrane, *self.heatmaps.values()):
             view.show_lost(lost)
         self._show_numbers(status, lost)
@@ -147,7 +150,7 @@ class Display:
 
     def estimate_shown(self) -> Estimate | None:
         """The newest estimate, None while what it shows is not coming in any more."""
-        lost = self._session.badge() in (LOST, OFF, STALE, WAITING)
+        lost = self._session.badge() in _OLD
         return None if lost else self._session.estimate
 
     def show_estimate(self, estimate: Estimate) -> None:

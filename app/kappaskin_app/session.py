@@ -20,6 +20,7 @@ from kappaskin import (
     Presentation,
     Refusal,
     Region,
+    Replay,
     Scene,
     Sensor,
     Setup,
@@ -34,10 +35,12 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.settings import Scanning, SceneSettings, Sending, Settings, Written, part
 from kappaskin_app.simulation import named, played, region_of, scene_of
-from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE, WAITING
+from kappaskin_app.views.badge import GAP, LIVE, LOST, OFF, PAUSED, REPLAY, SIM, STALE, WAITING
 
 Array = NDArray[np.float64]
 
+RECORDED = "replay:"
+"""What the name of a source begins with that is a recording."""
 STALE_AFTER = 0.5  # s without a frame
 _TICK = 4  # ms between two looks for a new estimate
 _ARRIVES = 0.3  # s after which what was asked of the engine shows in its status
@@ -46,10 +49,18 @@ _NEWS = 60.0  # s for which another device in the last one's place is told
 _STATUS = 0.05  # s between two looks at the status
 
 
-def _setup_of(settings: Settings, sensor: Sensor | None = None) -> Setup:
-    """The setup asked for, with calibration and tare if they are of `sensor`."""
-    s = settings
-    setup = Setup(s.functions_x, s.functions_y, edge=s.fit_edge, method=s.method)
+_BASE = Setup()
+
+
+def _setup_of(settings: Settings, sensor: Sensor | None = None, base: Setup = _BASE) -> Setup:
+    """The setup asked for, with calibration and tare if they are of `sensor`.
+
+    What no setting asks for is as in `base`.
+    """
+    s, named = settings, {"calibration": None, "tare": None}
+    setup = replace(
+        base, Ni=s.functions_x, Nj=s.functions_y, edge=s.fit_edge, method=s.method, **named
+    )
     for name in ("calibration", "tare"):
         found: Calibration | Tare | None = getattr(s, name)
         if found is not None and sensor is not None:
@@ -69,6 +80,14 @@ def _turn(region: Region) -> float:
     return _LATE / (LISTS * region.share)
 
 
+def _replayed(replay: Replay) -> str:
+    """What is true of a recording."""
+    if any(begin < replay.at < end for begin, end in replay.gaps):
+        return GAP
+    over = replay.at >= replay.length and not replay.looped
+    return PAUSED if over or not replay.speed else REPLAY
+
+
 class Session(QObject):
     """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick.
 
@@ -76,10 +95,13 @@ class Session(QObject):
     becomes another one, `refused` and `refusal` why it is not the one the settings describe now,
     with nothing to say when it is, and `preparing` whether that takes a while to be computed.
     `unsent` says why nothing is published, with nothing to say when it is.
+    `turning` tells that another source is about to be taken, or none; a recording that is one is
+    computed as `base` says, but for what the settings do.
     """
 
     refused = Signal(str)
     preparing = Signal(bool)
+    turning = Signal()
     playing = Signal(Scene)
     unsent = Signal(str)
     estimated = Signal(Estimate)
@@ -96,8 +118,9 @@ class Session(QObject):
         self._sought: float | None = None
         self._sought_at = 0.0
         self._ahead = Ahead()
-        self._asked = _setup_of(history.settings)
-        engine.set_up(self._asked)
+        self.base: Setup | None = None
+        self.asked = _setup_of(history.settings)
+        engine.set_up(self.asked)
         engine.scan(region_of(history.settings))
         self._laid: Step | None = None
         self.status = Status()
@@ -122,12 +145,18 @@ class Session(QObject):
         """Whether the loads and the noise are the panels' to choose: not in a written scene."""
         return self.inside and self._history.settings.written is None
 
+    @property
+    def replaying(self) -> bool:
+        """Whether a recording is what is read."""
+        return self.source.startswith(RECORDED)
+
     def connect_to(self, source: str, already: bool = False) -> None:
         """Take frames from `source`, unless the engine does `already`.
 
         A scene named there becomes the load case, or the one that is written; without a name, what
         was simulated last is simulated again.
         """
+        self.turning.emit()
         self.source, self.estimate = source.strip(), None
         self._turned_at = time.monotonic()
         if not already:
@@ -146,6 +175,7 @@ class Session(QObject):
         self._play()
 
     def disconnect_from(self) -> None:
+        self.turning.emit()
         self._turned_at = time.monotonic()
         self.engine.disconnect()
 
@@ -161,17 +191,17 @@ class Session(QObject):
 
     def _set_up(self) -> None:
         """Have the engine compute with what is asked for now, if that is something else."""
-        setup = _setup_of(self._settings, self.status.sensor)
+        setup = _setup_of(self._settings, self.status.sensor, self.base or _BASE)
         if self._laid is not None:
             setup = replace(setup, calibration=None, tare=None)
-        if not self.inside:
+        if not self.inside and self.base is None:
             setup = replace(setup, hold=max(setup.hold, _turn(region_of(self._settings))))
-        if setup != self._asked:
-            if self.inside and setup.calibration and not self._asked.calibration:
+        if setup != self.asked:
+            if self.inside and setup.calibration and not self.asked.calibration:
                 # A calibration follows the loops of a skin from rest on: these effects start anew.
                 self.engine.play(replace(self.scene, effects=()))
                 self.engine.play(played(self.scene))
-            self._asked = setup
+            self.asked = setup
             self.engine.set_up(setup)
 
     def _scan(self) -> None:
@@ -314,8 +344,11 @@ class Session(QObject):
             return OFF
         if self._lost:
             return LOST
-        if status.state == "waiting" or (status.computing and self.estimate is None):
+        waits = status.state == "waiting" and status.replay is None
+        if waits or (status.computing and self.estimate is None):
             return WAITING
+        if status.replay is not None:
+            return _replayed(status.replay)
         last = max(status.last_frame, self.estimate.host_time if self.estimate else 0.0)
         if status.sensor is None or now - last > STALE_AFTER:
             return WAITING if status.computing else STALE

@@ -6,6 +6,7 @@ from PySide6.QtCore import QObject, Signal
 
 from kappaskin import Engine, Refusal, Sensor, Status, Tare, Tares
 from kappaskin_app.history import History
+from kappaskin_app.session import RECORDED
 from kappaskin_app.settings import Settings
 
 
@@ -45,6 +46,11 @@ class Taring(QObject):
         if self._aside:
             return "Not while calibrating: readings come as they are."
         return "A tare is being taken." if self.taking else ""
+
+    @property
+    def _recorded(self) -> bool:
+        """Whether a recording is read, or is to be: what is in use with it is no sensor's now."""
+        return (self._engine.source or "").startswith(RECORDED)
 
     # What a person wishes.
 
@@ -91,8 +97,8 @@ class Taring(QObject):
     def _find(self, sensor: Sensor) -> None:
         """Use the tare that is kept of a sensor just connected, and say so."""
         self.message, self.stored, self._before = "", None, None
-        if sensor.simulated:
-            return  # begins anew each time
+        if sensor.simulated or self._recorded:
+            return  # one begins anew each time, the other has the tare that it had
         try:
             found = self._tares.load(sensor.serial_number).fit_for(sensor)
         except Refusal as refusal:
@@ -112,7 +118,7 @@ class Taring(QObject):
         if tare == self._last:
             return
         self._last = tare
-        if sensor is not None and not sensor.simulated:
+        if sensor is not None and not sensor.simulated and not self._recorded:
             try:
                 self._tares.use(sensor.serial_number, tare if is_of(tare, sensor) else None)
             except Refusal as refusal:

@@ -24,6 +24,7 @@ class Theme:
     missing: str
     good: str
     simulated: str
+    replayed: str
     warning: str
     bad: str
     off: str
@@ -43,6 +44,7 @@ LIGHT = Theme(
     missing="#9aa3ad",
     good="#1b7f4b",
     simulated="#1f6fb2",
+    replayed="#6d4aa8",
     warning="#9a5b00",
     bad="#b3261e",
     off="#5f6873",
@@ -61,6 +63,7 @@ DARK = Theme(
     missing="#59626d",
     good="#1b7f4b",
     simulated="#1f6fb2",
+    replayed="#6d4aa8",
     warning="#9a5b00",
     bad="#b93a32",
     off="#5a636e",

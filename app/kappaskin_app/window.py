@@ -24,8 +24,10 @@ from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.columns import column, heighten, widen
+from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
+from kappaskin_app.drops import Drops
 from kappaskin_app.exports import Exports
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
@@ -33,6 +35,7 @@ from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.naming import Naming
+from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.panels import Panels
@@ -41,22 +44,26 @@ from kappaskin_app.panels.stability import StabilityPanel
 from kappaskin_app.planning import Planning
 from kappaskin_app.plugs import Plugs
 from kappaskin_app.presenting import NAMED, SOUND_TIP, TIP, Presenting
+from kappaskin_app.replaying import Replaying
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
 from kappaskin_app.settings import COLOURS, Settings
 from kappaskin_app.simulation import settings_for
 from kappaskin_app.staging import Staging
+from kappaskin_app.taping import Taping
 from kappaskin_app.taring import Taring
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
+from kappaskin_app.views.recording_mark import RecordingMark
 from kappaskin_app.views.stage import Stage
 from kappaskin_app.views.timeline import Timeline
+from kappaskin_app.views.transport import Transport
 from kappaskin_app.wishes import Wishes
 
 _WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
-_HEIGHTS = {"scene": 0.38}
+_HEIGHTS = {"scene": 0.38, "compare": 0.36}
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -80,7 +87,12 @@ class MainWindow(QMainWindow):
         self.planning = Planning(self.session, self)
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
         self.health, self.testing = HealthPanel(), MapTesting(self)
-        self.timeline = Timeline()
+        self.compare = ComparePanel()
+        self.comparing = Comparing(self.history, self.session, self)
+        self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
+        self.taping = Taping(self.session.engine, self)
+        self.replaying = Replaying(self.history, self.session, self.transport, self)
+        self.drops = Drops(self, self.replaying.open_file, self.transport.take_key)
         self.staging = Staging(
             *(self.history, self.session, self.wishes, self.planning),
             *(self.scene, self.timeline, self),
@@ -118,6 +130,7 @@ class MainWindow(QMainWindow):
             self._dock("stability", "Stability", self.stability, below),
             self._dock("scene", "Scene", self.scene, below),
             self._dock("health", "Health", self.health, below),
+            self._dock("compare", "Compare A and B", self.compare, below),
         ]
         for first, second in pairwise(self._docks[2:]):
             self.tabifyDockWidget(first, second)
@@ -136,6 +149,8 @@ class MainWindow(QMainWindow):
         self.naming.named.connect(guarded(self.object.show_text))
         self.naming.found.connect(guarded(self.presenting.find))
         self.session.connect_to(source, already=engine is not None)
+        self.replaying.adopt(source)
+        self.taping.offer_repair()
 
     def _centre(self) -> QWidget:
         centre = QWidget()
@@ -147,6 +162,7 @@ class MainWindow(QMainWindow):
         beside.addWidget(self.display.scale)
         above.addLayout(beside, 1)
         above.addWidget(self.timeline)
+        above.addWidget(self.transport)
         return centre
 
     def _make_header(self) -> None:
@@ -156,6 +172,8 @@ class MainWindow(QMainWindow):
         header.setMovable(False)
         header.toggleViewAction().setEnabled(False)
         header.addWidget(self.badge)
+        self._mark = header.addWidget(self.mark)
+        self._mark.setVisible(False)
         header.addWidget(self.readouts)
         self.addToolBar(header)
 
@@ -193,6 +211,8 @@ class MainWindow(QMainWindow):
         add("ports", source, "&Look for ports", self.plugs.look, "F5")
         add("happenings", source, "What &happened", self.happenings.open_list, "F4")
         calibrating = self.calibrating
+        self.taping.add_actions(self.actions_by_name)
+        self.replaying.add_actions(self.actions_by_name)
         add("calibrate", source, "C&alibrate", self.panels.show_calibration, "Ctrl+L")
         add("take-step", source, "&Take the step of the calibration", calibrating.take, "Ctrl+K")
         for number, (value, words) in enumerate(COLOURS, 1):
@@ -207,7 +227,7 @@ class MainWindow(QMainWindow):
         for key, direction in (("F6", ABOVE), ("F7", FRONT), ("F8", SIDE)):
             words = f"Look {direction.words}"
             add(words.lower().replace(" ", "-"), view, words, self._look(direction), key)
-        add("pause", view, "&Pause or go on", self.staging.pause, "Ctrl+P")
+        add("pause", view, "&Pause or go on", self._pause, "Ctrl+P")
         add("present", view, "&Presenter", self.presenting.turn, "F11", TIP)
         sound = add("sound", view, "S&ound of the force", self._turn_sound, "F12", SOUND_TIP)
         sound.setCheckable(True)
@@ -218,7 +238,7 @@ class MainWindow(QMainWindow):
         for dock in self._docks[:2]:
             name = f"dock-{dock.objectName()}"
             self.actions_by_name.register(name, view, dock.toggleViewAction())
-        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2", "F3"), strict=True):
+        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2", "F3", "Ctrl+B"), strict=True):
             name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
             action = add(name, view, dock.windowTitle(), turn, key)
             action.setCheckable(True)
@@ -278,6 +298,7 @@ class MainWindow(QMainWindow):
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
         self._attend_health()
+        self._attend_recording()
         self.staging.told.connect(guarded(self._tell))
         self.exports.told.connect(guarded(self._tell))
         self.staging.played.connect(guarded(panels.connection.show_source))
@@ -302,6 +323,26 @@ class MainWindow(QMainWindow):
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
         guard.on_failure(self._tell)
+
+    def _attend_recording(self) -> None:
+        session, taping, replaying = self.session, self.taping, self.replaying
+        session.reported.connect(guarded(taping.follow))
+        taping.changed.connect(guarded(self._show_mark))
+        self.mark.clicked.connect(guarded(taping.dismiss))
+        replaying.opened.connect(guarded(self.panels.connection.show_source))
+        for news in (taping, replaying):
+            news.told.connect(guarded(self._tell))
+        self.panels.recording.attend(taping, replaying)
+        self._docks[6].visibilityChanged.connect(guarded(self.comparing.watch))
+        session.reported.connect(guarded(self.comparing.follow))
+        self.compare.form.wished.connect(guarded(self.wishes.wish))
+        self.compare.attend(self.comparing)
+
+    def _show_mark(self) -> None:
+        """Show in the header that something is recorded, or that it ended by itself."""
+        written, ended = self.taping.written, self.taping.ended
+        self._mark.setVisible(written.active or bool(ended))
+        self.mark.show_written(written, ended)
 
     def _attend_health(self) -> None:
         session, testing = self.session, self.testing
@@ -329,6 +370,8 @@ class MainWindow(QMainWindow):
     # Wishes that are no settings, or need what is shown.
 
     def _connect(self, source: str) -> None:
+        if self.replaying.takes(source):
+            return
         self.panels.connection.show_source(source)
         self.session.connect_to(source)
 
@@ -336,6 +379,10 @@ class MainWindow(QMainWindow):
         """Simulate the panels' skin, whatever was read or written."""
         self.history.change("Simulated skin", -1, written=None)
         self._connect("sim:")
+
+    def _pause(self) -> None:
+        """Let what is played stand, or go on: a recording, or else a scene."""
+        (self.replaying.toggle if self.session.replaying else self.staging.pause)()
 
     def _connect_chosen(self) -> None:
         self._connect(self.panels.connection.source())
@@ -360,8 +407,11 @@ class MainWindow(QMainWindow):
         self.panels.show_theme(theme)
         self.cost.show_theme(theme)
         self.scene.show_theme(theme)
-        self.timeline.show_theme(theme)
+        for view in (self.timeline, self.transport, self.mark):
+            view.show_theme(theme)
         self.stability.show_settings(settings)
+        self.compare.show_settings(settings)
+        self.compare.show_theme(theme)
         self.stability.show_theme(theme)
         self.health.show_theme(theme)
         self.display.show_theme(theme)
@@ -392,6 +442,7 @@ class MainWindow(QMainWindow):
         self.panels.show_status(status, simulating)
         self.stability.show_status(status, self.session.inside)
         self.health.show_status(status, self.session.inside)
+        self.compare.show_status(status, self.display.old)
 
     def _allow_tare(self) -> None:
         action, why_not = self.actions_by_name["tare"], self.taring.why_not
@@ -449,6 +500,7 @@ class MainWindow(QMainWindow):
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
             self.exports.close()
             self.plugs.close()
+            self.replaying.close()
             self.costing.close()
             self.planning.close()
             self.scene.gallery.close()

@@ -33,6 +33,7 @@ from kappaskin.effects import Hysteresis as Hysteresis
 from kappaskin.effects import Tolerance as Tolerance
 from kappaskin.effects import UniformNoise as UniformNoise
 from kappaskin.effects import parameters as parameters
+from kappaskin.engine import LONGEST_NOTE as LONGEST_NOTE
 from kappaskin.engine import Engine as Engine
 from kappaskin.errors import RankDeficient as RankDeficient
 from kappaskin.errors import Refusal as Refusal
@@ -120,6 +121,7 @@ from kappaskin.scene import scene_file as scene_file
 from kappaskin.scene import write_scene as write_scene
 from kappaskin.sensor import Sensor as Sensor
 from kappaskin.setup_text import setup_from as setup_from
+from kappaskin.setup_text import setups_of as setups_of
 from kappaskin.side import Computed as Computed
 from kappaskin.simulate import Simulator as Simulator
 from kappaskin.sources import Replay as Replay

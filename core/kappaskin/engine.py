@@ -15,6 +15,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import cast
 
+from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Event
 from kappaskin.live import Loop
 from kappaskin.pipeline import Setup
@@ -37,6 +38,9 @@ from kappaskin.requests import (
 from kappaskin.ring import Ring
 from kappaskin.scene import Playing, Scene
 from kappaskin.status import LOST, Status
+
+LONGEST_NOTE = 500
+"""Characters of a note."""
 
 _SWITCH = 2e-4  # s that one thread may keep the interpreter from another
 _GRACE = 0.5  # s for an orderly end once the parent is gone
@@ -172,6 +176,11 @@ class Engine:
         return len(self._deaths) >= _DEATHS
 
     @property
+    def source(self) -> str | None:
+        """The source asked for last, None where there is to be none."""
+        return self._source
+
+    @property
     def pid(self) -> int | None:
         return self._process.pid if self._process else None
 
@@ -224,6 +233,7 @@ class Engine:
 
     def step(self, frames: int) -> None:
         """Let a recording stand, so many `frames` further on, or back if negative."""
+        self._speed = 0.0
         self._send(Step(frames))
 
     def scan(self, region: Region) -> None:
@@ -251,6 +261,10 @@ class Engine:
 
     def note(self, text: str) -> None:
         """Let `text` be among what happened, and recorded with it."""
+        if len(text) > LONGEST_NOTE:
+            raise Refusal(
+                f"expected a note of at most {LONGEST_NOTE} characters, got {len(text)}; write two"
+            )
         self._send(Note(text))
 
     def status(self) -> Status:
@@ -261,11 +275,14 @@ class Engine:
             return replace(self._seen, state=LOST, rate=0.0, message=message)
         return self._seen
 
-    def latest(self, status: Status) -> Estimate | None:
-        """The newest estimate of the generation that `status` tells of."""
+    def latest(self, status: Status, sequence: int | None = None) -> Estimate | None:
+        """The newest estimate of the generation that `status` tells of, or of one frame before.
+
+        The frame with this `sequence` may be gone: the last 64 are there at most.
+        """
         if status.slot is None:
             return None
-        return self._ring.read(status.generation, status.slot)
+        return self._ring.read(status.generation, status.slot, sequence)
 
     def beside(self, status: Status) -> Estimate | None:
         """The newest estimate with the setup that is compared with."""

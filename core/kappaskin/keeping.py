@@ -44,6 +44,7 @@ class Keeping:
         """Take down what `source` brings, from now on; nothing of a recording."""
         self._live = not isinstance(source, ReplayedSource)
         if self._recorder is not None and source is not None:
+            self._recorder.goes_on(time.monotonic())
             source.record(self._recorder)
             self.plays(source)
 
@@ -54,7 +55,7 @@ class Keeping:
 
     def ended(self) -> None:
         """The source brings nothing more."""
-        if self._recorder is not None:
+        if self._recorder is not None and self._live:
             self._recorder.ended(time.monotonic())
 
     def set_up(self, side: Side) -> None:

@@ -44,6 +44,7 @@ _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
 _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
+_LOOKED_AT = 1 / 60  # s between two frames that are computed with the setup compared with
 
 
 class Loop:
@@ -65,6 +66,7 @@ class Loop:
         # What is computed beside it, while that is asked for.
         self._other = Side(beside, self._builder, status.beside or Computed())
         self._compares = self._changing = False
+        self._seen_beside = -math.inf
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
         self._arrivals, self._pace = Arrivals(), Pace()
@@ -75,9 +77,8 @@ class Loop:
         with suppress(EOFError):
             while True:
                 wait = 0.05 if self._source is None else 0.0
-                while self._requests.poll(wait):
-                    self._take(self._requests.recv())
-                    wait = 0.0
+                for request in self._asked(wait):
+                    self._take(request)
                 if self._source is not None:
                     self._read(self._source)
                 elif time.monotonic() >= self._again:
@@ -92,6 +93,21 @@ class Loop:
         self._publishing.close()
         self._builder.shutdown(wait=False, cancel_futures=True)
 
+    def _asked(self, wait: float) -> list[Request]:
+        """What was asked for within `wait` s, without places in a source left for another."""
+        asked: list[Request] = []
+        while self._requests.poll(wait):
+            try:
+                request, wait = self._requests.recv(), 0.0
+            except EOFError:
+                if asked:
+                    break  # and end the next time
+                raise
+            if asked and _overtaken(asked[-1], request):
+                asked.pop()
+            asked.append(request)
+        return asked
+
     def _take(self, request: Request) -> None:
         if isinstance(request, Setup):
             self._side.ask(request)
@@ -99,14 +115,8 @@ class Loop:
             self._compare(request.setup)
         elif isinstance(request, Scene):
             self._play(request)
-        elif isinstance(request, Seek):
-            if isinstance(self._source, ReplayedSource):
-                self._source.seek(request.at, request.speed, request.looped)
-            elif isinstance(self._source, SimulatedSource):
-                self._source.seek(request.at, request.speed)
-        elif isinstance(request, Step):
-            if isinstance(self._source, ReplayedSource):
-                self._source.step(request.frames)
+        elif isinstance(request, Seek | Step):
+            self._move(request)
         elif isinstance(request, Region):
             self._status = replace(self._status, region=request)
             self._steer()
@@ -152,6 +162,20 @@ class Loop:
             self._status = replace(self._status, state=LOST, source=name, message=str(error))
         except Refusal as refusal:
             self._status = replace(self._status, state=LOST, source=name, message=str(refusal))
+
+    def _move(self, request: Seek | Step) -> None:
+        """Go on from another place of the source."""
+        source = self._source
+        try:
+            if isinstance(request, Step):
+                if isinstance(source, ReplayedSource):
+                    source.step(request.frames)
+            elif isinstance(source, ReplayedSource):
+                source.seek(request.at, request.speed, request.looped)
+            elif isinstance(source, SimulatedSource):
+                source.seek(request.at, request.speed)
+        except Refusal as refusal:  # a file that is damaged there, or gone
+            self._lose(str(refusal))
 
     def _play(self, scene: Scene) -> None:
         if not isinstance(self._source, SimulatedSource):
@@ -213,26 +237,23 @@ class Loop:
             if self._side.pipeline is not was:
                 self._keeping.set_up(self._side)
                 self._leave_out(self._side)
+            self._show_again()
             self._report()
         if self._other.swap():
             self._leave_out(self._other)
+            self._show_again()
             self._report()
+
+    def _show_again(self) -> None:
+        """Let what a recording shows that stands be seen with another setup too."""
+        if isinstance(self._source, ReplayedSource):
+            self._source.again()
 
     def _read(self, source: Source) -> None:
         try:
             frames = source.read(_READ)
-        except Refusal as error:  # a scene that leaves its skin
-            accounting, last = source.accounting(), self._status.last_frame
-            self._close()
-            self._status = replace(
-                self._status,
-                state=LOST,
-                message=str(error),
-                accounting=accounting,
-                last_frame=last,
-                rate=0.0,
-            )
-            self._report()
+        except Refusal as error:  # a scene that leaves its skin, a file that is gone
+            self._lose(str(error))
             return
         self._follow(source)
         self._arrivals.read(frames)
@@ -241,6 +262,14 @@ class Loop:
         # Afterwards: what is left out is left out from the next frame that is read.
         for frame in frames:
             self._watch(frame)
+
+    def _lose(self, message: str) -> None:
+        """Let go of a source of which nothing more comes."""
+        if self._source is not None:
+            self._status = replace(self._status, accounting=self._source.accounting())
+        self._close()
+        self._status = replace(self._status, state=LOST, message=message, rate=0.0, replay=None)
+        self._report()
 
     def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:
         """Work out the newest frames, as many as there is time for."""
@@ -267,8 +296,18 @@ class Loop:
                 self._steering(estimate.touch, pipeline.fit)
             self._keeping.take(frame, estimate)
             if beside is not None:
-                self._other.compute(frame, beside)
+                self._compute_beside(frame, beside)
         self._pace.spend(len(frames) - late, time.monotonic() - began)
+
+    def _compute_beside(self, frame: Frame, pipeline: Pipeline) -> None:
+        """Work out a frame with the other setup too, as often as it is looked at."""
+        source = self._source
+        stands = isinstance(source, ReplayedSource) and source.stands
+        if stands or frame.host_time - self._seen_beside >= _LOOKED_AT:
+            self._seen_beside = frame.host_time
+            self._other.compute(frame, pipeline)
+        else:
+            pipeline.pass_over(frame)
 
     def _follow(self, source: Source) -> None:
         """Say how the source is doing, and who is on it."""
@@ -393,3 +432,10 @@ def _kind(status: Status) -> str:
     if status.replay is not None:
         return "replay"
     return "sim" if status.sensor.simulated else "live"
+
+
+def _overtaken(before: Request, request: Request) -> bool:
+    """Whether nobody would see what was asked `before`: another place in the source follows."""
+    if not (isinstance(before, Seek) and isinstance(request, Seek)) or request.at is None:
+        return False
+    return before.looped is None or request.looped is not None

@@ -51,6 +51,10 @@ class Recorder:
         """End the file, and wait until it is on the disk."""
         self._file.close()
 
+    def goes_on(self, now: float) -> None:
+        """What is told next belongs to the time `now`: a while may have passed without a source."""
+        self._now = now
+
     # What the source tells.
 
     def met(self, text: str) -> None:

@@ -195,8 +195,13 @@ class Ring:
         self._closed[place] = written + 1
         self._header[self._WRITTEN] = written + 1
 
-    def read(self, generation: int, slot: np.dtype[np.void]) -> Estimate | None:
-        """Reader: the latest estimate of `generation`, None when there is none yet."""
+    def read(
+        self, generation: int, slot: np.dtype[np.void], sequence: int | None = None
+    ) -> Estimate | None:
+        """Reader: the latest estimate of `generation`, or of the frame with this `sequence`.
+
+        None when there is none yet, or no more.
+        """
         if generation != self._generation or slot != self._slots.dtype:
             self._map(slot)
             self._generation = generation
@@ -205,16 +210,24 @@ class Ring:
             written = int(self._header[self._WRITTEN])
             if not written:
                 return None
-            here = self._slots[(written - 1) % len(self._slots)]
+            ticket = written if sequence is None else self._ticket_of(sequence)
+            if not ticket:
+                return None
+            here = self._slots[(ticket - 1) % len(self._slots)]
             closed, record = here["closed"], here.copy()
             # The tickets in the order opposite to the writer's, or a half may pass for a whole.
-            whole = closed == here["opened"] == written
+            whole = closed == here["opened"] == ticket
             return record if whole and self._header[self._GENERATION] == generation else None
 
         if self._header[self._GENERATION] != generation:
             return None
         record = _tried(copied)
         return _estimate(record) if record is not None else None
+
+    def _ticket_of(self, sequence: int) -> int:
+        """Which estimate was written of that frame last, counted from 1; 0 where none is there."""
+        tickets = np.where(self._slots["sequence"] == sequence, self._slots["closed"], 0)
+        return int(tickets.max())
 
     def close(self) -> None:
         """Let go of the memory."""

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import fields
+from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,10 +12,14 @@ from kappaskin.calibration.tares import tare_in, tare_text
 from kappaskin.errors import Refusal
 from kappaskin.fit import METHODS
 from kappaskin.pipeline import Setup
+from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import decode
+from kappaskin.recording.reading import Recording
 
 _WHOLE, _REAL, _TEXT = ("Ni", "Nj", "nx", "ny"), ("hold", "rim_sd"), ("edge", "method")
 _MOST = 4096  # functions or points along one side
 _LONGEST = 2**16
+_SETUPS = 500  # of a recording, the first of more
 
 
 def said_of(setup: Setup) -> tuple[str, dict[str, bytes]]:
@@ -52,6 +57,21 @@ def setup_from(text: str, file: Callable[[str], bytes]) -> Setup:
     if name := said.get("tare"):
         values["tare"] = tare_in(file(str(name)), str(name))
     return Setup(**values)
+
+
+def setups_of(recording: Recording) -> list[tuple[float, Setup]]:
+    """The setups in a recording, each with the time in s from its beginning on which it was used.
+
+    A `Refusal` where one is none.
+    """
+    told = recording.messages_on(m.SETUP)
+    return [
+        (
+            (message.stamp - recording.first) * 1e-9,
+            setup_from(decode(m.STRING, message.data)["data"], recording.attachment),
+        )
+        for message in islice(told, _SETUPS)
+    ]
 
 
 def _checked(said: dict[str, Any]) -> dict[str, Any]:

@@ -35,8 +35,8 @@ class Bench:
         self.asked, self.told = 0, []
         self.history = History(Settings(**settings))
         self.tares = Tares(folder)
-        engine = SimpleNamespace(tare=self.ask)
-        self.taring = Taring(self.history, cast(Any, engine), self.tares)
+        self.engine = SimpleNamespace(tare=self.ask, source="/dev/ttyACM0")
+        self.taring = Taring(self.history, cast(Any, self.engine), self.tares)
         self.taring.told.connect(self.told.append)
         self.panel = TarePanel()
         self.panel.attend(self.taring)
@@ -308,3 +308,16 @@ def test_large_counts_are_told_in_few_digits(window):
     assert told(3, 120, 9_999) == "3, 9999 skipped, 120 B"
     assert told(0, 0, 43_210) == "0, 43 k skipped"
     assert told(0, 0, 999_600) == "0, 1.0 M skipped"
+
+
+def test_what_is_in_use_with_a_recording_is_no_tare_of_the_sensor_now(bench):
+    bench.tares.use(SENSOR.serial_number, tare_of(1.0))
+    bench.engine.source = "replay:then.mcap"
+    bench.meet()
+    assert bench.used is None  # it was recorded without
+    bench.history.change("Settings of then.mcap", -1, tare=tare_of(2.0))
+    bench.history.change("Calibration and tare as before", -1, tare=None)
+    assert bench.tares.load(SENSOR.serial_number).fit_for(SENSOR) == tare_of(1.0)
+    bench.engine.source = "/dev/ttyACM0"
+    bench.meet()
+    assert bench.used == tare_of(1.0)

@@ -539,9 +539,10 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     window.wishes.wish("shape", shape)
     window.history.change("All", -1, load_case="two-points", side_x=0.03, x=0.02, region="skin")
     obeyed = set()
+    window.actions_by_name["dock-compare"].trigger()
     for page in range(window.panels.count()):
         window.panels.setCurrentIndex(page)
-        for form in window.panels.findChildren(Form):
+        for form in window.findChildren(Form):
             for editor in form.editors():
                 if not editor.isVisible():
                     continue

@@ -84,6 +84,20 @@ def test_the_latest_of_many_estimates_is_read(ring, writer) -> None:
         assert got.sequence == n
 
 
+def test_an_estimate_is_found_by_its_frame_while_it_is_there(ring, writer) -> None:
+    writer.lay_out(1, SLOT)
+    estimate, kept = estimate_of(), 64
+    assert ring.read(1, SLOT, 0) is None
+    for sequence in range(100):
+        writer.write(replace(estimate, sequence=sequence, noise=float(sequence)))
+    for sequence in (99, 50, 100 - kept):
+        assert ring.read(1, SLOT, sequence).noise == sequence
+    for sequence in (100 - kept - 1, 100):
+        assert ring.read(1, SLOT, sequence) is None
+    writer.write(replace(estimate, sequence=50, noise=-1.0))  # of a replay that went back
+    assert ring.read(1, SLOT, 50).noise == -1.0
+
+
 def test_an_estimate_read_stays_as_it_was_while_others_are_written(ring, writer) -> None:
     estimate = estimate_of()
     writer.lay_out(1, SLOT)

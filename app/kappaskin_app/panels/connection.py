@@ -2,6 +2,7 @@
 
 import re
 import time
+from datetime import datetime
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QGuiApplication
@@ -23,7 +24,7 @@ _TIP = (
     "The simulated skin, a serial port found on this machine, or a port or URL typed here, such as "
     "/dev/ttyACM0, COM3 or socket://host:port."
 )
-_COMMAND = re.compile("`([^`]+)`")  # what a message tells to type
+COMMAND = re.compile("`([^`]+)`")  # what a message tells to type
 _LONGEST, _TAIL = 56, 18  # characters of a port in the list, and of these at the end
 _MARGIN = 16  # px
 _LOSSES = 1.0  # s between two looks at what was lost
@@ -130,7 +131,7 @@ class ConnectionPanel(Panel):
     def show_status(self, status: Status, simulating: bool) -> None:
         text = ""
         if status.sensor is not None and status.state == "streaming":
-            text = _said(status.sensor, status.setup.calibration)
+            text = _said(status.sensor, status.setup.calibration) + _recorded(status)
         elif status.state == "waiting":
             text = "Waiting for the device to say what it is\N{HORIZONTAL ELLIPSIS}"
         if text != self.device.text():
@@ -151,10 +152,10 @@ class ConnectionPanel(Panel):
 
     def show_message(self, text: str, hint: bool = False) -> None:
         super().show_message(text, hint)
-        self.copy_button.setVisible(bool(_COMMAND.search(text)))
+        self.copy_button.setVisible(bool(COMMAND.search(text)))
 
     def _copy(self) -> None:
-        if command := _COMMAND.search(self.message.text()):
+        if command := COMMAND.search(self.message.text()):
             QGuiApplication.clipboard().setText(command[1])
 
 
@@ -168,6 +169,16 @@ def _short(words: str) -> str:
     if len(words) <= _LONGEST:
         return words
     return f"{words[: _LONGEST - _TAIL - 1]}\N{HORIZONTAL ELLIPSIS}{words[-_TAIL:]}"
+
+
+def _recorded(status: Status) -> str:
+    """When what is played was recorded, and how much it is."""
+    replay = status.replay
+    if replay is None:
+        return ""
+    when = f"{datetime.fromtimestamp(replay.begun):%Y-%m-%d %H:%M}"
+    whole = "" if replay.whole else ", never ended"
+    return f"\nRecorded {when}, {replay.length:.1f} s{whole}"
 
 
 def _said(sensor: Sensor, calibration: Calibration | None) -> str:

@@ -14,6 +14,7 @@ from kappaskin_app.panels.connection import ConnectionPanel
 from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.panels.publish import PublishPanel
+from kappaskin_app.panels.recording import RecordingPanel
 from kappaskin_app.panels.sensor import ElectronicsPanel, RegionPanel, SpoilsPanel
 from kappaskin_app.panels.skin import ElementsPanel, ShapePanel, SupportPanel
 from kappaskin_app.panels.tare import TarePanel
@@ -34,6 +35,7 @@ class Panels(QTabWidget):
         super().__init__(parent)
         self._pages: dict[str, list[Panel]] = {}
         self.connection = self._add(_LIVE, ConnectionPanel())
+        self.recording = self._add(_LIVE, RecordingPanel())
         self.tare = self._add(_LIVE, TarePanel())
         self.load = self._add(_LIVE, LoadPanel())
         self.noise = self._add(_LIVE, NoisePanel())

@@ -9,6 +9,7 @@ from kappaskin_app.settings.asks import Choice as Choice
 from kappaskin_app.settings.asks import Range as Range
 from kappaskin_app.settings.asks import Switch as Switch
 from kappaskin_app.settings.asks import Text as Text
+from kappaskin_app.settings.compared import Compared as Compared
 from kappaskin_app.settings.load import FREE_CASES as FREE_CASES
 from kappaskin_app.settings.load import LOAD_CASES as LOAD_CASES
 from kappaskin_app.settings.load import READY_CASES as READY_CASES
@@ -37,7 +38,7 @@ class SceneSettings(Skin, Load, Noise, Electronics, Spoils, Own):
 
 
 @dataclass(frozen=True)
-class Settings(SceneSettings, Fit, View, Scanning, Sending):
+class Settings(SceneSettings, Fit, View, Scanning, Sending, Compared):
     """Everything a person may change, in SI units; a change is a new `Settings`.
 
     `calibration` and `tare` are in use whenever the sensor that they are of is connected.

@@ -8,6 +8,8 @@ from kappaskin_app.theme import Theme
 
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
+_BESIDE = " \N{MIDDLE DOT} "  # parts a state from what more is true of it, below it
+REPLAY, PAUSED, GAP = "REPLAY", f"REPLAY{_BESIDE}paused", f"REPLAY{_BESIDE}gap"
 
 TIPS = {
     LIVE: "Readings of a real sensor, as they come.",
@@ -17,6 +19,9 @@ TIPS = {
     LOST: "The connection ended or could not be made: what is shown is the last that came. "
     "A device that comes back is gone on with by itself.",
     OFF: "Nothing is connected.",
+    REPLAY: "A recording is played: what is shown was once so.",
+    PAUSED: "A recording stands still: what is shown was once so.",
+    GAP: "A recording, where nothing came for a while: what is shown is old.",
 }
 
 
@@ -38,7 +43,8 @@ class Badge(QLabel):
     def show_state(self, state: str) -> None:
         if state != self.state:
             self.state = state
-            self.setText(state)
+            self.setText(state.replace(_BESIDE, "\n"))
+            self.setAccessibleName(state)
             self.setToolTip(f"{TIPS[state]}\n{_MORE}")
             self._paint()
 
@@ -53,9 +59,10 @@ class Badge(QLabel):
     def _paint(self) -> None:
         if self._theme is None or not self.state:
             return
+        size, padding = (13, 0) if _BESIDE in self.state else (20, 4)
         self.setStyleSheet(
             f"background: {colour_of(self.state, self._theme)}; color: white; font-weight: 700;"
-            "font-size: 20px; border-radius: 6px; padding: 4px;"
+            f"font-size: {size}px; border-radius: 6px; padding: {padding}px;"
         )
 
 
@@ -68,4 +75,7 @@ def colour_of(state: str, theme: Theme) -> str:
         STALE: theme.warning,
         LOST: theme.bad,
         OFF: theme.off,
+        REPLAY: theme.replayed,
+        PAUSED: theme.replayed,
+        GAP: theme.warning,
     }[state]

@@ -41,6 +41,7 @@ class MembraneView(QWidget):
         # Else each picture has the whole window put together anew, a fifth of its time in software.
         self.plotter.setAttribute(Qt.WidgetAttribute.WA_DontCreateNativeAncestors)
         self.plotter.setAttribute(Qt.WidgetAttribute.WA_NativeWindow)
+        self.plotter.setAcceptDrops(False)  # or it would take any file for a mesh to draw
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 0, 0, 0)
         around.addWidget(self.plotter)

@@ -126,7 +126,7 @@ class Readouts(QWidget):
         super().__init__(parent)
         grid = QGridLayout(self)
         grid.setContentsMargins(8, 2, 8, 2)
-        grid.setHorizontalSpacing(16)
+        grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(0)
         self._names: list[QLabel] = []
         self._numbers: dict[str, Line] = {}

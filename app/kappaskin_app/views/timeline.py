@@ -2,57 +2,18 @@
 
 import math
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetricsF, QIcon, QKeyEvent, QPainter, QPaintEvent, QPixmap
-from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from kappaskin import Scene
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import LIGHT, Theme
-from kappaskin_app.views.track import HEIGHT, Track
+from kappaskin_app.views.clock import Clock
+from kappaskin_app.views.glyphs import glyph_button, icon
+from kappaskin_app.views.track import Track
 
-
-class _Clock(QWidget):
-    """Time and duration, every digit in a place of its own width, so that nothing jitters."""
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.text, self._whole = "", ""
-        self.setToolTip("The time in the scene, which begins anew when it is over.")
-
-    def show_time(self, seconds: float, duration: float) -> None:
-        whole = f"{duration:.2f}"
-        text = f"{seconds:.2f} s of {whole} s"
-        if len(whole) != len(self._whole):
-            self._whole = whole
-            self._fit()
-        if text != self.text:
-            self.text = text
-            self.update()
-
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        self.setFixedSize(
-            math.ceil(sum(self._widths(f"{self._whole} s of {self._whole} s"))), HEIGHT
-        )
-
-    def _widths(self, text: str) -> list[float]:
-        metrics = QFontMetricsF(self.font())
-        digit = max(metrics.horizontalAdvance(c) for c in "0123456789")
-        return [digit if c.isdigit() else metrics.horizontalAdvance(c) for c in text]
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setPen(self.palette().windowText().color())
-        widths = self._widths(self.text)
-        x = self.width() - sum(widths)
-        for character, width in zip(self.text, widths, strict=True):
-            place = QRectF(x - 1, 0, width + 2, self.height())
-            painter.drawText(place, Qt.AlignmentFlag.AlignCenter, character)
-            x += width
+_TIP = "The time in the scene, which begins anew when it is over."
 
 
 class Timeline(QWidget):
@@ -67,11 +28,8 @@ class Timeline(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName("Timeline")
-        self.play = QToolButton(autoRaise=True)  # pyright: ignore[reportCallIssue]
-        self.play.setObjectName("timeline-play")
-        self.play.setIconSize(QSize(16, 16))
-        self.play.setFixedSize(HEIGHT - 2, HEIGHT - 2)
-        self.track, self.clock = Track(), _Clock()
+        self.play = glyph_button("timeline-play")
+        self.track, self.clock = Track(), Clock(_TIP)
         self.setFocusProxy(self.track)
         row = QHBoxLayout(self)
         row.setContentsMargins(6, 0, 8, 0)
@@ -93,7 +51,7 @@ class Timeline(QWidget):
         self.setVisible(self._scene is not None)
         if self._scene is not None:
             self.track.show_scene(self._scene)
-            self.clock.show_time(0.0, self._scene.duration)
+            self._show_clock(0.0, self._scene.duration)
 
     def show_time(self, seconds: float, playing: bool) -> None:
         """Show a time in s since the scene began for the first time, and whether it goes on."""
@@ -105,7 +63,11 @@ class Timeline(QWidget):
         time = seconds % self._scene.duration
         if time != self.track.time:
             self.track.show_time(time)
-            self.clock.show_time(time, self._scene.duration)
+            self._show_clock(time, self._scene.duration)
+
+    def _show_clock(self, seconds: float, duration: float) -> None:
+        whole = f"{duration:.2f}"
+        self.clock.show_text(f"{seconds:.2f} s of {whole} s", f"{whole} s of {whole} s")
 
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
@@ -117,11 +79,11 @@ class Timeline(QWidget):
         self.play.setAccessibleName(verb)
         what = "Hold the scene as it is now" if self._playing else "Let the scene go on from here"
         self.play.setToolTip(f"{what} (Space)")
-        self.play.setIcon(_icon(self._playing, self._theme))
+        self.play.setIcon(icon("pause" if self._playing else "play", self._theme))
 
     def _seek(self, seconds: float) -> None:
         if self._scene is not None:
-            self.clock.show_time(seconds, self._scene.duration)
+            self._show_clock(seconds, self._scene.duration)
             self.sought.emit(seconds)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -143,20 +105,3 @@ class Timeline(QWidget):
             self.play.click()
         else:
             super().keyPressEvent(event)
-
-
-def _icon(playing: bool, theme: Theme) -> QIcon:
-    """Two bars, or a triangle, fine enough for every screen."""
-    picture = QPixmap(64, 64)
-    picture.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(picture)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.text))
-    if playing:
-        painter.drawRoundedRect(QRectF(14, 8, 13, 48), 3, 3)
-        painter.drawRoundedRect(QRectF(37, 8, 13, 48), 3, 3)
-    else:
-        painter.drawConvexPolygon([QPointF(14, 6), QPointF(56, 32), QPointF(14, 58)])
-    painter.end()
-    return QIcon(picture)

@@ -374,6 +374,11 @@ class Recording:
             if record.code != Opcode.CHUNK:
                 raise Spoilt("its index is wrong")
             yield from self._messages_in(unpacked(record.body))
+        except OSError as error:
+            raise Refusal(
+                f"{self.path}: cannot be read any more ({error.strerror or error}); is it still "
+                "there?"
+            ) from error
         except Spoilt as fault:
             raise Refusal(
                 f"{self.path}: is damaged at byte {chunk.at} ({fault}); `kappaskin repair` saves "

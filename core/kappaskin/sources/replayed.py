@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,6 +26,8 @@ _NAP = 0.02  # s
 _MOST = 512  # frames given at once
 _BACK = 0.25  # s that are looked through at first for frames to step back over
 _GAP = 0.5  # s without a message that is a gap
+_TOLD = 500  # gaps, and events, that are told of at most: each status brings them
+_LONGEST = 200  # characters of an event
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class Replay:
     """Where a recording is played: `at` s of `length` s, `speed` times as fast, 0 while it stands.
 
     It begins anew at its end if it is `looped`. `gaps` are the times in s, from and to, in which
-    nothing came, `events` what happened and when, in s.
+    nothing came, `events` what happened and when, in s, the first of many. It was `begun` so many s
+    after 1970; one that is not `whole` was never ended, and is played up to where it breaks off.
     """
 
     at: float
@@ -42,6 +45,8 @@ class Replay:
     looped: bool
     gaps: tuple[tuple[float, float], ...]
     events: tuple[Event, ...]
+    begun: float
+    whole: bool
 
 
 class _Ready(NamedTuple):
@@ -85,26 +90,26 @@ class ReplayedSource:
         self._sensor: Sensor | None = None
         self._made: dict[str, Sensor] = {}
         self._events: list[Event] = []
-        self._last: tuple[int, int] | None = None  # mark of the frame given last
+        self._last: _Ready | None = None  # the frame given last
         self._steps, self._moves = 0, False  # frames to give at once, and go on from there
         self._go_to(0.0)
 
     def _landmarks(self) -> tuple[tuple[tuple[float, float], ...], tuple[Event, ...]]:
         chunks = self._recording.chunks
-        gaps = tuple(
+        gaps = (
             (self._place(a.last), self._place(b.first))
             for a, b in pairwise(chunks)
             if b.first - a.last > _GAP * 1e9
         )
         events: list[Event] = []
         with suppress(Refusal):  # damage is told of where it is played
-            for message in self._recording.messages_on(m.EVENTS):
+            for message in islice(self._recording.messages_on(m.EVENTS), _TOLD):
                 events.append(self._event(message, self._place(message.stamp)))
-        return gaps, tuple(events)
+        return tuple(islice(gaps, _TOLD)), tuple(events)
 
     def _event(self, message: Message, when: float) -> Event:
         said = decode(m.LOG, message.data)
-        return Event(when, said["name"], said["msg"])
+        return Event(when, said["name"][:_LONGEST], said["msg"][:_LONGEST])
 
     def _place(self, stamp: int) -> float:
         """Where a stamp is, in s from the beginning."""
@@ -115,7 +120,8 @@ class ReplayedSource:
     @property
     def replay(self) -> Replay:
         where = min(max(self._at(), 0.0), self.length)
-        return Replay(where, self.length, self._speed, self._looped, self._gaps, self._happened)
+        told = self._speed, self._looped, self._gaps, self._happened
+        return Replay(where, self.length, *told, self._first * 1e-9, self._recording.whole)
 
     def _at(self) -> float:
         return self._from + (self._clock() - self._since) * self._speed
@@ -160,9 +166,20 @@ class ReplayedSource:
             self._go_back(-frames)
         self._steps, self._moves = max(frames, 1), True
 
+    @property
+    def stands(self) -> bool:
+        """Whether no frame follows by itself."""
+        return not self._speed or self._next is None
+
+    def again(self) -> None:
+        """Give the frame that is shown once more, where none follows it by itself."""
+        if self._last is not None and not self._steps and self.stands:
+            self._ready.appendleft(self._last)
+            self._steps, self._moves = 1, False
+
     def _go_back(self, frames: int) -> None:
         """Stand before the frame that was given so many before the last one."""
-        here, back = self._last or (self._first, 0), _BACK
+        here, back = self._last.mark if self._last else (self._first, 0), _BACK
         marks, start = deque[tuple[int, int]](), 1.0
         while len(marks) < frames and start > 0:
             start, back = max(self._place(here[0]) - back, 0.0), 4 * back
@@ -230,13 +247,13 @@ class ReplayedSource:
             over = self._next is None and not self._ready
             self._steps = 0 if over else self._steps - len(frames)
             if self._moves:
-                self._from, self._since = self._place(self._last[0]), self._clock()
+                self._from, self._since = self._place(self._last.mark[0]), self._clock()
         return frames
 
     def _give(self, ready: _Ready) -> Frame:
         """The frame, as if it had come when it was due."""
         self._sensor, frame = ready.sensor, ready.frame
-        self._last = ready.mark
+        self._last = ready
         came = self._clock()
         if self._speed:
             came = self._since + (self._place(ready.mark[0]) - self._from) / self._speed

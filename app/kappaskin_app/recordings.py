@@ -1,0 +1,52 @@
+"""The user's folder of recordings: what is in it, and what the next one is called."""
+
+import itertools
+import shlex
+from datetime import datetime
+from pathlib import Path
+
+import platformdirs
+
+_OFFERED = 8  # recent ones
+_PART = ".part"
+
+
+def recordings_folder() -> Path:
+    """Where this user's recordings are, unless another place is chosen."""
+    return platformdirs.user_documents_path() / "Kappaskin"
+
+
+def proposed(folder: Path, now: datetime) -> Path:
+    """What a recording that begins `now` is called: nothing that is there already."""
+    plain = folder / f"kappaskin-{now:%Y%m%d-%H%M%S}.mcap"
+    others = (plain.with_stem(f"{plain.stem}-{n}") for n in itertools.count(2))
+    return next(path for path in itertools.chain([plain], others) if not _taken(path))
+
+
+def _taken(path: Path) -> bool:
+    return path.exists() or path.with_name(path.name + _PART).exists()
+
+
+def newest(folder: Path) -> list[Path]:
+    """The last recordings in a folder, the newest first."""
+    return _found(folder, "*.mcap")[:_OFFERED]
+
+
+def unfinished(folder: Path) -> list[Path]:
+    """Recordings in a folder that were never ended, the newest first."""
+    return _found(folder, f"*.mcap{_PART}")
+
+
+def repairing(file: Path) -> str:
+    """The command that makes the recording `file` whole, as another one beside it."""
+    name = file.name.removesuffix(_PART)
+    out = file.with_name(f"{Path(name).stem}-repaired.mcap")
+    return f"kappaskin repair {shlex.quote(str(file))} --out {shlex.quote(str(out))}"
+
+
+def _found(folder: Path, pattern: str) -> list[Path]:
+    try:
+        dated = [(path.stat().st_mtime, path) for path in folder.glob(pattern)]
+    except OSError:  # no such folder, or one that may not be read: then there are none
+        return []
+    return [path for _, path in sorted(dated, reverse=True)]

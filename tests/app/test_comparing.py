@@ -1,0 +1,124 @@
+"""A against B: the same frames, their difference, and nothing left when it ends."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kappaskin import Setup
+from kappaskin_app.comparing import Figure, Pair, other_setup
+from kappaskin_app.settings import Settings
+from kappaskin_app.window import MainWindow
+
+
+@pytest.fixture
+def pairs(window: MainWindow, until) -> list[Pair]:
+    """What came of comparing in the window on the simulation."""
+    found: list[Pair] = []
+    window.comparing.compared.connect(found.append)
+    window.actions_by_name["dock-compare"].trigger()
+    until(lambda: len(found) > 0)
+    return found
+
+
+def test_both_are_of_the_same_frame_and_the_difference_is_theirs(
+    window: MainWindow, pairs: list[Pair], until
+) -> None:
+    until(lambda: len(pairs) > 5)
+    for pair in pairs:
+        assert pair.a.sequence == pair.b.sequence
+        assert pair.a.coefficients.shape == (8, 8)
+        assert pair.b.coefficients.shape == (6, 6)
+        assert np.allclose(pair.difference, pair.b.surface - pair.a.surface)
+    assert np.abs(pairs[-1].difference).max() > 0
+
+
+def test_equal_settings_differ_by_nothing(window: MainWindow, pairs: list[Pair], until) -> None:
+    window.history.change("Equal", -1, other_x=8, other_y=8)
+    until(lambda: pairs[-1].b.coefficients.shape == (8, 8))
+    assert not pairs[-1].difference.any()
+    table = window.compare.table
+    until(lambda: table.item(0, 3).text().startswith("+0.00"))
+
+
+def test_every_figure_has_its_error_bar(window: MainWindow, pairs: list[Pair], until) -> None:
+    table = window.compare.table
+    until(lambda: table.rowCount() == 6)
+    for row in range(6):
+        for column in (1, 2, 3):
+            assert "\N{PLUS-MINUS SIGN}" in table.item(row, column).text()
+    assert [f.label for f in pairs[-1].figures()] == [
+        table.item(row, 0).text().rpartition(",")[0] for row in range(6)
+    ]
+
+
+def test_a_difference_has_the_errors_of_both() -> None:
+    figure = Figure("x", "mm", 1, (1.0, 0.3), (3.0, 0.4))
+    assert figure.difference == (2.0, pytest.approx(0.5))
+    unknown = Figure("x", "mm", 1, (math.nan, math.nan), (3.0, 0.4))
+    assert math.isnan(unknown.difference[0])
+
+
+def test_b_is_undone_like_any_setting(window: MainWindow, pairs: list[Pair], until, qtbot) -> None:
+    box = window.compare.form.editor("other_x")
+    box.setValue(4)
+    until(lambda: pairs[-1].b.coefficients.shape == (4, 6))
+    window.history.stack.undo()
+    until(lambda: pairs[-1].b.coefficients.shape == (6, 6))
+
+
+def test_a_and_b_change_places_in_one_step(window: MainWindow, pairs: list[Pair], until) -> None:
+    count = window.history.stack.count()
+    window.compare.form.swap.click()
+    until(lambda: pairs[-1].a.coefficients.shape == (6, 6))
+    until(lambda: pairs[-1].b.coefficients.shape == (8, 8))
+    assert window.history.stack.count() == count + 1
+    window.history.stack.undo()
+    assert window.history.settings.functions_x == 8
+
+
+def test_a_basis_that_the_readings_do_not_decide_is_refused_for_b_alone(
+    window: MainWindow, pairs: list[Pair], until
+) -> None:
+    window.history.change("Many", -1, other_x=12, other_y=12)
+    until(lambda: "determine 140 of the 144" in window.compare.form.message.text())
+    assert window.panels.basis.message.text() == ""
+
+
+def test_ending_it_leaves_the_window_as_it_was_and_the_engine_to_a_alone(
+    window: MainWindow, until
+) -> None:
+    size = window.size()
+    window.actions_by_name["dock-compare"].trigger()
+    until(lambda: window.session.status.beside is not None)
+    assert window.size() == size
+    window.actions_by_name["dock-compare"].trigger()
+    until(lambda: window.session.status.beside is None)
+    assert not window.compare.isVisible()
+    assert window.size() == size
+
+
+def test_it_works_on_a_recording_that_stands(
+    window: MainWindow, recording: Path, pairs: list[Pair], until
+) -> None:
+    window.replaying.open_file(recording)
+    until(lambda: window.badge.state == "REPLAY")
+    window.replaying.go(False)
+    window.replaying.seek(0.4)
+    until(lambda: abs(pairs[-1].a.device_time - 0.4) < 0.02)
+    window.history.change("B", -1, other_x=3)
+    until(lambda: pairs[-1].b.coefficients.shape == (3, 6))
+    assert abs(pairs[-1].b.device_time - 0.4) < 0.02
+
+
+def test_b_keeps_all_of_a_that_it_is_not_told_otherwise() -> None:
+    setup = Setup(8, 9, hold=0.3, method="bayes")
+    other = other_setup(Settings(), setup)
+    assert (other.Ni, other.Nj, other.method, other.hold) == (6, 6, "least-squares", 0.3)
+
+
+def test_nothing_is_blank(window: MainWindow, pairs: list[Pair], until, colours_in) -> None:
+    until(lambda: len(pairs) > 3)
+    for view in window.compare.maps.values():
+        assert colours_in(window, view.map) > 30

@@ -1,0 +1,204 @@
+"""Recording from the window: what is asked, shown, refused, and found afterwards."""
+
+import os
+import shlex
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit
+
+from kappaskin import LONGEST_NOTE, Recording, Written
+from kappaskin_app.recordings import newest, proposed, recordings_folder, unfinished
+from kappaskin_app.views.recording_mark import RecordingMark, duration_of, size_of
+from kappaskin_app.window import MainWindow
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Nobody's own folder of recordings."""
+    monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path / "documents"))
+    assert recordings_folder().is_relative_to(tmp_path)
+    return recordings_folder()
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """What was proposed where a recording was to go, which is taken."""
+    proposals: list[Path] = []
+
+    def ask(*arguments: object) -> tuple[str, str]:
+        proposals.append(Path(str(arguments[2])))
+        return str(proposals[-1]), ""
+
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", ask)
+    return proposals
+
+
+def _mark(window: MainWindow) -> RecordingMark:
+    return window.mark
+
+
+def test_a_recording_is_begun_shown_and_ended(
+    window: MainWindow, asked: list[Path], until, folder: Path
+) -> None:
+    action = window.actions_by_name["record"]
+    assert not _mark(window).isVisible()
+    action.trigger()
+    until(lambda: window.taping.recording)
+    assert asked[0].parent == folder
+    until(lambda: _mark(window).isVisible() and _mark(window).head.startswith("REC 0:0"))
+    until(lambda: action.text() == "&Stop recording")
+    assert window.panels.recording.record.text() == "Stop"
+    action.trigger()
+    until(lambda: not _mark(window).isVisible())
+    assert window.panels.recording.what.text().endswith(asked[0].name)
+    assert window.statusBar().currentMessage().startswith(f"Recorded {asked[0]}")
+    with Recording(asked[0]) as recorded:
+        assert recorded.whole
+
+
+def test_it_goes_on_when_the_source_changes(window: MainWindow, asked: list[Path], until) -> None:
+    window.actions_by_name["record"].trigger()
+    until(lambda: window.taping.written.messages > 0)
+    window.actions_by_name["disconnect"].trigger()
+    until(lambda: window.badge.state == "OFF")
+    assert window.taping.recording
+    window.actions_by_name["simulate"].trigger()
+    until(lambda: window.badge.state == "SIM")
+    messages = window.taping.written.messages
+    until(lambda: window.taping.written.messages > messages + 50)
+    assert _mark(window).isVisible()
+
+
+def test_a_note_goes_into_the_recording_and_the_list(
+    window: MainWindow, asked: list[Path], until
+) -> None:
+    window.actions_by_name["record"].trigger()
+    until(lambda: window.taping.recording)
+    window.actions_by_name["note"].trigger()
+    (dialog,) = window.findChildren(QInputDialog)
+    assert dialog.findChild(QLineEdit).maxLength() == LONGEST_NOTE
+    dialog.setTextValue("  another object  ")
+    dialog.accept()
+    until(lambda: "note:  another object" in window.happenings.list.toPlainText())
+    window.taping.write_down("   ")
+    window.actions_by_name["record"].trigger()
+    until(lambda: not window.taping.recording)
+    window.replaying.open_file(asked[0])
+    until(lambda: window.badge.state.startswith("REPLAY"))
+    assert [event.text for event in window.replaying.events] == ["another object"]
+
+
+def test_one_that_ends_by_itself_says_so_until_it_is_seen(
+    window: MainWindow, asked: list[Path], until
+) -> None:
+    window.actions_by_name["record"].trigger()
+    until(lambda: window.taping.written.messages > 0)
+    Path(f"{asked[0]}.part").rename(f"{asked[0]}.elsewhere")
+    until(lambda: bool(window.taping.ended))
+    assert "moved or removed" in window.panels.recording.message.text()
+    assert _mark(window).isVisible()
+    assert _mark(window).head == "REC ended"
+    assert window.badge.state == "SIM"  # what is live goes on
+    _mark(window).clicked.emit()
+    until(lambda: not _mark(window).isVisible())
+
+
+def test_nothing_is_ever_written_over(window: MainWindow, tmp_path: Path, until) -> None:
+    there = tmp_path / "there.mcap"
+    there.write_bytes(b"mine")
+    window.taping.begin(there)
+    until(lambda: "is there already" in window.panels.recording.message.text())
+    assert there.read_bytes() == b"mine"
+    assert not window.taping.recording
+    assert not _mark(window).isVisible()  # it never began
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the names are of a POSIX system")
+@pytest.mark.parametrize("place", ["/proc/nowhere/x.mcap", "/nowhere/at/all.mcap"])
+def test_a_place_that_cannot_be_written_to_is_refused(
+    window: MainWindow, until, place: str
+) -> None:
+    window.taping.begin(Path(place))
+    until(lambda: "cannot be written" in window.panels.recording.message.text())
+    assert window.badge.state == "SIM"
+
+
+def test_a_folder_that_cannot_be_made_is_told_and_another_asked_for(
+    window: MainWindow,
+    folder: Path,
+    asked: list[Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder.parent.parent.mkdir(parents=True, exist_ok=True)
+    folder.parent.write_bytes(b"a file")
+    window.actions_by_name["record"].trigger()
+    assert "cannot be made" in window.statusBar().currentMessage()
+    assert asked[0].name == str(asked[0])
+
+
+def test_what_was_never_ended_is_offered_to_be_repaired(opened, until, folder: Path) -> None:
+    folder.mkdir(parents=True)
+    (folder / "it's mine.mcap.part").write_bytes(b"")
+    window = opened("sim:")
+    until(lambda: window.badge.state == "SIM")
+    text = window.panels.recording.message.text()
+    assert "it's mine.mcap.part was never ended" in text
+    window.panels.recording.copy_button.click()
+    command = QGuiApplication.clipboard().text()
+    assert command.startswith("kappaskin repair ")
+    assert shlex.split(command)[2:] == [
+        str(folder / "it's mine.mcap.part"),
+        "--out",
+        str(folder / "it's mine-repaired.mcap"),
+    ]
+
+
+# The folder.
+
+
+def test_names_proposed_are_of_nothing_that_is_there(tmp_path: Path) -> None:
+    now = datetime(2026, 11, 22, 7, 5, 9)
+    names = []
+    for suffix in ("", ".part", ""):
+        path = proposed(tmp_path, now)
+        names.append(path.name)
+        path.with_name(path.name + suffix).write_bytes(b"")
+    assert names == [f"kappaskin-20261122-070509{n}.mcap" for n in ("", "-2", "-3")]
+
+
+def test_the_newest_come_first_and_only_eight(tmp_path: Path) -> None:
+    for k in range(12):
+        path = tmp_path / f"{k}.mcap"
+        path.write_bytes(b"")
+        os.utime(path, (k, k))
+    (tmp_path / "x.mcap.part").write_bytes(b"")
+    assert [path.stem for path in newest(tmp_path)] == [str(k) for k in range(11, 3, -1)]
+    assert [path.name for path in unfinished(tmp_path)] == ["x.mcap.part"]
+    assert newest(tmp_path / "nowhere") == []
+
+
+def test_figures_of_a_recording_are_short() -> None:
+    assert [size_of(n) for n in (0, 999, 3_400, 12_345_678, 7_250_000_000)] == [
+        "0 B",
+        "999 B",
+        "3.4 kB",
+        "12.3 MB",
+        "7.2 GB",
+    ]
+    assert [duration_of(s) for s in (0.9, 61.0, 3723.0)] == ["0:00", "1:01", "1:02:03"]
+
+
+def test_what_is_lost_is_shown_in_the_header(qtbot) -> None:
+    mark = RecordingMark()
+    qtbot.addWidget(mark)
+    mark.show_written(Written("x.mcap", True, 65.0, 5_000_000, 100, 7), "")
+    assert (mark.head, mark.below) == ("REC 1:05", "7 lost")
+    assert mark.accessibleName() == "REC 1:05, 7 lost"
+    assert "5.0 MB, 7 messages lost" in mark.toolTip()
+    mark.show_written(Written("x.mcap", True, 3723.0, 5_000_000, 100, 0), "")
+    assert (mark.head, mark.below) == ("1:02:03", "5.0 MB")
