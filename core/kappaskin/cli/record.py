@@ -53,12 +53,12 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
         try:
             status = _recorded(engine, seconds, stopped)
         except Refusal:
-            engine.record(None)
-            if not _ended(engine, engine.status()).recording.trouble:
+            if not _ended(engine).recording.trouble:
                 out.unlink(missing_ok=True)  # ours, with nothing in it
             raise
-        engine.record(None)
-        written = _ended(engine, status).recording
+        if engine.alive:
+            status = _ended(engine)
+        written = status.recording
     print(
         f"{written.path}: {written.messages:,} messages in {written.seconds:.1f} s, "
         f"{written.size / 1e6:.1f} MB; {status.accounting.words}"
@@ -108,11 +108,13 @@ def _line(status: Status) -> str:
     )
 
 
-def _ended(engine: Engine, status: Status) -> Status:
-    """How the engine is once the file is whole."""
+def _ended(engine: Engine) -> Status:
+    """End the recording; how the engine is once the file is whole."""
+    engine.record(None)
+    asked = time.monotonic()
     for _ in range(round(_BEGIN / _LOOK)):
-        if not status.recording.active:
+        status = engine.status()
+        if not status.recording.active and status.reported > asked:
             break
         time.sleep(_LOOK)
-        status = engine.status()
-    return status
+    return engine.status()
