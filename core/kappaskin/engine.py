@@ -43,6 +43,7 @@ LONGEST_NOTE = 500
 """Characters of a note."""
 
 _SWITCH = 2e-4  # s that one thread may keep the interpreter from another
+_ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
 _GRACE = 0.5  # s for an orderly end once the parent is gone
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
 
@@ -300,7 +301,7 @@ class Engine:
         if self._requests is not None:
             self._requests.close()
         if self._process is not None:
-            self._process.join(timeout=2.0)
+            self._process.join(_ORDERLY if self._recording is None else _WRITTEN)
             if self._process.is_alive():
                 self._process.kill()
                 self._process.join()
