@@ -4,6 +4,7 @@ import pytest
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLabel
 
 from kappaskin import EDGES, Status
+from kappaskin_app.panels.compare import OtherForm
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.settings import Choice, Range, SceneSettings, Settings, ask_of, part
 
@@ -16,7 +17,8 @@ def panels(qapp: QApplication) -> Panels:
 
 
 def test_every_setting_asked_for_stands_in_one_panel(panels: Panels) -> None:
-    shown = [name for panel in panels.all() for name in ASKED if panel.findChild(object, name)]
+    forms = [*panels.all(), OtherForm()]  # that of what is compared with stands beside its views
+    shown = [name for form in forms for name in ASKED if form.findChild(object, name)]
     assert sorted(shown) == sorted(ASKED)
 
 

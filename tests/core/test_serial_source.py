@@ -367,7 +367,7 @@ def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened) -> No
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("", "expected a source: sim:, sim:SCENE, a port or a URL; got an empty name"),
+        ("", "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"),
         ("  ", "got an empty name"),
         ("/dev/ttyABSENT7", "there is no such port; plug the sensor in, or choose one"),
         ("COM77", "there is no such port"),
@@ -381,7 +381,7 @@ def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened) -> No
         ("hwgrep://no such device", "no ports found"),
         ("socket://127.0.0.1", "URL such as socket://host:port"),
         ("socket://127.0.0.1:1", "nothing listens there"),
-        ("replay:x.mcap", "cannot be replayed yet"),
+        ("replay:x.mcap", "cannot be read"),
         ("sim:nowhere", "expected a scene among"),
     ],
 )

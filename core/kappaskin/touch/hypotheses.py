@@ -26,6 +26,7 @@ _ANGLE = 0.9  # rad, of an axis that is not known
 _INEXACT = 0.02  # of a reading: that closely does a skin behave like a plate at best
 _START = 0.025  # of a side: as wide as it is at first
 _SHORT = 0.25  # of a side: an object as long may lie across what looks like its axis
+_WORSE = 1.25  # times the cost of a ring, that one a little further on never has
 _BETTER = 6.0  # chi-squared that another axis must gain
 
 
@@ -143,8 +144,12 @@ class _Frame:
 
     def shaped(self, sphere: Optimum) -> Optimum:
         """The sphere that presses where the skin's own bending lets it."""
-        for _ in range(3 if self.skin.patch.base_curvature else 2):  # further from a circle
-            sphere = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
+        sphere = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
+        for _ in range(2 if self.skin.patch.base_curvature else 1):  # further from a circle
+            again = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
+            if again.cost > _WORSE * sphere.cost:  # the pattern has tipped over to another
+                break
+            sphere = again
         return sphere
 
     def edged(self, near: Optimum) -> Optimum:
