@@ -57,12 +57,12 @@ def heard(receiver: socket.socket, kind: str, **wanted: object) -> dict[str, obj
 
 
 def target(engine: Engine, within: float = 10.0) -> Published:
-    """How the first target is doing, once that is known."""
+    """How the first target is doing, once that is known of all."""
     end = time.monotonic() + within
     while time.monotonic() < end:
         engine.revive()
         told = engine.status().publishing.targets
-        if told and not told[0].opening:
+        if told and not any(one.opening for one in told):
             return told[0]
         time.sleep(0.02)
     raise AssertionError(engine.status())
