@@ -23,6 +23,7 @@ from kappaskin import (
     Stimulus,
     load_scene,
 )
+from kappaskin.health.window import Window
 
 ROUND = load_scene("circle")
 TO_COUNTS = 1 / ROUND.transduction.resolution
@@ -104,6 +105,17 @@ def test_a_dead_element_is_found_once_the_load_comes_by() -> None:
     assert at <= 6.0
     assert others <= {265}
     assert {told(monitor)[c] for c in (65, 165)} == {"dead"}
+
+
+@pytest.mark.parametrize("every", [1, 7, 40])
+def test_each_look_ends_before_the_next_however_few_frames_come(every) -> None:
+    frames, monitor = frames_of("circle", 8)[::every], Monitor(ROUND.sensor())
+    window, begun, ended = Window(ROUND.sensor()), 0, 0
+    for frame in frames:
+        begun += window(frame) is not None
+        ended += monitor(frame)
+        assert 0 <= begun - ended <= 1
+    assert begun >= 4
 
 
 def test_a_stuck_channel_is_found_by_itself() -> None:

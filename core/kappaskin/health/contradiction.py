@@ -1,5 +1,6 @@
 """What channels read to how far each is from what those around it say, over the last seconds."""
 
+from collections.abc import Iterator
 from typing import cast
 
 import numpy as np
@@ -90,20 +91,29 @@ class Contradiction:
     def recent(self) -> slice:
         return slice(_KEPT - _RECENT, None)
 
-    def __call__(self, look: Look, missing: Mask, wrong: Mask) -> None:
-        """Take in what was read, without what is `missing` (C,), some of it known to be `wrong`."""
+    def steps(self, look: Look, missing: Mask, wrong: Mask) -> Iterator[None]:
+        """Take in what was read, without what is `missing` (C,), some of it known to be `wrong`.
+
+        In steps, each after the one before.
+        """
         known = ~np.isnan(look.means)
         with np.errstate(invalid="ignore"):  # of none comes NaN
             reads = np.where(known, look.means, 0.0).sum(axis=0) / known.sum(axis=0)
         self.reads = np.where(np.isnan(reads), self.reads, reads)
         self.base = np.where(np.isnan(self.base), reads, self.base)
-        self._push(look.means - self.base)
+        T = self._push(look.means - self.base)
+        yield
+        self._compare(T)
+        yield
         unread = np.isnan(self.changed[self.recent]).all(axis=0)
         self.leave_out(missing | unread)
         self._forget(look.seconds, wrong)
+        yield
         self._measure(look)
+        yield
 
-    def _push(self, changed: Array) -> None:
+    def _push(self, changed: Array) -> int:
+        """Take in the newest changes (T, C); T."""
         T = len(changed)
         for ring in (self.changed, self.told, self.open):
             ring[:-T] = ring[T:]
@@ -112,6 +122,10 @@ class Contradiction:
         heard = np.nan_to_num(np.where(self.missing, 0.0, np.abs(self.changed[-T:])))
         self._beside[:-T] = self._beside[T:]
         self._beside[-T:] = heard[:, self.neighbours.beside].max(axis=2, initial=0.0)
+        return T
+
+    def _compare(self, T: int) -> None:
+        """How far off the channels that have nothing wrong were in the newest T."""
         self._alike[:-T] = self._alike[T:]
         self._alike[-T:] = [
             np.hypot(_USUAL * _median(np.abs(now - told)), _FINE * _largest(now))

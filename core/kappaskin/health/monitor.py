@@ -1,6 +1,7 @@
 """Frames to findings: which channels are dead, stuck, noisy, saturated, swapped or drifting."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ _ANSWERING = (DEAD, STUCK, SWAPPED)  # what only motion can clear
 
 
 class Monitor:
-    """The health of every channel of `sensor`; `monitor(frame)` says whether it was looked at.
+    """The health of every channel of `sensor`; `monitor(frame)` says whether a look has ended.
 
     Four times a second at most it compares what each channel reads with what those around it say,
     how noisy it is, and how often it is on a rail. A channel is accused when it was four standard
@@ -46,7 +47,8 @@ class Monitor:
     3.3. Of several accused beside each other the one furthest off is left out of what is told of
     the rest, which clears those that it misled. Accused for a second, it is a finding, until it
     agrees for four; a dead, stuck or swapped one until it does so while it is moved. Where nothing
-    moves nothing is called that.
+    moves nothing is called that. A look is spread over the frames that follow it, so that none of
+    them waits for the whole.
 
     `kinds` (C,) are numbers in `WHY`, 0 for channels that are well; `order` (C,) is how bad each
     is, the worst largest.
@@ -68,6 +70,7 @@ class Monitor:
         self._accused, self._calm = np.zeros(C, int), np.zeros(C, int)
         self._loud, self._railed = np.zeros((_LOUD_OF, C), bool), np.zeros((_SECOND, C))
         self._last = -math.inf
+        self._steps: Iterator[bool] = iter(())
 
     def __call__(self, frame: Frame) -> bool:
         """Take in the next frame; True where `kinds` may be others from it on."""
@@ -75,17 +78,28 @@ class Monitor:
             self.begin_anew()
         self._last = frame.device_time
         look = self._window(frame)
-        if look is None:
-            return False
+        if look is not None:
+            self._steps = self._take_in(look)
+        return next(self._steps, False)
+
+    def _take_in(self, look: Look) -> Iterator[bool]:
+        """Steps of a look, each as long as the estimate of a frame; True after the last.
+
+        They are no more than the frames that a look is made of.
+        """
         self._since[np.isnan(self._since) & (self.kinds > 0)] = look.time
         wrong = self._dead | (self.kinds > 0)
-        self._against(look, wrong | self._suspects, wrong)
+        for _ in self._against.steps(look, wrong | self._suspects, wrong):
+            yield False
         self._listen(look)
+        yield False
         self._look_at_rails(look)
         self._suspect(look)
+        yield False
         self._confirm(look)
+        yield False
         self._trust_again()
-        return True
+        yield True
 
     @property
     def badness(self) -> Array:
