@@ -48,7 +48,8 @@ def surface_geometry(
 ) -> LocalGeometry:
     """The geometry at `positions` (P, 2) or (2,) in m of the shape with `coefficients` (Ni, Nj).
 
-    `covariance_of` rows (..., 3, N) is that of their products with the flattened coefficients.
+    `covariance_of` rows (..., 6, N) is that (..., 6, 6) of their products with the flattened
+    coefficients: displacement, both slopes and three second derivatives, in the order of `ORDERS`.
     """
     if coefficients.shape != basis.shape or positions.ndim > 2 or positions.shape[-1:] != (2,):
         raise Refusal(
