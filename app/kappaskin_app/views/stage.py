@@ -96,12 +96,12 @@ class Stage(QWidget):
 
     # What it shows.
 
-    def show_cue(self, cue: Cue | None) -> None:
-        """Write what is felt, as often as it can be read."""
+    def show_cue(self, cue: Cue | None, why_none: str = "nothing felt") -> None:
+        """Write what is felt, or `why_none` is."""
         self.operator.pad.show_cue(cue)
         if cue is None:
             for figure in (self.force, self.displacement, self.place):
-                figure.show_figure(NONE, "nothing felt" if figure is self.force else "")
+                figure.show_figure(NONE, why_none if figure is self.force else "")
             self.radius.show_figure(NONE)
             return
         self.force.show_figure(f"{_number(cue.force, 3)} N", _off(cue.force_95, 3, "N"))
