@@ -319,6 +319,20 @@ def test_a_picture_is_saved(window: MainWindow, tmp_path: Path) -> None:
     assert QImage(str(tmp_path / "a.png")).size() == window.size()
 
 
+def test_every_number_is_whole_beside_the_mark_of_a_recording(
+    window: MainWindow, tmp_path: Path, until
+) -> None:
+    wide = window.readouts.width()
+    window.taping.begin(tmp_path / "a.mcap")
+    until(lambda: window.readouts.width() < wide - 50)
+    until(lambda: window.readouts.text("error").endswith(" mm"))
+    for line in window.readouts.findChildren(Line):
+        assert line.fontMetrics().horizontalAdvance(line.text()) < line.width() - 5, line.text()
+    assert window.width() == 1280
+    window.taping.turn()
+    until(lambda: not window.taping.recording)
+
+
 def test_every_action_is_in_a_menu_and_no_shortcut_is_used_twice(window: MainWindow) -> None:
     entries = window.actions_by_name.entries
     shortcuts = [entry.action.shortcut().toString() for entry in entries.values()]
