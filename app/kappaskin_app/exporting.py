@@ -183,7 +183,7 @@ class ExportDialog(QDialog):
             self._exporting.close()
             self._exporting = None
         self.words.setText(words)
-        high = self.layout().totalHeightForWidth(self.width())
+        high = self.heightForWidth(self.width())
         self.resize(self.width(), max(self.height(), high))  # or the fields would be pressed flat
         self._allow()
 
