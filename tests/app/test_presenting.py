@@ -376,7 +376,7 @@ def test_a_recording_that_stands_is_felt_where_it_stands(opened, recording, unti
     window.replaying.seek(1.4)
     until(lambda: stage.strip.state == GAP)
     until(lambda: (stage.force.value, stage.force.note) == ("\N{EN DASH}", "no reading"))
-    assert stage.strip.age == ""
+    assert (stage.strip.age, stage.radius.name) == ("", "Radius of what touches")
 
 
 def test_nothing_that_touches_is_said_to_be_nothing(demo, until) -> None:
