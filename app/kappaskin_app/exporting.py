@@ -144,6 +144,7 @@ class ExportDialog(QDialog):
         return Wanted(*files, self.begin.value(), until, self.every.value(), setup=setup)
 
     def _begin(self) -> None:
+        self.bar.reset()
         try:
             self._exporting = Exporting(self.wanted)
         except Refusal as refusal:

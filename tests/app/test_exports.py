@@ -149,6 +149,10 @@ def test_enter_exports_and_leaves_the_questions_for_files_alone(
     dialog.cancel_button.click()
     assert dialog.choose_file.isEnabled()
     assert dialog.bar.value() < 0  # no share of what is not there
+    dialog.bar.setValue(dialog.bar.maximum())  # as it stands when one is written
+    dialog.to.setText(str(recording.with_name("out.doc")))
+    qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
+    assert dialog.bar.value() < 0
 
 
 def test_an_export_is_cancelled_with_nothing_left(window, recording) -> None:
