@@ -35,6 +35,15 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
     return area
 
 
+def scroll_to(widget: QWidget) -> None:
+    """Bring a widget in sight, where it is on a page that is scrolled."""
+    area = widget.parentWidget()
+    while area is not None and not isinstance(area, QScrollArea):
+        area = area.parentWidget()
+    if area is not None:
+        area.ensureWidgetVisible(widget)
+
+
 def heighten(window: QMainWindow, dock: QDockWidget, share: float) -> None:
     """Give a `dock` below the skin its `share` of the height of the `window`."""
     height = max(_LOWEST, round(share * window.height()))

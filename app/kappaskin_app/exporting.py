@@ -50,6 +50,10 @@ class ExportDialog(QDialog):
         self.bar.setRange(0, 1000)
         self.words.setWordWrap(True)
         self.export_button, self.cancel_button = QPushButton("&Export"), QPushButton("&Cancel")
+        self.choose_recording = _choosing(self._choose_recording)
+        self.choose_file = _choosing(self._choose_file)
+        for button in (self.choose_recording, self.choose_file, self.cancel_button):
+            button.setAutoDefault(False)  # or Enter in a line would press the first of them
         self._setup = Setup()
         self._exporting: Exporting | None = None
         self._timer = QTimer(self)
@@ -65,10 +69,11 @@ class ExportDialog(QDialog):
 
     def _lay_out(self) -> None:
         form, layout = QFormLayout(), QVBoxLayout(self)
-        form.addRow(
-            _named("&Recording", self.recording), _chosen(self.recording, self._choose_recording)
-        )
-        form.addRow(_named("&File", self.to), _chosen(self.to, self._choose_file))
+        for words, line, button in (
+            ("&Recording", self.recording, self.choose_recording),
+            ("&File", self.to, self.choose_file),
+        ):
+            form.addRow(_named(words, line), _beside(line, button))
         form.addRow("&Settings", self.settings)
         form.addRow("Fr&om", self.begin)
         form.addRow("&Until", self.until)
@@ -94,6 +99,7 @@ class ExportDialog(QDialog):
             self.bar.reset()
         self.show()
         self.raise_()
+        (self.to if self.recording.text() else self.recording).setFocus()
 
     def _choose_recording(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Export a recording", "", _RECORDINGS)
@@ -120,7 +126,8 @@ class ExportDialog(QDialog):
             widget.setEnabled(not busy and not one)
         self.every.setEnabled(not busy and suffix != ".vtp")
         self.at.setEnabled(not busy and one)
-        for widget in (self.recording, self.to, self.settings):
+        choose = self.choose_recording, self.choose_file
+        for widget in (self.recording, self.to, self.settings, *choose):
             widget.setEnabled(not busy)
         named = bool(self.recording.text().strip() and self.to.text().strip())
         self.export_button.setEnabled(named and not busy)
@@ -137,6 +144,7 @@ class ExportDialog(QDialog):
         return Wanted(*files, self.begin.value(), until, self.every.value(), setup=setup)
 
     def _begin(self) -> None:
+        self.bar.reset()
         try:
             self._exporting = Exporting(self.wanted)
         except Refusal as refusal:
@@ -159,12 +167,14 @@ class ExportDialog(QDialog):
                     return
                 self.bar.setValue(round(self.bar.maximum() * told))
         except Refusal as refusal:
+            self.bar.reset()
             self._end(str(refusal))
 
     def _cancel(self) -> None:
         if self._exporting is None:
             self.reject()
         else:
+            self.bar.reset()
             self._end("Cancelled; nothing was written.")
 
     def _end(self, words: str) -> None:
@@ -174,6 +184,8 @@ class ExportDialog(QDialog):
             self._exporting.close()
             self._exporting = None
         self.words.setText(words)
+        high = self.heightForWidth(self.width())
+        self.resize(self.width(), max(self.height(), high))  # or the fields would be pressed flat
         self._allow()
 
     def done(self, result: int) -> None:
@@ -198,9 +210,14 @@ def _named(words: str, line: QLineEdit) -> QLabel:
     return label
 
 
-def _chosen(line: QLineEdit, choose: Callable[[], None]) -> QHBoxLayout:
-    button, layout = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}"), QHBoxLayout()
+def _choosing(choose: Callable[[], None]) -> QPushButton:
+    button = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}")
     button.clicked.connect(guarded(lambda *_: choose()))
+    return button
+
+
+def _beside(line: QLineEdit, button: QPushButton) -> QHBoxLayout:
+    layout = QHBoxLayout()
     layout.addWidget(line, 1)
     layout.addWidget(button)
     return layout

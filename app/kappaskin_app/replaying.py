@@ -2,22 +2,21 @@
 
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
-from kappaskin import Event, Recording, Refusal, Replay, Setup, Status, setups_of
+from kappaskin import Event, Refusal, Replay, Setup, Status
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.newest import Newest
-from kappaskin_app.recordings import newest, recordings_folder, repairing
+from kappaskin_app.recordings import newest, recordings_folder
+from kappaskin_app.seen import Seen, seen, told_of
 from kappaskin_app.session import RECORDED, Session
-from kappaskin_app.views.landmarks import minutes
+from kappaskin_app.views.landmarks import day
 from kappaskin_app.views.transport import SPEEDS, Transport
 
 FILES = "Recording (*.mcap *.mcap.part)"
@@ -26,46 +25,6 @@ _LOOK = 20  # ms between two looks whether a file has been read
 _ARRIVES = 0.4  # s after which what was asked of the engine shows in its status
 _HERE = 1e-4  # s: an event so near is where the replay is
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What there is to know of the recording at `path` before it is played.
-
-    `setups` it was made with, each from a time in s on, and why they cannot be told.
-    """
-
-    path: Path
-    length: float = 0.0
-    whole: bool = True
-    setups: tuple[tuple[float, Setup], ...] = ()
-    trouble: str = ""
-
-    def setup_at(self, at: float) -> Setup | None:
-        """The one in use at `at` s; before the first, that."""
-        used = [setup for since, setup in self.setups if since <= at] or [
-            setup for _, setup in self.setups[:1]
-        ]
-        return used[-1] if used else None
-
-    def changes(self) -> list[Event]:
-        """Where another setup came into use, in words."""
-        return [
-            Event(since, "settings", f"{now.Ni} x {now.Nj} functions, {now.method}")
-            for (_, was), (since, now) in zip(self.setups, self.setups[1:], strict=False)
-            if now != was
-        ]
-
-
-def seen(path: Path) -> Seen:
-    """Look into the file at `path`; a `Refusal` where it is no recording."""
-    with Recording(path) as recording:
-        length = (recording.last - recording.first) * 1e-9
-        try:
-            setups = tuple(setups_of(recording))
-        except Refusal as refusal:
-            return Seen(path, length, recording.whole, (), str(refusal))
-        return Seen(path, length, recording.whole, setups)
 
 
 class Replaying(QObject):
@@ -192,7 +151,7 @@ class Replaying(QObject):
         now = self._history.settings
         self._before = {"calibration": now.calibration, "tare": now.tare}
         self._use(found.setup_at(0.0))
-        self._say(_told_of(found))
+        self._say(told_of(found))
         self.opened.emit(source)
         self.told.emit(self.message or f"Playing {found.path.name}, with the settings recorded")
 
@@ -391,22 +350,3 @@ class Replaying(QObject):
         self._looking = None
         self._send.forget()
         self._thread.shutdown(wait=True, cancel_futures=True)
-
-
-def day(replay: Replay) -> str:
-    """When a recording was begun, to the minute."""
-    return f"{datetime.fromtimestamp(replay.begun):%Y-%m-%d %H:%M}"
-
-
-def _told_of(found: Seen) -> str:
-    """What a person should know of a recording that is opened, or nothing."""
-    told: list[str] = []
-    if not found.whole:
-        told.append(
-            f"The recording {found.path.name} was never ended: it is played up to "
-            f"{minutes(found.length)}, where it breaks off. To make it whole: "
-            f"`{repairing(found.path)}`."
-        )
-    if found.trouble:
-        told.append(f"The settings recorded cannot be used: {found.trouble}")
-    return " ".join(told)

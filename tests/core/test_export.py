@@ -467,7 +467,7 @@ def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
         ("out.stl", {"at": math.nan}, "times in s"),
         ("out.csv", {"begin": 100.0}, "from 100 s on; the last one came at"),
         ("out.stl", {"at": 100.0}, "from 100 s on; the last one came at"),
-        ("out.csv", {"begin": 0.1001, "end": 0.1002}, "until 0.1002 s"),
+        ("out.csv", {"begin": 0.1001, "end": 0.1002}, "until 0.1002 s; the next one came at"),
         ("no/out.csv", {}, "cannot be written"),
     ],
 )

@@ -1,11 +1,16 @@
 """What every panel is: a titled box that shows what is so and says what a person wishes."""
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGroupBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QApplication, QGroupBox, QLabel, QVBoxLayout, QWidget
 
 from kappaskin import Status
+from kappaskin_app.columns import scroll_to
+from kappaskin_app.guard import guarded
 from kappaskin_app.settings import Settings
 from kappaskin_app.theme import LIGHT, Theme
+
+_GROWN = 20  # ms after which the page of a panel that grew has grown too
 
 
 class Panel(QGroupBox):
@@ -48,3 +53,15 @@ class Panel(QGroupBox):
     def _paint(self) -> None:
         colour = self._theme.faint if self._hint else self._theme.alert
         self.message.setStyleSheet(f"color: {colour};")
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if 0 < event.oldSize().height() < event.size().height():
+            QTimer.singleShot(_GROWN, self, guarded(self._answer))
+
+    def _answer(self) -> None:
+        """Bring in sight what is said now to who has just asked for something here."""
+        asked = QApplication.focusWidget()
+        if asked is not None and self.isAncestorOf(asked):
+            scroll_to(self)
+            scroll_to(asked)

@@ -1,13 +1,12 @@
 """Estimates sent to who wants them, without a window."""
 
 import math
-import signal
 import time
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from kappaskin.cli.common import FAILED
+from kappaskin.cli.common import FAILED, check_time, stops
 from kappaskin.engine import Engine
 from kappaskin.errors import Refusal
 from kappaskin.publish import Latency, Published
@@ -44,8 +43,7 @@ def publish(
     seconds
         How long to publish; until stopped when left out.
     """
-    if not seconds > 0:
-        raise Refusal(f"expected a time above 0 s to publish, got {seconds:g}")
+    check_time(seconds, "publish")
     places = foxglove if foxglove != [] else [""]
     targets = [f"udp://{place}" for place in udp or ()]
     targets += [f"foxglove://{place}" for place in places or ()]
@@ -53,9 +51,7 @@ def publish(
         raise Refusal("expected somebody to send to: give --udp HOST:PORT, or --foxglove")
     if source.startswith(SIMULATION):
         load_scene(source.removeprefix(SIMULATION))  # or refused here
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda got, _: stopped.append(got))
+    stopped = stops()
     with Engine() as engine:
         engine.publish(targets)
         engine.connect(source)

@@ -1,0 +1,71 @@
+"""Panels around the skin of a window: beside it, and below it one in the place of another."""
+
+from functools import partial
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QWidget
+
+from kappaskin_app.actions import Actions
+from kappaskin_app.columns import heighten
+
+_HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
+_HEIGHTS = {"scene": 0.38, "compare": 0.36}
+_BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
+
+
+class Docks:
+    """The docks of a `window`, by name."""
+
+    def __init__(self, window: QMainWindow) -> None:
+        self._window = window
+        self._docks: dict[str, QDockWidget] = {}
+        self._keys: dict[str, str] = {}
+
+    def __getitem__(self, name: str) -> QDockWidget:
+        return self._docks[name]
+
+    @property
+    def below(self) -> list[QDockWidget]:
+        """Those that share the place below the skin."""
+        return [self._docks[name] for name in self._keys]
+
+    def put_beside(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
+        """Show a widget in a column beside the skin."""
+        dock = self._docks[name] = QDockWidget(title, self._window)
+        dock.setObjectName(name)
+        dock.setWidget(widget)
+        self._window.addDockWidget(area, dock)
+
+    def put_below(self, name: str, title: str, widget: QWidget, key: str) -> None:
+        """Have a widget below the skin, hidden until it is asked for with `key`."""
+        before = self.below
+        self.put_beside(name, title, widget, _BELOW)
+        self._keys[name] = key
+        dock = self[name]
+        if before:
+            self._window.tabifyDockWidget(before[-1], dock)
+        # Wider than a column beside it.
+        dock.setAllowedAreas(Qt.DockWidgetArea.TopDockWidgetArea | _BELOW)
+        dock.hide()  # so that a small window is left to the skin
+
+    def add_actions(self, actions: Actions, menu: str) -> None:
+        """Register how each is shown and hidden."""
+        for name, dock in self._docks.items():
+            if name not in self._keys:
+                actions.register(f"dock-{name}", menu, dock.toggleViewAction())
+        for name, key in self._keys.items():
+            dock = self[name]
+            turn = partial(self._turn, dock)
+            action = actions.add(f"dock-{name}", menu, dock.windowTitle(), turn, key)
+            action.setCheckable(True)
+            dock.visibilityChanged.connect(action.setChecked)
+
+    def _turn(self, dock: QDockWidget) -> None:
+        """Show a dock below the skin, before the other in its place; hide one that is seen."""
+        if not dock.visibleRegion().isEmpty():
+            dock.hide()
+            return
+        dock.show()
+        if not dock.isFloating():
+            heighten(self._window, dock, _HEIGHTS.get(dock.objectName(), _HEIGHT))
+        dock.raise_()
