@@ -6,8 +6,9 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QWidget
 
-from kappaskin import LONGEST_NOTE, Engine, Status, Written
+from kappaskin import LONGEST_NOTE, Engine, Left, Status, Written
 from kappaskin_app.actions import Actions
+from kappaskin_app.adopting import words
 from kappaskin_app.guard import guarded
 from kappaskin_app.recordings import proposed, recordings_folder, repairing, unfinished
 from kappaskin_app.views.recording_mark import duration_of, size_of
@@ -121,6 +122,10 @@ class Taping(QObject):
             alarming=False,
         )
         self.told.emit(f"The recording {file.name} was never ended: see Recording on the page Live")
+
+    def go_on(self, left: Left, wanted: str) -> None:
+        """Say what went on without a window, to one who `wanted` this source."""
+        self._say(words(left, wanted), alarming=False)
 
     # News.
 

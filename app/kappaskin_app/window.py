@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin import Engine, Status, Tares, data_folder
 from kappaskin_app import guard
+from kappaskin_app.adopting import Entrusting, settings_left
 from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.columns import column, widen
 from kappaskin_app.comparing import Comparing
@@ -67,7 +68,11 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
-        self.history = History(settings_for(source), self)
+        handed = engine.adopted if engine else None
+        if handed and source == "sim:":  # nothing else was asked for
+            source = handed.asked.source or source
+        begun = settings_left(handed) if handed else settings_for(source)
+        self.history = History(begun, self)
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
         self.calibrating = Calibrating(self.history, self)
@@ -119,9 +124,13 @@ class MainWindow(QMainWindow):
         self.naming = Naming(self)
         self.naming.named.connect(guarded(self.object.show_text))
         self.naming.found.connect(guarded(self.presenting.find))
-        self.session.connect_to(source, already=engine is not None)
-        self.replaying.adopt(source)
-        self.taping.offer_repair()
+        if handed:
+            self.session.go_on(handed)
+            self.taping.go_on(handed, source)
+        else:
+            self.session.connect_to(source, already=engine is not None)
+            self.taping.offer_repair()
+        self.replaying.adopt(self.session.source)
 
     def _centre(self) -> QWidget:
         centre = QWidget()
@@ -226,6 +235,8 @@ class MainWindow(QMainWindow):
     def _attend_recording(self) -> None:
         session, taping, replaying = self.session, self.taping, self.replaying
         session.reported.connect(guarded(taping.follow))
+        entrusting = Entrusting(self.history, session.engine)
+        session.reported.connect(guarded(entrusting.follow))
         taping.changed.connect(guarded(self._show_mark))
         self.mark.clicked.connect(guarded(taping.dismiss))
         replaying.opened.connect(guarded(self.panels.connection.show_source))

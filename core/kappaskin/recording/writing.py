@@ -1,5 +1,6 @@
 """Messages to an MCAP file, by a thread of its own: nothing that is live waits for a disk."""
 
+import itertools
 import threading
 import time
 from collections import deque
@@ -186,3 +187,9 @@ class RecordingFile:
 def part_of(path: Path) -> Path:
     """What a recording at `path` is called until it is closed."""
     return path.with_name(path.name + ".part")
+
+
+def unused(path: Path) -> Path:
+    """`path`, or one that is numbered, where no recording is yet."""
+    names = (path.with_stem(f"{path.stem}-{n}") if n > 1 else path for n in itertools.count(1))
+    return next(name for name in names if not (name.exists() or part_of(name).exists()))
