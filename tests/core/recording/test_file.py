@@ -19,7 +19,7 @@ from kappaskin.recording import disk as disk_room
 from kappaskin.recording import messages as m
 from kappaskin.recording import reading, writing
 from kappaskin.recording.reading import Recording
-from kappaskin.recording.repair import repair
+from kappaskin.recording.repair import repairing
 from kappaskin.recording.writing import RecordingFile, part_of
 
 LINE = m.pack_line(0.0, False, bytes(600))
@@ -117,7 +117,7 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
         Recording(tmp_path)
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")
-        for read in (Recording, lambda pipe: repair(pipe, path)):
+        for read in (Recording, lambda pipe: list(repairing(pipe, path))):
             with pytest.raises(Refusal, match="expected a file"):
                 read(tmp_path / "pipe")
     for data in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), reading.MAGIC, reading.MAGIC * 20):

@@ -11,7 +11,7 @@ from mcap.writer import Writer
 from kappaskin import Refusal
 from kappaskin.recording import messages as m
 from kappaskin.recording.reading import Recording
-from kappaskin.recording.repair import repair
+from kappaskin.recording.repair import Repaired, repairing
 from kappaskin.recording.writing import part_of
 
 CHUNKS, EACH = 12, 40
@@ -53,6 +53,11 @@ def places(whole):
     data = whole.read_bytes()
     chunks = [record for record in records if isinstance(record, Chunk)]
     return [(data.index(chunk.data), len(chunk.data)) for chunk in chunks]
+
+
+def repair(path, out) -> Repaired:
+    *_, done = repairing(path, out)
+    return done
 
 
 @pytest.fixture
@@ -204,8 +209,7 @@ def test_a_file_of_others_is_repaired_too(tmp_path) -> None:
 
 
 def test_the_share_that_is_done_is_told(whole, tmp_path) -> None:
-    shares = list[float]()
-    repair(whole, tmp_path / "out.mcap", shares.append)
+    *shares, _ = repairing(whole, tmp_path / "out.mcap")
     assert shares == sorted(shares)
     assert 0 <= shares[0] < 0.1
     assert shares[-1] > 0.9
