@@ -14,7 +14,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
-from kappaskin import Refusal
+from kappaskin import Damaged, Refusal
 from kappaskin.recording import disk as disk_room
 from kappaskin.recording import messages as m
 from kappaskin.recording import reading, writing
@@ -135,11 +135,20 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
         Recording(path)
 
 
-def test_one_of_a_later_version_is_refused(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(writing, "FORMAT", 2)
+@pytest.mark.parametrize("later", [2, 10**12])
+def test_one_of_a_later_version_is_refused(later: int, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(writing, "FORMAT", later)
     recorded(tmp_path / "later.mcap", 3)
-    with pytest.raises(Refusal, match=r"format 1, got 2.*update this program"):
+    with pytest.raises(Refusal, match=r"format 1, got [12].*update this program"):
         Recording(tmp_path / "later.mcap")
+
+
+def test_our_own_that_breaks_off_at_once_is_not_called_anothers(whole, tmp_path) -> None:
+    path = tmp_path / "broken.mcap"
+    with Recording(whole) as recording:
+        path.write_bytes(whole.read_bytes()[: recording.chunks[0].at + 20])
+    with pytest.raises(Damaged, match="none up to where it breaks off"):
+        Recording(path)
 
 
 def spoilt(whole, path, change):
