@@ -10,6 +10,7 @@ from kappaskin import LONGEST_NOTE, Engine, Status, Written
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.recordings import proposed, recordings_folder, repairing, unfinished
+from kappaskin_app.repairs import RepairDialog
 from kappaskin_app.views.recording_mark import duration_of, size_of
 
 FILES = "Recording (*.mcap)"
@@ -21,7 +22,7 @@ class Taping(QObject):
     """Has the engine record, and tells how that does: `told` once, `changed` whenever it is so.
 
     `message` says what a person should know or do about recordings, and `alarming` whether it is
-    bad news.
+    bad news; `damaged` is the one that a repair may help then.
     """
 
     told = Signal(str)
@@ -34,6 +35,8 @@ class Taping(QObject):
         self.written, self.ended = Written(), ""
         """How it does, and why it ended by itself."""
         self.message, self.alarming = "", False
+        self.damaged: Path | None = None
+        self.repairs = RepairDialog(window)
         self._actions: Actions | None = None
 
     @property
@@ -119,6 +122,7 @@ class Taping(QObject):
             f"The recording {file.name} was never ended. What is in it can be opened as it is, or "
             f"repaired: `{repairing(file)}`.{more}",
             alarming=False,
+            damaged=file,
         )
         self.told.emit(f"The recording {file.name} was never ended: see Recording on the page Live")
 
@@ -147,6 +151,10 @@ class Taping(QObject):
             action.setText(_STOP if self.recording else _RECORD)
             action.setEnabled(not self.why_not)
 
-    def _say(self, message: str, alarming: bool = True) -> None:
-        self.message, self.alarming = message, alarming
+    def close(self) -> None:
+        """End what is being repaired: it is not there then."""
+        self.repairs.close()
+
+    def _say(self, message: str, alarming: bool = True, damaged: Path | None = None) -> None:
+        self.message, self.alarming, self.damaged = message, alarming, damaged
         self.changed.emit()

@@ -330,6 +330,8 @@ class MainWindow(QMainWindow):
         taping.changed.connect(guarded(self._show_mark))
         self.mark.clicked.connect(guarded(taping.dismiss))
         replaying.opened.connect(guarded(self.panels.connection.show_source))
+        replaying.offered.connect(guarded(self.panels.show_recording))
+        taping.repairs.saved.connect(guarded(replaying.open_file))
         for news in (taping, replaying):
             news.told.connect(guarded(self._tell))
         self.panels.recording.attend(taping, replaying)
@@ -501,6 +503,7 @@ class MainWindow(QMainWindow):
             self.exports.close()
             self.plugs.close()
             self.replaying.close()
+            self.taping.close()
             self.costing.close()
             self.planning.close()
             self.scene.gallery.close()
