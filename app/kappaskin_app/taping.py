@@ -4,7 +4,7 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QWidget
+from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox, QWidget
 
 from kappaskin import LONGEST_NOTE, Engine, Status, Written
 from kappaskin_app.actions import Actions
@@ -37,6 +37,7 @@ class Taping(QObject):
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
         self.repairs = RepairDialog(window)
+        self._question: QMessageBox | None = None
         self._actions: Actions | None = None
 
     @property
@@ -106,6 +107,36 @@ class Taping(QObject):
         if text.strip():
             self._engine.note(text.strip())
 
+    def may_close(self) -> bool:
+        """Whether the window may close now; asks, where that would end a recording."""
+        if not self.recording:
+            return True
+        if self._question is None:
+            self._question = self._asking()
+        self._question.open()
+        self._question.activateWindow()
+        return False
+
+    def _asking(self) -> QMessageBox:
+        box = QMessageBox(self._window)
+        box.setIcon(QMessageBox.Icon.Question)
+        box.setWindowTitle("Close while recording")
+        box.setText(f"{Path(self.written.path).name} is being recorded.")
+        box.setInformativeText("Closing the window ends the recording; the file is whole then.")
+        roles = QMessageBox.ButtonRole
+        end = box.addButton("&End the recording and close", roles.AcceptRole)
+        keep = box.addButton("&Keep the window", roles.RejectRole)
+        box.setDefaultButton(keep)
+        box.setEscapeButton(keep)
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.finished.connect(guarded(lambda *_: self._answer(box.clickedButton() is end)))
+        return box
+
+    def _answer(self, closes: bool) -> None:
+        self._question = None
+        if closes:
+            self._window.close()
+
     def dismiss(self) -> None:
         """Show no more that a recording ended by itself."""
         if self.ended:
@@ -152,8 +183,10 @@ class Taping(QObject):
             action.setEnabled(not self.why_not)
 
     def close(self) -> None:
-        """End what is being repaired: it is not there then."""
+        """End what is being repaired: it is not there then; and ask no more."""
         self.repairs.close()
+        if self._question is not None:
+            self._question.close()
 
     def _say(self, message: str, alarming: bool = True, damaged: Path | None = None) -> None:
         self.message, self.alarming, self.damaged = message, alarming, damaged

@@ -197,7 +197,7 @@ class MainWindow(QMainWindow):
             "Ctrl+Shift+S",
         )
         add("picture", file, "Save &picture", self._save_picture, "Ctrl+S")
-        add("quit", file, "&Quit", self.close, "Ctrl+Q")
+        add("quit", file, "&Quit", self._quit, "Ctrl+Q")
         undo, redo = stack.createUndoAction(self), stack.createRedoAction(self)
         undo.setShortcut("Ctrl+Z")
         redo.setShortcut("Ctrl+Shift+Z")
@@ -495,7 +495,15 @@ class MainWindow(QMainWindow):
         super().resizeEvent(event)
         widen(self, self._docks[1], event)
 
+    def _quit(self) -> None:
+        if self.taping.may_close():
+            self.close()
+
     def closeEvent(self, event: QCloseEvent) -> None:
+        # Only of a person: a run of so many seconds ends, and so does one that gets a signal.
+        if event.spontaneous() and not self.session.closed and not self.taping.may_close():
+            event.ignore()
+            return
         if not self.session.closed:
             guard.forget(self._tell)
             self.presenting.close()
