@@ -53,7 +53,7 @@ class Disk:
 
     def write(self, data: bytes) -> None:
         try:
-            _write(self._file, data)
+            self.put(data)
         except OSError as error:
             self._back()
             if self._reserve is None:
@@ -64,6 +64,10 @@ class Disk:
             self.write(data)
             return
         self._at += len(data)
+
+    def put(self, data: bytes) -> None:
+        """Write to the disk; an `OSError` where there is no room for all of it."""
+        _write(self._file, data)
 
     def _back(self) -> None:
         self._file.truncate(self._at)

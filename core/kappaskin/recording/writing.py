@@ -3,6 +3,7 @@
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -45,11 +46,11 @@ class Written:
 class RecordingFile:
     """A recording at `path`, called `path` + `.part` until it is closed.
 
-    `put` and `attach` never wait; `written` tells what has become of it. One that ends by itself,
-    as on a full disk, is closed as one that is asked to.
+    It is on what `disk` makes. `put` and `attach` never wait; `written` tells what has become of it.
+    One that ends by itself, as on a full disk, is closed as one that is asked to.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, disk: Callable[[Path], Disk] = Disk) -> None:
         self.path, self.part = path, part_of(path)
         for there in (self.path, self.part):
             if there.exists():
@@ -57,7 +58,7 @@ class RecordingFile:
                     f"{there}: is there already; choose another name"
                     + (f", or see `kappaskin repair {there}`" if there == self.part else "")
                 )
-        self._disk = Disk(self.part)
+        self._disk = disk(self.part)
         self._began = time.monotonic()
         # Wall-clock time is looked at once, so that a clock that is set does not reorder messages.
         self._wall = time.time_ns() - time.monotonic_ns()
