@@ -46,8 +46,8 @@ class Written:
 class RecordingFile:
     """A recording at `path`, called `path` + `.part` until it is closed.
 
-    It is on what `disk` makes. `put` and `attach` never wait; `written` tells what has become of it.
-    One that ends by itself, as on a full disk, is closed as one that is asked to.
+    It is on what `disk` makes. `put` and `attach` never wait; `written` tells what has become of
+    it. One that ends by itself, as on a full disk, is closed as one that is asked to.
     """
 
     def __init__(self, path: Path, disk: Callable[[Path], Disk] = Disk) -> None:
