@@ -97,6 +97,17 @@ class Disk:
 _ELSEWHERE = "choose another place"
 
 
+def is_there(path: Path) -> bool:
+    """Whether anything is at `path`; a `Refusal` where that cannot be told, as of too long a name.
+
+    The path's own `exists` raises then, which would end the process that is live.
+    """
+    try:
+        return path.exists() or path.is_symlink()
+    except OSError as error:
+        raise Refusal(f"{path}: cannot be looked for ({_why(error)}); {_ELSEWHERE}") from error
+
+
 def _write(file: IO[bytes], data: bytes) -> None:
     left = memoryview(data)
     while left:

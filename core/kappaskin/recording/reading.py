@@ -32,6 +32,7 @@ from mcap.records import (
 )
 
 from kappaskin.errors import Damaged, Refusal
+from kappaskin.recording.disk import is_there
 from kappaskin.recording.messages import TOPICS, Topic
 from kappaskin.recording.writing import FORMAT
 
@@ -183,7 +184,7 @@ def summary_of(file: Bytes, size: int) -> Iterator[Record]:
 
 def check_file(path: Path) -> None:
     """Refuse what is there but is no file, as a pipe that nobody writes to: opening it may wait."""
-    if path.exists() and not path.is_file():
+    if is_there(path) and not path.is_file():
         raise Refusal(f"{path}: cannot be read; expected a file")
 
 

@@ -13,7 +13,7 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from kappaskin.errors import Refusal
-from kappaskin.recording.disk import Disk
+from kappaskin.recording.disk import Disk, is_there
 from kappaskin.recording.messages import TOPICS
 from kappaskin.recording.reading import (
     LARGEST,
@@ -87,7 +87,7 @@ def repairing(path: Path, out: Path) -> Generator[float | Repaired]:
 
 def check_new(out: Path) -> None:
     """Refuse a file that is there, or is being written."""
-    if out.exists() or part_of(out).exists():
+    if is_there(out) or is_there(part_of(out)):
         raise Refusal(f"{out}: is there already; choose another name")
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from kappaskin.errors import Refusal
-from kappaskin.recording.disk import Disk
+from kappaskin.recording.disk import Disk, is_there
 from kappaskin.recording.messages import TOPICS, Topic
 
 FORMAT = 1
@@ -53,7 +53,7 @@ class RecordingFile:
     def __init__(self, path: Path, disk: Callable[[Path], Disk] = Disk) -> None:
         self.path, self.part = path, part_of(path)
         for there in (self.path, self.part):
-            if there.exists():
+            if is_there(there):
                 raise Refusal(
                     f"{there}: is there already; choose another name"
                     + (f", or see `kappaskin repair {there}`" if there == self.part else "")

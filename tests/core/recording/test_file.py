@@ -14,7 +14,7 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
-from kappaskin import Damaged, Refusal
+from kappaskin import Damaged, Refusal, Wanted
 from kappaskin.recording import disk as disk_room
 from kappaskin.recording import messages as m
 from kappaskin.recording import reading, writing
@@ -356,3 +356,18 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_not_written_is_counted(
     assert file.written.lost + file.written.messages == 1000
     with Recording(file.path) as recording:
         assert recording.counts[m.LINES.name] == file.written.messages
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        RecordingFile,
+        Recording,
+        lambda path: list(repairing(path, path)),
+        lambda path: Wanted(path, path),
+    ],
+    ids=["record", "read", "repair", "export"],
+)
+def test_a_name_that_no_file_can_have_is_refused(use, tmp_path) -> None:
+    with pytest.raises(Refusal, match=r"cannot be looked for \(File name too long\)"):
+        use(tmp_path / f"{'x' * 300}.csv")
