@@ -367,8 +367,8 @@ class Replaying(QObject):
         if status.state != "lost" or found is None or why == self.message:
             return
         if str(found.path) in why:
-            there = found.path.exists()
-            self._say(why, alarming=True, damaged=found.path if there else None)
+            helps = "`kappaskin repair`" in why and found.path.exists()
+            self._say(why, alarming=True, damaged=found.path if helps else None)
 
     def _show(self) -> None:
         self._transport.show_time(self.time, self.playing)

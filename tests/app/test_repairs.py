@@ -1,11 +1,13 @@
 """A damaged recording in the window: a repair is offered, and writes a whole one beside it."""
 
 import os
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from kappaskin import Recording
+from kappaskin import Event, Recording
+from kappaskin.recorder import Recorder
 from kappaskin_app.repairs import RepairDialog
 from kappaskin_app.window import MainWindow
 
@@ -74,6 +76,15 @@ def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Pat
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(500))
     window.replaying.open_file(path)
     until(lambda: "expected a recording" in panel.message.text())
+    assert not panel.offer.isVisibleTo(panel)
+
+
+def test_one_without_readings_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
+    path, panel = tmp_path / "empty.mcap", window.panels.recording
+    with closing(Recorder(path, 0.0)) as recorder:
+        recorder.happened(Event(0.0, "note", "nothing else"))
+    window.replaying.open_file(path)
+    until(lambda: "expected bytes of a device" in panel.message.text())
     assert not panel.offer.isVisibleTo(panel)
 
 

@@ -117,7 +117,8 @@ def parsed(kind: type[_Kind], body: bytes) -> _Kind:
     try:
         return kind.read(ReadDataStream(BytesIO(body)))  # type: ignore[attr-defined]
     except _FAULTS as error:
-        raise Spoilt(f"a {kind.__name__.lower()} cannot be read ({error!s:.80})") from error
+        why = str(error)[:80] or "it is cut off"
+        raise Spoilt(f"a {kind.__name__.lower()} cannot be read ({why})") from error
 
 
 def unpacked(body: bytes) -> bytes:

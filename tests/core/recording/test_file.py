@@ -143,6 +143,13 @@ def test_one_of_a_later_version_is_refused(later: int, tmp_path, monkeypatch) ->
         Recording(tmp_path / "later.mcap")
 
 
+def test_a_header_that_is_cut_off_is_said_to_be(tmp_path) -> None:
+    path = tmp_path / "broken.mcap"
+    path.write_bytes(reading.MAGIC + struct.pack("<BQI", 1, 7, 2**32 - 1) + b"abc")
+    with pytest.raises(Damaged, match=r"a header cannot be read \(it is cut off\)"):
+        Recording(path)
+
+
 def test_our_own_that_breaks_off_at_once_is_not_called_anothers(whole, tmp_path) -> None:
     path = tmp_path / "broken.mcap"
     with Recording(whole) as recording:
