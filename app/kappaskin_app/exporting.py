@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFileDialog, QLineEdit,
 
 from kappaskin import Exported, Exporting, Setup, Wanted
 from kappaskin_app.guard import guarded
-from kappaskin_app.working import WorkDialog, chosen, named, path_in
+from kappaskin_app.working import WorkDialog, beside, choosing, named, path_in
 
 _LONGEST = 1e6  # s
 _RECORDINGS = "Recording (*.mcap)"
@@ -29,6 +29,9 @@ class ExportDialog(WorkDialog):
         self.settings.addItems(["As they were recorded", "As they are now"])
         self.begin, self.until = _seconds("the beginning"), _seconds("the end")
         self.every, self.at = _seconds("every frame"), _seconds("")
+        self.export_button = self.begin_button
+        self.choose_recording = choosing(self._choose_recording)
+        self.choose_file = choosing(self._choose_file)
         self._setup = Setup()
         self._files: tuple[Path, ...] = ()
         self._lay_out()
@@ -39,10 +42,11 @@ class ExportDialog(WorkDialog):
 
     def _lay_out(self) -> None:
         form = self.form
-        form.addRow(
-            named("&Recording", self.recording), chosen(self.recording, self._choose_recording)
-        )
-        form.addRow(named("&File", self.to), chosen(self.to, self._choose_file))
+        for words, line, button in (
+            ("&Recording", self.recording, self.choose_recording),
+            ("&File", self.to, self.choose_file),
+        ):
+            form.addRow(named(words, line), beside(line, button))
         form.addRow("&Settings", self.settings)
         form.addRow("Fr&om", self.begin)
         form.addRow("&Until", self.until)
@@ -58,6 +62,7 @@ class ExportDialog(WorkDialog):
                 self.recording.setText(source.removeprefix("replay:"))
                 self.at.setValue(at)
         self.ask()
+        (self.to if self.recording.text() else self.recording).setFocus()
 
     def _choose_recording(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Export a recording", "", _RECORDINGS)
@@ -84,7 +89,8 @@ class ExportDialog(WorkDialog):
             widget.setEnabled(not busy and not one)
         self.every.setEnabled(not busy and suffix != ".vtp")
         self.at.setEnabled(not busy and one)
-        for widget in (self.recording, self.to, self.settings):
+        choose = self.choose_recording, self.choose_file
+        for widget in (self.recording, self.to, self.settings, *choose):
             widget.setEnabled(not busy)
         both = bool(self.recording.text().strip() and self.to.text().strip())
         self.begin_button.setEnabled(both and not busy)

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 from kappaskin import Repaired, Repairing
 from kappaskin_app.guard import guarded
 from kappaskin_app.recordings import repaired
-from kappaskin_app.working import WorkDialog, chosen, named, path_in
+from kappaskin_app.working import WorkDialog, beside, choosing, named, path_in
 
 
 class RepairDialog(WorkDialog):
@@ -22,7 +22,8 @@ class RepairDialog(WorkDialog):
         self.recording, self.to = QLineEdit(), QLineEdit()
         self.recording.setReadOnly(True)
         self.form.addRow(named("&Damaged", self.recording), self.recording)
-        self.form.addRow(named("&Whole one", self.to), chosen(self.to, self._choose))
+        self.choose_file = choosing(self._choose)
+        self.form.addRow(named("&Whole one", self.to), beside(self.to, self.choose_file))
         self._add_buttons()
         self.begin_button.setDefault(True)
         self.to.textChanged.connect(guarded(lambda *_: self._allow()))
@@ -46,7 +47,8 @@ class RepairDialog(WorkDialog):
 
     def _allow(self) -> None:
         super()._allow()
-        self.to.setEnabled(not self.busy)
+        for widget in (self.to, self.choose_file):
+            widget.setEnabled(not self.busy)
         self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
     def _work(self) -> Repairing:

@@ -46,6 +46,7 @@ class WorkDialog(QDialog):
         self.bar.setRange(0, 1000)
         self.words.setWordWrap(True)
         self.begin_button, self.cancel_button = QPushButton(verb), QPushButton("&Cancel")
+        self.cancel_button.setAutoDefault(False)
         self._going: Work | None = None
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL)
@@ -93,6 +94,7 @@ class WorkDialog(QDialog):
         self.raise_()
 
     def _begin(self) -> None:
+        self.bar.reset()
         try:
             self._going = self._work()
         except Refusal as refusal:
@@ -115,12 +117,14 @@ class WorkDialog(QDialog):
                     self._end(self._said(told))
                     return
         except Refusal as refusal:
+            self.bar.reset()
             self._end(str(refusal))
 
     def _cancel(self) -> None:
         if self._going is None:
             self.reject()
         else:
+            self.bar.reset()
             self._end("Cancelled; nothing was written.")
 
     def _end(self, words: str) -> None:
@@ -130,6 +134,8 @@ class WorkDialog(QDialog):
             self._going.close()
             self._going = None
         self.words.setText(words)
+        high = self.heightForWidth(self.width())
+        self.resize(self.width(), max(self.height(), high))  # or the fields would be pressed flat
         self._allow()
 
     def done(self, result: int) -> None:
@@ -149,10 +155,16 @@ def named(words: str, line: QLineEdit) -> QLabel:
     return label
 
 
-def chosen(line: QLineEdit, choose: Callable[[], None]) -> QHBoxLayout:
-    """The line, with a button beside it that lets one choose a file."""
-    button, layout = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}"), QHBoxLayout()
+def choosing(choose: Callable[[], None]) -> QPushButton:
+    """A button that lets one choose a file."""
+    button = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}")
+    button.setAutoDefault(False)  # or Enter in a line would press the first of them
     button.clicked.connect(guarded(lambda *_: choose()))
+    return button
+
+
+def beside(line: QLineEdit, button: QPushButton) -> QHBoxLayout:
+    layout = QHBoxLayout()
     layout.addWidget(line, 1)
     layout.addWidget(button)
     return layout

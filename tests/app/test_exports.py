@@ -116,12 +116,12 @@ def test_a_film_ends_whole_with_the_window(window, until, named, tmp_path) -> No
 def test_a_recording_is_exported_from_the_dialog(window, until, recording) -> None:
     window.actions_by_name["export"].trigger()
     dialog = window.exports.dialog
-    assert not dialog.begin_button.isEnabled()
+    assert not dialog.export_button.isEnabled()
     dialog.recording.setText(str(recording))
     dialog.to.setText(str(recording.with_name("out.npz")))
     assert dialog.every.isEnabled()
     assert not dialog.at.isEnabled()
-    dialog.begin_button.click()
+    dialog.export_button.click()
     assert not dialog.to.isEnabled()
     until(lambda: dialog.to.isEnabled(), 30.0)
     assert dialog.words.text().startswith("Written: ")
@@ -135,10 +135,10 @@ def test_an_export_is_cancelled_with_nothing_left(window, recording) -> None:
     dialog = window.exports.dialog
     dialog.recording.setText(str(recording))
     dialog.to.setText(str(recording.with_name("out.csv")))
-    dialog.begin_button.click()
+    dialog.export_button.click()
     dialog.cancel_button.click()
     assert "nothing was written" in dialog.words.text()
-    assert dialog.begin_button.isEnabled()
+    assert dialog.export_button.isEnabled()
     assert [path.name for path in recording.parent.iterdir()] == ["rec.mcap"]
 
 
@@ -160,6 +160,6 @@ def test_what_is_refused_is_said_in_the_dialog(window, tmp_path) -> None:
     dialog = window.exports.dialog
     dialog.recording.setText(str(tmp_path / "none.mcap"))
     dialog.to.setText(str(tmp_path / "out.txt"))
-    dialog.begin_button.click()
+    dialog.export_button.click()
     assert "ends in one of" in dialog.words.text()
-    assert dialog.begin_button.isEnabled()
+    assert dialog.export_button.isEnabled()
