@@ -240,6 +240,8 @@ class MainWindow(QMainWindow):
         taping.changed.connect(guarded(self._show_mark))
         self.mark.clicked.connect(guarded(taping.dismiss))
         replaying.opened.connect(guarded(self.panels.connection.show_source))
+        replaying.offered.connect(guarded(self.panels.show_recording))
+        taping.repairs.saved.connect(guarded(replaying.open_file))
         for news in (taping, replaying):
             news.told.connect(guarded(self.tell))
         self.panels.recording.attend(taping, replaying)
@@ -377,7 +379,16 @@ class MainWindow(QMainWindow):
         super().resizeEvent(event)
         widen(self, self.docks["curvature"], event)
 
+    def quit(self) -> None:
+        """Close, unless a recording is to go on."""
+        if self.taping.may_close():
+            self.close()
+
     def closeEvent(self, event: QCloseEvent) -> None:
+        # Only of a person: a run of so many seconds ends, and so does one that gets a signal.
+        if event.spontaneous() and not self.session.closed and not self.taping.may_close():
+            event.ignore()
+            return
         if not self.session.closed:
             guard.forget(self.tell)
             self.presenting.close()
@@ -385,6 +396,7 @@ class MainWindow(QMainWindow):
             self.exports.close()
             self.plugs.close()
             self.replaying.close()
+            self.taping.close()
             self.costing.close()
             self.planning.close()
             self.scene.gallery.close()

@@ -36,7 +36,7 @@ from kappaskin.publish.channels import CHANNELS
 from kappaskin.publish.client import Client
 from kappaskin.recorder import Recorder
 from kappaskin.recording.messages import TOPICS
-from kappaskin.recording.repair import repair
+from kappaskin.recording.repair import repairing
 from kappaskin.scene import read_scene
 from kappaskin.sources import ReplayedSource, SimulatedSource, information
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
@@ -255,7 +255,7 @@ def _recording(data: bytes, folder: Path) -> None:
     path.write_bytes(data)
     out.unlink(missing_ok=True)
     with suppress(Refusal):
-        repair(path, out)
+        list(repairing(path, out))
     for place in (path, out):
         if place.exists():
             with suppress(Refusal):

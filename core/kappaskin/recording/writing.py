@@ -4,6 +4,7 @@ import itertools
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from kappaskin.errors import Refusal
-from kappaskin.recording.disk import Disk
+from kappaskin.recording.disk import Disk, is_there
 from kappaskin.recording.messages import TOPICS, Topic
 
 FORMAT = 1
@@ -46,19 +47,19 @@ class Written:
 class RecordingFile:
     """A recording at `path`, called `path` + `.part` until it is closed.
 
-    `put` and `attach` never wait; `written` tells what has become of it. One that ends by itself,
-    as on a full disk, is closed as one that is asked to.
+    It is on what `disk` makes. `put` and `attach` never wait; `written` tells what has become of
+    it. One that ends by itself, as on a full disk, is closed as one that is asked to.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, disk: Callable[[Path], Disk] = Disk) -> None:
         self.path, self.part = path, part_of(path)
         for there in (self.path, self.part):
-            if there.exists():
+            if is_there(there):
                 raise Refusal(
                     f"{there}: is there already; choose another name"
                     + (f", or see `kappaskin repair {there}`" if there == self.part else "")
                 )
-        self._disk = Disk(self.part)
+        self._disk = disk(self.part)
         self._began = time.monotonic()
         # Wall-clock time is looked at once, so that a clock that is set does not reorder messages.
         self._wall = time.time_ns() - time.monotonic_ns()
