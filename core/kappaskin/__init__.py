@@ -98,6 +98,7 @@ from kappaskin.publish import Latency as Latency
 from kappaskin.publish import Published as Published
 from kappaskin.publish import PublishNews as PublishNews
 from kappaskin.publish import Receiver as Receiver
+from kappaskin.recording.disk import is_written as is_written
 from kappaskin.recording.reading import Recording as Recording
 from kappaskin.recording.repair import Repaired as Repaired
 from kappaskin.recording.writing import Written as Written
