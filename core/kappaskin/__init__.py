@@ -94,6 +94,10 @@ from kappaskin.publish import Latency as Latency
 from kappaskin.publish import Published as Published
 from kappaskin.publish import PublishNews as PublishNews
 from kappaskin.publish import Receiver as Receiver
+from kappaskin.quantities import QUANTITIES as QUANTITIES
+from kappaskin.quantities import ErrorBars as ErrorBars
+from kappaskin.quantities import Quantities as Quantities
+from kappaskin.quantities import of_form as of_form
 from kappaskin.recording.reading import Recording as Recording
 from kappaskin.recording.writing import Written as Written
 from kappaskin.region import Bargain as Bargain
