@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint
+from PySide6.QtCore import QEvent, QPoint
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -30,6 +30,8 @@ def no_window_and_no_failure_left(
     left = [widget for widget in qapp.topLevelWidgets() if widget.isVisible()]
     for widget in left:
         widget.close()
+    # Outside of an event loop nothing else does, and each palette would be told to all there were.
+    qapp.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     assert not left
     assert not failures or request.node.get_closest_marker("fails_inside")
 
