@@ -78,6 +78,7 @@ from kappaskin.mechanics import DiscLoad as DiscLoad
 from kappaskin.mechanics import GaussianLoad as GaussianLoad
 from kappaskin.mechanics import LineLoad as LineLoad
 from kappaskin.mechanics import Load as Load
+from kappaskin.mechanics import Placed as Placed
 from kappaskin.mechanics import Plate as Plate
 from kappaskin.mechanics import PointLoad as PointLoad
 from kappaskin.mechanics import RectangleLoad as RectangleLoad
@@ -151,6 +152,7 @@ from kappaskin.touch import NO_OBJECT as NO_OBJECT
 from kappaskin.touch import ContactObject as ContactObject
 from kappaskin.touch import ObjectFinder as ObjectFinder
 from kappaskin.touch import PointContact as PointContact
+from kappaskin.touch import placed as placed
 from kappaskin.transduction import FIRST_GENERATION as FIRST_GENERATION
 from kappaskin.transduction import SECOND_GENERATION as SECOND_GENERATION
 from kappaskin.transduction import Amplifier as Amplifier

@@ -134,6 +134,15 @@ class Quantities:
             self._changes[name] = CurvatureMap(self.basis, name, *self.grid)
         return self._changes[name](estimate.coefficients)
 
+    def directions(self, estimate: Estimate) -> Array:
+        """Both principal curvatures in 1/m, and the angle of the first in rad from x, on the grid.
+
+        They are (3, ny, nx).
+        """
+        xx, yy, xy = form = self._form(estimate.coefficients)
+        angle = np.arctan2(xy, (xx - yy) / 2) / 2
+        return np.stack([of_form("first", form), of_form("second", form), angle])
+
     def of_elements(self, name: str, estimate: Estimate) -> Array:
         """The values (P,) in SI units: of curvature as each element reads it; NaN where missing."""
         if name in COMPONENTS:

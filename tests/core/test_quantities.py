@@ -85,6 +85,18 @@ def test_the_surface_curves_as_each_of_its_points_does(scene: str) -> None:
         np.testing.assert_allclose(found, values, atol=1e-9 * np.abs(values).max())
 
 
+def test_the_surface_curves_along_its_directions_by_its_principal_curvatures(centre) -> None:
+    pipeline, estimate = centre
+    quantities = quantities_of(pipeline)
+    points = np.stack(np.meshgrid(*quantities.grid), axis=-1).reshape(-1, 2)
+    K = local_geometry(pipeline.fitted, points).curvature_form
+    first, second, angle = quantities.directions(estimate).reshape(3, -1)
+    c, s = np.cos(angle), np.sin(angle)
+    for along, curvature in (([c, s], first), ([-s, c], second)):
+        found = np.einsum("ip,pij,jp->p", along, K, along)
+        np.testing.assert_allclose(found, curvature, atol=1e-9 * np.abs(first).max())
+
+
 def test_a_bent_skin_at_rest_keeps_its_bend() -> None:
     layout = SensorLayout.regular(BENT, 4, 4)
     quantities = Quantities(layout, basis_for(BENT, "hinged", 3, 3), 5, 5)
