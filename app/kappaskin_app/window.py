@@ -1,7 +1,6 @@
 """The window: builds the panels and views, wires them to the session, and nothing else."""
 
 import time
-from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -23,7 +22,7 @@ from kappaskin import FIGURES, Engine, Status, Tares, data_folder
 from kappaskin_app import guard
 from kappaskin_app.actions import Actions
 from kappaskin_app.calibrating import Calibrating
-from kappaskin_app.columns import column, heighten, widen
+from kappaskin_app.columns import heighten, widen
 from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
@@ -33,6 +32,7 @@ from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
+from kappaskin_app.looking import Looking
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.compare import ComparePanel
@@ -47,13 +47,12 @@ from kappaskin_app.presenting import NAMED, SOUND_TIP, TIP, Presenting
 from kappaskin_app.replaying import Replaying
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
-from kappaskin_app.settings import COLOURS, Settings
+from kappaskin_app.settings import Settings
 from kappaskin_app.simulation import settings_for
 from kappaskin_app.staging import Staging
 from kappaskin_app.taping import Taping
 from kappaskin_app.taring import Taring
 from kappaskin_app.theme import THEMES, palette
-from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
 from kappaskin_app.views.recording_mark import RecordingMark
 from kappaskin_app.views.stage import Stage
@@ -122,10 +121,9 @@ class MainWindow(QMainWindow):
             area.RightDockWidgetArea,
             area.BottomDockWidgetArea,
         )
-        maps = column(*self.heatmaps.values())
         self._docks = [
             self._dock("settings", "Settings", self.panels, left),
-            self._dock("curvature", "Curvature, by element", maps, right),
+            self._dock("curvature", "By element", self.display.maps, right),
             self._dock("cost", "Cost of accuracy", self.cost, below),
             self._dock("stability", "Stability", self.stability, below),
             self._dock("scene", "Scene", self.scene, below),
@@ -148,6 +146,7 @@ class MainWindow(QMainWindow):
         self.naming = Naming(self)
         self.naming.named.connect(guarded(self.object.show_text))
         self.naming.found.connect(guarded(self.presenting.find))
+        self.naming.found.connect(guarded(lambda what, _: self.display.overlays.find(what)))
         self.session.connect_to(source, already=engine is not None)
         self.replaying.adopt(source)
         self.taping.offer_repair()
@@ -213,20 +212,9 @@ class MainWindow(QMainWindow):
         calibrating = self.calibrating
         self.taping.add_actions(self.actions_by_name)
         self.replaying.add_actions(self.actions_by_name)
+        Looking(self.history, wishes, self.display).add_actions(self.actions_by_name)
         add("calibrate", source, "C&alibrate", self.panels.show_calibration, "Ctrl+L")
         add("take-step", source, "&Take the step of the calibration", calibrating.take, "Ctrl+K")
-        for number, (value, words) in enumerate(COLOURS, 1):
-            colour = partial(wishes.wish, "colour_by", value)
-            add(f"colour-{value}", view, f"Colour by {words.lower()}", colour, f"Ctrl+{number}")
-        add("higher", view, "Draw &higher", partial(wishes.exaggerate, 1), "Ctrl++")
-        add("lower", view, "Draw &lower", partial(wishes.exaggerate, -1), "Ctrl+-")
-        for name, words, key in (("elements", "&elements", "E"), ("truth", "&true surface", "U")):
-            toggle = partial(wishes.toggle, f"show_{name}")
-            add(name, view, f"Show or hide {words}", toggle, f"Ctrl+{key}")
-        add("camera", view, "Reset &camera", self._look(FROM_THE_LEFT), "Ctrl+R")
-        for key, direction in (("F6", ABOVE), ("F7", FRONT), ("F8", SIDE)):
-            words = f"Look {direction.words}"
-            add(words.lower().replace(" ", "-"), view, words, self._look(direction), key)
         add("pause", view, "&Pause or go on", self._pause, "Ctrl+P")
         add("present", view, "&Presenter", self.presenting.turn, "F11", TIP)
         sound = add("sound", view, "S&ound of the force", self._turn_sound, "F12", SOUND_TIP)
@@ -387,9 +375,6 @@ class MainWindow(QMainWindow):
     def _connect_chosen(self) -> None:
         self._connect(self.panels.connection.source())
 
-    def _look(self, direction: Direction) -> Callable[[], None]:
-        return partial(self.membrane.look_from, direction)
-
     def _lock(self, locked: bool) -> None:
         limit = self.display.limit_shown() if locked else 0.0
         self.wishes.wish(f"range_{self.history.settings.colour_by}", limit)
@@ -507,5 +492,5 @@ class MainWindow(QMainWindow):
             self.seeing.close()
             self.session.close()
             self.naming.close()
-            self.membrane.close_plotter()
+            self.display.close()
         super().closeEvent(event)

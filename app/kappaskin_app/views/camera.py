@@ -28,7 +28,9 @@ class Direction:
 
 
 FROM_THE_LEFT = Direction("from the front, a little from the left", (-0.45, -1.1, 1.1))
+ISOMETRIC = Direction("from a corner, all sides alike", (-1.0, -1.0, 1.0))
 ABOVE = Direction("from above", (0.0, 0.0, 1.6), (0.0, 1.0, 0.0))
+BELOW = Direction("from below", (0.0, 0.0, -1.6), (0.0, 1.0, 0.0))
 FRONT = Direction("along y", (0.0, -1.6, 0.0))
 SIDE = Direction("along x", (1.6, 0.0, 0.0))
 
