@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kappaskin import COMPONENTS, WHY, Estimate, Status
 from kappaskin_app.colouring import Colouring
 from kappaskin_app.maps import Maps
+from kappaskin_app.measuring import Measuring
 from kappaskin_app.overlaying import Overlaying
 from kappaskin_app.scale import Ranges, locked_at
 from kappaskin_app.session import Session
@@ -47,6 +48,7 @@ class Display:
         self.scale, self.notice = SkinScale(), Notice(_HINT)
         self.maps, self.colouring = Maps(), Colouring()
         self.heatmaps = self.maps.heatmaps
+        self.measuring = Measuring(self.membrane)
         self.overlays = Overlaying(self.membrane, self.colouring, session)
         self.ranges = Ranges()
         self._settings = Settings()
@@ -74,6 +76,8 @@ class Display:
             heatmap.show_lock(locked_at(name, settings) > 0)
         self.scale.lock.show_locked(locked_at(settings.colour_by, settings) > 0)
         self._allow_lock()
+        s = settings
+        self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y))
         self.membrane.show_options(settings.show_elements, settings.show_truth)
 
     def limit_shown(self) -> float:
@@ -102,6 +106,7 @@ class Display:
 
     def show_theme(self, theme: Theme) -> None:
         self._missing = theme.missing
+        self.measuring.ruler.show_theme(theme)
         for view in (
             self.membrane,
             self.badge,
@@ -196,6 +201,7 @@ class Display:
         self._colour_skin(estimate, kinds, railed, now)
         self._show_loads(estimate)
         self.overlays.show(estimate, settings, self._times())
+        self.measuring.show(estimate)
         if now >= self._next_heatmaps:
             self._next_heatmaps = now + _HEATMAPS
             self._show_heatmaps(estimate, kinds, railed, now)

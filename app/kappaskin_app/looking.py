@@ -3,8 +3,11 @@
 from collections.abc import Callable
 from functools import partial
 
+from PySide6.QtGui import QKeySequence, QShortcut
+
 from kappaskin_app.actions import Actions
 from kappaskin_app.display import Display
+from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.settings import COLOURS
 from kappaskin_app.views.camera import (
@@ -32,6 +35,7 @@ _TOGGLES = (
     ("object", "object f&ound", "Ctrl+Alt+O"),
     ("pressed", "object &pressed", "Ctrl+Alt+P"),
 )
+_TIP = "Measure between two places of the skin that you click; Escape ends"
 _DIGITS = 9  # actions that may have a digit for a shortcut
 
 
@@ -57,6 +61,23 @@ class Looking:
         for key, direction in _LOOKS:
             words = f"Look {direction.words}"
             add(words.lower().replace(" ", "-"), _MENU, words, self._look(direction), key)
+
+        measuring = self._display.measuring
+        self._measure = add("measure", _MENU, "&Measure", measuring.turn, "Ctrl+Alt+M", _TIP)
+        self._measure.setCheckable(True)
+        self._escape = QShortcut(QKeySequence("Esc"), self._display.membrane.window())
+        self._escape.setEnabled(False)
+        self._escape.activated.connect(guarded(measuring.end))
+        measuring.changed.connect(guarded(self._show_measuring))
+        self._display.membrane.pointing.clicked.connect(guarded(self._click))
+
+    def _show_measuring(self, on: bool) -> None:
+        self._measure.setChecked(on)
+        self._escape.setEnabled(on)
+
+    def _click(self, x: float, y: float) -> None:
+        if self._display.measuring.on:
+            self._display.measuring.take(x, y)
 
     def _look(self, direction: Direction) -> Callable[[], None]:
         return partial(self._display.membrane.look_from, direction)

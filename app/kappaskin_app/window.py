@@ -212,7 +212,8 @@ class MainWindow(QMainWindow):
         calibrating = self.calibrating
         self.taping.add_actions(self.actions_by_name)
         self.replaying.add_actions(self.actions_by_name)
-        Looking(self.history, wishes, self.display).add_actions(self.actions_by_name)
+        self.looking = Looking(self.history, wishes, self.display)
+        self.looking.add_actions(self.actions_by_name)
         add("calibrate", source, "C&alibrate", self.panels.show_calibration, "Ctrl+L")
         add("take-step", source, "&Take the step of the calibration", calibrating.take, "Ctrl+K")
         add("pause", view, "&Pause or go on", self._pause, "Ctrl+P")

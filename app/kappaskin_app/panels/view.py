@@ -12,6 +12,7 @@ class ViewPanel(Form):
         names = (
             *("colour_by", "colour_from", "maps", "one_range"),
             *("exaggeration", "show_elements", "show_truth", "show_directions", "show_band"),
-            *("show_frame", "show_object", "show_pressed", "theme"),
+            *("show_frame", "show_object", "show_pressed", "from_x", "to_x", "from_y", "to_y"),
+            "theme",
         )
         super().__init__("View", names, parent)

@@ -72,6 +72,11 @@ class Fit:
     )
 
 
+def _cut(side: str, axis: str) -> Range:
+    tip = f"Cut away what lies beyond this share of the skin, seen from above along {axis}."
+    return Range(f"{side} {axis}", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
+
+
 @dataclass(frozen=True)
 class View:
     """How the skin is shown."""
@@ -175,6 +180,10 @@ class View:
             "and stretched in height as the skin is. Loads of the panels have none.",
         ),
     )
+    from_x: float = asked(0.0, _cut("From", "x"))
+    to_x: float = asked(1.0, _cut("To", "x"))
+    from_y: float = asked(0.0, _cut("From", "y"))
+    to_y: float = asked(1.0, _cut("To", "y"))
     theme: str = asked(
         "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
     )

@@ -1,6 +1,7 @@
 """A skin as it is drawn: its points at rest, moved in and out along its normals, in mm."""
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ Indices = NDArray[np.intp]
 MM = 1e3
 _DEEPEST = 0.45  # of the shorter side that a skin is drawn deep at most, to stay in the picture
 _NEAREST = 0.7  # of the base radius, so that no skin is drawn through its own axis
+
+
+_SEAM = 1e-9  # of a side: or a line passes between two triangles
 
 
 class DrawnSkin:
@@ -58,6 +62,12 @@ class DrawnSkin:
         """How far in mm the skin may be drawn from where it rests."""
         patch = self.patch
         return MM * min(_DEEPEST * min(patch.a, patch.b), _NEAREST * patch.radius)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """From where to where in mm it reaches at rest, along x and along y in space."""
+        low, high = self._rest.min(axis=0), self._rest.max(axis=0)
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
     # Its faces and lines, over the points of the grid.
 
@@ -141,6 +151,30 @@ class DrawnSkin:
         wider = 1 + self.height[q, p] * self.patch.base_curvature / MM
         x = wider * np.array([out[2], 0.0, -out[0]]) + h_x * out
         return x, np.array([0.0, 1.0, 0.0]) + h_y * out
+
+    @cached_property
+    def _triangles(self) -> Indices:
+        corners = self.faces()[:, 1:]
+        return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+
+    def hit(self, near: Array, far: Array) -> Array | None:
+        """Where the line of sight from `near` to `far` first meets the drawn skin, (2,) in m.
+
+        None where it passes it by. Moeller and Trumbore's way, for all triangles at once.
+        """
+        a, b, c = np.moveaxis(self.points()[self._triangles], 1, 0)
+        along, ab, ac, start = far - near, b - a, c - a, near - a
+        p, q = np.cross(along, ac), np.cross(start, ab)
+        area = np.vecdot(ab, p)
+        area[area == 0] = np.nan  # seen edge-on
+        u, v = np.vecdot(start, p) / area, np.vecdot(along[None], q) / area
+        met = np.flatnonzero((u >= -_SEAM) & (v >= -_SEAM) & (u + v <= 1 + _SEAM))
+        if not len(met):
+            return None
+        first = met[np.argmin(np.vecdot(ac[met], q[met]) / area[met])]
+        share = np.array([1 - u[first] - v[first], u[first], v[first]])
+        sides = self.patch.a, self.patch.b
+        return share @ self.shares[self._triangles[first]] * sides
 
     def seen_at(self, near: Array, far: Array, height: float, beside: Array) -> Array:
         """Where the line of sight from `near` to `far` meets the skin `height` mm out, (2,) in m.

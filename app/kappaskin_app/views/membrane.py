@@ -17,11 +17,13 @@ from pyvistaqt import QtInteractor
 from kappaskin import Estimate, Load, Sensor
 from kappaskin_app.theme import OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
+from kappaskin_app.views.box import WHOLE, Box, Shares
 from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
 from kappaskin_app.views.drag import LoadDrag
 from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
 from kappaskin_app.views.loads import DrawnLoads, put_upright
 from kappaskin_app.views.marks import Marks
+from kappaskin_app.views.pointing import Pointing
 from kappaskin_app.views.surface import Surface
 
 Array = NDArray[np.float64]
@@ -48,7 +50,9 @@ class MembraneView(QWidget):
         around.addWidget(self.plotter)
         self._make_actors()
         self._make_lights()
+        self.pointing = Pointing(self.plotter)  # after the drag: of filters the last goes first
         self.drag = LoadDrag(self.plotter)
+        self._box = Box()
         self.setMinimumSize(320, 240)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
         """(when, age of its frame in s) of each drawing completed."""
@@ -125,7 +129,7 @@ class MembraneView(QWidget):
         """Draw a surface of nx x ny points for the skin of `sensor`, at rest until an estimate."""
         patch = sensor.layout.patch
         another = self.surface.actor is None or self.skin.patch != patch
-        self.skin = self.drag.skin = skin = DrawnSkin(patch, nx, ny)
+        self.skin = self.drag.skin = self.pointing.skin = skin = DrawnSkin(patch, nx, ny)
         self.surface.show_skin(skin, sensor.layout)
         self.lift = _LIFT * skin.size
         self._wire = self._wireframe(skin)
@@ -137,6 +141,7 @@ class MembraneView(QWidget):
         self._contact.scale = skin.size
         self._arrays = self._changing()
         self._place_labels(skin)
+        self.show_box(self._box.shares)
         if another:
             self.look_from(self._from)
         if self._theme:
@@ -232,6 +237,8 @@ class MembraneView(QWidget):
         for marks in (self.out, self.asked):
             marks.follow(skin, self.lift)
         put_upright(self._contact, skin, estimate.touch.position)
+        if self._box.shares != WHOLE:
+            self._box.cut(self.plotter.actors.values())  # some may be new
         known = math.isfinite(estimate.taken)
         # It was taken before it came: where nothing else is known, it is at least so old.
         self._taken = estimate.taken if known else estimate.host_time
@@ -265,6 +272,13 @@ class MembraneView(QWidget):
     def show_options(self, elements: bool, truth: bool) -> None:
         self._want_elements, self._want_truth = elements, truth
         self._elements_actor.visibility = elements and self.surface.actor is not None
+        self.plotter.update()
+
+    def show_box(self, shares: Shares) -> None:
+        """Draw only what is within these shares of the skin: from and to, along x and along y."""
+        self._box.shares = shares
+        self._box.show(self.skin)
+        self._box.cut(self.plotter.actors.values())
         self.plotter.update()
 
     def show_caption(self, text: str) -> None:
