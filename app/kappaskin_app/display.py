@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
 
 from kappaskin import COMPONENTS, WHY, Estimate, Status
 from kappaskin_app.colouring import Colouring
@@ -39,10 +40,16 @@ Mask = NDArray[np.bool_]
 Kinds = NDArray[np.uint8]
 
 
-class Display:
-    """The views, and in which colours and how high they show what the `session` brings."""
+class Display(QObject):
+    """The views, and in which colours and how high they show what the `session` brings.
+
+    `pointed` tells which element is pointed at, -1 none.
+    """
+
+    pointed = Signal(int)
 
     def __init__(self, session: Session) -> None:
+        super().__init__()
         self._session = session
         self.membrane, self.badge, self.readouts = MembraneView(), Badge(), Readouts()
         self.scale, self.notice = SkinScale(), Notice(_HINT)
@@ -58,13 +65,18 @@ class Display:
         self.old = True
         """Whether what is shown is not coming in any more."""
         self._missing = LIGHT.missing
-        self._met, self._asked = 0, -1
+        self._met, self._asked, self._element = 0, -1, -1
         self._out = np.empty(0, np.intp)  # elements that are left out
         self._colours: object = None
         self._next_heatmaps = self._next_numbers = 0.0
 
     def point(self, element: int) -> None:
-        """Point at an element in every heatmap; -1 at none."""
+        """Point at an element in every view; -1 at none."""
+        if element == self._element:
+            return
+        self._element = element
+        self.membrane.point(element)
+        self.pointed.emit(element)
         for heatmap in self.heatmaps.values():
             heatmap.show_element(element)
         self._next_numbers = 0.0
@@ -134,6 +146,7 @@ class Display:
         sensor, setup = status.sensor, status.setup
         if sensor is None:
             return
+        self._element = -1
         self._met, self._out = status.meetings, np.empty(0, np.intp)
         self.membrane.show_skin(sensor, setup.nx, setup.ny)
         self.ranges = Ranges(1e3 * max(sensor.layout.patch.a, sensor.layout.patch.b))

@@ -41,6 +41,7 @@ from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
+from kappaskin_app.picking import Picking
 from kappaskin_app.planning import Planning
 from kappaskin_app.plugs import Plugs
 from kappaskin_app.presenting import NAMED, SOUND_TIP, TIP, Presenting
@@ -63,6 +64,7 @@ from kappaskin_app.wishes import Wishes
 _WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38, "compare": 0.36}
+_KEYS = ("F9", "F10", "F2", "F3", "Ctrl+B", "Ctrl+Alt+E", "Ctrl+Alt+T")  # of the docks below
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -96,6 +98,7 @@ class MainWindow(QMainWindow):
             *(self.history, self.session, self.wishes, self.planning),
             *(self.scene, self.timeline, self),
         )
+        self.picking = Picking(self.history, self.session, self.display)
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._shortcuts: QMessageBox | None = None
@@ -129,6 +132,8 @@ class MainWindow(QMainWindow):
             self._dock("scene", "Scene", self.scene, below),
             self._dock("health", "Health", self.health, below),
             self._dock("compare", "Compare A and B", self.compare, below),
+            self._dock("element", "Element", self.picking.card, below),
+            self._dock("traces", "Traces", self.picking.traces, below),
         ]
         for first, second in pairwise(self._docks[2:]):
             self.tabifyDockWidget(first, second)
@@ -227,7 +232,7 @@ class MainWindow(QMainWindow):
         for dock in self._docks[:2]:
             name = f"dock-{dock.objectName()}"
             self.actions_by_name.register(name, view, dock.toggleViewAction())
-        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2", "F3", "Ctrl+B"), strict=True):
+        for dock, key in zip(self._docks[2:], _KEYS, strict=True):
             name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
             action = add(name, view, dock.windowTitle(), turn, key)
             action.setCheckable(True)
@@ -242,8 +247,14 @@ class MainWindow(QMainWindow):
 
     def _turn(self, dock: QDockWidget) -> None:
         """Show a dock below the skin, before the other in its place; hide one that is seen."""
-        if not dock.visibleRegion().isEmpty():
+        if dock.visibleRegion().isEmpty():
+            self._reveal(dock)
+        else:
             dock.hide()
+
+    def _reveal(self, dock: QDockWidget) -> None:
+        """Show a dock below the skin, before the others in its place."""
+        if not dock.visibleRegion().isEmpty():
             return
         dock.show()
         if not dock.isFloating():
@@ -310,6 +321,7 @@ class MainWindow(QMainWindow):
             heatmap.pointed.connect(guarded(self.display.point))
             heatmap.chosen.connect(guarded(wishes.choose))
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
+        self.picking.picked.connect(guarded(lambda _: self._reveal(self._docks[7])))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
         guard.on_failure(self._tell)
 
@@ -402,6 +414,7 @@ class MainWindow(QMainWindow):
         self.health.show_theme(theme)
         self.display.show_theme(theme)
         self.presenting.show_theme(theme)
+        self.picking.show_theme(theme)
 
     def _show_shape(self) -> None:
         """Draw the shape that is looked at on the skin, while somebody looks and wants it."""

@@ -135,6 +135,7 @@ from kappaskin.sources import Replay as Replay
 from kappaskin.sources.ports import Port as Port
 from kappaskin.sources.ports import serial_ports as serial_ports
 from kappaskin.sources.scanning import LISTS as LISTS
+from kappaskin.spectrum import amplitudes as amplitudes
 from kappaskin.status import Status as Status
 from kappaskin.studies.beside import Beside as Beside
 from kappaskin.studies.cost import Cost as Cost

@@ -187,6 +187,7 @@ class View:
     theme: str = asked(
         "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
     )
+    traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
     # How far colours reach, in SI units: on one side, or on both. 0 follows what is shown.
     range_displacement: float = 0.0
     range_xx: float = 0.0

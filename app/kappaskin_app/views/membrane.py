@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, Load, Sensor
-from kappaskin_app.theme import OUT, WANTED, Colours, Theme
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.box import WHOLE, Box, Shares
 from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
@@ -86,6 +86,8 @@ class MembraneView(QWidget):
             self._elements, style="points", point_size=5, **unlit
         )
         self.out, self.asked = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
+        # Seen on every colour.
+        self.pointed = Marks(plotter, 17, DARK_INK), Marks(plotter, 12, LIGHT_INK)
         self._loads = DrawnLoads(plotter)
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
@@ -137,6 +139,7 @@ class MembraneView(QWidget):
         self._positions = sensor.layout.positions
         self._marked = (b"", -1)
         self.show_marked(np.empty(0, np.intp), -1)
+        self.point(-1)
         self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
         self._contact.scale = skin.size
         self._arrays = self._changing()
@@ -187,6 +190,18 @@ class MembraneView(QWidget):
             self.asked.place(self.skin, self._positions[[asked] if asked >= 0 else []])
             self.plotter.update()
 
+    def point(self, element: int) -> None:
+        """Mark the element that is pointed at; -1 for none."""
+        there = [element] if 0 <= element < len(self._positions) else []
+        for marks in self.pointed:
+            marks.place(self.skin, self._positions[there])
+        self._follow_pointed()
+        self.plotter.update()
+
+    def _follow_pointed(self) -> None:
+        for above, marks in enumerate(self.pointed, 2):
+            marks.follow(self.skin, above * self.lift)  # the inner one is not to sink into the rim
+
     def _place_labels(self, skin: DrawnSkin) -> None:
         a, b = skin.patch.a, skin.patch.b
         corners, _ = skin.at_rest(np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]))
@@ -236,6 +251,7 @@ class MembraneView(QWidget):
             self._arrays["elements"][:] = points + out * height[:, None]
         for marks in (self.out, self.asked):
             marks.follow(skin, self.lift)
+        self._follow_pointed()
         put_upright(self._contact, skin, estimate.touch.position)
         if self._box.shares != WHOLE:
             self._box.cut(self.plotter.actors.values())  # some may be new
