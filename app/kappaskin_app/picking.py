@@ -36,6 +36,7 @@ class Picking(QObject):
         self.card, self.traces = ElementCard(), Traces()
         self.element = -1
         self._past, self._met = Past(), 0
+        self._of, self._after = (0, 0), 0
         self._next_plots = self._next_words = 0.0
         session.estimated.connect(guarded(self.receive))
         history.changed.connect(guarded(self._follow))
@@ -87,9 +88,12 @@ class Picking(QObject):
         status, now = self._session.status, time.monotonic()
         if status.meetings != self._met:
             self._met, self.element = status.meetings, -1
-            self._past.forget(estimate.curvature.shape[1])
             self.card.show_facts("", "")
-        self._past.take(estimate)
+        key = status.meetings, estimate.generation
+        if key != self._of:
+            self._of, self._after = key, 0
+        times, readings, self._after = self._session.engine.recent(status, self._after)
+        self._past.take(times, readings)
         if self.card.isVisible() and self.element >= 0:
             self._show_card(estimate, now)
         if now >= self._next_plots:

@@ -9,7 +9,10 @@ _TICKS = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
 
 
 class SeveralButton(QToolButton):
-    """Says how many are chosen; `chosen` brings the values, in the order that they are offered."""
+    """Says how many are chosen; `chosen` brings the values, in the order that they are offered.
+
+    The Down key takes one more, Up one less.
+    """
 
     chosen = Signal(tuple)
 
@@ -27,6 +30,16 @@ class SeveralButton(QToolButton):
         tick.setCheckable(True)
         tick.toggled.connect(self._tell)
         return tick
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        on = [tick for tick in self.ticks.values() if tick.isChecked()]
+        off = [tick for tick in self.ticks.values() if not tick.isChecked()]
+        if event.key() == Qt.Key.Key_Down and off:
+            off[0].setChecked(True)
+        elif event.key() == Qt.Key.Key_Up and on:
+            on[-1].setChecked(False)
+        else:
+            super().keyPressEvent(event)
 
     def _values(self) -> tuple[str, ...]:
         return tuple(value for value, tick in self.ticks.items() if tick.isChecked())

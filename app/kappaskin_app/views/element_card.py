@@ -15,10 +15,10 @@ Array = NDArray[np.float64]
 
 _NONE = "Click an element, on the skin or in a heatmap."
 _NONE_TRACED = "Click an element and press Trace it, on its card (Ctrl+Alt+E)."
-_TRACE = "The curvature over the last 10 s, as often as the window took it."
+_TRACE = "The curvature over the last 10 s, in every frame that was computed, up to 500 a second."
 _SPECTRUM = (
     "The amplitude of the sine of each frequency that fits best to the last 10 s, by least squares "
-    "(Lomb and Scargle), up to half of what the window took in a second: hum stands out as a line."
+    "(Lomb and Scargle), up to half of the frames in a second: hum stands out as a line."
 )
 
 
