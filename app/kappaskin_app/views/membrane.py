@@ -219,7 +219,7 @@ class MembraneView(QWidget):
     def look_from(self, direction: Direction) -> None:
         """Look at the whole skin, as large as it fits, and again whenever the size changes."""
         self._from = direction
-        fit_camera(self.plotter.renderer, self.skin, direction)
+        fit_camera(self.plotter.renderer, self.skin, direction, self.plotter.width())
         self._fitted = True
         self._show_labels(direction.sees(0), direction.sees(1))
         self.plotter.update()
