@@ -1,6 +1,7 @@
 """Kappaskin: shape and contact from curvature-sensing tactile skins, live and with error bars."""
 
 from kappaskin.apart import Distances as Distances
+from kappaskin.apart import between as between
 from kappaskin.apart import distances as distances
 from kappaskin.bases import EDGES as EDGES
 from kappaskin.bases import Basis as Basis
