@@ -6,8 +6,8 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QDockWidget,
@@ -33,11 +33,16 @@ from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
+from kappaskin_app.lessons.pointing import Pointing
+from kappaskin_app.lessons.reading import DOCKS
+from kappaskin_app.lessons.teaching import Teaching
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
+from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.health import HealthPanel
+from kappaskin_app.panels.lesson import LessonPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
@@ -64,6 +69,7 @@ from kappaskin_app.wishes import Wishes
 _WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38, "compare": 0.36}
+_LESSONS = "Learn how the sensor works, step by step on the simulated skin"
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -137,8 +143,21 @@ class MainWindow(QMainWindow):
         for dock in self._docks[2:]:
             dock.setAllowedAreas(area.TopDockWidgetArea | below)  # wider than a column beside it
             dock.hide()  # so that a small window is left to the skin until they are asked for
+        self.lesson = LessonPanel()
+        self._lesson_dock = self._dock("lesson", "Lesson", self.lesson, left)
+        self.splitDockWidget(self._lesson_dock, self._docks[0], Qt.Orientation.Vertical)
+        self._lesson_dock.hide()
         self.actions_by_name = Actions(self)
         self.exports = Exports(self.session, self.membrane, self)
+        self.teaching = Teaching(
+            *(self.history, self.session, self.seeing, self),
+            *(self._connect, self._seen, self.exports.caption),
+        )
+        docks = {dock.objectName(): dock.widget() for dock in self._docks}
+        shown = {f"readout-{name}": line for name, line in self.readouts.lines.items()}
+        forms = [panel for panel in self.panels.all() if isinstance(panel, Form)]
+        places = {name: docks[name] for name in DOCKS} | shown
+        self.pointing = Pointing(forms, places, self._bring, self)
         self._make_actions()
         self._wire()
         self._follow(self.history.settings)
@@ -249,17 +268,34 @@ class MainWindow(QMainWindow):
         maps = {f"curvature {name}": view for name, view in self.heatmaps.items()}
         docks = {dock.windowTitle(): dock.widget() for dock in self._docks[2:]}
         self.exports.register(self.actions_by_name, solid, maps | docks)
+        turn_lesson = partial(self._turn, self._lesson_dock)
+        lessons = add("dock-lesson", help_, "&Lessons", turn_lesson, "Shift+F1", _LESSONS)
+        lessons.setCheckable(True)
+        self._lesson_dock.visibilityChanged.connect(lessons.setChecked)
         add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
 
     def _turn(self, dock: QDockWidget) -> None:
         """Show a dock below the skin, before the other in its place; hide one that is seen."""
         if not dock.visibleRegion().isEmpty():
             dock.hide()
-            return
+        else:
+            self._bring(dock)
+
+    def _bring(self, dock: QDockWidget) -> None:
+        """Show a dock, before the others in its place; one that is shown keeps its height."""
+        seen = not dock.visibleRegion().isEmpty()
         dock.show()
-        if not dock.isFloating():
-            heighten(self, dock, _HEIGHTS.get(dock.objectName(), _HEIGHT))
+        if not seen and not dock.isFloating():
+            self._heighten(dock)
         dock.raise_()
+
+    def _heighten(self, dock: QDockWidget) -> None:
+        name = dock.objectName()
+        if self.dockWidgetArea(dock) == Qt.DockWidgetArea.BottomDockWidgetArea:
+            heighten(self, dock, _HEIGHTS.get(name, _HEIGHT))
+        elif dock is self._lesson_dock:
+            shares = [round(share * self.height()) for share in (0.52, 0.34)]
+            self.resizeDocks([dock, self._docks[0]], shares, Qt.Orientation.Vertical)
 
     def _wire(self) -> None:
         panels, wishes, session, drag = self.panels, self.wishes, self.session, self.membrane.drag
@@ -299,6 +335,9 @@ class MainWindow(QMainWindow):
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
         self._attend_health()
         self._attend_recording()
+        self.lesson.attend(self.teaching)
+        self.teaching.pointed.connect(guarded(self.pointing.point))
+        self.teaching.told.connect(guarded(self._tell))
         self.staging.told.connect(guarded(self._tell))
         self.exports.told.connect(guarded(self._tell))
         self.staging.played.connect(guarded(panels.connection.show_source))
@@ -414,6 +453,8 @@ class MainWindow(QMainWindow):
         self.compare.show_theme(theme)
         self.stability.show_theme(theme)
         self.health.show_theme(theme)
+        self.lesson.show_theme(theme)
+        self.pointing.show_theme(theme)
         self.display.show_theme(theme)
         self.presenting.show_theme(theme)
 
@@ -464,6 +505,14 @@ class MainWindow(QMainWindow):
     def picture(self, path: Path) -> bool:
         """Save the window, 3-D picture included, as a PNG; whether it could be written."""
         return self.grab().save(str(path), "PNG")
+
+    def _seen(self) -> list[QPixmap]:
+        """Pictures of the numbers, and of the skin with the maps and what is shown below them."""
+        shown = [dock for dock in self._docks[1:] if not dock.visibleRegion().isEmpty()]
+        whole = QRect()
+        for part in (self.presenting.stage, *shown):
+            whole = whole.united(part.geometry())
+        return [self.readouts.grab(), self.grab(whole)]
 
     def _save_picture(self) -> None:
         path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png"))

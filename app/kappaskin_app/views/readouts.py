@@ -146,6 +146,11 @@ class Readouts(QWidget):
     def text(self, key: str) -> str:
         return self._numbers[key].text()
 
+    @property
+    def lines(self) -> dict[str, Line]:
+        """Where each number stands, by name."""
+        return dict(self._numbers)
+
     def show_health(self, health: Health) -> None:
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
         self._write("age", _age(1e3 * health.age, 1e3 * health.age_sd))
