@@ -69,6 +69,7 @@ from kappaskin_app.wishes import Wishes
 _WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38, "compare": 0.36}
+_LESSON = (0.58, 0.28)  # of it, of the lesson and of the settings below it
 _LESSONS = "Learn how the sensor works, step by step on the simulated skin"
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
@@ -153,8 +154,8 @@ class MainWindow(QMainWindow):
             *(self.history, self.session, self.seeing, self),
             *(self._connect, self._seen, self.exports.caption),
         )
-        docks = {dock.objectName(): dock.widget() for dock in self._docks}
-        shown = {f"readout-{name}": line for name, line in self.readouts.lines.items()}
+        docks = {dock.objectName(): [dock.widget()] for dock in self._docks}
+        shown = {f"readout-{name}": parts for name, parts in self.readouts.parts.items()}
         forms = [panel for panel in self.panels.all() if isinstance(panel, Form)]
         places = {name: docks[name] for name in DOCKS} | shown
         self.pointing = Pointing(forms, places, self._bring, self)
@@ -293,9 +294,8 @@ class MainWindow(QMainWindow):
         name = dock.objectName()
         if self.dockWidgetArea(dock) == Qt.DockWidgetArea.BottomDockWidgetArea:
             heighten(self, dock, _HEIGHTS.get(name, _HEIGHT))
-        elif dock is self._lesson_dock:
-            shares = [round(share * self.height()) for share in (0.52, 0.34)]
-            self.resizeDocks([dock, self._docks[0]], shares, Qt.Orientation.Vertical)
+        heights = [round(share * self.height()) for share in _LESSON]
+        self.resizeDocks([self._lesson_dock, self._docks[0]], heights, Qt.Orientation.Vertical)
 
     def _wire(self) -> None:
         panels, wishes, session, drag = self.panels, self.wishes, self.session, self.membrane.drag

@@ -1,9 +1,18 @@
 """Every lesson played through on the window, and what the panel says meanwhile."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QDockWidget, QFileDialog
 
 from kappaskin_app.lessons.lesson import UNITS, Choice, Number, Question, Task
 from kappaskin_app.lessons.progress import DONE
+from kappaskin_app.lessons.reading import DOCKS, READOUTS
+from kappaskin_app.lessons.setting import SETTABLE
 from kappaskin_app.window import MainWindow
 
 
@@ -72,6 +81,109 @@ def test_every_lesson_can_be_played_through(window: MainWindow, until) -> None:
         play(window, name, until)
         window.teaching.leave()
         assert window.history.settings == before, name
-    while window.history.stack.canUndo():
-        window.history.stack.undo()
-    assert window.history.settings == before
+    below = [window.findChild(QDockWidget, name) for name in DOCKS[1:]]
+    assert all(dock.isHidden() for dock in below)
+
+
+def test_steps_are_undone_one_by_one_and_back_gives_them_again(window: MainWindow) -> None:
+    history, teaching = window.history, window.teaching
+    before = history.settings
+    window.actions_by_name["dock-lesson"].trigger()
+    teaching.take("03-why-sines")
+    first = history.settings
+    for number in range(1, 6):
+        teaching.go(number)
+    assert history.settings.functions_x == 8
+    teaching.go(4)
+    assert history.settings.functions_x == 2
+    teaching.go(0)
+    assert history.settings == first
+    while history.stack.canUndo():
+        history.stack.undo()
+    assert history.settings == before
+
+
+def test_a_theme_chosen_in_a_lesson_stays_and_its_settings_do_not(window: MainWindow) -> None:
+    window.history.change("Mine", -1, functions_x=5, noise_seed=7)
+    mine = window.history.settings
+    take(window, "07-silent-mode")
+    assert window.history.settings.functions_x == 8
+    window.wishes.switch_theme()
+    window.lesson.leave.click()
+    assert window.history.settings == replace(mine, theme="light")
+    assert window.lesson.list.isVisible()
+    assert not window.pointing.rings
+
+
+def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindow, qtbot) -> None:
+    window.actions_by_name["dock-lesson"].trigger()
+    lessons = window.lesson.list.list
+    lessons.setFocus()
+    qtbot.keyClick(lessons, Qt.Key.Key_Return)
+    window.lesson.next.setFocus()
+    qtbot.keyClick(window.lesson.next, Qt.Key.Key_Space)
+    asking = window.lesson.step.asking
+    for typed, said in (("much", "Type a number"), ("2", "Not so."), ("20", "Right.")):
+        asking.number.clear()
+        qtbot.keyClicks(asking.number, typed)
+        qtbot.keyClick(asking.number, Qt.Key.Key_Return)
+        assert asking.feedback.text().startswith(said)
+    assert not asking.check.isEnabled()
+    assert window.teaching.progress.answer.outcome() == "right at try 2"
+
+
+def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWindow, until) -> None:
+    take(window, "04-how-many-functions")
+    until(lambda: window.teaching.figures()["error_rms"] > 1e-5)
+    asking = window.lesson.step.asking
+    for _ in range(2):
+        asking.check.click()
+    assert "makes the dent a little sharper" in asking.feedback.text()
+    assert asking.show_how.isVisible()
+    asking.show_how.click()
+    assert window.history.settings.functions_x == 6
+    window.teaching.go(3)
+    window.teaching.leave()
+    window.lesson.list.list.setCurrentRow(3)
+    assert "step 4 of 7" in window.lesson.list.about.text()
+    window.lesson.list.begin.click()
+    assert window.teaching.progress.step == 3
+    window.teaching.go(0)
+    assert "makes the dent a little sharper" in window.lesson.step.asking.feedback.text()
+
+
+def test_the_figure_holds_the_name_and_the_window(
+    window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take(window, "01-curvature-gage")
+    window.teaching.answer("1")
+    window.teaching.go(99)
+    window.lesson.end.name.setText("Ada <Lovelace>")
+    files = {end: tmp_path / f"figure.{end}" for end in ("png", "svg")}
+    for file in files.values():
+        monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, file=file: (str(file), ""))
+        window.lesson.end.save.click()
+    picture = QImage(str(files["png"]))
+    assert picture.text("Title") == "What a curvature gage feels"
+    assert picture.text("Description").startswith("Ada <Lovelace>: kappaskin ")
+    assert picture.width() == 1000
+    assert picture.height() > 600
+    drawing = files["svg"].read_text("utf-8")
+    assert "Ada &lt;Lovelace&gt;" in drawing
+    assert "Under the arrow" in drawing
+
+
+def test_whatever_a_lesson_may_point_at_is_in_the_window_and_own_ones_are_taken(
+    window: MainWindow, tmp_path: Path
+) -> None:
+    for place in (*DOCKS, *READOUTS, *SETTABLE):
+        assert window.pointing.targets(place)
+    file = tmp_path / "own.md"
+    head = '+++\nformat = 1\ntitle = "Mine"\nminutes = 3\nlearn = "It."\n+++\n'
+    file.write_text(head + "## One\nText.\n```toml\nset = { functions_x = 99 }\n```\n")
+    window.teaching.open_file(file)
+    assert "own, line 10: " in window.statusBar().currentMessage()
+    assert "functions_x from 1 to 64" in window.statusBar().currentMessage()
+    file.write_text(head + "## One\nText.\n```toml\nset = { functions_x = 9 }\n```\n")
+    window.teaching.open_file(file)
+    assert window.history.settings.functions_x == 9

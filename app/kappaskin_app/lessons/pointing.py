@@ -59,19 +59,20 @@ class Pointing(QObject):
     def __init__(
         self,
         forms: list[Form],
-        others: Mapping[str, QWidget],
+        others: Mapping[str, list[QWidget]],
         show_dock: Callable[[QDockWidget], None],
         parent: QObject,
     ) -> None:
         super().__init__(parent)
         self._forms, self._others, self._show_dock = forms, others, show_dock
         self.rings: list[_Ring] = []
+        self._shown: list[QDockWidget] = []
         self._theme = LIGHT
 
     def targets(self, name: str) -> list[QWidget]:
         """The widgets that `name` means: a control with its label, a dock or a number."""
         if name in self._others:
-            return [self._others[name]]
+            return self._others[name]
         for form in self._forms:
             if name in form.names:
                 editor = form.editor(name)
@@ -85,12 +86,19 @@ class Pointing(QObject):
             ring.hide()
             ring.deleteLater()
         self.rings = []
-        for name in names:
-            targets = self.targets(name)
+        pointed = [self.targets(name) for name in names]
+        self._put_away([one for targets in pointed for one in _around(targets[0])])
+        for targets in pointed:
             self._reveal(targets[0])
             self.rings.append(_Ring(targets, self._theme.accent))
         # Once more when what was shown has its place.
         QTimer.singleShot(0, self, guarded(self._scroll))
+
+    def _put_away(self, needed: list[QWidget]) -> None:
+        """Hide the docks that were shown for what is pointed at no more."""
+        for dock in [one for one in self._shown if one not in needed]:
+            self._shown.remove(dock)
+            dock.hide()
 
     def _scroll(self) -> None:
         for ring in reversed(self.rings):  # the first one named is the one that is seen for sure
@@ -105,6 +113,8 @@ class Pointing(QObject):
                 pages = [area.widget(index) for index in range(area.count())]
                 area.setCurrentIndex([page in around for page in pages].index(True))
             if isinstance(area, QDockWidget):
+                if area.isHidden():
+                    self._shown.append(area)
                 self._show_dock(area)
 
     def show_theme(self, theme: Theme) -> None:

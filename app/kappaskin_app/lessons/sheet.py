@@ -17,20 +17,21 @@ _WIDTH, _MARGIN = 1000, 24  # px
 
 
 def changed(settings: Settings) -> Iterator[str]:
-    """Each setting that is not as usual, in words, as the forms call it."""
+    """Each setting that is not as usual, in words."""
     usual = Settings()
     for name in (one for one in vars(usual) if one in SETTABLE):
         value, how = getattr(settings, name), ask_of(name)
         if value == getattr(usual, name):
             continue
+        said = name.replace("_", " ")
         if isinstance(how, Range):
-            yield f"{how.label} {value * how.scale:.6g} {how.unit}".strip()
+            yield f"{said} {value * how.scale:.6g} {how.unit}".strip()
         elif isinstance(how, Choice):
-            yield f"{how.label} {dict(how.options)[value]}"
+            yield f"{said} {dict(how.options)[value].lower()}"
         elif isinstance(how, Switch):
-            yield f"{how.label} {'on' if value else 'off'}"
+            yield f"{said} {'on' if value else 'off'}"
     if settings.written is not None:
-        yield f"Scene {settings.written.file.stem}"
+        yield f"scene {settings.written.file.stem}"
     if settings.dead_elements:
         yield f"{len(settings.dead_elements)} dead elements"
 

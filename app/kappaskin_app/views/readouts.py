@@ -147,9 +147,12 @@ class Readouts(QWidget):
         return self._numbers[key].text()
 
     @property
-    def lines(self) -> dict[str, Line]:
-        """Where each number stands, by name."""
-        return dict(self._numbers)
+    def parts(self) -> dict[str, list[QWidget]]:
+        """Each number with what stands above it, by name."""
+        return {
+            key: [number, name]
+            for (key, number), name in zip(self._numbers.items(), self._names, strict=True)
+        }
 
     def show_health(self, health: Health) -> None:
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")

@@ -21,7 +21,7 @@ class EndPage(QWidget):
         super().__init__(parent)
         self.text = text_label()
         self.text.setTextFormat(Qt.TextFormat.RichText)
-        asked = text_label("Your name, or your names, as they are to stand on the figure:")
+        asked = text_label("Your name, as it is to stand on the figure:")
         self.name = QLineEdit()
         self.name.setObjectName("student")
         self.name.setMaxLength(80)
@@ -35,7 +35,9 @@ class EndPage(QWidget):
         )
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(scrolled(self.text, asked, self.name, self.save))
+        whole.addWidget(scrolled(self.text), 1)
+        for widget in (asked, self.name, self.save):
+            whole.addWidget(widget)
         self.name.textChanged.connect(guarded(self._allow))
         self.name.returnPressed.connect(guarded(self.save.click))
         self.save.clicked.connect(guarded(lambda *_: self.hand_in_wanted.emit(self.name.text())))
@@ -45,12 +47,10 @@ class EndPage(QWidget):
         self.save.setEnabled(bool(self.name.text().strip()))
 
     def show_progress(self, progress: Progress) -> None:
-        rows = "".join(
-            f"<li>{escape(title)}: <b>{escape(outcome)}</b></li>"
-            for title, _, _, outcome in progress.rows()
+        rows = "<br>".join(
+            f"{escape(title)}: <b>{escape(outcome)}</b>" for title, _, _, outcome in progress.rows()
         )
         self.text.setText(
-            f"<p><b>The end.</b> {escape(progress.lesson.learn)}</p><ul style='margin-left: 0; "
-            f"-qt-list-indent: 1'>{rows}</ul><p>Bring the window to what you would like to show, "
-            "then save the figure.</p>"
+            f"<p><b>The end.</b> {escape(progress.lesson.learn)}</p><p>{rows}</p><p>Bring the "
+            "window to what you would like to show, then save the figure to hand in.</p>"
         )
