@@ -1,6 +1,7 @@
 """Lessons as files: what is read, what is refused and where, how answers are judged."""
 
 import math
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -9,14 +10,15 @@ from hypothesis import strategies as st
 
 from kappaskin import Refusal
 from kappaskin_app.lessons.expression import NUMBER, TRUTH, WORD, expression
-from kappaskin_app.lessons.figures import KINDS, Watch
-from kappaskin_app.lessons.lesson import Number, Task, whole
+from kappaskin_app.lessons.figures import KINDS, SETTINGS, Watch
+from kappaskin_app.lessons.lesson import UNITS, Number, Task, whole
 from kappaskin_app.lessons.progress import Answer, Progress, judged, number_in
-from kappaskin_app.lessons.reading import READY, lesson_of, read_lesson
+from kappaskin_app.lessons.reading import DOCKS, READY, lesson_of, read_lesson
 from kappaskin_app.lessons.setting import SETTABLE, checked_setting
 from kappaskin_app.settings import Settings, ask_of
 from kappaskin_app.settings.asks import Range
 
+FIGURES_SEEN = [name for name in KINDS if name not in SETTINGS]
 FIGURES = {"force": 0.2, "method": "bayes", "noise": math.nan, "functions_x": 8.0}
 HEAD = '+++\nformat = 1\ntitle = "A"\nminutes = 5\nlearn = "B"\n+++\n'
 ASK = 'question = "Q?"\nhint = "h"\nexplain = "e"\n'
@@ -242,6 +244,17 @@ def test_a_step_without_settings_begins_with_those_of_one_before() -> None:
     read = lesson_of(HEAD + "## A\nT\n```toml\nset = { force = 0.1 }\n```\n## B\nT\n## C\nT\n", "x")
     assert [step.sets for step in read.steps] == [{"force": 0.1}, None, None]
     assert read.begins(2) == {"force": 0.1}
+
+
+def test_the_guide_tells_of_all_there_is_and_its_example_is_a_lesson() -> None:
+    guide = READY[0].with_name("README.md").read_text("utf-8")
+    for name in (*FIGURES_SEEN, *SETTABLE, *DOCKS):
+        assert f"`{name}`" in guide
+    for unit in filter(None, UNITS):
+        assert unit in guide
+    lines = guide.split("    +++", 1)[1].split("\nEach step", 1)[0]
+    example = lesson_of(textwrap.dedent("    +++" + lines), "example")
+    assert example.steps[0].question is not None
 
 
 def test_windows_line_ends_are_read_too() -> None:
