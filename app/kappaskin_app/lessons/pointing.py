@@ -10,7 +10,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.panels.form import Form
 from kappaskin_app.theme import LIGHT, Theme
 
-_AROUND, _THICK = 3, 2  # px
+_AROUND, _THICK, _ABOUT = 3, 2, 60  # px: of a ring, and of what is seen around it
 
 
 class _Ring(QWidget):
@@ -104,7 +104,7 @@ class Pointing(QObject):
         for ring in reversed(self.rings):  # the first one named is the one that is seen for sure
             for area in _around(ring):
                 if isinstance(area, QScrollArea):
-                    area.ensureWidgetVisible(ring, 0, 4 * _AROUND)
+                    area.ensureWidgetVisible(ring, 0, _ABOUT)
 
     def _reveal(self, target: QWidget) -> None:
         around = list(_around(target))
