@@ -19,7 +19,7 @@ from kappaskin_app.window import MainWindow
 def take(window: MainWindow, name: str) -> None:
     if not window.lesson.isVisible():
         window.actions_by_name["dock-lesson"].trigger()
-    window.teaching.take(name)
+    window.teaching.take(next(file for file in window.teaching.taken if name in file))
 
 
 def number_seen(window: MainWindow, how: Number) -> float:
@@ -88,8 +88,7 @@ def test_every_lesson_can_be_played_through(window: MainWindow, until) -> None:
 def test_steps_are_undone_one_by_one_and_back_gives_them_again(window: MainWindow) -> None:
     history, teaching = window.history, window.teaching
     before = history.settings
-    window.actions_by_name["dock-lesson"].trigger()
-    teaching.take("03-why-sines")
+    take(window, "03-why-sines")
     first = history.settings
     for number in range(1, 6):
         teaching.go(number)
@@ -103,14 +102,17 @@ def test_steps_are_undone_one_by_one_and_back_gives_them_again(window: MainWindo
     assert history.settings == before
 
 
-def test_a_theme_chosen_in_a_lesson_stays_and_its_settings_do_not(window: MainWindow) -> None:
+def test_settings_and_source_from_before_come_back_and_a_theme_stays(window: MainWindow) -> None:
+    window.panels.connection.connect_wanted.emit("/dev/none")
     window.history.change("Mine", -1, functions_x=5, noise_seed=7)
     mine = window.history.settings
     take(window, "07-silent-mode")
     assert window.history.settings.functions_x == 8
+    assert window.session.source == "sim:"
     window.wishes.switch_theme()
     window.lesson.leave.click()
     assert window.history.settings == replace(mine, theme="light")
+    assert window.session.source == "/dev/none"
     assert window.lesson.list.isVisible()
     assert not window.pointing.rings
 
@@ -182,8 +184,10 @@ def test_whatever_a_lesson_may_point_at_is_in_the_window_and_own_ones_are_taken(
     head = '+++\nformat = 1\ntitle = "Mine"\nminutes = 3\nlearn = "It."\n+++\n'
     file.write_text(head + "## One\nText.\n```toml\nset = { functions_x = 99 }\n```\n")
     window.teaching.open_file(file)
-    assert "own, line 10: " in window.statusBar().currentMessage()
-    assert "functions_x from 1 to 64" in window.statusBar().currentMessage()
+    window.actions_by_name["dock-lesson"].trigger()
+    assert window.lesson.list.message.isVisible()
+    assert window.lesson.list.message.text().startswith("own.md, line 10: ")
+    assert "functions_x from 1 to 64" in window.lesson.list.message.text()
     file.write_text(head + "## One\nText.\n```toml\nset = { functions_x = 9 }\n```\n")
     window.teaching.open_file(file)
     assert window.history.settings.functions_x == 9

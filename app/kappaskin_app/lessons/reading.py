@@ -61,7 +61,7 @@ def read_lesson(file: Path) -> Lesson:
         text = data.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise Refusal(f"{file}: expected a lesson in UTF-8 text, got none: {error}") from error
-    return lesson_of(text, file.stem)
+    return lesson_of(text, file.name)
 
 
 def lesson_of(text: str, name: str) -> Lesson:

@@ -9,11 +9,11 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import Refusal
+from kappaskin import Estimate, Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.lessons.figures import Watch
-from kappaskin_app.lessons.lesson import Lesson, Task, whole
+from kappaskin_app.lessons.lesson import Task, whole
 from kappaskin_app.lessons.progress import Progress
 from kappaskin_app.lessons.reading import READY, read_lesson
 from kappaskin_app.lessons.sheet import sheet
@@ -26,11 +26,12 @@ _FILES = "Lesson (*.md)"
 
 
 class Teaching(QObject):
-    """Knows the lessons and how far each is; `changed` tells when that or a judgement is another.
+    """Knows the lessons, by file, and how far each is; `changed` tells when that is another.
 
     `progress` is that of the lesson that is taken, None while none is; `message` says why an answer
-    could not be judged. `told` says what came of a wish, `pointed` at what to point. It is told how
-    to `connect` to a source, and gets pictures of what is seen and the words below them.
+    could not be judged, or a file not be read. `told` says what came of a wish, `pointed` at what
+    to point. It is told how to `connect` to a source, and gets pictures of what is seen and the
+    words below them.
     """
 
     changed = Signal()
@@ -56,18 +57,18 @@ class Teaching(QObject):
         self.message = ""
         self._watch = Watch()
         self._before: tuple[Settings, str] | None = None
-        session.estimated.connect(guarded(self._watch.receive))
+        session.estimated.connect(guarded(self._receive))
         history.changed.connect(guarded(lambda *_: self._watch.forget()))
+
+    def _receive(self, estimate: Estimate) -> None:
+        if self.progress is not None:
+            self._watch.receive(estimate)
 
     def look(self) -> None:
         """Read the lessons that come with the program, the first time that somebody asks."""
         if not self.taken:
-            for file in READY:
-                self._add(read_lesson(file))
+            self.taken = {str(file): Progress(read_lesson(file)) for file in READY}
             self.changed.emit()
-
-    def _add(self, lesson: Lesson) -> None:
-        self.taken[lesson.name] = Progress(lesson)
 
     # What a person wishes.
 
@@ -81,16 +82,16 @@ class Teaching(QObject):
         """Take the lesson in a file of one's own, or say why there is none."""
         self.look()
         try:
-            lesson = read_lesson(file)
+            self.taken[str(file)] = Progress(read_lesson(file))
         except Refusal as refusal:
-            self.told.emit(str(refusal))
+            self.message = str(refusal)
+            self.changed.emit()
             return
-        self._add(lesson)
-        self.take(lesson.name)
+        self.take(str(file))
 
-    def take(self, name: str) -> None:
-        """Begin a lesson, or go on where it was left."""
-        progress = self.taken[name]
+    def take(self, file: str) -> None:
+        """Begin the lesson in `file`, or go on where it was left."""
+        progress = self.taken[file]
         if self._before is None:
             self._before = self._history.settings, self._session.source
         self.progress = progress

@@ -89,7 +89,7 @@ class LessonPanel(QWidget):
         self.list.setVisible(progress is None)
         self._taking.setVisible(progress is not None)
         if progress is None:
-            self.list.show_lessons(teaching.taken)
+            self.list.show_lessons(teaching.taken, teaching.message)
             self.step.forget()
             return
         steps = len(progress.lesson.steps)
@@ -110,7 +110,8 @@ class LessonPanel(QWidget):
         self.seen.emit()
 
     def show_theme(self, theme: Theme) -> None:
-        self.step.show_theme(theme)
+        for page in (self.list, self.step):
+            page.show_theme(theme)
         self.where.setStyleSheet(f"color: {theme.faint};")
         self.bar.setStyleSheet(
             f"QProgressBar {{ background: {theme.line}; border: none; border-radius: 2px; }}"

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem, QVBoxLayout, QWidget
 from kappaskin_app.guard import guarded
 from kappaskin_app.lessons.progress import Progress
 from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, in_a_row, text_label
+from kappaskin_app.theme import Theme
 
 _NAME = Qt.ItemDataRole.UserRole
 _DONE = "\N{CHECK MARK}"
@@ -39,7 +40,8 @@ class ListPage(QWidget):
         self.list.setSpacing(2)
         self.list.setTextElideMode(Qt.TextElideMode.ElideRight)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.about = text_label()
+        self.about, self.message = text_label(), text_label()
+        self.message.setTextFormat(Qt.TextFormat.PlainText)
         self.about.setTextFormat(Qt.TextFormat.PlainText)
         self.about.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.about.setMinimumHeight(5 * self.about.fontMetrics().lineSpacing())
@@ -56,6 +58,7 @@ class ListPage(QWidget):
         stack.setContentsMargins(8, 6, 8, 8)
         stack.addWidget(self.list, 1)
         stack.addWidget(self.about)
+        stack.addWidget(self.message)
         stack.addLayout(in_a_row(self.begin, self.open))
         self._progress: Mapping[str, Progress] = {}
         self.list.currentItemChanged.connect(guarded(self._describe))
@@ -64,9 +67,11 @@ class ListPage(QWidget):
         self.begin.clicked.connect(guarded(self._take))
         self.open.clicked.connect(guarded(lambda *_: self.open_wanted.emit()))
 
-    def show_lessons(self, progress: Mapping[str, Progress]) -> None:
-        """Show the lessons by name, and how far each is."""
+    def show_lessons(self, progress: Mapping[str, Progress], message: str) -> None:
+        """Show the lessons by file, how far each is, and why a file was no lesson."""
         self._progress = progress
+        self.message.setText(message)
+        self.message.setVisible(bool(message))
         for row, (name, one) in enumerate(progress.items()):
             if row == self.list.count():
                 self.list.addItem(QListWidgetItem())
@@ -82,6 +87,9 @@ class ListPage(QWidget):
     def selected(self) -> str:
         item = self.list.currentItem()
         return "" if item is None else item.data(_NAME)
+
+    def show_theme(self, theme: Theme) -> None:
+        self.message.setStyleSheet(f"color: {theme.alert};")
 
     def _describe(self, *_: object) -> None:
         one = self._progress.get(self.selected)
