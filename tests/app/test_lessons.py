@@ -154,6 +154,16 @@ def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWin
     assert "makes the dent a little sharper" in window.lesson.step.asking.feedback.text()
 
 
+def test_what_is_said_to_an_answer_is_scrolled_to(window: MainWindow, until) -> None:
+    take(window, "07-silent-mode")
+    window.teaching.go(4)
+    until(lambda: window.teaching.figures()["silent"] == 0)
+    asking = window.lesson.step.asking
+    assert asking.feedback.visibleRegion().isEmpty()
+    window.teaching.answer("5")
+    until(lambda: not asking.feedback.visibleRegion().isEmpty())
+
+
 def test_the_figure_holds_the_name_and_the_window(
     window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,6 +1,6 @@
 """One step of a lesson: what there is to read, to try and to answer."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtWidgets import QLayout, QVBoxLayout, QWidget
 
 from kappaskin_app.columns import scrolled
@@ -42,11 +42,18 @@ class StepPage(QWidget):
     def show_progress(self, progress: Progress, message: str) -> None:
         """Show the step that a person is at, and what came of the answer."""
         now = progress.lesson.name, progress.step
-        if now != self._shown:
+        if another := now != self._shown:
             self._shown = now
             self._make(progress)
         if self.asking is not None:
             self.asking.show_answer(progress.answer, message)
+            if not another:
+                # Once what is said has its place below the question.
+                QTimer.singleShot(0, self.asking, guarded(self._see_feedback))
+
+    def _see_feedback(self) -> None:
+        if self.asking is not None:
+            self.area.ensureWidgetVisible(self.asking.feedback)
 
     def _make(self, progress: Progress) -> None:
         step = progress.lesson.steps[progress.step]
