@@ -63,12 +63,19 @@ class Actions:
         return self.entries[name].action
 
     def cheat_sheet(self) -> str:
-        """Every shortcut with what it does, as HTML."""
-        rows = [
-            f"<tr><td><b>{entry.action.shortcut().toString()}</b>&nbsp;&nbsp;</td>"
-            f"<td>{entry.action.text().replace('&', '')}</td></tr>"
-            for entry in self.entries.values()
-            if not entry.action.shortcut().isEmpty()
-        ]
+        """Every shortcut with what it does, menu by menu in two columns, as HTML."""
+        menus: dict[str, list[str]] = {}
+        for entry in self.entries.values():
+            if key := entry.action.shortcut().toString():
+                does = entry.action.text().replace("&", "")
+                row = f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td><nobr>{does}</nobr></td></tr>"
+                menus.setdefault(entry.menu.replace("&", ""), []).append(row)
+        half = sum(1 + len(rows) for rows in menus.values()) / 2
+        columns, count = ["", ""], 0
+        for menu, rows in menus.items():
+            head = f'<tr><td colspan="2"><u>{menu}</u></td></tr>'
+            columns[count + len(rows) / 2 > half] += "".join([head, *rows])
+            count += 1 + len(rows)
+        left, right = (f'<td><table cellpadding="1">{rows}</table></td>' for rows in columns)
         mouse = "<p>Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom.</p>"
-        return f"<table>{''.join(rows)}</table>{mouse}"
+        return f"<table><tr>{left}<td>{8 * '&nbsp;'}</td>{right}</tr></table>{mouse}"

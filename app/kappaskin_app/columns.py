@@ -7,17 +7,6 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QVBoxLayout
 _LOWEST = 240  # px of what is below the skin
 
 
-def column(*widgets: QWidget) -> QWidget:
-    """The widgets sharing the height evenly."""
-    whole, stack = QWidget(), QVBoxLayout()
-    stack.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        stack.addWidget(widget, 1)
-    whole.setLayout(stack)
-    whole.setMinimumWidth(270)
-    return whole
-
-
 def scrolled(*widgets: QWidget) -> QScrollArea:
     """The widgets as tall as they like to be, scrolled where the window is too low for them."""
     whole, stack = QWidget(), QVBoxLayout()
@@ -33,6 +22,15 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
     bar = area.verticalScrollBar().sizeHint().width()
     area.setMinimumWidth(whole.minimumSizeHint().width() + bar)
     return area
+
+
+def scroll_to(widget: QWidget) -> None:
+    """Bring a widget in sight, where it is on a page that is scrolled."""
+    area = widget.parentWidget()
+    while area is not None and not isinstance(area, QScrollArea):
+        area = area.parentWidget()
+    if area is not None:
+        area.ensureWidgetVisible(widget)
 
 
 def heighten(window: QMainWindow, dock: QDockWidget, share: float) -> None:

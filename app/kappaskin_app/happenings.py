@@ -55,7 +55,7 @@ class Happenings(QDialog):
         self._happened = status.happened
         self._lines.extendleft(line for line in _lines(new))
         self.list.setPlainText("\n".join(self._lines))
-        self.told.emit("; ".join(_sentence(event.text) for event in new[-2:]))
+        self.told.emit("; ".join(dict.fromkeys(_sentence(event.text) for event in new[-2:])))
 
     def open_list(self) -> None:
         self.show()

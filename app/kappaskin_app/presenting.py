@@ -121,22 +121,22 @@ class Presenting(QObject):
         self._found = Found(what, within.touch) if what.probability else None
         self._found_at = time.monotonic()
 
-    def receive(self, estimate: Estimate) -> None:
-        """Show what is felt in an estimate."""
+    def receive(self, _: Estimate) -> None:
+        """Show what is felt by now, as often as that can be seen."""
         now = time.monotonic()
-        if not self.on or now < self._next_felt:
-            return
-        self._next_felt = now + _FELT
-        self._feel(self._display.estimate_shown() and estimate, now)
+        if self.on and now >= self._next_felt:
+            self._feel(now)
 
-    def _feel(self, estimate: Estimate | None, now: float) -> None:
+    def _feel(self, now: float) -> None:
+        self._next_felt = now + _FELT
+        estimate = self._display.estimate_shown()
         found = self._found if now - self._found_at < _OLD else None
         self.cue = None if estimate is None else cue_of(estimate, found)
         self.stage.show_felt(self.cue, now)
         self.sound.follow(self.stage.bar.share)
         if now >= self._next_figures:
             self._next_figures = now + _READ
-            self.stage.show_cue(self.cue)
+            self.stage.show_cue(self.cue, "no reading" if estimate is None else "nothing felt")
 
     def follow(self, status: Status) -> None:
         """Show how live it is, and what to do if it is not."""
@@ -144,13 +144,13 @@ class Presenting(QObject):
             return
         state, now = self._session.badge(), time.monotonic()
         if state not in REMEDIES:
-            age = age_in_words(*self._display.age())
+            age = "" if self._display.old else age_in_words(*self._display.age())
             self.stage.show_trouble("", "", "")
         else:
             age = age_in_words(now - status.last_frame)
             since = self._session.alarm().partition("\n")[0].removeprefix(state).strip()
             self.stage.show_trouble(state, since, status.message.replace("`", ""))
-            self._feel(None, now)
+        self._feel(now)  # a recording that stands, or has a gap, brings no estimate
         self.stage.strip.show_state(state, _called(status), age)
         self._show_hand()
 

@@ -2,22 +2,21 @@
 
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
-from kappaskin import Event, Recording, Refusal, Replay, Setup, Status, setups_of
+from kappaskin import Damaged, Event, Refusal, Replay, Setup, Status
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.newest import Newest
-from kappaskin_app.recordings import newest, recordings_folder, repairing
+from kappaskin_app.recordings import newest, recordings_folder
+from kappaskin_app.seen import Seen, seen, told_of
 from kappaskin_app.session import RECORDED, Session
-from kappaskin_app.views.landmarks import minutes
+from kappaskin_app.views.landmarks import day
 from kappaskin_app.views.transport import SPEEDS, Transport
 
 FILES = "Recording (*.mcap *.mcap.part)"
@@ -28,56 +27,18 @@ _HERE = 1e-4  # s: an event so near is where the replay is
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 
 
-@dataclass(frozen=True)
-class Seen:
-    """What there is to know of the recording at `path` before it is played.
-
-    `setups` it was made with, each from a time in s on, and why they cannot be told.
-    """
-
-    path: Path
-    length: float = 0.0
-    whole: bool = True
-    setups: tuple[tuple[float, Setup], ...] = ()
-    trouble: str = ""
-
-    def setup_at(self, at: float) -> Setup | None:
-        """The one in use at `at` s; before the first, that."""
-        used = [setup for since, setup in self.setups if since <= at] or [
-            setup for _, setup in self.setups[:1]
-        ]
-        return used[-1] if used else None
-
-    def changes(self) -> list[Event]:
-        """Where another setup came into use, in words."""
-        return [
-            Event(since, "settings", f"{now.Ni} x {now.Nj} functions, {now.method}")
-            for (_, was), (since, now) in zip(self.setups, self.setups[1:], strict=False)
-            if now != was
-        ]
-
-
-def seen(path: Path) -> Seen:
-    """Look into the file at `path`; a `Refusal` where it is no recording."""
-    with Recording(path) as recording:
-        length = (recording.last - recording.first) * 1e-9
-        try:
-            setups = tuple(setups_of(recording))
-        except Refusal as refusal:
-            return Seen(path, length, recording.whole, (), str(refusal))
-        return Seen(path, length, recording.whole, setups)
-
-
 class Replaying(QObject):
     """Opens recordings, and has the engine play them as `transport` asks.
 
     `opened` names the source that is played, `told` says what came of a wish, `changed` that
-    `message` did: what a person should know about the recording, `alarming` where it is bad news.
+    `message` did: what a person should know about the recording, `alarming` where it is bad news;
+    `damaged` is the one that a repair may help then, and `offered` tells that there is one.
     """
 
     opened = Signal(str)
     told = Signal(str)
     changed = Signal()
+    offered = Signal()
 
     def __init__(
         self, history: History, session: Session, transport: Transport, window: QWidget
@@ -87,6 +48,7 @@ class Replaying(QObject):
         self._window = window
         self.seen: Seen | None = None
         self.message, self.alarming = "", False
+        self.damaged: Path | None = None
         self.speed, self._looped, self._goes = 1.0, False, True
         self._replay: Replay | None = None
         self._sought: float | None = None
@@ -95,7 +57,7 @@ class Replaying(QObject):
         self._before: dict[str, object] = {}
         self._changes: list[Event] = []
         self._thread = ThreadPoolExecutor(1, "recording-reader")
-        self._looking: tuple[Future[Seen], bool] | None = None
+        self._looking: tuple[Future[Seen], Path, bool] | None = None
         self._send, self._recent = Newest(self), QMenu(window)
         self._opened: list[Path] = []
         self._actions: Actions | None = None
@@ -161,13 +123,13 @@ class Replaying(QObject):
 
     def _look(self, path: Path, connects: bool) -> None:
         self.told.emit(f"Reading {path.name}{_DOTS}")
-        self._looking = self._thread.submit(seen, path), connects
+        self._looking = self._thread.submit(seen, path), path, connects
         QTimer.singleShot(_LOOK, self, guarded(self._take))
 
     def _take(self) -> None:
         if self._looking is None:
             return
-        future, connects = self._looking
+        future, path, connects = self._looking
         if not future.done():
             QTimer.singleShot(_LOOK, self, guarded(self._take))
             return
@@ -175,7 +137,8 @@ class Replaying(QObject):
         try:
             found = future.result()
         except Refusal as refusal:
-            self._say(str(refusal), alarming=True)
+            damaged = path if isinstance(refusal, Damaged) else None
+            self._say(str(refusal), alarming=True, damaged=damaged)
             self.told.emit(str(refusal))
             return
         self._play(found, connects)
@@ -192,7 +155,7 @@ class Replaying(QObject):
         now = self._history.settings
         self._before = {"calibration": now.calibration, "tare": now.tare}
         self._use(found.setup_at(0.0))
-        self._say(_told_of(found))
+        self._say(told_of(found), damaged=None if found.whole else found.path)
         self.opened.emit(source)
         self.told.emit(self.message or f"Playing {found.path.name}, with the settings recorded")
 
@@ -351,10 +314,20 @@ class Replaying(QObject):
             there = 0 <= replay.at - self._sought <= passed * self._pace + 1e-6
             if there or passed > _ARRIVES:
                 self._sought = None
+        self._look_for_damage(status)
         self._transport.show_recording(replay, self.events)
         self._show()
         self._show_actions()
         self._show_title(replay)
+
+    def _look_for_damage(self, status: Status) -> None:
+        """Take note of why the engine let go of the recording."""
+        why, found = status.message, self.seen
+        if status.state != "lost" or found is None or why == self.message:
+            return
+        if str(found.path) in why:
+            helps = "`kappaskin repair`" in why and found.path.exists()
+            self._say(why, alarming=True, damaged=found.path if helps else None)
 
     def _show(self) -> None:
         self._transport.show_time(self.time, self.playing)
@@ -383,30 +356,13 @@ class Replaying(QObject):
         if self._recent.isEmpty():
             self._recent.addAction("None yet").setEnabled(False)
 
-    def _say(self, message: str, alarming: bool = False) -> None:
-        self.message, self.alarming = message, alarming
+    def _say(self, message: str, alarming: bool = False, damaged: Path | None = None) -> None:
+        self.message, self.alarming, self.damaged = message, alarming, damaged
         self.changed.emit()
+        if damaged is not None:
+            self.offered.emit()
 
     def close(self) -> None:
         self._looking = None
         self._send.forget()
         self._thread.shutdown(wait=True, cancel_futures=True)
-
-
-def day(replay: Replay) -> str:
-    """When a recording was begun, to the minute."""
-    return f"{datetime.fromtimestamp(replay.begun):%Y-%m-%d %H:%M}"
-
-
-def _told_of(found: Seen) -> str:
-    """What a person should know of a recording that is opened, or nothing."""
-    told: list[str] = []
-    if not found.whole:
-        told.append(
-            f"The recording {found.path.name} was never ended: it is played up to "
-            f"{minutes(found.length)}, where it breaks off. To make it whole: "
-            f"`{repairing(found.path)}`."
-        )
-    if found.trouble:
-        told.append(f"The settings recorded cannot be used: {found.trouble}")
-    return " ".join(told)

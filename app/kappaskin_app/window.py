@@ -1,42 +1,40 @@
 """The window: builds the panels and views, wires them to the session, and nothing else."""
 
 import time
-from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
-    QDockWidget,
     QHBoxLayout,
     QMainWindow,
-    QMessageBox,
     QToolBar,
     QVBoxLayout,
     QWidget,
 )
 
-from kappaskin import FIGURES, Engine, Status, Tares, data_folder
+from kappaskin import Engine, Status, Tares, data_folder
 from kappaskin_app import guard
-from kappaskin_app.actions import Actions
+from kappaskin_app.adopting import Entrusting, settings_left
 from kappaskin_app.calibrating import Calibrating
-from kappaskin_app.columns import column, heighten, widen
+from kappaskin_app.columns import widen
 from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
+from kappaskin_app.docks import Docks
 from kappaskin_app.drops import Drops
 from kappaskin_app.exports import Exports
-from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.guard import guarded
 from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.lessons.pointing import Pointing
 from kappaskin_app.lessons.reading import DOCKS
 from kappaskin_app.lessons.teaching import Teaching
+from kappaskin_app.looking import Looking
 from kappaskin_app.map_testing import MapTesting
+from kappaskin_app.menus import Menus
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
@@ -46,19 +44,19 @@ from kappaskin_app.panels.lesson import LessonPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
+from kappaskin_app.picking import Picking
 from kappaskin_app.planning import Planning
 from kappaskin_app.plugs import Plugs
-from kappaskin_app.presenting import NAMED, SOUND_TIP, TIP, Presenting
+from kappaskin_app.presenting import NAMED, Presenting
 from kappaskin_app.replaying import Replaying
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.session import Session
-from kappaskin_app.settings import COLOURS, Settings
+from kappaskin_app.settings import Settings
 from kappaskin_app.simulation import settings_for
 from kappaskin_app.staging import Staging
 from kappaskin_app.taping import Taping
 from kappaskin_app.taring import Taring
 from kappaskin_app.theme import THEMES, palette
-from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE, Direction
 from kappaskin_app.views.line import Line
 from kappaskin_app.views.recording_mark import RecordingMark
 from kappaskin_app.views.stage import Stage
@@ -67,10 +65,6 @@ from kappaskin_app.views.transport import Transport
 from kappaskin_app.wishes import Wishes
 
 _WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
-_HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
-_HEIGHTS = {"scene": 0.38, "compare": 0.36}
-_LESSON = (0.58, 0.28)  # of it, of the lesson and of the settings below it
-_LESSONS = "Learn how the sensor works, step by step on the simulated skin"
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -81,7 +75,11 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
-        self.history = History(settings_for(source), self)
+        handed = engine.adopted if engine else None
+        if handed and source == "sim:":  # nothing else was asked for
+            source = handed.asked.source or source
+        begun = settings_left(handed) if handed else settings_for(source)
+        self.history = History(begun, self)
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
         self.calibrating = Calibrating(self.history, self)
@@ -104,9 +102,9 @@ class MainWindow(QMainWindow):
             *(self.history, self.session, self.wishes, self.planning),
             *(self.scene, self.timeline, self),
         )
+        self.picking = Picking(self.history, self.session, self.display)
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
-        self._shortcuts: QMessageBox | None = None
         self._next_bargain = self._next_words = 0.0
         self._held_still = False
         # There from the start, or its first message would push the rest up.
@@ -123,43 +121,16 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(stage)
         self.presenting = Presenting(self, stage, self.session, self.display, self.wishes)
         self._make_header()
-        area = Qt.DockWidgetArea
-        left, right, below = (
-            area.LeftDockWidgetArea,
-            area.RightDockWidgetArea,
-            area.BottomDockWidgetArea,
-        )
-        maps = column(*self.heatmaps.values())
-        self._docks = [
-            self._dock("settings", "Settings", self.panels, left),
-            self._dock("curvature", "Curvature, by element", maps, right),
-            self._dock("cost", "Cost of accuracy", self.cost, below),
-            self._dock("stability", "Stability", self.stability, below),
-            self._dock("scene", "Scene", self.scene, below),
-            self._dock("health", "Health", self.health, below),
-            self._dock("compare", "Compare A and B", self.compare, below),
-        ]
-        for first, second in pairwise(self._docks[2:]):
-            self.tabifyDockWidget(first, second)
-        for dock in self._docks[2:]:
-            dock.setAllowedAreas(area.TopDockWidgetArea | below)  # wider than a column beside it
-            dock.hide()  # so that a small window is left to the skin until they are asked for
         self.lesson = LessonPanel()
-        self._lesson_dock = self._dock("lesson", "Lesson", self.lesson, left)
-        self.splitDockWidget(self._lesson_dock, self._docks[0], Qt.Orientation.Vertical)
-        self._lesson_dock.hide()
-        self.actions_by_name = Actions(self)
+        self.docks = self._surround()
         self.exports = Exports(self.session, self.membrane, self)
         self.teaching = Teaching(
             *(self.history, self.session, self.seeing, self),
             *(self._connect, self._seen, self.exports.caption),
         )
-        docks = {dock.objectName(): [dock.widget()] for dock in self._docks}
-        shown = {f"readout-{name}": parts for name, parts in self.readouts.parts.items()}
-        forms = [panel for panel in self.panels.all() if isinstance(panel, Form)]
-        places = {name: docks[name] for name in DOCKS} | shown
-        self.pointing = Pointing(forms, places, self._bring, self)
-        self._make_actions()
+        self.pointing = self._pointing()
+        self.looking = Looking(self.history, self.wishes, self.display)
+        self.actions_by_name = Menus(self).actions
         self._wire()
         self._follow(self.history.settings)
         self.plugs.look()
@@ -168,9 +139,14 @@ class MainWindow(QMainWindow):
         self.naming = Naming(self)
         self.naming.named.connect(guarded(self.object.show_text))
         self.naming.found.connect(guarded(self.presenting.find))
-        self.session.connect_to(source, already=engine is not None)
-        self.replaying.adopt(source)
-        self.taping.offer_repair()
+        self.naming.found.connect(guarded(lambda what, _: self.display.overlays.find(what)))
+        if handed:
+            self.session.go_on(handed)
+            self.taping.go_on(handed, source)
+        else:
+            self.session.connect_to(source, already=engine is not None)
+            self.taping.offer_repair()
+        self.replaying.adopt(self.session.source)
 
     def _centre(self) -> QWidget:
         centre = QWidget()
@@ -197,105 +173,25 @@ class MainWindow(QMainWindow):
         header.addWidget(self.readouts)
         self.addToolBar(header)
 
-    def _dock(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> QDockWidget:
-        dock = QDockWidget(title, self)
-        dock.setObjectName(name)
-        dock.setWidget(widget)
-        self.addDockWidget(area, dock)
-        return dock
+    def _surround(self) -> Docks:
+        docks, area = Docks(self), Qt.DockWidgetArea
+        docks.put_beside("settings", "Settings", self.panels, area.LeftDockWidgetArea)
+        docks.put_above("lesson", "Lessons", self.lesson, "settings", "Shift+F1")
+        docks.put_beside("curvature", "By element", self.display.maps, area.RightDockWidgetArea)
+        docks.put_below("cost", "Cost of accuracy", self.cost, "F9")
+        docks.put_below("stability", "Stability", self.stability, "F10")
+        docks.put_below("scene", "Scene", self.scene, "F2")
+        docks.put_below("health", "Health", self.health, "F3")
+        docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
+        docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
+        docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
+        return docks
 
-    def _make_actions(self) -> None:
-        add, stack, wishes = self.actions_by_name.add, self.history.stack, self.wishes
-        file, edit, source, view, help_ = "&File", "&Edit", "&Source", "&View", "&Help"
-        figures = "Fi&gures"
-        add("open-scene", file, "&Open scene\N{HORIZONTAL ELLIPSIS}", self.staging.open, "Ctrl+O")
-        add(
-            "save-scene",
-            file,
-            "Save scene &as\N{HORIZONTAL ELLIPSIS}",
-            self.staging.save,
-            "Ctrl+Shift+S",
-        )
-        add("picture", file, "Save &picture", self._save_picture, "Ctrl+S")
-        add("quit", file, "&Quit", self.close, "Ctrl+Q")
-        undo, redo = stack.createUndoAction(self), stack.createRedoAction(self)
-        undo.setShortcut("Ctrl+Z")
-        redo.setShortcut("Ctrl+Shift+Z")
-        self.actions_by_name.register("undo", edit, undo)
-        self.actions_by_name.register("redo", edit, redo)
-        add("reset", edit, "&Reset settings", wishes.reset)
-        add("simulate", source, "&Simulated skin", self._simulate, "Ctrl+M")
-        add("connect", source, "&Connect", self._connect_chosen, "Ctrl+Return")
-        add("disconnect", source, "&Disconnect", self.session.disconnect_from, "Ctrl+D")
-        add("tare", source, "Ta&re", self.taring.tare, "Ctrl+0")
-        add("ports", source, "&Look for ports", self.plugs.look, "F5")
-        add("happenings", source, "What &happened", self.happenings.open_list, "F4")
-        calibrating = self.calibrating
-        self.taping.add_actions(self.actions_by_name)
-        self.replaying.add_actions(self.actions_by_name)
-        add("calibrate", source, "C&alibrate", self.panels.show_calibration, "Ctrl+L")
-        add("take-step", source, "&Take the step of the calibration", calibrating.take, "Ctrl+K")
-        for number, (value, words) in enumerate(COLOURS, 1):
-            colour = partial(wishes.wish, "colour_by", value)
-            add(f"colour-{value}", view, f"Colour by {words.lower()}", colour, f"Ctrl+{number}")
-        add("higher", view, "Draw &higher", partial(wishes.exaggerate, 1), "Ctrl++")
-        add("lower", view, "Draw &lower", partial(wishes.exaggerate, -1), "Ctrl+-")
-        for name, words, key in (("elements", "&elements", "E"), ("truth", "&true surface", "U")):
-            toggle = partial(wishes.toggle, f"show_{name}")
-            add(name, view, f"Show or hide {words}", toggle, f"Ctrl+{key}")
-        add("camera", view, "Reset &camera", self._look(FROM_THE_LEFT), "Ctrl+R")
-        for key, direction in (("F6", ABOVE), ("F7", FRONT), ("F8", SIDE)):
-            words = f"Look {direction.words}"
-            add(words.lower().replace(" ", "-"), view, words, self._look(direction), key)
-        add("pause", view, "&Pause or go on", self._pause, "Ctrl+P")
-        add("present", view, "&Presenter", self.presenting.turn, "F11", TIP)
-        sound = add("sound", view, "S&ound of the force", self._turn_sound, "F12", SOUND_TIP)
-        sound.setCheckable(True)
-        self.presenting.sound.ended.connect(guarded(self._show_sound))
-        add("theme", view, "Light or &dark", wishes.switch_theme, "Ctrl+T")
-        add("next-panels", view, "&Next panels", partial(self.panels.turn, 1), "Ctrl+PgDown")
-        add("last-panels", view, "&Previous panels", partial(self.panels.turn, -1), "Ctrl+PgUp")
-        for dock in self._docks[:2]:
-            name = f"dock-{dock.objectName()}"
-            self.actions_by_name.register(name, view, dock.toggleViewAction())
-        for dock, key in zip(self._docks[2:], ("F9", "F10", "F2", "F3", "Ctrl+B"), strict=True):
-            name, turn = f"dock-{dock.objectName()}", partial(self._turn, dock)
-            action = add(name, view, dock.windowTitle(), turn, key)
-            action.setCheckable(True)
-            dock.visibilityChanged.connect(action.setChecked)
-        for name in FIGURES:
-            add(name, figures, TITLES.get(name, name), partial(self._draw, name))
-        solid = {"the window": self, "the skin": self.centralWidget()}
-        maps = {f"curvature {name}": view for name, view in self.heatmaps.items()}
-        docks = {dock.windowTitle(): dock.widget() for dock in self._docks[2:]}
-        self.exports.register(self.actions_by_name, solid, maps | docks)
-        turn_lesson = partial(self._turn, self._lesson_dock)
-        lessons = add("dock-lesson", help_, "&Lessons", turn_lesson, "Shift+F1", _LESSONS)
-        lessons.setCheckable(True)
-        self._lesson_dock.visibilityChanged.connect(lessons.setChecked)
-        add("shortcuts", help_, "&Shortcuts", self._show_shortcuts, "F1")
-
-    def _turn(self, dock: QDockWidget) -> None:
-        """Show a dock below the skin, before the other in its place; hide one that is seen."""
-        if not dock.visibleRegion().isEmpty():
-            dock.hide()
-        else:
-            self._bring(dock)
-
-    def _bring(self, dock: QDockWidget) -> None:
-        """Show a dock, before the others in its place; one that is shown keeps its height."""
-        seen = not dock.visibleRegion().isEmpty()
-        dock.show()
-        if not seen and not dock.isFloating():
-            self._heighten(dock)
-        dock.raise_()
-
-    def _heighten(self, dock: QDockWidget) -> None:
-        name = dock.objectName()
-        if self.dockWidgetArea(dock) == Qt.DockWidgetArea.BottomDockWidgetArea:
-            heighten(self, dock, _HEIGHTS.get(name, _HEIGHT))
-        heights = [round(share * self.height()) for share in _LESSON]
-        self.resizeDocks([self._lesson_dock, self._docks[0]], heights, Qt.Orientation.Vertical)
+    def _pointing(self) -> Pointing:
+        docks = {name: [self.docks[name].widget()] for name in DOCKS}
+        numbers = {f"readout-{name}": parts for name, parts in self.readouts.parts.items()}
+        forms = [panel for panel in self.panels.all() if isinstance(panel, Form)]
+        return Pointing(forms, docks | numbers, self.docks.reveal, self)
 
     def _wire(self) -> None:
         panels, wishes, session, drag = self.panels, self.wishes, self.session, self.membrane.drag
@@ -305,7 +201,7 @@ class MainWindow(QMainWindow):
         panels.connection.ports_wanted.connect(guarded(self.plugs.look))
         self.plugs.found.connect(guarded(panels.connection.show_ports))
         session.reported.connect(guarded(self.happenings.follow))
-        self.happenings.told.connect(guarded(self._tell))
+        self.happenings.told.connect(guarded(self.tell))
         self.badge.clicked.connect(guarded(self.happenings.open_list))
         self.history.changed.connect(guarded(self._follow))
         session.estimated.connect(guarded(self.display.show_estimate))
@@ -318,18 +214,18 @@ class MainWindow(QMainWindow):
         panels.calibrate.attend(self.calibrating)
         panels.in_use.attend(self.calibrating)
         session.reported.connect(guarded(self.taring.follow))
-        self.taring.told.connect(guarded(self._tell))
+        self.taring.told.connect(guarded(self.tell))
         self.taring.changed.connect(guarded(self._allow_tare))
         calibrating = self.calibrating
         calibrating.changed.connect(
             guarded(lambda: self.taring.stand_aside(calibrating.procedure is not None))
         )
         panels.tare.attend(self.taring)
-        self._docks[2].visibilityChanged.connect(guarded(self.costing.watch))
+        self.docks["cost"].visibilityChanged.connect(guarded(self.costing.watch))
         session.reported.connect(guarded(self.costing.follow))
         session.estimated.connect(guarded(self.costing.receive))
         self.cost.attend(self.costing)
-        self._docks[3].visibilityChanged.connect(guarded(self.seeing.watch))
+        self.docks["stability"].visibilityChanged.connect(guarded(self.seeing.watch))
         session.reported.connect(guarded(self.seeing.follow))
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
@@ -337,9 +233,9 @@ class MainWindow(QMainWindow):
         self._attend_recording()
         self.lesson.attend(self.teaching)
         self.teaching.pointed.connect(guarded(self.pointing.point))
-        self.teaching.told.connect(guarded(self._tell))
-        self.staging.told.connect(guarded(self._tell))
-        self.exports.told.connect(guarded(self._tell))
+        self.teaching.told.connect(guarded(self.tell))
+        self.staging.told.connect(guarded(self.tell))
+        self.exports.told.connect(guarded(self.tell))
         self.staging.played.connect(guarded(panels.connection.show_source))
         session.reported.connect(guarded(wishes.follow))
         self.stability.back.connect(guarded(self.history.stack.undo))
@@ -360,19 +256,24 @@ class MainWindow(QMainWindow):
             heatmap.pointed.connect(guarded(self.display.point))
             heatmap.chosen.connect(guarded(wishes.choose))
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
+        self.picking.picked.connect(guarded(lambda _: self.docks.reveal("element")))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
-        guard.on_failure(self._tell)
+        guard.on_failure(self.tell)
 
     def _attend_recording(self) -> None:
         session, taping, replaying = self.session, self.taping, self.replaying
         session.reported.connect(guarded(taping.follow))
+        entrusting = Entrusting(self.history, session.engine)
+        session.reported.connect(guarded(entrusting.follow))
         taping.changed.connect(guarded(self._show_mark))
         self.mark.clicked.connect(guarded(taping.dismiss))
         replaying.opened.connect(guarded(self.panels.connection.show_source))
+        replaying.offered.connect(guarded(self.panels.show_recording))
+        taping.repairs.saved.connect(guarded(replaying.open_file))
         for news in (taping, replaying):
-            news.told.connect(guarded(self._tell))
+            news.told.connect(guarded(self.tell))
         self.panels.recording.attend(taping, replaying)
-        self._docks[6].visibilityChanged.connect(guarded(self.comparing.watch))
+        self.docks["compare"].visibilityChanged.connect(guarded(self.comparing.watch))
         session.reported.connect(guarded(self.comparing.follow))
         self.compare.form.wished.connect(guarded(self.wishes.wish))
         self.compare.attend(self.comparing)
@@ -414,20 +315,18 @@ class MainWindow(QMainWindow):
         self.panels.connection.show_source(source)
         self.session.connect_to(source)
 
-    def _simulate(self) -> None:
+    def simulate(self) -> None:
         """Simulate the panels' skin, whatever was read or written."""
         self.history.change("Simulated skin", -1, written=None)
         self._connect("sim:")
 
-    def _pause(self) -> None:
+    def pause(self) -> None:
         """Let what is played stand, or go on: a recording, or else a scene."""
         (self.replaying.toggle if self.session.replaying else self.staging.pause)()
 
-    def _connect_chosen(self) -> None:
+    def connect_chosen(self) -> None:
+        """Connect what is named in the panel."""
         self._connect(self.panels.connection.source())
-
-    def _look(self, direction: Direction) -> Callable[[], None]:
-        return partial(self.membrane.look_from, direction)
 
     def _lock(self, locked: bool) -> None:
         limit = self.display.limit_shown() if locked else 0.0
@@ -457,6 +356,7 @@ class MainWindow(QMainWindow):
         self.pointing.show_theme(theme)
         self.display.show_theme(theme)
         self.presenting.show_theme(theme)
+        self.picking.show_theme(theme)
 
     def _show_shape(self) -> None:
         """Draw the shape that is looked at on the skin, while somebody looks and wants it."""
@@ -492,45 +392,22 @@ class MainWindow(QMainWindow):
 
     # Small things.
 
-    def _turn_sound(self) -> None:
-        self._show_sound(self.presenting.sound.turn())
-
-    def _show_sound(self, why_not: str) -> None:
-        self._tell(why_not)
-        self.actions_by_name["sound"].setChecked(self.presenting.sound.on)
-
-    def _tell(self, text: str) -> None:
+    def tell(self, text: str) -> None:
+        """Say something in passing."""
         self.statusBar().showMessage(text, 10_000)
+
+    def _seen(self) -> list[QPixmap]:
+        """Pictures of the numbers, and of the skin with the maps and what is shown below them."""
+        docks = [self.docks["curvature"], *self.docks.below]
+        whole = self.presenting.stage.geometry()
+        for dock in docks:
+            if not dock.visibleRegion().isEmpty():
+                whole = whole.united(dock.geometry())
+        return [self.readouts.grab(), self.grab(whole)]
 
     def picture(self, path: Path) -> bool:
         """Save the window, 3-D picture included, as a PNG; whether it could be written."""
         return self.grab().save(str(path), "PNG")
-
-    def _seen(self) -> list[QPixmap]:
-        """Pictures of the numbers, and of the skin with the maps and what is shown below them."""
-        shown = [dock for dock in self._docks[1:] if not dock.visibleRegion().isEmpty()]
-        whole = QRect()
-        for part in (self.presenting.stage, *shown):
-            whole = whole.united(part.geometry())
-        return [self.readouts.grab(), self.grab(whole)]
-
-    def _save_picture(self) -> None:
-        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png"))
-        done = self.picture(path)
-        self._tell(f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}")
-
-    def _draw(self, name: str) -> None:
-        """Draw a figure of the paper from a run of its own, in a window beside this one."""
-        FigureWindow(name, self).show()
-
-    def _show_shortcuts(self) -> None:
-        if self._shortcuts is None:
-            text = self.actions_by_name.cheat_sheet()
-            self._shortcuts = QMessageBox(QMessageBox.Icon.NoIcon, "Shortcuts", text)
-            self._shortcuts.setParent(self, Qt.WindowType.Dialog)
-            self._shortcuts.setModal(False)
-        self._shortcuts.show()
-        self._shortcuts.raise_()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self.presenting.on:
@@ -540,21 +417,31 @@ class MainWindow(QMainWindow):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        widen(self, self._docks[1], event)
+        widen(self, self.docks["curvature"], event)
+
+    def quit(self) -> None:
+        """Close, unless a recording is to go on."""
+        if self.taping.may_close():
+            self.close()
 
     def closeEvent(self, event: QCloseEvent) -> None:
+        # Only of a person: a run of so many seconds ends, and so does one that gets a signal.
+        if event.spontaneous() and not self.session.closed and not self.taping.may_close():
+            event.ignore()
+            return
         if not self.session.closed:
-            guard.forget(self._tell)
+            guard.forget(self.tell)
             self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
             self.exports.close()
             self.plugs.close()
             self.replaying.close()
+            self.taping.close()
             self.costing.close()
             self.planning.close()
             self.scene.gallery.close()
             self.seeing.close()
             self.session.close()
             self.naming.close()
-            self.membrane.close_plotter()
+            self.display.close()
         super().closeEvent(event)

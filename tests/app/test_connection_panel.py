@@ -173,3 +173,14 @@ def test_events_that_came_together_are_all_listed(qtbot):
     window.follow(Status().after([Event(now, "gap", str(n)) for n in range(100)]))
     lines = window.list.toPlainText().splitlines()
     assert [line.split()[-1] for line in (lines[0], lines[-1])] == ["99", "36"]
+
+
+def test_what_happened_twice_at_once_is_listed_twice_and_told_once(qtbot):
+    window = Happenings()
+    qtbot.addWidget(window)
+    told = []
+    window.told.connect(told.append)
+    now = time.monotonic()
+    window.follow(Status().after([Event(now, "met", "a skin"), Event(now, "met", "a skin")]))
+    assert told == ["A skin"]
+    assert len(window.list.toPlainText().splitlines()) == 2

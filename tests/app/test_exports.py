@@ -8,6 +8,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import Refusal
@@ -128,6 +129,30 @@ def test_a_recording_is_exported_from_the_dialog(window, until, recording) -> No
     with np.load(recording.with_name("out.npz")) as found:
         assert found["curvature"].shape[1] == 3
     assert sorted(path.name for path in recording.parent.iterdir()) == ["out.npz", "rec.mcap"]
+
+
+def test_enter_exports_and_leaves_the_questions_for_files_alone(
+    window, until, recording, qtbot
+) -> None:
+    window.actions_by_name["export"].trigger()
+    dialog = window.exports.dialog
+    dialog.recording.setText(str(recording))
+    dialog.to.setText(str(recording.with_name("out.doc")))
+    was = dialog.every.height()
+    qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
+    assert ".csv, .npz, .h5" in dialog.words.text()
+    qtbot.wait(50)
+    assert dialog.every.height() == was  # no field is pressed flat by what is said
+    dialog.to.setText(str(recording.with_name("out.npz")))
+    qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
+    assert not dialog.choose_file.isEnabled()
+    dialog.cancel_button.click()
+    assert dialog.choose_file.isEnabled()
+    assert dialog.bar.value() < 0  # no share of what is not there
+    dialog.bar.setValue(dialog.bar.maximum())  # as it stands when one is written
+    dialog.to.setText(str(recording.with_name("out.doc")))
+    qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
+    assert dialog.bar.value() < 0
 
 
 def test_an_export_is_cancelled_with_nothing_left(window, recording) -> None:

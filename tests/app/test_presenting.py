@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QDockWidget
 
 from kappaskin_app.cue import Cue, Roundness
 from kappaskin_app.theme import THEMES
-from kappaskin_app.views.badge import LIVE, LOST, OFF, SIM, STALE, WAITING
+from kappaskin_app.views.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.views.banner import REMEDIES
 from kappaskin_app.views.lettering import PRIMARY
 from kappaskin_app.views.pad import Hand
@@ -90,7 +90,7 @@ def test_every_text_fits_and_is_not_made_smaller(size, qtbot) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("state", [LOST, STALE, WAITING, OFF])
+@pytest.mark.parametrize("state", [LOST, STALE, WAITING, OFF, GAP])
 def test_what_to_do_fits_whole(size, state, qtbot) -> None:
     stage = stage_of(size, qtbot)
     stage.show_trouble(state, "1234 s", WHY)
@@ -361,6 +361,22 @@ def test_a_lost_line_says_what_to_do_and_what_is_felt_comes_back(demo, until) ->
     demo.session.connect_to("sim:demo")
     until(lambda: stage.strip.state == SIM and stage.pages.currentWidget() is not stage.banner)
     until(lambda: demo.presenting.cue is not None)
+
+
+def test_a_recording_that_stands_is_felt_where_it_stands(opened, recording, until) -> None:
+    window = opened(f"replay:{recording}")
+    until(lambda: window.badge.state == "REPLAY")
+    window.replaying.go(False)
+    window.replaying.seek(0.3)
+    until(lambda: window.session.status.replay.at == 0.3)
+    until(lambda: window.session.estimate and 28 < window.session.estimate.sequence < 33)
+    window.presenting.enter()
+    stage = window.presenting.stage
+    until(lambda: stage.force.value.endswith(" N"))
+    window.replaying.seek(1.4)
+    until(lambda: stage.strip.state == GAP)
+    until(lambda: (stage.force.value, stage.force.note) == ("\N{EN DASH}", "no reading"))
+    assert (stage.strip.age, stage.radius.name) == ("", "Radius of what touches")
 
 
 def test_nothing_that_touches_is_said_to_be_nothing(demo, until) -> None:

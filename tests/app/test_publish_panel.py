@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QLineEdit
+from PySide6.QtWidgets import QCheckBox, QLabel, QLineEdit, QWidget
 
 from kappaskin import Latency, Published, PublishNews, Receiver, Status
+from kappaskin_app.columns import scrolled
 from kappaskin_app.panels.publish import PublishPanel
 from kappaskin_app.settings import Settings
 
@@ -74,6 +75,30 @@ def test_an_address_is_wished_once_it_is_typed(panel: PublishPanel, qtbot) -> No
     assert wishes == []
     qtbot.keyClick(line, Qt.Key.Key_Return)
     assert wishes[-1] == ("udp_to", "robot:9870")
+
+
+def test_what_comes_of_it_is_in_sight_of_who_asked(qtbot) -> None:
+    panel, other = PublishPanel(), QLineEdit()
+    page = scrolled(other, QLabel("\n" * 40), panel)
+    qtbot.addWidget(page)
+    page.resize(300, 280)
+    page.show()
+    page.activateWindow()
+    box, bar = panel.editor("serve_foxglove"), page.verticalScrollBar()
+
+    def grown_after(asked: QWidget) -> int:
+        told(panel)
+        asked.setFocus()
+        qtbot.waitUntil(asked.hasFocus)
+        qtbot.wait(50)
+        bar.setValue(bar.maximum())
+        told(panel, FINE, SERVED)
+        qtbot.wait(50)
+        return bar.maximum() - bar.value()
+
+    assert grown_after(other) > 50
+    assert grown_after(box) == 0
+    assert panel.counts.visibleRegion().boundingRect() == panel.counts.rect()
 
 
 def test_the_window_publishes_when_asked_and_undo_ends_it(window, until) -> None:

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDockWidget,
     QLineEdit,
+    QMessageBox,
     QPushButton,
 )
 
@@ -319,6 +320,20 @@ def test_a_picture_is_saved(window: MainWindow, tmp_path: Path) -> None:
     assert QImage(str(tmp_path / "a.png")).size() == window.size()
 
 
+def test_every_number_is_whole_beside_the_mark_of_a_recording(
+    window: MainWindow, tmp_path: Path, until
+) -> None:
+    wide = window.readouts.width()
+    window.taping.begin(tmp_path / "a.mcap")
+    until(lambda: window.readouts.width() < wide - 50)
+    until(lambda: window.readouts.text("error").endswith(" mm"))
+    for line in window.readouts.findChildren(Line):
+        assert line.fontMetrics().horizontalAdvance(line.text()) < line.width() - 5, line.text()
+    assert window.width() == 1280
+    window.taping.turn()
+    until(lambda: not window.taping.recording)
+
+
 def test_every_action_is_in_a_menu_and_no_shortcut_is_used_twice(window: MainWindow) -> None:
     entries = window.actions_by_name.entries
     shortcuts = [entry.action.shortcut().toString() for entry in entries.values()]
@@ -326,6 +341,19 @@ def test_every_action_is_in_a_menu_and_no_shortcut_is_used_twice(window: MainWin
     assert len(used) == len(set(used))
     in_menus = [a for menu in window.menuBar().actions() for a in menu.menu().actions()]
     assert {e.action for e in entries.values()} == set(in_menus)
+
+
+def test_every_shortcut_is_read_on_a_small_screen_under_its_menu(window: MainWindow, until) -> None:
+    window.actions_by_name["shortcuts"].trigger()
+    (sheet,) = window.findChildren(QMessageBox)
+    until(lambda: sheet.height() > 100)
+    assert sheet.height() < 700
+    assert sheet.width() < 1000
+    text = sheet.text()
+    assert text.index("<u>Export</u>") < text.index("Ctrl+Shift+E") < text.index("<u>Help</u>")
+    for entry in window.actions_by_name.entries.values():
+        assert f"<b>{entry.action.shortcut().toString()}</b>" in f"{text}<b></b>"
+    sheet.close()
 
 
 def test_every_dock_has_a_name_for_saved_layouts(window: MainWindow) -> None:

@@ -467,7 +467,7 @@ def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
         ("out.stl", {"at": math.nan}, "times in s"),
         ("out.csv", {"begin": 100.0}, "from 100 s on; the last one came at"),
         ("out.stl", {"at": 100.0}, "from 100 s on; the last one came at"),
-        ("out.csv", {"begin": 0.1001, "end": 0.1002}, "until 0.1002 s"),
+        ("out.csv", {"begin": 0.1001, "end": 0.1002}, "until 0.1002 s; the next one came at"),
         ("no/out.csv", {}, "cannot be written"),
     ],
 )
@@ -589,4 +589,14 @@ def test_ctrl_c_stops_the_command_and_leaves_nothing(taps, run, tmp_path, monkey
     code, _, err = run("export", taps[0], "--to", tmp_path / "out.csv")
     assert code == 2
     assert "nothing was written" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_while_it_begins_leaves_nothing(taps, tmp_path, monkeypatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("kappaskin.studies.beside.Beside.__init__", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Exporting(Wanted(taps[0], tmp_path / "out.csv"))
     assert not list(tmp_path.iterdir())

@@ -10,7 +10,7 @@ import numpy as np
 
 from kappaskin import Estimate, Status
 from kappaskin_app.lessons.expression import NUMBER, WORD
-from kappaskin_app.settings import Choice, Settings, Text
+from kappaskin_app.settings import Choice, Settings, Several, Text
 
 if TYPE_CHECKING:
     from kappaskin_app.seeing import Spectrum
@@ -67,7 +67,7 @@ def _kind_of(how: object) -> str:
 SETTINGS = {
     field.name: _kind_of(field.metadata["ask"])
     for field in fields(Settings)
-    if "ask" in field.metadata
+    if "ask" in field.metadata and not isinstance(field.metadata["ask"], Several)
 }
 KINDS = dict.fromkeys((*OF_AN_ESTIMATE, *OF_THE_STATUS, *OF_THE_SPECTRUM), NUMBER) | SETTINGS
 """Every name that an expression may have, with whether it is a number or a word."""

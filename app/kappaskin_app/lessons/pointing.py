@@ -53,14 +53,14 @@ class _Ring(QWidget):
 class Pointing(QObject):
     """Finds what a lesson points at among `forms` and `others`, and brings it to be seen.
 
-    `show_dock` brings a dock to the front.
+    `show_dock` brings a dock to the front, by its name.
     """
 
     def __init__(
         self,
         forms: list[Form],
         others: Mapping[str, list[QWidget]],
-        show_dock: Callable[[QDockWidget], None],
+        show_dock: Callable[[str], None],
         parent: QObject,
     ) -> None:
         super().__init__(parent)
@@ -115,7 +115,7 @@ class Pointing(QObject):
             if isinstance(area, QDockWidget):
                 if area.isHidden():
                     self._shown.append(area)
-                self._show_dock(area)
+                self._show_dock(area.objectName())
 
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme

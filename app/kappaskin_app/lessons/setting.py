@@ -12,6 +12,7 @@ from kappaskin_app.settings import (
     Scanning,
     SceneSettings,
     Settings,
+    Several,
     Switch,
     View,
     ask_of,
@@ -37,6 +38,8 @@ def checked_setting(name: str, value: Any) -> Any:
     how = ask_of(name)
     if isinstance(how, Range):
         return _number(name, how, value)
+    if isinstance(how, Several):
+        return _several(name, how, value)
     if not _is_one(how, value):
         choices = [one for one, _ in how.options] if isinstance(how, Choice) else ["true", "false"]
         raise Refusal(f"expected {name} to be one of {', '.join(choices)}; got {value!r}")
@@ -57,6 +60,13 @@ def _number(name: str, how: Range, value: Any) -> float | int:
     if kind(value) != value:
         raise Refusal(f"expected {name} to be a whole number, got {value!r}")
     return kind(value)
+
+
+def _several(name: str, how: Several, value: Any) -> tuple[str, ...]:
+    known = [one for one, _ in how.options]
+    if not isinstance(value, list) or not all(one in known for one in value):
+        raise Refusal(f"expected {name} to be a list of {', '.join(known)}; got {value!r}")
+    return tuple(value)
 
 
 def _elements(name: str, value: Any) -> tuple[int, ...]:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from kappaskin_app.lessons.progress import Progress
 from kappaskin_app.lessons.setting import SETTABLE
-from kappaskin_app.settings import Choice, Range, Settings, Switch, ask_of
+from kappaskin_app.settings import Choice, Range, Settings, Several, Switch, ask_of
 from kappaskin_app.theme import LIGHT, palette
 
 _WIDTH, _MARGIN = 1000, 24  # px
@@ -28,6 +28,8 @@ def changed(settings: Settings) -> Iterator[str]:
             yield f"{said} {value * how.scale:.6g} {how.unit}".strip()
         elif isinstance(how, Choice):
             yield f"{said} {dict(how.options)[value].lower()}"
+        elif isinstance(how, Several):
+            yield f"{said} {', '.join(dict(how.options)[one] for one in value)}"
         elif isinstance(how, Switch):
             yield f"{said} {'on' if value else 'off'}"
     if settings.written is not None:

@@ -2,7 +2,6 @@
 
 import re
 import time
-from datetime import datetime
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QGuiApplication
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
 from kappaskin import Calibration, Port, Sensor, Status
 from kappaskin_app.panels.calibration.parts import said
 from kappaskin_app.panels.panel import Panel
+from kappaskin_app.views.landmarks import day
 
 _SIMULATED = ("sim:", "Simulated skin")
 _TIP = (
@@ -176,9 +176,8 @@ def _recorded(status: Status) -> str:
     replay = status.replay
     if replay is None:
         return ""
-    when = f"{datetime.fromtimestamp(replay.begun):%Y-%m-%d %H:%M}"
     whole = "" if replay.whole else ", never ended"
-    return f"\nRecorded {when}, {replay.length:.1f} s{whole}"
+    return f"\nRecorded {day(replay)}, {replay.length:.1f} s{whole}"
 
 
 def _said(sensor: Sensor, calibration: Calibration | None) -> str:

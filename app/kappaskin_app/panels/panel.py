@@ -1,11 +1,16 @@
 """What every panel is: a titled box that shows what is so and says what a person wishes."""
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGroupBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QApplication, QGroupBox, QLabel, QVBoxLayout, QWidget
 
 from kappaskin import Status
+from kappaskin_app.columns import scroll_to
+from kappaskin_app.guard import guarded
 from kappaskin_app.settings import Settings
 from kappaskin_app.theme import LIGHT, Theme
+
+_GROWN = 20  # ms after which the page of a panel that grew has grown too
 
 
 class Panel(QGroupBox):
@@ -21,6 +26,8 @@ class Panel(QGroupBox):
             how.TextSelectableByMouse | how.TextSelectableByKeyboard
         )
         self._theme, self._hint = LIGHT, False
+        self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
+        self._grown.timeout.connect(guarded(self._answer))
         self.body = QVBoxLayout()
         self._around = QVBoxLayout(self)
         self._around.setContentsMargins(8, 6, 8, 8)
@@ -48,3 +55,15 @@ class Panel(QGroupBox):
     def _paint(self) -> None:
         colour = self._theme.faint if self._hint else self._theme.alert
         self.message.setStyleSheet(f"color: {colour};")
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if 0 < event.oldSize().height() < event.size().height():
+            self._grown.start()
+
+    def _answer(self) -> None:
+        """Bring in sight what is said now to who has just asked for something here."""
+        asked = QApplication.focusWidget()
+        if asked is not None and self.isAncestorOf(asked):
+            scroll_to(self)
+            scroll_to(asked)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from datetime import datetime
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QHelpEvent, QPainter, QPen
@@ -27,6 +28,11 @@ def minutes(seconds: float) -> str:
     """A time as m:ss.mmm."""
     ms = round(1e3 * seconds)
     return f"{ms // 60_000}:{ms // 1000 % 60:02d}.{ms % 1000:03d}"
+
+
+def day(replay: Replay) -> str:
+    """When a recording was begun, to the minute."""
+    return f"{datetime.fromtimestamp(replay.begun):%Y-%m-%d %H:%M}"
 
 
 class Landmarks(Course):

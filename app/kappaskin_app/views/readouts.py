@@ -62,14 +62,14 @@ FIELDS = {
 }
 
 _WIDTHS = {
-    "contact": 7,
-    "rate": 5,
-    "lost": 6,
-    "force": 5,
-    "depth": 5,
-    "age": 4,
-    "error": 3,
-    "rms": 3,
+    "contact": 13,
+    "rate": 10,
+    "lost": 12,
+    "force": 10,
+    "depth": 10,
+    "age": 8,
+    "error": 7,
+    "rms": 7,
 }
 
 
@@ -126,7 +126,7 @@ class Readouts(QWidget):
         super().__init__(parent)
         grid = QGridLayout(self)
         grid.setContentsMargins(8, 2, 8, 2)
-        grid.setHorizontalSpacing(12)
+        grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(0)
         self._names: list[QLabel] = []
         self._numbers: dict[str, Line] = {}
@@ -141,7 +141,7 @@ class Readouts(QWidget):
             self._numbers[key] = below
             grid.addWidget(above, 0, column)
             grid.addWidget(below, 1, column)
-            grid.setColumnStretch(column, _WIDTHS.get(key, 4))
+            grid.setColumnStretch(column, _WIDTHS[key])
 
     def text(self, key: str) -> str:
         return self._numbers[key].text()

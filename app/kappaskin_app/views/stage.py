@@ -18,6 +18,7 @@ from kappaskin_app.views.strip import Strip
 _HEIGHT, _WIDTH = 1080.0, 1920.0  # of the picture that a unit is a pixel of
 _SKIN, _FIGURES = 51, 49  # how they share the width
 _EDGE = 26.0  # units around the figures
+_RADIUS = "Radius of what touches"
 _PM = "\N{PLUS-MINUS SIGN}"
 _TOUCHES = {"sphere": "ball", "cylinder": "pipe", "plane": "flat face"}
 
@@ -30,7 +31,7 @@ class Stage(QWidget):
         self.strip, self.operator, self.banner = Strip(), Operator(), Banner()
         self.force, self.bar = Figure("Force"), ForceBar()
         self.displacement, self.place = Figure("Displacement"), Figure("Contact at x, y")
-        self.radius, self.round = Figure("Radius of what touches"), RoundView()
+        self.radius, self.round = Figure(_RADIUS), RoundView()
         self.boards: list[Board] = [
             *(self.strip, self.banner, self.force, self.bar),
             *(self.displacement, self.place, self.radius, self.round),
@@ -96,13 +97,13 @@ class Stage(QWidget):
 
     # What it shows.
 
-    def show_cue(self, cue: Cue | None) -> None:
-        """Write what is felt, as often as it can be read."""
+    def show_cue(self, cue: Cue | None, why_none: str = "nothing felt") -> None:
+        """Write what is felt, or `why_none` is."""
         self.operator.pad.show_cue(cue)
         if cue is None:
             for figure in (self.force, self.displacement, self.place):
-                figure.show_figure(NONE, "nothing felt" if figure is self.force else "")
-            self.radius.show_figure(NONE)
+                figure.show_figure(NONE, why_none if figure is self.force else "")
+            self.radius.show_figure(NONE, name=_RADIUS)  # nothing is a ball now
             return
         self.force.show_figure(f"{_number(cue.force, 3)} N", _off(cue.force_95, 3, "N"))
         off = _off(1e3 * cue.displacement_95, 2, "mm") or "at its deepest"

@@ -1,6 +1,7 @@
-"""What commands share: exit codes, and how they read pairs, print JSON and write files."""
+"""What commands share: exit codes, and how they stop, read pairs, print JSON and write files."""
 
 import json
+import signal
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -34,6 +35,20 @@ def pair(text: str, what: str) -> tuple[int, int]:
     except ValueError:
         raise Refusal(f"expected {what} as two numbers such as 8x8, got {text!r}") from None
     return first, second
+
+
+def stops() -> list[int]:
+    """The signals to stop (Ctrl+C, and what ends a service) that come from now on."""
+    stopped: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda got, _: stopped.append(got))
+    return stopped
+
+
+def check_time(seconds: float, what: str) -> None:
+    """Raise a `Refusal` unless there is time to do `what`."""
+    if not seconds > 0:
+        raise Refusal(f"expected a time above 0 s to {what}, got {seconds:g}")
 
 
 def progress(told: Iterable[object], kind: type[_Kind]) -> _Kind:

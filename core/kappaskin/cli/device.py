@@ -1,10 +1,10 @@
 """A simulated sensor on a pseudo-terminal."""
 
 import json
-import signal
 import sys
 from dataclasses import replace
 
+from kappaskin.cli.common import stops
 from kappaskin.errors import Refusal
 from kappaskin.scene import load_scene
 
@@ -38,9 +38,7 @@ def device(scene: str = "", *, rate: float | None = None, dwell: float | None = 
             )
         played = replace(played, laid=replace(played.laid, dwell=dwell))
     server = PseudoDevice(played if rate is None else replace(played, rate=rate))
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda got, _: stopped.append(got))
+    stopped = stops()
     print(json.dumps({"port": server.port, "rate": server.rate}), flush=True)
     server.serve(lambda: bool(stopped))
     server.close()

@@ -1,11 +1,9 @@
 """What somebody publishes, as readable lines."""
 
 import math
-import signal
 import time
 
-from kappaskin.cli.common import FAILED, Switch, print_json
-from kappaskin.errors import Refusal
+from kappaskin.cli.common import FAILED, Switch, check_time, print_json, stops
 from kappaskin.publish.listening import Listener
 
 _READ = 0.1  # s
@@ -28,11 +26,8 @@ def listen(*, udp: int = 9870, seconds: float = math.inf, json: Switch = False) 
     json
         Print every message as it came, one a line.
     """
-    if not seconds > 0:
-        raise Refusal(f"expected a time above 0 s to listen, got {seconds:g}")
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda got, _: stopped.append(got))
+    check_time(seconds, "listen")
+    stopped = stops()
     listener, end = Listener(udp), time.monotonic() + seconds
     try:
         while not stopped and time.monotonic() < end:

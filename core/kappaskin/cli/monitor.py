@@ -1,11 +1,9 @@
 """What a device says, as readable lines."""
 
 import math
-import signal
 import time
 
-from kappaskin.cli.common import FAILED, Switch
-from kappaskin.errors import Refusal
+from kappaskin.cli.common import FAILED, Switch, check_time, stops
 from kappaskin.sources.monitor import Monitor
 
 _READ = 0.1  # s
@@ -29,11 +27,8 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
     reset
         Pulse DTR and RTS first, at which many boards start anew.
     """
-    if not seconds > 0:
-        raise Refusal(f"expected a time above 0 s to listen, got {seconds:g}")
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda got, _: stopped.append(got))
+    check_time(seconds, "listen")
+    stopped = stops()
     listening, end = Monitor(port), time.monotonic() + seconds
     try:
         if reset:

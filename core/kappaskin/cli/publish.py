@@ -1,16 +1,15 @@
 """Estimates sent to who wants them, without a window."""
 
 import math
-import signal
 import time
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from kappaskin.cli.common import FAILED
+from kappaskin.cli.common import FAILED, check_time, stops
 from kappaskin.engine import Engine
 from kappaskin.errors import Refusal
-from kappaskin.publish import Latency, Published
+from kappaskin.publish import Latency, Published, targets_of
 from kappaskin.scene import load_scene
 from kappaskin.sources import SIMULATION
 from kappaskin.status import Status
@@ -44,18 +43,16 @@ def publish(
     seconds
         How long to publish; until stopped when left out.
     """
-    if not seconds > 0:
-        raise Refusal(f"expected a time above 0 s to publish, got {seconds:g}")
+    check_time(seconds, "publish")
     places = foxglove if foxglove != [] else [""]
     targets = [f"udp://{place}" for place in udp or ()]
     targets += [f"foxglove://{place}" for place in places or ()]
     if not targets:
         raise Refusal("expected somebody to send to: give --udp HOST:PORT, or --foxglove")
+    targets_of(targets)  # or refused here
     if source.startswith(SIMULATION):
         load_scene(source.removeprefix(SIMULATION))  # or refused here
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda got, _: stopped.append(got))
+    stopped = stops()
     with Engine() as engine:
         engine.publish(targets)
         engine.connect(source)

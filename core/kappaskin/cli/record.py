@@ -1,14 +1,13 @@
 """A source to a recording, without a window."""
 
 import math
-import signal
 import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 
 from kappaskin.calibration import Tares, data_folder
-from kappaskin.cli.common import FAILED
+from kappaskin.cli.common import FAILED, check_time, stops
 from kappaskin.engine import Engine
 from kappaskin.errors import Refusal
 from kappaskin.pipeline import Setup
@@ -39,13 +38,10 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     seconds
         How long to record.
     """
-    if not seconds > 0:
-        raise Refusal(f"expected a time above 0 s to record, got {seconds:g}")
+    check_time(seconds, "record")
     if source.startswith(REPLAY):
         raise Refusal(f"expected a live source to record, got {source}; copy its file")
-    stopped: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda got, _: stopped.append(got))
+    stopped = stops()
     with Engine() as engine:
         # Before there is a source, so that nothing of it is missed.
         engine.record(out)
@@ -82,7 +78,7 @@ def _recorded(engine: Engine, seconds: float, stopped: list[int]) -> Status:
         if status.sensor is not known and status.sensor is not None:
             known = status.sensor
             _use_tare(engine, known)
-        if stopped or written.trouble or now - began >= seconds or not engine.alive:
+        if stopped or written.trouble or written.seconds >= seconds or not engine.alive:
             return status
         if status.state == LOST and known is None:
             raise Refusal(status.message)

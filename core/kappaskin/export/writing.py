@@ -102,7 +102,7 @@ class _Work:
         self._retrace = Retrace(recording, wanted.setup)
         self._device, self._sensor = to_json(about.sensor), about.sensor
         self._due = wanted.first  # s since the recording began
-        self._last = math.nan  # s, when the last frame of all came
+        self._last = math.nan  # s, when the last frame that was looked at came
         self._written = self._unsettled = self._shapeless = 0
 
     def _at(self, message: Message) -> float:
@@ -155,7 +155,8 @@ class _Work:
         elif math.isnan(self._last):
             why = "got none that can be used"
         else:
-            why = f"got none {span}; the last one came at {self._last:.6g} s"
+            which = "next" if self._last > self._wanted.end else "last"
+            why = f"got none {span}; the {which} one came at {self._last:.6g} s"
         raise Refusal(f"{self._recording.path}: expected frames, {why}; choose another span")
 
     def share(self, message: Message) -> float:

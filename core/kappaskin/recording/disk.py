@@ -1,6 +1,7 @@
 """A file on a disk that may fill: whatever is written to it stands there whole, or not at all."""
 
 import os
+import sys
 import tempfile
 from pathlib import Path
 from typing import IO, cast
@@ -25,6 +26,7 @@ class Disk:
             self._file = path.open("xb", buffering=0)
         except OSError as error:
             raise Refusal(f"{path}: cannot be written ({_why(error)}); {_ELSEWHERE}") from error
+        _locked(self._file)
         self._reserved = self._at = 0
         try:
             self._reserve = tempfile.TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115
@@ -53,7 +55,7 @@ class Disk:
 
     def write(self, data: bytes) -> None:
         try:
-            _write(self._file, data)
+            self.put(data)
         except OSError as error:
             self._back()
             if self._reserve is None:
@@ -64,6 +66,10 @@ class Disk:
             self.write(data)
             return
         self._at += len(data)
+
+    def put(self, data: bytes) -> None:
+        """Write to the disk; an `OSError` where there is no room for all of it."""
+        _write(self._file, data)
 
     def _back(self) -> None:
         self._file.truncate(self._at)
@@ -91,6 +97,40 @@ class Disk:
 
 
 _ELSEWHERE = "choose another place"
+
+
+def is_written(path: Path) -> bool:
+    """Whether a process is writing the file at `path`; never known on Windows."""
+    try:
+        with path.open("rb") as file:
+            return not _locked(file)
+    except OSError:
+        return False
+
+
+def _locked(file: IO[bytes]) -> bool:
+    """Whether this process could mark `file` as its own, as long as it is open."""
+    if sys.platform != "win32":
+        import fcntl
+
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        except OSError:  # a disk that knows no such marks
+            return True
+    return True
+
+
+def is_there(path: Path) -> bool:
+    """Whether anything is at `path`; a `Refusal` where that cannot be told, as of too long a name.
+
+    The path's own `exists` raises then, which would end the process that is live.
+    """
+    try:
+        return path.exists() or path.is_symlink()
+    except OSError as error:
+        raise Refusal(f"{path}: cannot be looked for ({_why(error)}); {_ELSEWHERE}") from error
 
 
 def _write(file: IO[bytes], data: bytes) -> None:

@@ -1,0 +1,116 @@
+"""What a person can do in a window, menu by menu."""
+
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtWidgets import QMessageBox
+
+from kappaskin import FIGURES
+from kappaskin_app.actions import Actions
+from kappaskin_app.figures import TITLES, FigureWindow
+from kappaskin_app.guard import guarded
+from kappaskin_app.presenting import SOUND_TIP, TIP
+
+if TYPE_CHECKING:
+    from kappaskin_app.window import MainWindow
+
+_DOTS = "\N{HORIZONTAL ELLIPSIS}"
+_FILE, _EDIT, _SOURCE, _VIEW = "&File", "&Edit", "&Source", "&View"
+_FIGURES, _HELP = "Fi&gures", "&Help"
+
+
+class Menus(QObject):
+    """Registers all that the rooms of a `window` can be asked for, as `actions`."""
+
+    def __init__(self, window: "MainWindow") -> None:
+        super().__init__(window)
+        self._window, self.actions = window, Actions(window)
+        self._shortcuts: QMessageBox | None = None
+        self._add_file()
+        self._add_edit()
+        self._add_source()
+        self._add_view()
+        for name in FIGURES:
+            self.actions.add(name, _FIGURES, TITLES.get(name, name), partial(self._draw, name))
+        self._add_export()
+        self.actions.add("shortcuts", _HELP, "&Shortcuts", self._show_shortcuts, "F1")
+
+    def _add_file(self) -> None:
+        add, window = self.actions.add, self._window
+        add("open-scene", _FILE, f"&Open scene{_DOTS}", window.staging.open, "Ctrl+O")
+        add("save-scene", _FILE, f"Save scene &as{_DOTS}", window.staging.save, "Ctrl+Shift+S")
+        add("picture", _FILE, "Save &picture", self._save_picture, "Ctrl+S")
+        add("quit", _FILE, "&Quit", window.quit, "Ctrl+Q")
+
+    def _add_edit(self) -> None:
+        stack = self._window.history.stack
+        undo, redo = stack.createUndoAction(self._window), stack.createRedoAction(self._window)
+        undo.setShortcut("Ctrl+Z")
+        redo.setShortcut("Ctrl+Shift+Z")
+        self.actions.register("undo", _EDIT, undo)
+        self.actions.register("redo", _EDIT, redo)
+        self.actions.add("reset", _EDIT, "&Reset settings", self._window.wishes.reset)
+
+    def _add_source(self) -> None:
+        add, window = self.actions.add, self._window
+        take = window.calibrating.take
+        add("simulate", _SOURCE, "&Simulated skin", window.simulate, "Ctrl+M")
+        add("connect", _SOURCE, "&Connect", window.connect_chosen, "Ctrl+Return")
+        add("disconnect", _SOURCE, "&Disconnect", window.session.disconnect_from, "Ctrl+D")
+        add("tare", _SOURCE, "Ta&re", window.taring.tare, "Ctrl+0")
+        add("ports", _SOURCE, "&Look for ports", window.plugs.look, "F5")
+        add("happenings", _SOURCE, "What &happened", window.happenings.open_list, "F4")
+        window.taping.add_actions(self.actions)
+        window.replaying.add_actions(self.actions)
+        window.looking.add_actions(self.actions)
+        add("calibrate", _SOURCE, "C&alibrate", window.panels.show_calibration, "Ctrl+L")
+        add("take-step", _SOURCE, "&Take the step of the calibration", take, "Ctrl+K")
+
+    def _add_view(self) -> None:
+        add, window = self.actions.add, self._window
+        add("pause", _VIEW, "&Pause or go on", window.pause, "Ctrl+P")
+        add("present", _VIEW, "&Presenter", window.presenting.turn, "F11", TIP)
+        sound = add("sound", _VIEW, "S&ound of the force", self._turn_sound, "F12", SOUND_TIP)
+        sound.setCheckable(True)
+        window.presenting.sound.ended.connect(guarded(self._show_sound))
+        add("theme", _VIEW, "Light or &dark", window.wishes.switch_theme, "Ctrl+T")
+        add("next-panels", _VIEW, "&Next panels", partial(window.panels.turn, 1), "Ctrl+PgDown")
+        add("last-panels", _VIEW, "&Previous panels", partial(window.panels.turn, -1), "Ctrl+PgUp")
+        window.docks.add_actions(self.actions, _VIEW)
+
+    def _add_export(self) -> None:
+        window = self._window
+        solid = {"the window": window, "the skin": window.centralWidget()}
+        maps = {f"curvature {name}": view for name, view in window.heatmaps.items()}
+        docks = {dock.windowTitle(): dock.widget() for dock in window.docks.below}
+        window.exports.register(self.actions, solid, maps | docks)
+
+    def _turn_sound(self) -> None:
+        self._show_sound(self._window.presenting.sound.turn())
+
+    def _show_sound(self, why_not: str) -> None:
+        self._window.tell(why_not)
+        self.actions["sound"].setChecked(self._window.presenting.sound.on)
+
+    def _save_picture(self) -> None:
+        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png"))
+        done = self._window.picture(path)
+        self._window.tell(
+            f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}"
+        )
+
+    def _draw(self, name: str) -> None:
+        """Draw a figure of the paper from a run of its own, in a window beside this one."""
+        FigureWindow(name, self._window).show()
+
+    def _show_shortcuts(self) -> None:
+        if self._shortcuts is None:
+            text = self.actions.cheat_sheet()
+            self._shortcuts = QMessageBox(QMessageBox.Icon.NoIcon, "Shortcuts", text)
+            self._shortcuts.setParent(self._window, Qt.WindowType.Dialog)
+            self._shortcuts.setModal(False)
+        self._shortcuts.show()
+        self._shortcuts.raise_()
