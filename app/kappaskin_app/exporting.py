@@ -61,7 +61,7 @@ class ExportDialog(QDialog):
         self._lay_out()
         self._timer.timeout.connect(guarded(self._follow))
         self.export_button.clicked.connect(guarded(lambda *_: self._begin()))
-        self.cancel_button.clicked.connect(guarded(lambda *_: self._cancel()))
+        self.cancel_button.clicked.connect(guarded(lambda *_: self.cancel()))
         self.to.textChanged.connect(guarded(lambda *_: self._allow()))
         self.recording.textChanged.connect(guarded(lambda *_: self._allow()))
         self.every.valueChanged.connect(guarded(lambda *_: self._allow()))
@@ -170,7 +170,12 @@ class ExportDialog(QDialog):
             self.bar.reset()
             self._end(str(refusal))
 
-    def _cancel(self) -> None:
+    @property
+    def writing(self) -> bool:
+        return self._exporting is not None
+
+    def cancel(self) -> None:
+        """End what is written, or close."""
         if self._exporting is None:
             self.reject()
         else:
@@ -190,7 +195,7 @@ class ExportDialog(QDialog):
 
     def done(self, result: int) -> None:
         if self._exporting is not None:
-            self._cancel()
+            self.cancel()
         super().done(result)
 
 

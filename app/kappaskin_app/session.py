@@ -136,6 +136,11 @@ class Session(QObject):
         return self.inside and self._history.settings.written is None
 
     @property
+    def making(self) -> bool:
+        """Whether the scene that is asked for is still being made."""
+        return self._ahead.busy
+
+    @property
     def replaying(self) -> bool:
         """Whether a recording is what is read."""
         return self.source.startswith(RECORDED)

@@ -23,6 +23,7 @@ from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
 from kappaskin_app.docks import Docks
+from kappaskin_app.doing import Doing, works_of
 from kappaskin_app.drops import Drops
 from kappaskin_app.exports import Exports
 from kappaskin_app.guard import guarded
@@ -49,6 +50,7 @@ from kappaskin_app.staging import Staging
 from kappaskin_app.taping import Taping
 from kappaskin_app.taring import Taring
 from kappaskin_app.theme import THEMES, palette
+from kappaskin_app.views.activity import Activity
 from kappaskin_app.views.line import Line
 from kappaskin_app.views.recording_mark import RecordingMark
 from kappaskin_app.views.stage import Stage
@@ -102,21 +104,23 @@ class MainWindow(QMainWindow):
             "probability; and the principal curvatures of the skin at the contact."
         )
         self.statusBar().addPermanentWidget(self.object, 1)
+        self.activity = Activity()
+        self.statusBar().addPermanentWidget(self.activity)
         # What it takes of the bar, all that the rest leaves, a passing message needs.
         self.statusBar().messageChanged.connect(lambda text: self.object.setHidden(bool(text)))
         stage = Stage(self._centre())
         self.setCentralWidget(stage)
         self.presenting = Presenting(self, stage, self.session, self.display, self.wishes)
         self._make_header()
-        self.docks = self._surround()
+        self.docks, self.naming = self._surround(), Naming(self)
         self.exports = Exports(self.session, self.membrane, self)
         self.actions_by_name = Menus(self).actions
+        self.doing = Doing(works_of(self), self)
         self._wire()
         self._follow(self.history.settings)
         self.plugs.look()
         self.resize(1280, 800)
         self.panels.connection.show_source(source)
-        self.naming = Naming(self)
         self.naming.named.connect(guarded(self.object.show_text))
         self.naming.found.connect(guarded(self.presenting.find))
         self.session.connect_to(source, already=engine is not None)
@@ -221,7 +225,15 @@ class MainWindow(QMainWindow):
             heatmap.chosen.connect(guarded(wishes.choose))
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
+        session.reported.connect(guarded(self.doing.follow))
+        self.doing.told.connect(guarded(self._show_work))
+        self.activity.cancel_wanted.connect(guarded(self.doing.cancel))
         guard.on_failure(self.tell)
+
+    def _show_work(self, words: str) -> None:
+        """Show what takes long, and whether it can be ended."""
+        work = self.doing.work
+        self.activity.show_work(words, work is not None and work.cancel is not None)
 
     def _attend_recording(self) -> None:
         session, taping, replaying = self.session, self.taping, self.replaying
