@@ -3,11 +3,13 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
@@ -39,6 +41,73 @@ else:
     resource_tracker.ensure_running()
 
 _PATIENCE = 2.0  # s that what was told to end may take
+
+_PARENT = """
+import sys, time
+from pathlib import Path
+from kappaskin import Setup
+from kappaskin.engine import Engine
+
+folder, file, patience, entrusted = sys.argv[1:]
+engine = Engine(Setup(6, 7), Path(folder), float(patience))
+engine.entrust(bytes.fromhex(entrusted))
+if file:
+    engine.record(Path(file))
+engine.connect("sim:centre")
+while engine.latest(status := engine.status()) is None or (file and not status.recording.messages):
+    time.sleep(0.01)
+print(engine.pid, engine._ring.name, engine._beside.name, status.generation, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_real_orphans(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Lets no app that a test starts take over what a real one left."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield
+
+
+@dataclass(frozen=True)
+class Abandoned:
+    """An engine whose parent was killed, and its blocks of memory, where the system lists them."""
+
+    pid: int
+    blocks: tuple[Path, ...]
+    generation: int
+
+    @property
+    def gone(self) -> bool:
+        """Whether the process ended, be it still a zombie because nobody asked for its code."""
+        try:
+            return psutil.Process(self.pid).status() == psutil.STATUS_ZOMBIE
+        except psutil.NoSuchProcess:
+            return True
+
+
+@pytest.fixture
+def abandoned() -> Iterator[Callable[..., Abandoned]]:
+    """Kills a process whose engine records `sim:centre`, 6 x 7 functions, to `file` if any."""
+    made: list[Abandoned] = []
+
+    def begin(
+        orphans: Path, file: Path | None, patience: float = 20.0, entrusted: bytes = b""
+    ) -> Abandoned:
+        said = [str(orphans), str(file or ""), str(patience), entrusted.hex()]
+        call = [sys.executable, "-c", _PARENT, *said]
+        quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+        with subprocess.Popen(call, text=True, **quiet) as parent:
+            pid, *names, generation = (parent.stdout or sys.stdin).readline().split()
+            parent.kill()
+        blocks = tuple(Path("/dev/shm", name) for name in names)
+        made.append(Abandoned(int(pid), blocks, int(generation)))
+        return made[-1]
+
+    yield begin
+    for one in made:
+        if not one.gone:
+            os.kill(one.pid, signal.SIGKILL)
 
 
 def _children() -> set[int]:

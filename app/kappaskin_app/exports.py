@@ -51,7 +51,7 @@ class Exports(QObject):
     def ask(self) -> None:
         """Ask what of a recording is to be written where."""
         session, replay = self._session, self._session.status.replay
-        self.dialog.ask(session.source, replay.at if replay else 0.0, session.status.setup)
+        self.dialog.ask_of(session.source, replay.at if replay else 0.0, session.status.setup)
 
     def caption(self) -> str:
         """What the window shows now, in words."""

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin import Engine, Refusal
+from kappaskin import Engine, Refusal, orphans_folder
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -19,7 +19,7 @@ _BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want 
 
 
 def opened(source: str) -> "tuple[QApplication, MainWindow]":
-    """The application and its window, shown, on `source`."""
+    """The application and its window, shown, on `source` or on what the last window left."""
     # Beside: the engine's process starts while this one loads Qt and VTK.
     with ThreadPoolExecutor(1) as beside:
         starting = beside.submit(_connected, source)
@@ -53,8 +53,10 @@ def _stand_behind() -> None:
 
 
 def _connected(source: str) -> Engine:
-    engine = Engine()
-    engine.connect(source)
+    """An engine that reads `source`, or one that a window left that is gone."""
+    engine = Engine(orphans=orphans_folder())
+    if engine.adopted is None:
+        engine.connect(source)
     return engine
 
 
@@ -74,7 +76,7 @@ def launch(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: asked.append(got))
     application, window = opened(source)
-    if presenting:
+    if presenting and not window.session.engine.adopted:
         window.presenting.enter()
     from PySide6.QtCore import QTimer
 

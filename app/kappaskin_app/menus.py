@@ -45,7 +45,7 @@ class Menus(QObject):
         add("open-scene", _FILE, f"&Open scene{_DOTS}", window.staging.open, "Ctrl+O")
         add("save-scene", _FILE, f"Save scene &as{_DOTS}", window.staging.save, "Ctrl+Shift+S")
         add("picture", _FILE, "Save &picture", self._save_picture, "Ctrl+S")
-        add("quit", _FILE, "&Quit", window.close, "Ctrl+Q")
+        add("quit", _FILE, "&Quit", window.quit, "Ctrl+Q")
 
     def _add_edit(self) -> None:
         stack = self._window.history.stack

@@ -18,7 +18,11 @@ def recordings_folder() -> Path:
 
 def proposed(folder: Path, now: datetime) -> Path:
     """What a recording that begins `now` is called: nothing that is there already."""
-    plain = folder / f"kappaskin-{now:%Y%m%d-%H%M%S}.mcap"
+    return _free(folder / f"kappaskin-{now:%Y%m%d-%H%M%S}.mcap")
+
+
+def _free(plain: Path) -> Path:
+    """`plain`, or one that is numbered, where nothing is."""
     others = (plain.with_stem(f"{plain.stem}-{n}") for n in itertools.count(2))
     return next(path for path in itertools.chain([plain], others) if not _taken(path))
 
@@ -37,11 +41,15 @@ def unfinished(folder: Path) -> list[Path]:
     return _found(folder, f"*.mcap{_PART}")
 
 
+def repaired(file: Path) -> Path:
+    """What the recording `file` is called once it is repaired: nothing that is there already."""
+    stem = Path(file.name.removesuffix(_PART)).stem
+    return _free(file.with_name(f"{stem}-repaired.mcap"))
+
+
 def repairing(file: Path) -> str:
     """The command that makes the recording `file` whole, as another one beside it."""
-    name = file.name.removesuffix(_PART)
-    out = file.with_name(f"{Path(name).stem}-repaired.mcap")
-    return f"kappaskin repair {shlex.quote(str(file))} --out {shlex.quote(str(out))}"
+    return f"kappaskin repair {shlex.quote(str(file))} --out {shlex.quote(str(repaired(file)))}"
 
 
 def _found(folder: Path, pattern: str) -> list[Path]:

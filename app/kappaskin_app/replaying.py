@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
-from kappaskin import Event, Refusal, Replay, Setup, Status
+from kappaskin import Damaged, Event, Refusal, Replay, Setup, Status
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
@@ -31,12 +31,14 @@ class Replaying(QObject):
     """Opens recordings, and has the engine play them as `transport` asks.
 
     `opened` names the source that is played, `told` says what came of a wish, `changed` that
-    `message` did: what a person should know about the recording, `alarming` where it is bad news.
+    `message` did: what a person should know about the recording, `alarming` where it is bad news;
+    `damaged` is the one that a repair may help then, and `offered` tells that there is one.
     """
 
     opened = Signal(str)
     told = Signal(str)
     changed = Signal()
+    offered = Signal()
 
     def __init__(
         self, history: History, session: Session, transport: Transport, window: QWidget
@@ -46,6 +48,7 @@ class Replaying(QObject):
         self._window = window
         self.seen: Seen | None = None
         self.message, self.alarming = "", False
+        self.damaged: Path | None = None
         self.speed, self._looped, self._goes = 1.0, False, True
         self._replay: Replay | None = None
         self._sought: float | None = None
@@ -54,7 +57,7 @@ class Replaying(QObject):
         self._before: dict[str, object] = {}
         self._changes: list[Event] = []
         self._thread = ThreadPoolExecutor(1, "recording-reader")
-        self._looking: tuple[Future[Seen], bool] | None = None
+        self._looking: tuple[Future[Seen], Path, bool] | None = None
         self._send, self._recent = Newest(self), QMenu(window)
         self._opened: list[Path] = []
         self._actions: Actions | None = None
@@ -120,7 +123,7 @@ class Replaying(QObject):
 
     def _look(self, path: Path, connects: bool) -> None:
         self.told.emit(f"Reading {path.name}{_DOTS}")
-        self._looking = self._thread.submit(seen, path), connects
+        self._looking = self._thread.submit(seen, path), path, connects
         QTimer.singleShot(_LOOK, self, guarded(self._take))
 
     @property
@@ -136,7 +139,7 @@ class Replaying(QObject):
     def _take(self) -> None:
         if self._looking is None:
             return
-        future, connects = self._looking
+        future, path, connects = self._looking
         if not future.done():
             QTimer.singleShot(_LOOK, self, guarded(self._take))
             return
@@ -144,7 +147,8 @@ class Replaying(QObject):
         try:
             found = future.result()
         except Refusal as refusal:
-            self._say(str(refusal), alarming=True)
+            damaged = path if isinstance(refusal, Damaged) else None
+            self._say(str(refusal), alarming=True, damaged=damaged)
             self.told.emit(str(refusal))
             return
         self._play(found, connects)
@@ -161,7 +165,7 @@ class Replaying(QObject):
         now = self._history.settings
         self._before = {"calibration": now.calibration, "tare": now.tare}
         self._use(found.setup_at(0.0))
-        self._say(told_of(found))
+        self._say(told_of(found), damaged=None if found.whole else found.path)
         self.opened.emit(source)
         self.told.emit(self.message or f"Playing {found.path.name}, with the settings recorded")
 
@@ -320,10 +324,20 @@ class Replaying(QObject):
             there = 0 <= replay.at - self._sought <= passed * self._pace + 1e-6
             if there or passed > _ARRIVES:
                 self._sought = None
+        self._look_for_damage(status)
         self._transport.show_recording(replay, self.events)
         self._show()
         self._show_actions()
         self._show_title(replay)
+
+    def _look_for_damage(self, status: Status) -> None:
+        """Take note of why the engine let go of the recording."""
+        why, found = status.message, self.seen
+        if status.state != "lost" or found is None or why == self.message:
+            return
+        if str(found.path) in why:
+            helps = "`kappaskin repair`" in why and found.path.exists()
+            self._say(why, alarming=True, damaged=found.path if helps else None)
 
     def _show(self) -> None:
         self._transport.show_time(self.time, self.playing)
@@ -352,9 +366,11 @@ class Replaying(QObject):
         if self._recent.isEmpty():
             self._recent.addAction("None yet").setEnabled(False)
 
-    def _say(self, message: str, alarming: bool = False) -> None:
-        self.message, self.alarming = message, alarming
+    def _say(self, message: str, alarming: bool = False, damaged: Path | None = None) -> None:
+        self.message, self.alarming, self.damaged = message, alarming, damaged
         self.changed.emit()
+        if damaged is not None:
+            self.offered.emit()
 
     def close(self) -> None:
         self._looking = None

@@ -16,6 +16,7 @@ from kappaskin import (
     CurvatureMap,
     Engine,
     Estimate,
+    Left,
     PointLoad,
     Presentation,
     Refusal,
@@ -109,9 +110,12 @@ class Session(QObject):
         self._sought_at = 0.0
         self._ahead = Ahead()
         self.base: Setup | None = None
-        self.asked = _setup_of(history.settings)
-        engine.set_up(self.asked)
-        engine.scan(region_of(history.settings))
+        if engine.adopted is None:
+            self.asked = _setup_of(history.settings)
+            engine.set_up(self.asked)
+            engine.scan(region_of(history.settings))
+        else:
+            self.asked = engine.adopted.asked.setup
         self._laid: Step | None = None
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0
@@ -159,6 +163,13 @@ class Session(QObject):
         if self.inside:
             self._anew = True
             self._history.change("Simulated skin", -1, **named(self.source))
+            self._play()
+
+    def go_on(self, left: Left) -> None:
+        """Go on with what the engine was left with, whose settings are the history's."""
+        self.source, self.running = left.asked.source or "", bool(left.asked.speed)
+        self.engine.compare(None)
+        if self.inside:
             self._play()
 
     def begin(self, written: Written) -> None:

@@ -4,12 +4,14 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QWidget
+from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox, QWidget
 
-from kappaskin import LONGEST_NOTE, Engine, Status, Written
+from kappaskin import LONGEST_NOTE, Engine, Left, Status, Written
 from kappaskin_app.actions import Actions
+from kappaskin_app.adopting import words
 from kappaskin_app.guard import guarded
 from kappaskin_app.recordings import proposed, recordings_folder, repairing, unfinished
+from kappaskin_app.repairs import RepairDialog
 from kappaskin_app.views.recording_mark import duration_of, size_of
 
 FILES = "Recording (*.mcap)"
@@ -21,7 +23,7 @@ class Taping(QObject):
     """Has the engine record, and tells how that does: `told` once, `changed` whenever it is so.
 
     `message` says what a person should know or do about recordings, and `alarming` whether it is
-    bad news.
+    bad news; `damaged` is the one that a repair may help then.
     """
 
     told = Signal(str)
@@ -34,6 +36,9 @@ class Taping(QObject):
         self.written, self.ended = Written(), ""
         """How it does, and why it ended by itself."""
         self.message, self.alarming = "", False
+        self.damaged: Path | None = None
+        self.repairs = RepairDialog(window)
+        self._question: QMessageBox | None = None
         self._actions: Actions | None = None
 
     @property
@@ -103,6 +108,36 @@ class Taping(QObject):
         if text.strip():
             self._engine.note(text.strip())
 
+    def may_close(self) -> bool:
+        """Whether the window may close now; asks, where that would end a recording."""
+        if not self.recording:
+            return True
+        if self._question is None:
+            self._question = self._asking()
+        self._question.open()
+        self._question.activateWindow()
+        return False
+
+    def _asking(self) -> QMessageBox:
+        box = QMessageBox(self._window)
+        box.setIcon(QMessageBox.Icon.Question)
+        box.setWindowTitle("Close while recording")
+        box.setText(f"{Path(self.written.path).name} is being recorded.")
+        box.setInformativeText("Closing the window ends the recording; the file is whole then.")
+        roles = QMessageBox.ButtonRole
+        end = box.addButton("&End the recording and close", roles.AcceptRole)
+        keep = box.addButton("&Keep the window", roles.RejectRole)
+        box.setDefaultButton(keep)
+        box.setEscapeButton(keep)
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.finished.connect(guarded(lambda *_: self._answer(box.clickedButton() is end)))
+        return box
+
+    def _answer(self, closes: bool) -> None:
+        self._question = None
+        if closes:
+            self._window.close()
+
     def dismiss(self) -> None:
         """Show no more that a recording ended by itself."""
         if self.ended:
@@ -119,8 +154,13 @@ class Taping(QObject):
             f"The recording {file.name} was never ended. What is in it can be opened as it is, or "
             f"repaired: `{repairing(file)}`.{more}",
             alarming=False,
+            damaged=file,
         )
         self.told.emit(f"The recording {file.name} was never ended: see Recording on the page Live")
+
+    def go_on(self, left: Left, wanted: str) -> None:
+        """Say what went on without a window, to one who `wanted` this source."""
+        self._say(words(left, wanted), alarming=False)
 
     # News.
 
@@ -147,6 +187,12 @@ class Taping(QObject):
             action.setText(_STOP if self.recording else _RECORD)
             action.setEnabled(not self.why_not)
 
-    def _say(self, message: str, alarming: bool = True) -> None:
-        self.message, self.alarming = message, alarming
+    def close(self) -> None:
+        """End what is being repaired: it is not there then; and ask no more."""
+        self.repairs.close()
+        if self._question is not None:
+            self._question.close()
+
+    def _say(self, message: str, alarming: bool = True, damaged: Path | None = None) -> None:
+        self.message, self.alarming, self.damaged = message, alarming, damaged
         self.changed.emit()

@@ -17,13 +17,14 @@ from PySide6.QtWidgets import (
 
 from kappaskin import Engine, Status, Tares, data_folder
 from kappaskin_app import guard
+from kappaskin_app.adopting import Entrusting, settings_left
 from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.columns import column, widen
 from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
 from kappaskin_app.docks import Docks
-from kappaskin_app.doing import Doing, works_of
+from kappaskin_app.doing import Doing, tasks_of
 from kappaskin_app.drops import Drops
 from kappaskin_app.exports import Exports
 from kappaskin_app.guard import guarded
@@ -69,7 +70,11 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
-        self.history = History(settings_for(source), self)
+        handed = engine.adopted if engine else None
+        if handed and source == "sim:":  # nothing else was asked for
+            source = handed.asked.source or source
+        begun = settings_left(handed) if handed else settings_for(source)
+        self.history = History(begun, self)
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
         self.calibrating = Calibrating(self.history, self)
@@ -115,7 +120,7 @@ class MainWindow(QMainWindow):
         self.docks, self.naming = self._surround(), Naming(self)
         self.exports = Exports(self.session, self.membrane, self)
         self.actions_by_name = Menus(self).actions
-        self.doing = Doing(works_of(self), self)
+        self.doing = Doing(tasks_of(self), self)
         self._wire()
         self._follow(self.history.settings)
         self.plugs.look()
@@ -123,9 +128,13 @@ class MainWindow(QMainWindow):
         self.panels.connection.show_source(source)
         self.naming.named.connect(guarded(self.object.show_text))
         self.naming.found.connect(guarded(self.presenting.find))
-        self.session.connect_to(source, already=engine is not None)
-        self.replaying.adopt(source)
-        self.taping.offer_repair()
+        if handed:
+            self.session.go_on(handed)
+            self.taping.go_on(handed, source)
+        else:
+            self.session.connect_to(source, already=engine is not None)
+            self.taping.offer_repair()
+        self.replaying.adopt(self.session.source)
 
     def _centre(self) -> QWidget:
         centre = QWidget()
@@ -232,15 +241,19 @@ class MainWindow(QMainWindow):
 
     def _show_work(self, words: str) -> None:
         """Show what takes long, and whether it can be ended."""
-        work = self.doing.work
-        self.activity.show_work(words, work is not None and work.cancel is not None)
+        task = self.doing.task
+        self.activity.show_work(words, task is not None and task.cancel is not None)
 
     def _attend_recording(self) -> None:
         session, taping, replaying = self.session, self.taping, self.replaying
         session.reported.connect(guarded(taping.follow))
+        entrusting = Entrusting(self.history, session.engine)
+        session.reported.connect(guarded(entrusting.follow))
         taping.changed.connect(guarded(self._show_mark))
         self.mark.clicked.connect(guarded(taping.dismiss))
         replaying.opened.connect(guarded(self.panels.connection.show_source))
+        replaying.offered.connect(guarded(self.panels.show_recording))
+        taping.repairs.saved.connect(guarded(replaying.open_file))
         for news in (taping, replaying):
             news.told.connect(guarded(self.tell))
         self.panels.recording.attend(taping, replaying)
@@ -378,7 +391,16 @@ class MainWindow(QMainWindow):
         super().resizeEvent(event)
         widen(self, self.docks["curvature"], event)
 
+    def quit(self) -> None:
+        """Close, unless a recording is to go on."""
+        if self.taping.may_close():
+            self.close()
+
     def closeEvent(self, event: QCloseEvent) -> None:
+        # Only of a person: a run of so many seconds ends, and so does one that gets a signal.
+        if event.spontaneous() and not self.session.closed and not self.taping.may_close():
+            event.ignore()
+            return
         if not self.session.closed:
             guard.forget(self.tell)
             self.presenting.close()
@@ -386,6 +408,7 @@ class MainWindow(QMainWindow):
             self.exports.close()
             self.plugs.close()
             self.replaying.close()
+            self.taping.close()
             self.costing.close()
             self.planning.close()
             self.scene.gallery.close()

@@ -1,5 +1,7 @@
 """Kappaskin: shape and contact from curvature-sensing tactile skins, live and with error bars."""
 
+from kappaskin.adoption import Left as Left
+from kappaskin.adoption import orphans_folder as orphans_folder
 from kappaskin.bases import EDGES as EDGES
 from kappaskin.bases import Basis as Basis
 from kappaskin.bases import CurvatureMap as CurvatureMap
@@ -35,11 +37,13 @@ from kappaskin.effects import UniformNoise as UniformNoise
 from kappaskin.effects import parameters as parameters
 from kappaskin.engine import LONGEST_NOTE as LONGEST_NOTE
 from kappaskin.engine import Engine as Engine
+from kappaskin.errors import Damaged as Damaged
 from kappaskin.errors import RankDeficient as RankDeficient
 from kappaskin.errors import Refusal as Refusal
 from kappaskin.errors import SourceError as SourceError
 from kappaskin.export import Exported as Exported
 from kappaskin.export import Exporting as Exporting
+from kappaskin.export import Repairing as Repairing
 from kappaskin.export import Wanted as Wanted
 from kappaskin.figures import FIGURES as FIGURES
 from kappaskin.figures import write_figures as write_figures
@@ -95,6 +99,7 @@ from kappaskin.publish import Published as Published
 from kappaskin.publish import PublishNews as PublishNews
 from kappaskin.publish import Receiver as Receiver
 from kappaskin.recording.reading import Recording as Recording
+from kappaskin.recording.repair import Repaired as Repaired
 from kappaskin.recording.writing import Written as Written
 from kappaskin.region import Bargain as Bargain
 from kappaskin.region import Region as Region

@@ -1,7 +1,6 @@
 """The live process, away from whatever draws: started, asked, watched and ended from here."""
 
 import gc
-import itertools
 import multiprocessing
 import os
 import signal
@@ -14,20 +13,25 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
+from kappaskin.adoption import Left, Orphan, adopted
+from kappaskin.asker import Asker
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Event
 from kappaskin.live import Loop
 from kappaskin.pipeline import Setup
 from kappaskin.processes import beginning_processes
 from kappaskin.publish import targets_of
-from kappaskin.recording.writing import part_of
+from kappaskin.recording.writing import unused
 from kappaskin.region import Region
 from kappaskin.requests import (
+    Asked,
     Compare,
     Connect,
     Disconnect,
+    Entrust,
+    Goodbye,
     Note,
     Publish,
     Record,
@@ -46,6 +50,7 @@ LONGEST_NOTE = 500
 _SWITCH = 2e-4  # s that one thread may keep the interpreter from another
 _ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
 _GRACE = 0.5  # s for an orderly end once the parent is gone
+_PATIENCE = 600.0  # s that a recording goes on without one, where another may come
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
 
 _AGAIN = "the engine process ended unexpectedly and was started again"
@@ -60,93 +65,117 @@ _GIVEN_UP = (
 def _end_with_parent(loop: Loop) -> None:
     """End this process soon after the one that started it, whatever is being computed.
 
-    What was recorded is ended first.
+    What was recorded is ended first. What is being recorded, and may be adopted, goes on.
     """
     if parent := multiprocessing.parent_process():
         parent.join()
         time.sleep(_GRACE)
-        loop.end_recording()
-        os._exit(1)
+        if not loop.may_be_adopted:
+            loop.end_recording()
+            os._exit(1)
 
 
-def _serve(requests: "Connection[Request, Request]", name: str, beside: str) -> None:
+def _serve(
+    requests: "Connection[Request, Request]",
+    names: tuple[str, str],
+    orphans: Path | None,
+    patience: float,
+) -> None:
     """What the child process does."""
     # The thread that reads the line needs the interpreter three times for 4 KiB: with Python's 5 ms
     # for each, a loop that always computes would starve it below the rate of the line.
     sys.setswitchinterval(_SWITCH)
     gc.freeze()  # what was imported is no garbage: to look through it takes 27 ms each time
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
-    rings = Ring.attach(name), Ring.attach(beside)
+    # Ctrl+C and a terminal that closes are the parent's: it says goodbye, or is gone.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "SIGHUP"):
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    rings = Ring.attach(names[0]), Ring.attach(names[1])
     try:
-        loop = Loop(requests, *rings)
+        loop = Loop(Asker(requests, names, orphans, patience), *rings)
         watcher = threading.Thread(target=_end_with_parent, args=(loop,), name="parent-watcher")
         watcher.daemon = True
         watcher.start()
         loop.run()
     finally:
+        parent = multiprocessing.parent_process()
         for ring in rings:
-            ring.close()
-
-
-def _unused(path: Path) -> Path:
-    """`path`, or one that is numbered, where no recording is yet."""
-    names = (path.with_stem(f"{path.stem}-{n}") if n > 1 else path for n in itertools.count(1))
-    return next(name for name in names if not (name.exists() or part_of(name).exists()))
+            if parent and parent.is_alive():
+                ring.close()
+            else:
+                ring.destroy()
 
 
 class Engine:
     """The live process, seen from the one that shows; no call here waits for it.
 
-    It ends when `close` is called, or within a second when this process is gone.
+    It ends when `close` is called, or within a second when this process is gone. With a folder for
+    `orphans` one that records goes on for `patience` s instead, until another `Engine` with that
+    folder adopts it instead of beginning one: `adopted` tells what it was left with.
     """
 
-    def __init__(self, setup: Setup | None = None) -> None:
-        self._ring, self._beside = Ring.create(), Ring.create()
-        self._setup = setup or Setup()
-        self._compared: Setup | None = None
-        self._region = Region()
-        self._targets: tuple[str, ...] = ()
-        # What was asked for last, for a process that takes over.
-        self._source: str | None = None
-        self._scene: Scene | None = None
-        self._speed = 1.0
-        self._recording: Path | None = None
+    def __init__(
+        self,
+        setup: Setup | None = None,
+        orphans: Path | None = None,
+        patience: float = _PATIENCE,
+    ) -> None:
+        self._orphans, self._patience = orphans, patience
+        # For a process that takes over.
+        self._asked = Asked(setup or Setup())
         self._deaths: list[float] = []
         self._seen = Status()
-        self._process: BaseProcess | None = None
-        self._requests: Connection[Request, Request] | None = None
-        self._start(Status(setup=self._setup))
+        self._process: BaseProcess | Orphan | None = None
+        self._requests: Connection[Request, Any] | None = None
+        self.adopted: Left | None = None
+        orphan = adopted(orphans) if orphans else None
+        if orphan is None:
+            self._ring, self._beside = Ring.create(), Ring.create()
+            self._start(Status(setup=self._asked.setup))
+        else:
+            self._adopt(orphan)
+
+    def _adopt(self, orphan: Orphan) -> None:
+        self._process, self._requests = orphan, orphan.line
+        self.adopted, self._asked = orphan.left, orphan.left.asked
+        self._ring, self._beside = map(Ring.borrow, orphan.left.rings)
 
     def _start(self, status: Status) -> None:
         self._ring.write_status(status)
+        names = self._ring.name, self._beside.name
         theirs, ours = multiprocessing.Pipe(duplex=False)
         self._requests = cast("Connection[Request, Request]", ours)
         with beginning_processes() as context:
             self._process = context.Process(
                 target=_serve,
-                args=(theirs, self._ring.name, self._beside.name),
+                args=(theirs, names, self._orphans, self._patience),
                 name="kappaskin-engine",
                 daemon=True,
             )
             self._process.start()
         theirs.close()
-        self._send(self._setup)
-        self._send(self._region)
-        if self._compared is not None:
-            self._send(Compare(self._compared))
-        if self._targets:
-            self._send(Publish(self._targets))
+        asked = self._asked
+        self._send(asked.setup)
+        self._send(asked.region)
+        if asked.compared is not None:
+            self._send(Compare(asked.compared))
+        if asked.targets:
+            self._send(Publish(asked.targets))
+        if asked.entrusted:
+            self._send(Entrust(asked.entrusted))
 
     def _start_again(self, *events: Event) -> None:
         """Let another process take over; it goes on counting, so that no generation comes twice."""
         self._end()
         # One killed while it wrote left no status that can be read.
         was = self._ring.read_status() or self._seen
-        fresh = Status(
-            setup=self._setup, generation=was.generation, meetings=was.meetings, tare=was.tare
-        )
-        if events and self._source is not None:
-            fresh = replace(fresh, state=LOST, source=self._source, message=events[-1].text)
+        if self.adopted is not None:
+            self._give_memory_back()
+            self._ring, self._beside, self.adopted = Ring.create(), Ring.create(), None
+        setup, source = self._asked.setup, self._asked.source
+        fresh = Status(setup=setup, generation=was.generation, meetings=was.meetings, tare=was.tare)
+        if events and source is not None:
+            fresh = replace(fresh, state=LOST, source=source, message=events[-1].text)
         self._start(replace(fresh, events=was.events, happened=was.happened).after(events))
 
     def revive(self) -> None:
@@ -164,15 +193,16 @@ class Engine:
             self._ring.write_status(was.after((Event(now, "engine", _GIVEN_UP),)))
             return
         self._start_again(Event(now, "engine", _AGAIN))
-        if self._source is not None:
-            self._send(Connect(self._source))
-        if self._recording is not None:
+        asked = self._asked
+        if asked.source is not None:
+            self._send(Connect(asked.source))
+        if asked.recording is not None:
             # Beside the one that broke off, which `repair` makes whole.
-            self.record(_unused(self._recording))
-        if self._scene is not None:
-            self._send(self._scene)
-        if self._speed != 1.0:
-            self._send(Seek(None, self._speed))
+            self.record(unused(asked.recording))
+        if asked.scene is not None:
+            self._send(asked.scene)
+        if asked.speed != 1.0:
+            self._send(Seek(None, asked.speed))
 
     @property
     def _given_up(self) -> bool:
@@ -181,7 +211,7 @@ class Engine:
     @property
     def source(self) -> str | None:
         """The source asked for last, None where there is to be none."""
-        return self._source
+        return self._asked.source
 
     @property
     def pid(self) -> int | None:
@@ -192,6 +222,7 @@ class Engine:
         return self._process is not None and self._process.is_alive()
 
     def _send(self, request: Request) -> None:
+        self._asked = self._asked.after(request)
         if self._requests is not None:
             with suppress(OSError):  # the process died: `status` says so
                 self._requests.send(request)
@@ -201,26 +232,21 @@ class Engine:
         if not self.alive:
             self._deaths = []
             self._start_again()
-        self._source, self._scene, self._speed = source, None, 1.0
         self._send(Connect(source))
 
     def disconnect(self) -> None:
-        self._source, self._scene, self._speed = None, None, 1.0
         self._send(Disconnect())
 
     def set_up(self, setup: Setup) -> None:
         """Compute with another setup; a refused one leaves the present one, `status` says why."""
-        self._setup = setup
         self._send(setup)
 
     def compare(self, setup: Setup | None) -> None:
         """Compute with another setup too, of the same frames; None ends that."""
-        self._compared = setup
         self._send(Compare(setup))
 
     def play(self, scene: Scene) -> None:
         """Let the simulated source, if that is what there is, go on with `scene`."""
-        self._scene = scene
         self._send(scene)
 
     def seek(self, at: float | None = None, speed: float = 1.0, looped: bool | None = None) -> None:
@@ -231,17 +257,14 @@ class Engine:
         Status tells where it is.
         """
         Playing(at or 0.0, 0.0, speed)  # or refused here
-        self._speed = speed
         self._send(Seek(at, speed, looped))
 
     def step(self, frames: int) -> None:
         """Let a recording stand, so many `frames` further on, or back if negative."""
-        self._speed = 0.0
         self._send(Step(frames))
 
     def scan(self, region: Region) -> None:
         """Let every frame scan `region`; where it cannot, `status` says why."""
-        self._region = region
         self._send(region)
 
     def publish(self, targets: Sequence[str]) -> None:
@@ -250,8 +273,7 @@ class Engine:
         Those asked for before get no more; `status` tells how each is doing. Raises a `Refusal`
         where one is no target.
         """
-        self._targets = tuple(str(target) for target in targets_of(targets))
-        self._send(Publish(self._targets))
+        self._send(Publish(tuple(str(target) for target in targets_of(targets))))
 
     def tare(self) -> None:
         """Take a tare; `status` tells what came of it, and a setup with it uses it."""
@@ -259,8 +281,11 @@ class Engine:
 
     def record(self, path: Path | None) -> None:
         """Record to `path` from now on, or end that with None; `status` tells what came of it."""
-        self._recording = path
         self._send(Record(path and path.absolute()))
+
+    def entrust(self, data: bytes) -> None:
+        """Let `data` be there for whoever adopts the process."""
+        self._send(Entrust(data))
 
     def note(self, text: str) -> None:
         """Let `text` be among what happened, and recorded with it."""
@@ -300,18 +325,25 @@ class Engine:
         self.close()
 
     def _end(self) -> None:
-        if self._requests is not None:
-            self._requests.close()
+        self._send(Goodbye())
         if self._process is not None:
-            self._process.join(_ORDERLY if self._recording is None else _WRITTEN)
+            self._process.join(_ORDERLY if self._asked.recording is None else _WRITTEN)
             if self._process.is_alive():
                 self._process.kill()
                 self._process.join()
             self._process.close()
+        if self._requests is not None:
+            self._requests.close()
         self._process, self._requests = None, None
+
+    def _give_memory_back(self) -> None:
+        for ring in (self._ring, self._beside):
+            if self.adopted is None:
+                ring.destroy()
+            else:
+                ring.close()  # the process that was adopted gives it back
 
     def close(self) -> None:
         """End the process and give the memory back."""
         self._end()
-        self._ring.destroy()
-        self._beside.destroy()
+        self._give_memory_back()

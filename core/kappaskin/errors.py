@@ -15,3 +15,7 @@ class RankDeficient(Refusal):
 
 class SourceError(Refusal):
     """A source cannot be opened, stopped answering, or speaks something else."""
+
+
+class Damaged(Refusal):
+    """A file is not whole, and a repair may save what is."""

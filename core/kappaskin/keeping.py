@@ -23,6 +23,10 @@ class Keeping:
         self._live = True  # what a recording brings is not recorded again
         self.written = Written()
 
+    @property
+    def active(self) -> bool:
+        return self._recorder is not None
+
     def begin(self, path: Path, source: Source | None, side: Side) -> None:
         """Record to `path` from now on, instead of to where it was."""
         self.end(source)

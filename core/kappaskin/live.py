@@ -3,14 +3,13 @@
 import math
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
 
 from kappaskin.arrivals import Arrivals
+from kappaskin.asker import Asker
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.health import Health, Monitor
@@ -22,6 +21,7 @@ from kappaskin.region import Region
 from kappaskin.requests import (
     Compare,
     Connect,
+    Disconnect,
     Note,
     Publish,
     Record,
@@ -50,8 +50,8 @@ _LOOKED_AT = 1 / 60  # s between two frames that are computed with the setup com
 class Loop:
     """The engine's own side: takes requests, reads, computes, writes, reports."""
 
-    def __init__(self, requests: "Connection[Request, Request]", ring: Ring, beside: Ring) -> None:
-        self._requests, self._ring = requests, ring
+    def __init__(self, asker: Asker, ring: Ring, beside: Ring) -> None:
+        self._asker, self._ring = asker, ring
         self._source: Source | None = None
         self._monitor: Monitor | None = None
         self._place = np.full(2, math.nan)  # of the last contact, in m
@@ -73,40 +73,37 @@ class Loop:
         self._again = math.inf
 
     def run(self) -> None:
-        """Serve until the parent closes its end, or is gone."""
-        with suppress(EOFError):
-            while True:
-                wait = 0.05 if self._source is None else 0.0
-                for request in self._asked(wait):
-                    self._take(request)
-                if self._source is not None:
-                    self._read(self._source)
-                elif time.monotonic() >= self._again:
-                    self._open(self._status.source)
-                self._swap()
-                if self._side.pipeline is not None and self._source is not None:
-                    self._taking.go_on(self._side.pipeline, self._source)
-                if time.monotonic() - self._status.reported >= _REPORT:
-                    self._report()
+        """Serve until whoever asks says goodbye, or is gone and nobody comes in its place."""
+        while True:
+            for request in self._asker.asked(0.05 if self._source is None else 0.0):
+                self._take(request)
+            if not self._goes_on():
+                break
+            if self._source is not None:
+                self._read(self._source)
+            elif time.monotonic() >= self._again:
+                self._open(self._status.source)
+            self._swap()
+            if self._side.pipeline is not None and self._source is not None:
+                self._taking.go_on(self._side.pipeline, self._source)
+            if time.monotonic() - self._status.reported >= _REPORT:
+                self._report()
         self._close()
         self.end_recording()
         self._publishing.close()
         self._builder.shutdown(wait=False, cancel_futures=True)
 
-    def _asked(self, wait: float) -> list[Request]:
-        """What was asked for within `wait` s, without places in a source left for another."""
-        asked: list[Request] = []
-        while self._requests.poll(wait):
-            try:
-                request, wait = self._requests.recv(), 0.0
-            except EOFError:
-                if asked:
-                    break  # and end the next time
-                raise
-            if asked and _overtaken(asked[-1], request):
-                asked.pop()
-            asked.append(request)
-        return asked
+    def _goes_on(self) -> bool:
+        """Whether somebody asks, or may come yet for what is recorded."""
+        if news := self._asker.look(self._keeping.active):
+            self._happen(Event(time.monotonic(), "engine", news))
+            self._report()
+        return not self._asker.over
+
+    @property
+    def may_be_adopted(self) -> bool:
+        """Whether it goes on where whoever asks is gone."""
+        return self._asker.adoptable and self._keeping.active
 
     def _take(self, request: Request) -> None:
         if isinstance(request, Setup):
@@ -128,7 +125,7 @@ class Loop:
             self._happen(Event(time.monotonic(), "note", request.text))
         elif isinstance(request, Publish):
             self._publishing.ask(request.targets)
-        else:
+        elif isinstance(request, Connect | Disconnect):
             self._close()
             self._status = replace(
                 self._status,
@@ -432,10 +429,3 @@ def _kind(status: Status) -> str:
     if status.replay is not None:
         return "replay"
     return "sim" if status.sensor.simulated else "live"
-
-
-def _overtaken(before: Request, request: Request) -> bool:
-    """Whether nobody would see what was asked `before`: another place in the source follows."""
-    if not (isinstance(before, Seek) and isinstance(request, Seek)) or request.at is None:
-        return False
-    return before.looped is None or request.looped is not None

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Generator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeAlias
@@ -28,6 +29,8 @@ def beginning_processes() -> Generator[Context]:
     was = {name: os.environ.get(name) for name in names}
     os.environ.update(dict.fromkeys(names, "1"))
     try:
+        if context.get_start_method() == "forkserver":
+            _begin_deaf()
         yield context
     finally:
         for name, value in was.items():
@@ -35,3 +38,18 @@ def beginning_processes() -> Generator[Context]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+def _begin_deaf() -> None:
+    """Begin the process that the others come from, deaf to Ctrl+C, as they are then.
+
+    The signal goes to every process of a terminal, and would break that one off while it loads.
+    """
+    from multiprocessing import forkserver, resource_tracker
+
+    resource_tracker.ensure_running()  # first: it lets the signal through once it is begun
+    was = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, was)

@@ -1,6 +1,7 @@
 """What the live process reads and finds to a recording, before it goes anywhere else."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from kappaskin.memory import Memory
 from kappaskin.pipeline import Pipeline
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import Layout, encode
+from kappaskin.recording.disk import Disk
 from kappaskin.recording.writing import RecordingFile, Written
 from kappaskin.scene import Scene, write_scene
 from kappaskin.setup_text import said_of
@@ -31,8 +33,8 @@ class Recorder:
     A `Refusal` where no file can be made. No call waits for the disk.
     """
 
-    def __init__(self, path: Path, now: float) -> None:
-        self._file = RecordingFile(path)
+    def __init__(self, path: Path, now: float, disk: Callable[[Path], Disk] = Disk) -> None:
+        self._file = RecordingFile(path, disk)
         self._now = now  # host time in s of what came last
         self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)  # told last, and its layout
         self._attached: set[str] = set()

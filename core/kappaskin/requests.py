@@ -1,6 +1,6 @@
 """What may be asked of the live process."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from kappaskin.pipeline import Setup
@@ -70,6 +70,18 @@ class Publish:
     targets: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Entrust:
+    """Keep `data` of whoever asks, for the one that asks after it is gone."""
+
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Goodbye:
+    """End, in order."""
+
+
 Request = (
     Connect
     | Disconnect
@@ -83,4 +95,49 @@ Request = (
     | Record
     | Note
     | Publish
+    | Entrust
+    | Goodbye
 )
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What was asked for last, of everything that lasts; another may go on with it."""
+
+    setup: Setup = field(default_factory=Setup)
+    compared: Setup | None = None
+    region: Region = field(default_factory=Region)
+    targets: tuple[str, ...] = ()
+    source: str | None = None
+    scene: Scene | None = None
+    speed: float = 1.0
+    recording: Path | None = None
+    entrusted: bytes = b""
+
+    def after(self, request: Request) -> "Asked":
+        """The same once `request` was asked for too."""
+        match request:
+            case Setup():
+                return replace(self, setup=request)
+            case Compare():
+                return replace(self, compared=request.setup)
+            case Region():
+                return replace(self, region=request)
+            case Publish():
+                return replace(self, targets=request.targets)
+            case Connect():
+                return replace(self, source=request.source, scene=None, speed=1.0)
+            case Disconnect():
+                return replace(self, source=None, scene=None, speed=1.0)
+            case Scene():
+                return replace(self, scene=request)
+            case Seek():
+                return replace(self, speed=request.speed)
+            case Step():
+                return replace(self, speed=0.0)
+            case Record():
+                return replace(self, recording=request.path)
+            case Entrust():
+                return replace(self, entrusted=request.data)
+            case TakeTare() | Note() | Goodbye():
+                return self

@@ -5,8 +5,10 @@ as fit, written round and round. Neither side ever waits: each value carries a c
 writer makes odd, or changes, while it writes, and a reader that saw it change reads again.
 """
 
+import os
 import pickle
 from collections.abc import Callable
+from multiprocessing import resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from operator import attrgetter
 from typing import Any, cast
@@ -141,6 +143,15 @@ class Ring:
     @classmethod
     def attach(cls, name: str) -> "Ring":
         return cls(SharedMemory(name))
+
+    @classmethod
+    def borrow(cls, name: str) -> "Ring":
+        """A block that is given back by a process that began neither this one nor from it."""
+        memory = SharedMemory(name)
+        if os.name == "posix":
+            # Attached, it counts as this process's own, which would be given back with it.
+            resource_tracker.unregister(f"/{name}", "shared_memory")
+        return cls(memory)
 
     @property
     def name(self) -> str:

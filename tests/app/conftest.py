@@ -11,6 +11,7 @@ from PySide6.QtCore import QEvent, QPoint
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QWidget
 
+from kappaskin import Engine
 from kappaskin_app import guard
 from kappaskin_app.window import MainWindow
 
@@ -54,13 +55,13 @@ def until(qapp: QApplication) -> Wait:
 
 
 @pytest.fixture
-def opened(qapp: QApplication) -> Iterator[Callable[[str], MainWindow]]:
+def opened(qapp: QApplication) -> Iterator[Callable[..., MainWindow]]:
     """Opens the window on a source, and closes it whatever happens."""
     qapp.setStyle("Fusion")
     made: list[MainWindow] = []
 
-    def opened(source: str) -> MainWindow:
-        made.append(MainWindow(source))
+    def opened(source: str, engine: Engine | None = None) -> MainWindow:
+        made.append(MainWindow(source, engine))
         made[-1].show()
         made[-1].activateWindow()
         return made[-1]
@@ -73,7 +74,7 @@ def opened(qapp: QApplication) -> Iterator[Callable[[str], MainWindow]]:
 
 
 @pytest.fixture
-def window(opened: Callable[[str], MainWindow], until: Wait) -> MainWindow:
+def window(opened: Callable[..., MainWindow], until: Wait) -> MainWindow:
     """The window on the default simulation, once it has drawn an estimate."""
     window = opened("sim:")
     until(lambda: window.badge.state == "SIM")

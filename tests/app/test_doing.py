@@ -1,20 +1,20 @@
 import pytest
 
 from kappaskin import Status
-from kappaskin_app.doing import Doing, Work
+from kappaskin_app.doing import Doing, Task
 from kappaskin_app.window import MainWindow
 
 
 class Bench:
-    """Two works that go on while their names are in `going`, and what was told of them."""
+    """Two tasks that go on while their names are in `going`, and what was told of them."""
 
     def __init__(self) -> None:
         self.now, self.going, self.told = 0.0, set[str](), list[str]()
-        works = [
-            Work(name, lambda name=name: name in self.going, lambda name=name: self.end(name))
+        tasks = [
+            Task(name, lambda name=name: name in self.going, lambda name=name: self.end(name))
             for name in ("Counting", "Sorting")
         ]
-        self.doing = Doing(works, clock=lambda: self.now)
+        self.doing = Doing(tasks, clock=lambda: self.now)
         self.doing.told.connect(self.told.append)
 
     def end(self, name: str) -> None:

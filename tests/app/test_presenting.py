@@ -90,7 +90,7 @@ def test_every_text_fits_and_is_not_made_smaller(size, qtbot) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("state", [LOST, STALE, WAITING, OFF])
+@pytest.mark.parametrize("state", [LOST, STALE, WAITING, OFF, GAP])
 def test_what_to_do_fits_whole(size, state, qtbot) -> None:
     stage = stage_of(size, qtbot)
     stage.show_trouble(state, "1234 s", WHY)

@@ -70,6 +70,10 @@ def test_where_nothing_came_it_is_grey(standing: MainWindow, until) -> None:
     standing.replaying.seek(1.4)
     until(lambda: standing.badge.state == "REPLAY \N{MIDDLE DOT} gap")
     until(lambda: standing.membrane.greyed)
+    standing.presenting.enter()
+    until(lambda: standing.presenting.stage.strip.state == standing.badge.state)
+    assert "Ctrl+P" in standing.presenting.stage.banner.remedy
+    assert standing.presenting.stage.banner.isVisible()
 
 
 def test_the_settings_recorded_are_used_and_can_be_undone(

@@ -6,8 +6,9 @@ from datetime import datetime
 from pathlib import Path
 
 import pytest
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QCloseEvent, QGuiApplication
+from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox
 
 from kappaskin import LONGEST_NOTE, Recording, Written
 from kappaskin_app.recordings import newest, proposed, recordings_folder, unfinished
@@ -156,6 +157,67 @@ def test_what_was_never_ended_is_offered_to_be_repaired(opened, until, folder: P
         "--out",
         str(folder / "it's mine-repaired.mcap"),
     ]
+
+
+# The end.
+
+
+class _Clicked(QCloseEvent):
+    """The window's own cross, clicked."""
+
+    def spontaneous(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def taped(window: MainWindow, tmp_path: Path, until) -> MainWindow:
+    """The window, recording to `taped.mcap`."""
+    window.taping.begin(tmp_path / "taped.mcap")
+    until(lambda: window.taping.recording)
+    return window
+
+
+def _boxes(window: MainWindow) -> list[QMessageBox]:
+    return [box for box in window.findChildren(QMessageBox) if box.isVisible()]
+
+
+def test_closing_while_recording_asks_once_by_mouse_and_keyboard(
+    taped: MainWindow, qtbot, until
+) -> None:
+    event = _Clicked()
+    taped.closeEvent(event)
+    assert not event.isAccepted()
+    taped.actions_by_name["quit"].trigger()
+    [box] = _boxes(taped)
+    assert "taped.mcap is being recorded" in box.text()
+    qtbot.keyClick(box, Qt.Key.Key_Escape)
+    until(lambda: not _boxes(taped))
+    assert taped.isVisible()
+    assert taped.taping.recording
+    taped.actions_by_name["quit"].trigger()
+    [box] = _boxes(taped)
+    qtbot.keyClick(box, Qt.Key.Key_Return)  # nothing is ended by a key that slips
+    until(lambda: not _boxes(taped))
+    assert taped.isVisible()
+
+
+def test_the_answer_to_end_it_closes_and_leaves_a_whole_file(
+    taped: MainWindow, tmp_path: Path, qtbot, until
+) -> None:
+    taped.actions_by_name["quit"].trigger()
+    [box] = _boxes(taped)
+    qtbot.mouseClick(box.buttons()[0], Qt.MouseButton.LeftButton)
+    until(lambda: not taped.isVisible())
+    assert not _boxes(taped)
+    with Recording(tmp_path / "taped.mcap") as recorded:
+        assert recorded.whole
+
+
+def test_a_run_that_closes_by_itself_asks_nothing(taped: MainWindow, tmp_path: Path) -> None:
+    taped.close()
+    assert not _boxes(taped)
+    assert not taped.isVisible()
+    assert (tmp_path / "taped.mcap").exists()
 
 
 # The folder.

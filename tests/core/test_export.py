@@ -590,3 +590,13 @@ def test_ctrl_c_stops_the_command_and_leaves_nothing(taps, run, tmp_path, monkey
     assert code == 2
     assert "nothing was written" in err
     assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_while_it_begins_leaves_nothing(taps, tmp_path, monkeypatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("kappaskin.studies.beside.Beside.__init__", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Exporting(Wanted(taps[0], tmp_path / "out.csv"))
+    assert not list(tmp_path.iterdir())

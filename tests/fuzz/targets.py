@@ -26,6 +26,7 @@ from kappaskin import (
     Setup,
     load_scene,
 )
+from kappaskin.adoption import adopted
 from kappaskin.calibration import Tare, Tares
 from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.calibration.file import from_toml, to_toml
@@ -35,7 +36,7 @@ from kappaskin.publish.channels import CHANNELS
 from kappaskin.publish.client import Client
 from kappaskin.recorder import Recorder
 from kappaskin.recording.messages import TOPICS
-from kappaskin.recording.repair import repair
+from kappaskin.recording.repair import repairing
 from kappaskin.scene import read_scene
 from kappaskin.sources import ReplayedSource, SimulatedSource, information
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
@@ -254,7 +255,7 @@ def _recording(data: bytes, folder: Path) -> None:
     path.write_bytes(data)
     out.unlink(missing_ok=True)
     with suppress(Refusal):
-        repair(path, out)
+        list(repairing(path, out))
     for place in (path, out):
         if place.exists():
             with suppress(Refusal):
@@ -327,6 +328,13 @@ def _recorded() -> tuple[bytes, bytes]:
         return path.read_bytes(), b"".join(messages)
 
 
+def _note(data: bytes, folder: Path) -> None:
+    """What an engine that was left alone leaves where the next one looks."""
+    (folder / "x.note").write_bytes(data)
+    if adopted(folder) is not None:
+        raise RuntimeError("nobody is there")
+
+
 _FILE, _MESSAGES = _recorded()
 
 TARGETS = (
@@ -349,6 +357,7 @@ TARGETS = (
     ),
     Target("calibration", _calibration, (_calibrated(3), _calibrated(1)), _TOML),
     Target("tares", _tares, (_tared(),), _TOML),
+    Target("note", _note, (b"0.1.0 " + b"5c" * 32,), (b" ", b"\xc3\xa9", b"zz")),
     Target("recording", _recording, (_FILE,), (b"\x06", b"\x04\0\0\0lz4", b"\xff" * 8)),
     Target("messages", _messages, (_MESSAGES,), (b"\0\1\0\0", b"\xff" * 4, *_JSON)),
     Target("ply", _mesh("ply"), (_PLY[:4000], _PLY), (*_NUMBERS, b"element face ", b"\nproperty ")),

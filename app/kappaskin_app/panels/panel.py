@@ -26,6 +26,8 @@ class Panel(QGroupBox):
             how.TextSelectableByMouse | how.TextSelectableByKeyboard
         )
         self._theme, self._hint = LIGHT, False
+        self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
+        self._grown.timeout.connect(guarded(self._answer))
         self.body = QVBoxLayout()
         self._around = QVBoxLayout(self)
         self._around.setContentsMargins(8, 6, 8, 8)
@@ -57,7 +59,7 @@ class Panel(QGroupBox):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if 0 < event.oldSize().height() < event.size().height():
-            QTimer.singleShot(_GROWN, self, guarded(self._answer))
+            self._grown.start()
 
     def _answer(self) -> None:
         """Bring in sight what is said now to who has just asked for something here."""

@@ -3,7 +3,7 @@
 from typing import TypeVar
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QTabWidget, QWidget
+from PySide6.QtWidgets import QScrollArea, QTabWidget, QWidget
 
 from kappaskin import Status
 from kappaskin_app.columns import scrolled
@@ -72,6 +72,13 @@ class Panels(QTabWidget):
     def show_calibration(self) -> None:
         """Show the page that guides through a calibration."""
         self.setCurrentIndex(list(self._pages).index(_CALIBRATE))
+
+    def show_recording(self) -> None:
+        """Show the panel on recordings."""
+        self.setCurrentIndex(list(self._pages).index(_LIVE))
+        page = self.currentWidget()
+        if isinstance(page, QScrollArea):
+            page.ensureWidgetVisible(self.recording)
 
     def show_settings(self, settings: Settings) -> None:
         for panel in self.all():

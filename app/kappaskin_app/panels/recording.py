@@ -17,6 +17,7 @@ from kappaskin_app.views.recording_mark import duration_of, size_of
 _RECORD = "Write all that comes in to a file, or end that (Ctrl+Shift+R)."
 _NOTE = "Write down what happened just now, in the recording too (Ctrl+Shift+N)."
 _OPEN = "Play a recording as if it were live (Ctrl+Shift+O); or drop one on the window."
+_REPAIR = "Save what is whole of the damaged recording to a new one beside it, and play that."
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 
 
@@ -32,13 +33,20 @@ class RecordingPanel(Panel):
         self.copy_button = button(
             "Copy the command", "copy-repair", "Copy what the message above says to type."
         )
-        self.copy_button.hide()
+        self.repair = button(f"Repair{_DOTS}", "repair-button", _REPAIR)
+        self.offer = QWidget()
+        buttons = in_a_row(self.repair, self.copy_button)
+        buttons.setContentsMargins(0, 0, 0, 0)
+        self.offer.setLayout(buttons)
+        self.offer.hide()
         self.body.addLayout(in_a_row(self.record, self.note, self.open))
         self.body.addWidget(self.what)
-        self._around.addWidget(self.copy_button)
+        self._around.addWidget(self.offer)
         self._taping: Taping | None = None
         self._replaying: Replaying | None = None
+        self._damaged: Path | None = None
         self.copy_button.clicked.connect(guarded(self._copy))
+        self.repair.clicked.connect(guarded(self._ask_for_repair))
 
     def attend(self, taping: Taping, replaying: Replaying) -> None:
         """Show how both go, and tell them what a person wishes."""
@@ -65,7 +73,13 @@ class RecordingPanel(Panel):
         message = replaying.message or taping.message
         alarm = bool(replaying.alarming if replaying.message else taping.alarming)
         self.show_message(sentence(message), hint=not alarm)
+        self._damaged = replaying.damaged if replaying.message else taping.damaged
+        self.offer.setVisible(self._damaged is not None)
         self.copy_button.setVisible("`kappaskin repair " in message)
+
+    def _ask_for_repair(self) -> None:
+        if self._taping is not None and self._damaged is not None:
+            self._taping.repairs.ask_of(self._damaged)
 
     def _copy(self) -> None:
         if command := COMMAND.search(self.message.text()):

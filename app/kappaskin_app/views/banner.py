@@ -3,7 +3,7 @@
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QPainter
 
-from kappaskin_app.views.badge import LOST, OFF, STALE, WAITING, colour_of
+from kappaskin_app.views.badge import GAP, LOST, OFF, STALE, WAITING, colour_of
 from kappaskin_app.views.board import Board
 from kappaskin_app.views.lettering import PRIMARY, SECONDARY, Words, shrunk
 
@@ -15,6 +15,8 @@ REMEDIES = {
     "Connection.",
     OFF: "Ctrl+Return connects the source that is chosen, Ctrl+M simulates. To choose another, "
     "press Esc.",
+    GAP: "Nothing came here when it was recorded. Wait, or press Ctrl+P if it is paused: it plays "
+    "past this. Ctrl+] goes to the next event.",
 }
 """What to do in each state in which nothing new is shown."""
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from kappaskin.cli.common import FAILED, check_time, stops
 from kappaskin.engine import Engine
 from kappaskin.errors import Refusal
-from kappaskin.publish import Latency, Published
+from kappaskin.publish import Latency, Published, targets_of
 from kappaskin.scene import load_scene
 from kappaskin.sources import SIMULATION
 from kappaskin.status import Status
@@ -49,6 +49,7 @@ def publish(
     targets += [f"foxglove://{place}" for place in places or ()]
     if not targets:
         raise Refusal("expected somebody to send to: give --udp HOST:PORT, or --foxglove")
+    targets_of(targets)  # or refused here
     if source.startswith(SIMULATION):
         load_scene(source.removeprefix(SIMULATION))  # or refused here
     stopped = stops()

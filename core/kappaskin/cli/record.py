@@ -78,7 +78,7 @@ def _recorded(engine: Engine, seconds: float, stopped: list[int]) -> Status:
         if status.sensor is not known and status.sensor is not None:
             known = status.sensor
             _use_tare(engine, known)
-        if stopped or written.trouble or now - began >= seconds or not engine.alive:
+        if stopped or written.trouble or written.seconds >= seconds or not engine.alive:
             return status
         if status.state == LOST and known is None:
             raise Refusal(status.message)

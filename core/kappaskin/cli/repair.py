@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from kappaskin.cli.common import FAILED
-from kappaskin.recording.repair import repair as repaired
+from kappaskin.cli.common import FAILED, progress
+from kappaskin.recording.repair import Repaired, repairing
 
 _NOTHING = 3
 
@@ -23,12 +23,11 @@ def repair(file: Path, *, out: Path) -> int:
     out
         The new one, which must not be there yet.
     """
-    done = repaired(file, out)
-    lost = f"{done.lost:,} bytes could not be read" if done.lost else "nothing was lost"
+    done = progress(repairing(file, out), Repaired)
     if not (done.total or done.attachments):
-        print(f"{file}: no message could be saved; {lost}")
+        print(f"{file}: {done.words}")
         return _NOTHING
-    print(f"{out}: {done.total:,} messages and {done.attachments} attachments; {lost}")
+    print(f"{out}: {done.words}")
     for topic, count in sorted(done.messages.items()):
         print(f"  {count:>10,}  {topic}")
     return FAILED if done.lost else 0

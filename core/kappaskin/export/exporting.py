@@ -25,7 +25,13 @@ class Exporting:
         except OSError as error:
             raise _unwritable(wanted.to, error) from error
         self._room = Path(room)
-        self._beside = Beside[float | Exported]("kappaskin-export", exported, wanted, self._room)
+        try:
+            self._beside = Beside[float | Exported](
+                "kappaskin-export", exported, wanted, self._room
+            )
+        except BaseException:  # Ctrl+C, while it begins
+            shutil.rmtree(self._room, ignore_errors=True)
+            raise
 
     @property
     def done(self) -> bool:

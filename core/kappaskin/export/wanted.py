@@ -6,6 +6,7 @@ from pathlib import Path
 
 from kappaskin.errors import Refusal
 from kappaskin.pipeline import Setup
+from kappaskin.recording.disk import is_there
 
 TABLES = (".csv", ".npz", ".h5")
 """Suffixes of files with a row for each frame."""
@@ -95,5 +96,5 @@ class Wanted:
 
     def _check_place(self) -> None:
         for place in self.files:
-            if place.exists() or place.is_symlink():
+            if is_there(place):
                 raise Refusal(f"{place}: is there already; choose another name")

@@ -53,7 +53,7 @@ class Disk:
 
     def write(self, data: bytes) -> None:
         try:
-            _write(self._file, data)
+            self.put(data)
         except OSError as error:
             self._back()
             if self._reserve is None:
@@ -64,6 +64,10 @@ class Disk:
             self.write(data)
             return
         self._at += len(data)
+
+    def put(self, data: bytes) -> None:
+        """Write to the disk; an `OSError` where there is no room for all of it."""
+        _write(self._file, data)
 
     def _back(self) -> None:
         self._file.truncate(self._at)
@@ -91,6 +95,17 @@ class Disk:
 
 
 _ELSEWHERE = "choose another place"
+
+
+def is_there(path: Path) -> bool:
+    """Whether anything is at `path`; a `Refusal` where that cannot be told, as of too long a name.
+
+    The path's own `exists` raises then, which would end the process that is live.
+    """
+    try:
+        return path.exists() or path.is_symlink()
+    except OSError as error:
+        raise Refusal(f"{path}: cannot be looked for ({_why(error)}); {_ELSEWHERE}") from error
 
 
 def _write(file: IO[bytes], data: bytes) -> None:

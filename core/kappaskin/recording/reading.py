@@ -31,7 +31,8 @@ from mcap.records import (
     Statistics,
 )
 
-from kappaskin.errors import Refusal
+from kappaskin.errors import Damaged, Refusal
+from kappaskin.recording.disk import is_there
 from kappaskin.recording.messages import TOPICS, Topic
 from kappaskin.recording.writing import FORMAT
 
@@ -40,6 +41,7 @@ LARGEST = 2**26  # bytes of a record, or of what is in a chunk
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _FOOTER = _HEAD.size + 20
+_DIGITS = 9  # of a version
 _FAULTS = (
     McapError,
     ValueError,
@@ -115,7 +117,8 @@ def parsed(kind: type[_Kind], body: bytes) -> _Kind:
     try:
         return kind.read(ReadDataStream(BytesIO(body)))  # type: ignore[attr-defined]
     except _FAULTS as error:
-        raise Spoilt(f"a {kind.__name__.lower()} cannot be read ({error!s:.80})") from error
+        why = str(error)[:80] or "it is cut off"
+        raise Spoilt(f"a {kind.__name__.lower()} cannot be read ({why})") from error
 
 
 def unpacked(body: bytes) -> bytes:
@@ -182,7 +185,7 @@ def summary_of(file: Bytes, size: int) -> Iterator[Record]:
 
 def check_file(path: Path) -> None:
     """Refuse what is there but is no file, as a pipe that nobody writes to: opening it may wait."""
-    if path.exists() and not path.is_file():
+    if is_there(path) and not path.is_file():
         raise Refusal(f"{path}: cannot be read; expected a file")
 
 
@@ -233,13 +236,18 @@ class Recording:
             record = record_at(self._file, len(MAGIC), self._size)
             self.library = parsed(Header, record.body).library
         except Spoilt as fault:
-            raise Refusal(f"{self.path}: is no recording: {fault}") from fault
+            raise Damaged(f"{self.path}: is no recording: {fault}") from fault
 
     def _check_format(self) -> None:
         if self.format > FORMAT:
             raise Refusal(
                 f"{self.path}: expected a recording of format {FORMAT}, got {self.format}, of a "
                 "later version; update this program"
+            )
+        if not self._topics and self.library.startswith("kappaskin"):
+            raise Damaged(
+                f"{self.path}: expected messages, got none up to where it breaks off; `kappaskin "
+                "repair` saves what is whole beyond"
             )
         if not self._topics:
             raise Refusal(
@@ -380,7 +388,7 @@ class Recording:
                 "there?"
             ) from error
         except Spoilt as fault:
-            raise Refusal(
+            raise Damaged(
                 f"{self.path}: is damaged at byte {chunk.at} ({fault}); `kappaskin repair` saves "
                 "what is whole"
             ) from fault
@@ -423,4 +431,4 @@ class Recording:
 
 def _format(said: dict[str, str]) -> int:
     text = said.get("format", "")
-    return int(text) if text.isascii() and text.isdigit() and len(text) < 9 else FORMAT
+    return int(text[:_DIGITS]) if text.isascii() and text.isdigit() else FORMAT

@@ -4,7 +4,7 @@ import mmap
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from kappaskin.errors import Refusal
-from kappaskin.recording.disk import Disk
+from kappaskin.recording.disk import Disk, is_there
 from kappaskin.recording.messages import TOPICS
 from kappaskin.recording.reading import (
     LARGEST,
@@ -37,6 +37,7 @@ _ENDS = (Opcode.DATA_END, Opcode.FOOTER)
 _KNOWN = frozenset(Opcode)
 _PRIVATE = 0x80
 _CHUNK = 2**20  # bytes
+_REPORTS = 200  # at most
 _RECORDS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 
@@ -56,24 +57,38 @@ class Repaired:
     def total(self) -> int:
         return sum(self.messages.values())
 
+    @property
+    def words(self) -> str:
+        """What was saved, and what was not."""
+        lost = f"{self.lost:,} bytes could not be read" if self.lost else "nothing was lost"
+        if not (self.total or self.attachments):
+            return f"no message could be saved; {lost}"
+        return f"{self.total:,} messages and {self.attachments} attachments; {lost}"
 
-def repair(path: Path, out: Path, told: Callable[[float], object] = lambda share: None) -> Repaired:
+
+def repairing(path: Path, out: Path) -> Generator[float | Repaired]:
     """Save every whole message of `path` to `out`, with summary and index.
 
-    `told` is called now and then with the share that is done. Nothing is written where nothing is
-    saved. A `Refusal` where `path` cannot be read or is no MCAP file, or `out` cannot be written.
+    Now and then the share that is done, and what was saved at the end. Nothing is written where
+    nothing is saved. A `Refusal` where `path` cannot be read or is no MCAP file, or `out` cannot be
+    written.
     """
-    if out.exists() or part_of(out).exists():
-        raise Refusal(f"{out}: is there already; choose another name")
+    check_new(out)
     check_file(path)
     try:
         with path.open("rb") as file:
             if not path.stat().st_size:
                 raise Refusal(f"{path}: is empty")
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                return _Repair(path, data, out).run(told)
+                yield (yield from _Repair(path, data, out).run())
     except OSError as error:
         raise Refusal(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+def check_new(out: Path) -> None:
+    """Refuse a file that is there, or is being written."""
+    if is_there(out) or is_there(part_of(out)):
+        raise Refusal(f"{out}: is there already; choose another name")
 
 
 class _Repair:
@@ -89,13 +104,15 @@ class _Repair:
         self._attached = self._lost = 0
         self._ended = False
 
-    def run(self, told: Callable[[float], object]) -> Repaired:
-        disk = Disk(part_of(self._out))
+    def run(self) -> Generator[float, None, Repaired]:
+        disk, next_report = Disk(part_of(self._out)), 0.0
         try:
             self._writer = Writer(disk.stream, _CHUNK, CompressionType.LZ4)
             self._begin()
             for at in self._through():
-                told(at / self._size)
+                if at >= next_report:
+                    next_report = at + self._size / _REPORTS
+                    yield at / self._size
             if self._counts or self._attached:
                 self._writer.finish()
                 disk.sync()

@@ -1,8 +1,10 @@
 """Messages to an MCAP file, by a thread of its own: nothing that is live waits for a disk."""
 
+import itertools
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -10,7 +12,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from kappaskin.errors import Refusal
-from kappaskin.recording.disk import Disk
+from kappaskin.recording.disk import Disk, is_there
 from kappaskin.recording.messages import TOPICS, Topic
 
 FORMAT = 1
@@ -45,19 +47,19 @@ class Written:
 class RecordingFile:
     """A recording at `path`, called `path` + `.part` until it is closed.
 
-    `put` and `attach` never wait; `written` tells what has become of it. One that ends by itself,
-    as on a full disk, is closed as one that is asked to.
+    It is on what `disk` makes. `put` and `attach` never wait; `written` tells what has become of
+    it. One that ends by itself, as on a full disk, is closed as one that is asked to.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, disk: Callable[[Path], Disk] = Disk) -> None:
         self.path, self.part = path, part_of(path)
         for there in (self.path, self.part):
-            if there.exists():
+            if is_there(there):
                 raise Refusal(
                     f"{there}: is there already; choose another name"
                     + (f", or see `kappaskin repair {there}`" if there == self.part else "")
                 )
-        self._disk = Disk(self.part)
+        self._disk = disk(self.part)
         self._began = time.monotonic()
         # Wall-clock time is looked at once, so that a clock that is set does not reorder messages.
         self._wall = time.time_ns() - time.monotonic_ns()
@@ -186,3 +188,9 @@ class RecordingFile:
 def part_of(path: Path) -> Path:
     """What a recording at `path` is called until it is closed."""
     return path.with_name(path.name + ".part")
+
+
+def unused(path: Path) -> Path:
+    """`path`, or one that is numbered, where no recording is yet."""
+    names = (path.with_stem(f"{path.stem}-{n}") if n > 1 else path for n in itertools.count(1))
+    return next(name for name in names if not (name.exists() or part_of(name).exists()))

@@ -1,7 +1,10 @@
 """What a function tells, one item after the other, computed in a process of its own."""
 
 import multiprocessing
+import os
 import signal
+import threading
+import time
 from collections.abc import Callable, Generator, Iterable
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -11,6 +14,15 @@ from kappaskin.errors import Refusal
 from kappaskin.processes import beginning_processes
 
 _Item = TypeVar("_Item")
+_GRACE = 1.0  # s to clear up in once the one that asked is gone
+
+
+def _end_with_parent() -> None:
+    """End this process soon after the one that started it, whatever is being computed."""
+    if parent := multiprocessing.parent_process():
+        parent.join()
+        time.sleep(_GRACE)
+        os._exit(1)
 
 
 def _tell(
@@ -18,6 +30,7 @@ def _tell(
 ) -> None:
     """What the child process does: each item in a tuple, a refusal, and None at the end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
+    threading.Thread(target=_end_with_parent, name="parent-watcher", daemon=True).start()
     with suppress(OSError):  # who asked has gone
         try:
             for item in make(*about):

@@ -14,12 +14,12 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
-from kappaskin import Refusal
+from kappaskin import Damaged, Refusal, Wanted
 from kappaskin.recording import disk as disk_room
 from kappaskin.recording import messages as m
 from kappaskin.recording import reading, writing
 from kappaskin.recording.reading import Recording
-from kappaskin.recording.repair import repair
+from kappaskin.recording.repair import repairing
 from kappaskin.recording.writing import RecordingFile, part_of
 
 LINE = m.pack_line(0.0, False, bytes(600))
@@ -117,7 +117,7 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
         Recording(tmp_path)
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")
-        for read in (Recording, lambda pipe: repair(pipe, path)):
+        for read in (Recording, lambda pipe: list(repairing(pipe, path))):
             with pytest.raises(Refusal, match="expected a file"):
                 read(tmp_path / "pipe")
     for data in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), reading.MAGIC, reading.MAGIC * 20):
@@ -135,11 +135,27 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
         Recording(path)
 
 
-def test_one_of_a_later_version_is_refused(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(writing, "FORMAT", 2)
+@pytest.mark.parametrize("later", [2, 10**12])
+def test_one_of_a_later_version_is_refused(later: int, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(writing, "FORMAT", later)
     recorded(tmp_path / "later.mcap", 3)
-    with pytest.raises(Refusal, match=r"format 1, got 2.*update this program"):
+    with pytest.raises(Refusal, match=r"format 1, got [12].*update this program"):
         Recording(tmp_path / "later.mcap")
+
+
+def test_a_header_that_is_cut_off_is_said_to_be(tmp_path) -> None:
+    path = tmp_path / "broken.mcap"
+    path.write_bytes(reading.MAGIC + struct.pack("<BQI", 1, 7, 2**32 - 1) + b"abc")
+    with pytest.raises(Damaged, match=r"a header cannot be read \(it is cut off\)"):
+        Recording(path)
+
+
+def test_our_own_that_breaks_off_at_once_is_not_called_anothers(whole, tmp_path) -> None:
+    path = tmp_path / "broken.mcap"
+    with Recording(whole) as recording:
+        path.write_bytes(whole.read_bytes()[: recording.chunks[0].at + 20])
+    with pytest.raises(Damaged, match="none up to where it breaks off"):
+        Recording(path)
 
 
 def spoilt(whole, path, change):
@@ -347,3 +363,18 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_not_written_is_counted(
     assert file.written.lost + file.written.messages == 1000
     with Recording(file.path) as recording:
         assert recording.counts[m.LINES.name] == file.written.messages
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        RecordingFile,
+        Recording,
+        lambda path: list(repairing(path, path)),
+        lambda path: Wanted(path, path),
+    ],
+    ids=["record", "read", "repair", "export"],
+)
+def test_a_name_that_no_file_can_have_is_refused(use, tmp_path) -> None:
+    with pytest.raises(Refusal, match=r"cannot be looked for \(File name too long\)"):
+        use(tmp_path / f"{'x' * 300}.csv")

@@ -8,10 +8,10 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
-from kappaskin import Refusal
+from kappaskin import Refusal, Repairing
 from kappaskin.recording import messages as m
 from kappaskin.recording.reading import Recording
-from kappaskin.recording.repair import repair
+from kappaskin.recording.repair import Repaired, repairing
 from kappaskin.recording.writing import part_of
 
 CHUNKS, EACH = 12, 40
@@ -53,6 +53,11 @@ def places(whole):
     data = whole.read_bytes()
     chunks = [record for record in records if isinstance(record, Chunk)]
     return [(data.index(chunk.data), len(chunk.data)) for chunk in chunks]
+
+
+def repair(path, out) -> Repaired:
+    *_, done = repairing(path, out)
+    return done
 
 
 @pytest.fixture
@@ -204,8 +209,33 @@ def test_a_file_of_others_is_repaired_too(tmp_path) -> None:
 
 
 def test_the_share_that_is_done_is_told(whole, tmp_path) -> None:
-    shares = list[float]()
-    repair(whole, tmp_path / "out.mcap", shares.append)
+    *shares, _ = repairing(whole, tmp_path / "out.mcap")
     assert shares == sorted(shares)
     assert 0 <= shares[0] < 0.1
     assert shares[-1] > 0.9
+
+
+def test_a_process_of_its_own_saves_as_much(whole, tmp_path) -> None:
+    out, told = tmp_path / "out.mcap", list[float | Repaired]()
+    work = Repairing(whole, out)
+    while not (told and isinstance(told[-1], Repaired)):
+        told += work.poll()
+    work.close()
+    *_, alone = repairing(whole, tmp_path / "alone.mcap")
+    assert told[-1] == alone
+    assert out.exists()
+
+
+def test_one_given_up_leaves_nothing(whole, tmp_path) -> None:
+    out = tmp_path / "out.mcap"
+    work = Repairing(whole, out)
+    part_of(out).write_bytes(b"as far as it is")
+    work.close()
+    assert not list(tmp_path.glob("out*"))
+
+
+def test_what_another_writes_is_left_alone(whole, tmp_path) -> None:
+    part_of(tmp_path / "out.mcap").write_bytes(b"another's")
+    with pytest.raises(Refusal, match="is there already"):
+        Repairing(whole, tmp_path / "out.mcap")
+    assert part_of(tmp_path / "out.mcap").read_bytes() == b"another's"

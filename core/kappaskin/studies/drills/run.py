@@ -5,17 +5,17 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from kappaskin.errors import SourceError
-from kappaskin.studies.drills import bytes_spoilt, devices, disks, processes
+from kappaskin.studies.drills import bytes_spoilt, devices, disks, processes, recordings
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.outcome import NeedsSimulated, Outcome, judged
 from kappaskin.studies.drills.stand import Device, Stand, opened
 
-# A writer that is slow has nothing to hold up yet: frames are not recorded.
 DRILLS: tuple[Drill, ...] = (
     *bytes_spoilt.DRILLS,
     *devices.DRILLS,
     *processes.DRILLS,
     *disks.DRILLS,
+    *recordings.DRILLS,
 )
 
 _SEED = 6

@@ -1,0 +1,171 @@
+"""What dialogs have in common whose work goes on beside the window: a bar, words, an end."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import (
+    QDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin import Refusal
+from kappaskin_app.guard import guarded
+
+_POLL = 100  # ms
+_WIDTH = 560  # px
+
+
+class Work(Protocol):
+    """Tells the shares that are done, and something else at its end; or a `Refusal`."""
+
+    def poll(self) -> Sequence[object]: ...
+
+    def close(self) -> None: ...
+
+
+class WorkDialog(QDialog):
+    """Asks in a `form`, begins what `_work` makes of it, and shows how far that is.
+
+    It can be cancelled, and is, when it closes.
+    """
+
+    def __init__(self, title: str, verb: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        self.setMinimumWidth(_WIDTH)
+        self.form, self.bar, self.words = QFormLayout(), QProgressBar(), QLabel()
+        self.bar.setRange(0, 1000)
+        self.words.setWordWrap(True)
+        self.begin_button, self.cancel_button = QPushButton(verb), QPushButton("&Cancel")
+        self.cancel_button.setAutoDefault(False)
+        self._going: Work | None = None
+        self._timer = QTimer(self)
+        self._timer.setInterval(_POLL)
+        self._timer.timeout.connect(guarded(self._follow))
+        self.begin_button.clicked.connect(guarded(lambda *_: self._begin()))
+        self.cancel_button.clicked.connect(guarded(lambda *_: self.cancel()))
+
+    def _add_buttons(self) -> None:
+        """Lay out what is below the form, once that is there: Tab goes from above to below."""
+        layout, buttons = QVBoxLayout(self), QHBoxLayout()
+        buttons.addStretch()
+        for button in (self.begin_button, self.cancel_button):
+            buttons.addWidget(button)
+        layout.addLayout(self.form)
+        for widget in (self.bar, self.words):
+            layout.addWidget(widget)
+        layout.addLayout(buttons)
+
+    # What differs.
+
+    def _work(self) -> Work:
+        """What is begun; a `Refusal` where that cannot be."""
+        raise NotImplementedError
+
+    def _said(self, result: object) -> str:
+        """What came of it, in words."""
+        raise NotImplementedError
+
+    def _allow(self) -> None:
+        """Ask only for what makes sense."""
+        self.cancel_button.setText("&Cancel" if self.busy else "C&lose")
+
+    # What is the same.
+
+    @property
+    def busy(self) -> bool:
+        return self._going is not None
+
+    def ask(self) -> None:
+        """Show it, as new unless it is at work."""
+        if not self.busy:
+            self.words.clear()
+            self.bar.reset()
+        self.show()
+        self.raise_()
+
+    def _begin(self) -> None:
+        self.bar.reset()
+        try:
+            self._going = self._work()
+        except Refusal as refusal:
+            self._end(str(refusal))
+            return
+        self.words.setText("Writing\N{HORIZONTAL ELLIPSIS}")
+        self.bar.setValue(0)
+        self._timer.start()
+        self._allow()
+
+    def _follow(self) -> None:
+        if self._going is None:
+            return
+        try:
+            for told in self._going.poll():
+                if isinstance(told, float):
+                    self.bar.setValue(round(self.bar.maximum() * told))
+                else:
+                    self.bar.setValue(self.bar.maximum())
+                    self._end(self._said(told))
+                    return
+        except Refusal as refusal:
+            self.bar.reset()
+            self._end(str(refusal))
+
+    def cancel(self) -> None:
+        """End what is at work, or close."""
+        if self._going is None:
+            self.reject()
+        else:
+            self.bar.reset()
+            self._end("Cancelled; nothing was written.")
+
+    def _end(self, words: str) -> None:
+        """Be done, in `words`."""
+        self._timer.stop()
+        if self._going is not None:
+            self._going.close()
+            self._going = None
+        self.words.setText(words)
+        high = self.heightForWidth(self.width())
+        self.resize(self.width(), max(self.height(), high))  # or the fields would be pressed flat
+        self._allow()
+
+    def done(self, result: int) -> None:
+        if self.busy:
+            self.cancel()
+        super().done(result)
+
+
+def path_in(line: QLineEdit) -> Path:
+    """The file that is named in a line."""
+    return Path(line.text().strip())
+
+
+def named(words: str, line: QLineEdit) -> QLabel:
+    label = QLabel(words)
+    label.setBuddy(line)
+    return label
+
+
+def choosing(choose: Callable[[], None]) -> QPushButton:
+    """A button that lets one choose a file."""
+    button = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}")
+    button.setAutoDefault(False)  # or Enter in a line would press the first of them
+    button.clicked.connect(guarded(lambda *_: choose()))
+    return button
+
+
+def beside(line: QLineEdit, button: QPushButton) -> QHBoxLayout:
+    layout = QHBoxLayout()
+    layout.addWidget(line, 1)
+    layout.addWidget(button)
+    return layout

@@ -1,0 +1,96 @@
+"""A window that takes over a recording which the last one left."""
+
+import pickle
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from kappaskin import Engine, Left, Setup, Status, Written
+from kappaskin.requests import Asked
+from kappaskin_app.adopting import Entrusting, settings_left, words
+from kappaskin_app.history import History
+from kappaskin_app.settings import Settings
+from kappaskin_app.window import MainWindow
+
+BEFORE = Settings(
+    functions_x=6, functions_y=7, load_case="point", x=0.03, y=0.07, theme="dark", colour_by="xx"
+)
+
+
+def left(source: str | None, entrusted: bytes = b"") -> Left:
+    asked = Asked(source=source, recording=Path("/tmp/press.mcap"), entrusted=entrusted)
+    return Left(asked, ("", ""), 1, 5.0)
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as place:
+        yield Path(place)
+
+
+def test_the_next_window_goes_on_as_the_last_one_was(
+    opened, abandoned, folder: Path, tmp_path: Path, until
+) -> None:
+    alone = abandoned(folder, tmp_path / "press.mcap", entrusted=pickle.dumps(BEFORE))
+    until(lambda: bool(list(folder.glob("*.note"))))
+    window: MainWindow = opened("/dev/ttyABSENT7", Engine(orphans=folder))
+    until(lambda: window.badge.state == "SIM" and window.taping.recording)
+    status = window.session.status
+    assert (status.generation, status.setup) == (alone.generation, Setup(6, 7))
+    assert window.history.settings == BEFORE
+    assert not window.history.stack.canUndo()
+    text = window.panels.recording.message.text()
+    assert text.startswith("The recording press.mcap of the simulated skin went on for ")
+    assert text.endswith(
+        "You asked for /dev/ttyABSENT7: Connect goes there, and the recording goes on with it."
+    )
+    assert window.panels.connection.source() == "/dev/ttyABSENT7"
+    until(lambda: window.session.estimate.true_contact.tolist() == [0.03, 0.07])
+    assert window.session.scene.loads[0].centre().tolist() == [0.03, 0.07]
+    window.actions_by_name["record"].trigger()
+    until(lambda: not window.taping.recording)
+    assert window.session.status.recording.trouble == ""
+    window.close()
+    until(lambda: alone.gone)
+    assert (tmp_path / "press.mcap").exists()
+
+
+@pytest.mark.parametrize("data", [b"", b"garbage", pickle.dumps("no settings")])
+def test_settings_that_cannot_be_read_are_those_of_the_source(data: bytes) -> None:
+    assert settings_left(left("sim:line", data)).load_case == "line"
+    assert settings_left(left("/dev/ttyACM0", data)) == Settings()
+
+
+def test_what_is_said_names_file_and_source_and_what_was_asked_for_if_it_is_another() -> None:
+    told = f"The recording press.mcap of the simulated skin {left('').lasted}."
+    assert words(left("sim:"), "sim:") == told
+    assert "press.mcap of COM7 went on" in words(left("COM7"), "COM7")
+    assert words(left(None), "sim:") == f"The recording press.mcap {left('').lasted}."
+    assert words(left("sim:"), "COM3") == (
+        f"{told} You asked for COM3: Connect goes there, and the recording goes on with it."
+    )
+
+
+class Trusted:
+    """Stands in for an engine, to see what it is entrusted with."""
+
+    def __init__(self) -> None:
+        self.data: list[bytes] = []
+
+    def entrust(self, data: bytes) -> None:
+        self.data.append(data)
+
+
+def test_settings_are_entrusted_once_each_and_only_while_it_records(qapp) -> None:
+    history, engine = History(Settings()), Trusted()
+    entrusting = Entrusting(history, engine)
+    recording = Status(recording=Written("x.mcap", active=True))
+    entrusting.follow(Status())
+    assert engine.data == []
+    for status in (recording, recording, Status()):
+        entrusting.follow(status)
+    history.change("x", -1, functions_x=6)
+    entrusting.follow(recording)
+    assert [pickle.loads(data).functions_x for data in engine.data] == [8, 6]

@@ -1,0 +1,118 @@
+"""A damaged recording in the window: a repair is offered, and writes a whole one beside it."""
+
+import os
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from kappaskin import Event, Recording
+from kappaskin.recorder import Recorder
+from kappaskin_app.repairs import RepairDialog
+from kappaskin_app.window import MainWindow
+
+
+@pytest.fixture(autouse=True)
+def documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody's own folder of recordings."""
+    monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path / "documents"))
+
+
+@pytest.fixture
+def broken(recording: Path, tmp_path: Path) -> Path:
+    """One that breaks off within its last chunk, as a killed process leaves it."""
+    with Recording(recording) as whole:
+        within_the_last = whole.chunks[-1].at + 100
+    path = tmp_path / "broken.mcap.part"
+    path.write_bytes(recording.read_bytes()[:within_the_last])
+    return path
+
+
+@pytest.fixture
+def dialog(qtbot) -> RepairDialog:
+    dialog = RepairDialog()
+    qtbot.addWidget(dialog)
+    return dialog
+
+
+def test_one_that_breaks_off_is_repaired_beside_it_and_played(
+    window: MainWindow, broken: Path, until
+) -> None:
+    was, panel = broken.read_bytes(), window.panels.recording
+    window.panels.turn(1)
+    window.replaying.open_file(broken)
+    until(panel.repair.isVisible)  # on its page
+    panel.repair.click()
+    dialog = window.taping.repairs
+    assert dialog.to.text() == str(broken.with_name("broken-repaired.mcap"))
+    dialog.begin_button.click()
+    until(lambda: window.windowTitle().startswith("broken-repaired.mcap"))
+    with Recording(broken.with_name("broken-repaired.mcap")) as saved:
+        assert saved.whole
+        assert f"{sum(saved.counts.values()):,} messages" in dialog.words.text()
+    assert broken.read_bytes() == was
+    until(lambda: not panel.offer.isVisible())
+    dialog.close()
+
+
+def test_damage_found_while_it_is_played_is_offered_to_be_repaired(
+    window: MainWindow, recording: Path, tmp_path: Path, until
+) -> None:
+    copy, panel = tmp_path / "copy.mcap", window.panels.recording
+    copy.write_bytes(recording.read_bytes())
+    window.replaying.open_file(copy)
+    until(lambda: window.badge.state == "REPLAY")
+    assert not panel.offer.isVisibleTo(panel)
+    with Recording(copy) as whole:
+        third = whole.chunks[2].at
+    os.truncate(copy, third + 50)
+    window.replaying.seek(2.2)
+    until(panel.repair.isVisible)
+    assert "is damaged at byte" in panel.message.text()
+
+
+def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
+    path, panel = tmp_path / "picture.mcap", window.panels.recording
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(500))
+    window.replaying.open_file(path)
+    until(lambda: "expected a recording" in panel.message.text())
+    assert not panel.offer.isVisibleTo(panel)
+
+
+def test_one_without_readings_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
+    path, panel = tmp_path / "empty.mcap", window.panels.recording
+    with closing(Recorder(path, 0.0)) as recorder:
+        recorder.happened(Event(0.0, "note", "nothing else"))
+    window.replaying.open_file(path)
+    until(lambda: "expected bytes of a device" in panel.message.text())
+    assert not panel.offer.isVisibleTo(panel)
+
+
+def test_one_given_up_leaves_the_damaged_one_alone(dialog: RepairDialog, broken: Path) -> None:
+    dialog.ask_of(broken)
+    dialog.begin_button.click()
+    assert not dialog.to.isEnabled()
+    dialog.cancel_button.click()
+    assert "nothing was written" in dialog.words.text()
+    assert [path.name for path in broken.parent.glob("broken*")] == [broken.name]
+
+
+def test_no_file_is_written_over(dialog: RepairDialog, broken: Path) -> None:
+    there = broken.with_name("broken-repaired.mcap")
+    there.write_bytes(b"mine")
+    dialog.ask_of(broken)
+    assert dialog.to.text() == str(broken.with_name("broken-repaired-2.mcap"))
+    dialog.to.setText(str(there))
+    dialog.begin_button.click()
+    assert "is there already" in dialog.words.text()
+    assert there.read_bytes() == b"mine"
+
+
+def test_where_nothing_is_whole_nothing_is_written(
+    dialog: RepairDialog, broken: Path, until
+) -> None:
+    broken.write_bytes(broken.read_bytes()[:60])
+    dialog.ask_of(broken)
+    dialog.begin_button.click()
+    until(lambda: not dialog.busy)
+    assert dialog.words.text().startswith("Nothing was written: no message could be saved")

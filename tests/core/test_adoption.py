@@ -1,0 +1,386 @@
+"""An engine that was left alone while it recorded, and who comes for it."""
+
+import multiprocessing
+import os
+import signal
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Client, Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kappaskin import Region, Setup, load_scene
+from kappaskin.adoption import Left, Orphan, Waiting, _address, adopted
+from kappaskin.asker import Asker
+from kappaskin.engine import Engine
+from kappaskin.recording import messages as m
+from kappaskin.recording.reading import Recording
+from kappaskin.recording.writing import part_of
+from kappaskin.requests import (
+    Asked,
+    Connect,
+    Disconnect,
+    Entrust,
+    Goodbye,
+    Note,
+    Publish,
+    Record,
+    Request,
+    Seek,
+    Step,
+)
+from kappaskin.sources.reenact import Reenactment
+
+LEFT = Left(Asked(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
+
+
+def wait_for(ask: Callable[[], Any], within: float = 10.0) -> Any:
+    """The first answer that is true, or the last one."""
+    end = time.monotonic() + within
+    while not (answer := ask()) and time.monotonic() < end:
+        time.sleep(0.01)
+    return answer
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """Where notes are left, in a place whose name is short enough for a socket."""
+    with tempfile.TemporaryDirectory() as place:
+        yield Path(place, "orphans")
+
+
+@pytest.fixture
+def waiting(folder: Path) -> Iterator[Waiting]:
+    one = Waiting(folder, lambda: LEFT)
+    yield one
+    one.end()
+    if one.line is not None:
+        one.line.close()
+
+
+Line = tuple["Connection[Any, Any]", Asker]
+
+
+@pytest.fixture
+def asked_by(folder: Path) -> Iterator[Callable[..., Line]]:
+    """Makes who takes requests, and the line by which they come."""
+    lines: list[Connection[Any, Any]] = []
+
+    def make(folder: Path | None = folder, patience: float = 20.0) -> Line:
+        theirs, ours = multiprocessing.Pipe(duplex=False)
+        lines.extend((theirs, ours))
+        return ours, Asker(theirs, ("ring", "beside"), folder, patience)
+
+    yield make
+    while (orphan := adopted(folder)) is not None:
+        orphan.close()
+        time.sleep(0.05)
+    for line in lines:
+        line.close()
+
+
+# The processes.
+
+
+def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
+    abandoned, folder, tmp_path
+) -> None:
+    file = tmp_path / "x.mcap"
+    engine_alone = abandoned(folder, file)
+    assert wait_for(lambda: list(folder.glob("*.note")))
+    time.sleep(0.7)  # longer than an engine outlives its parent that nobody may adopt
+
+    with Engine(orphans=folder) as engine:
+        assert engine.adopted is not None
+        assert engine.pid == engine_alone.pid
+        assert engine.adopted.alone > 0.6
+        assert (engine.source, engine.adopted.asked.setup) == ("sim:centre", Setup(6, 7))
+        assert not list(folder.iterdir())
+        status = wait_for(lambda: (s := engine.status()).events and len(s.events) == 2 and s)
+        first = wait_for(lambda: engine.latest(engine.status()))
+        assert first.coefficients.shape == (6, 7)
+        assert (status.generation, status.meetings) == (engine_alone.generation, 1)
+        assert [event.text for event in status.events] == [
+            "the window ended unexpectedly while it recorded",
+            f"the recording {engine.adopted.lasted}",
+        ]
+        assert wait_for(lambda: engine.latest(engine.status()).sequence > first.sequence + 50)
+        lost = engine.status().accounting.lost
+        engine.record(None)
+        assert wait_for(lambda: not engine.status().recording.active)
+        assert engine.status().recording.trouble == ""
+        lost_at_most = engine.status().accounting.lost
+    assert wait_for(lambda: engine_alone.gone)
+    assert not any(block.exists() for block in engine_alone.blocks)
+
+    reenact = Reenactment(str(file))
+    with Recording(file) as recording:
+        assert recording.whole
+        sequences = np.array([f.sequence for said in recording.messages() for f in reenact(said)])
+        told = [said.stamp for said in recording.messages_on(m.EVENTS)]
+        contacts = np.array([said.stamp for said in recording.messages_on(m.CONTACTS)])
+    assert sequences[0] == 0
+    assert (np.diff(sequences) > 0).all()
+    missing = sequences[-1] + 1 - len(sequences)
+    assert lost <= missing <= lost_at_most
+    died, came = told
+    assert ((died < contacts) & (contacts < came)).sum() > 50
+
+
+def test_adopted_it_is_revived_as_any_other_when_it_dies(abandoned, folder, tmp_path) -> None:
+    engine_alone = abandoned(folder, tmp_path / "x.mcap")
+    assert wait_for(lambda: list(folder.glob("*.note")))
+    with Engine(orphans=folder) as engine:
+        os.kill(engine_alone.pid, signal.SIGKILL)
+        assert wait_for(lambda: not engine.alive)
+
+        engine.revive()
+
+        estimate = wait_for(lambda: engine.latest(engine.status()))
+        assert estimate.coefficients.shape == (6, 7)
+        assert engine.pid != engine_alone.pid
+        assert engine.status().generation > engine_alone.generation
+        assert wait_for(lambda: engine.status().recording.path.endswith("x-2.mcap"))
+    assert wait_for(lambda: not any(block.exists() for block in engine_alone.blocks))
+
+
+def test_one_for_whom_nobody_comes_ends_its_file_and_leaves_nothing(
+    abandoned, folder, tmp_path
+) -> None:
+    file = tmp_path / "x.mcap"
+    engine_alone = abandoned(folder, file, patience=0.3)
+    assert wait_for(lambda: engine_alone.gone)
+    with Recording(file) as recording:
+        assert recording.whole
+    assert not part_of(file).exists()
+    assert not list(folder.iterdir())
+    assert not any(block.exists() for block in engine_alone.blocks)
+
+
+def test_one_that_does_not_record_ends_with_its_parent(abandoned, folder) -> None:
+    engine_alone = abandoned(folder, None)
+    assert wait_for(lambda: engine_alone.gone, within=3.0)
+    assert not folder.exists()
+    assert not any(block.exists() for block in engine_alone.blocks)
+
+
+def test_closed_in_order_it_ends_its_recording_at_once(folder, tmp_path) -> None:
+    with Engine(orphans=folder) as engine:
+        assert engine.adopted is None
+        engine.record(tmp_path / "x.mcap")
+        assert wait_for(lambda: engine.status().recording.active)
+    assert (tmp_path / "x.mcap").exists()
+    assert not folder.exists()
+
+
+# Who asks.
+
+
+def test_a_goodbye_is_the_end_after_all_that_was_asked_for_before(asked_by) -> None:
+    line, asker = asked_by()
+    line.send(Note("last"))
+    line.send(Goodbye())
+    line.close()
+    assert asker.asked(1.0) == [Note("last"), Goodbye()]
+    assert asker.look(recording=True) == ""
+    assert asker.over
+
+
+@pytest.mark.parametrize("recording", [False, True])
+@pytest.mark.parametrize("known", [False, True])
+def test_a_line_that_breaks_is_the_end_but_of_a_recording_that_may_be_adopted(
+    asked_by, folder, known: bool, recording: bool
+) -> None:
+    line, asker = asked_by(folder if known else None)
+    line.send(Note("last"))
+    line.close()
+    assert asker.asked(1.0) == [Note("last")]
+    assert bool(asker.look(recording)) == (known and recording)
+    assert asker.over == (not (known and recording))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="writes half a message as POSIX systems do")
+def test_a_request_that_breaks_off_is_no_request(asked_by) -> None:
+    line, asker = asked_by()
+    os.write(line.fileno(), b"\0\0\1\0half")
+    line.close()
+    assert asker.asked(1.0) == []
+    asker.look(recording=False)
+    assert asker.over
+
+
+def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
+    asked_by, folder
+) -> None:
+    line, asker = asked_by()
+    line.send(Setup(5, 4))
+    line.send(Connect("sim:line"))
+    line.send(Entrust(b"mine"))
+    line.close()
+    assert wait_for(lambda: not (asker.asked(0.0) or asker.adoptable) or asker.look(True))
+
+    orphan = adopted(folder)
+    assert orphan is not None
+    assert orphan.left.asked == Asked(Setup(5, 4), source="sim:line", entrusted=b"mine")
+    assert (orphan.left.rings, orphan.pid) == (("ring", "beside"), os.getpid())
+    assert "went on for 0 s" in wait_for(lambda: asker.look(recording=True))
+    orphan.line.send(Note("here"))
+    assert asker.asked(1.0) == [Note("here")]
+    orphan.close()
+    asker.asked(1.0)
+    assert asker.look(recording=True) != ""  # and it waits for another
+    assert not asker.over
+
+
+def test_nobody_is_waited_for_when_the_recording_ends_by_itself(asked_by, folder) -> None:
+    line, asker = asked_by()
+    line.close()
+    asker.asked(1.0)
+    asker.look(recording=True)
+    assert list(folder.iterdir())
+    asker.look(recording=False)
+    assert asker.over
+    assert not list(folder.iterdir())
+
+
+def test_nobody_is_waited_for_longer_than_may_be(asked_by, folder, monkeypatch) -> None:
+    clock, later = time.monotonic, [0.0]
+    monkeypatch.setattr("kappaskin.asker.time.monotonic", lambda: clock() + later[0])
+    line, asker = asked_by(patience=600.0)
+    line.close()
+    asker.asked(1.0)
+    asker.look(recording=True)
+    later[0] = 550.0
+    asker.look(recording=True)
+    assert not asker.over
+    later[0] = 600.1
+    asker.look(recording=True)
+    assert asker.over
+    assert not list(folder.iterdir())
+
+
+def test_where_no_note_can_be_left_it_is_the_end(asked_by, tmp_path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    line, asker = asked_by(tmp_path / "file")
+    line.close()
+    asker.asked(1.0)
+    assert asker.look(recording=True) == ""
+    assert asker.over
+
+
+SCENE = load_scene("line")
+
+
+@pytest.mark.parametrize(
+    ("requests", "asked"),
+    [
+        ([Setup(3, 3)], Asked(Setup(3, 3))),
+        ([Region("skin")], Asked(region=Region("skin"))),
+        ([Publish(("udp://a:1",))], Asked(targets=("udp://a:1",))),
+        ([Connect("sim:"), SCENE], Asked(source="sim:", scene=SCENE)),
+        ([Seek(1.0, 0.5)], Asked(speed=0.5)),
+        ([Step(2)], Asked(speed=0.0)),
+        ([SCENE, Seek(None, 0.0), Connect("x")], Asked(source="x")),
+        ([Connect("x"), Disconnect()], Asked()),
+        ([Record(Path("a")), Record(None)], Asked()),
+        ([Note("n"), Goodbye()], Asked()),
+    ],
+)
+def test_what_was_asked_for_last_is_what_lasts(requests: list[Request], asked: Asked) -> None:
+    was = Asked()
+    for request in requests:
+        was = was.after(request)
+    assert was == asked
+
+
+# Notes, and who finds them.
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the rights are of a POSIX system")
+def test_only_this_user_can_read_a_note(waiting: Waiting, folder: Path) -> None:
+    (note,) = folder.glob("*.note")
+    assert note.stat().st_mode & 0o777 == 0o600
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_of_two_who_come_at_once_one_gets_it(waiting: Waiting, folder: Path) -> None:
+    both = threading.Barrier(2)
+
+    def come(_: int) -> Orphan | None:
+        both.wait()
+        return adopted(folder)
+
+    with ThreadPoolExecutor(2) as pool:
+        found = [orphan for orphan in pool.map(come, range(2)) if orphan]
+    assert [orphan.left for orphan in found] == [LEFT]
+    assert not list(folder.iterdir())
+    found[0].close()
+
+
+def test_who_has_not_the_key_is_told_nothing_and_another_may_come(
+    waiting: Waiting, folder: Path
+) -> None:
+    (note,) = folder.glob("*.note")
+    with Client(_address(note)) as stranger:
+        assert stranger.poll(5.0)
+        stranger.recv_bytes()
+        stranger.send_bytes(b"let me in")
+        assert stranger.poll(5.0)
+        assert stranger.recv_bytes() == b"#FAILURE#"
+        with pytest.raises(EOFError):
+            stranger.recv_bytes()
+    version, key = note.read_text().split()
+    note.write_text(f"{version} {bytes(32).hex()}")
+    assert adopted(folder) is None
+    assert waiting.line is None
+    note.write_text(f"{version} {key}")
+    orphan = adopted(folder)
+    assert orphan is not None
+    orphan.close()
+
+
+def test_another_version_leaves_it_to_its_own(waiting: Waiting, folder: Path) -> None:
+    (note,) = folder.glob("*.note")
+    _, key = note.read_text().split()
+    note.write_text(f"0.0.0 {key}")
+    assert adopted(folder) is None
+    assert note.exists()
+    assert waiting.line is None
+
+
+@pytest.mark.parametrize(
+    "text", [b"", b"\xff\xfe", b"one", b"0.1.0 xyz", b"0.1.0 00 more", b"[" * 9999]
+)
+def test_a_note_that_is_none_is_taken_away(folder: Path, text: bytes) -> None:
+    folder.mkdir()
+    (folder / "x.note").write_bytes(text)
+    assert adopted(folder) is None
+    assert not list(folder.iterdir())
+
+
+def test_a_note_of_one_that_died_is_taken_away_and_another_is_found(
+    waiting: Waiting, folder: Path
+) -> None:
+    (note,) = folder.glob("*.note")
+    stale = folder / "0.note"
+    stale.write_text(note.read_text())
+    stale.with_suffix(".sock").touch()
+    orphan = adopted(folder)
+    assert orphan is not None
+    assert orphan.left == LEFT
+    assert wait_for(lambda: not list(folder.iterdir()))
+    orphan.close()
+
+
+def test_where_nobody_left_a_note_nobody_is_found(folder: Path) -> None:
+    assert adopted(folder) is None
+
+
+def test_how_long_it_went_on_is_told_in_minutes_and_seconds() -> None:
+    assert LEFT.lasted == "went on for 3 min 12 s after the last window ended"

@@ -1,0 +1,52 @@
+"""Processes beside this one: what they are deaf to, and when they end."""
+
+import signal
+import time
+from multiprocessing import Pipe, forkserver
+from types import SimpleNamespace
+
+import pytest
+
+from kappaskin.processes import beginning_processes
+from kappaskin.studies import beside
+
+pytestmark = pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no signal masks")
+
+
+def _blocked() -> set[signal.Signals]:
+    return signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_ctrl_c_reaches_this_process_alone_while_others_begin(monkeypatch) -> None:
+    began: list[set[signal.Signals]] = []
+    monkeypatch.setattr(forkserver, "ensure_running", lambda: began.append(_blocked()))
+    with beginning_processes():
+        assert signal.SIGINT not in _blocked()
+    assert [signal.SIGINT in mask for mask in began] == [True]
+    assert signal.SIGINT not in _blocked()
+
+
+def test_one_that_computes_for_long_ends_soon_after_who_asked(monkeypatch) -> None:
+    ended: list[object] = []
+    parent = SimpleNamespace(join=lambda: ended.append("who asked"))
+    monkeypatch.setattr(beside.multiprocessing, "parent_process", lambda: parent)
+    monkeypatch.setattr(beside.os, "_exit", lambda code: ended.append("it"))
+    monkeypatch.setattr(beside, "_GRACE", 0.0)
+    monkeypatch.setattr(beside.signal, "signal", lambda *_: None)
+    told, asked = Pipe(duplex=False)
+    beside._tell(asked, _waiting_for(ended), ())  # noqa: SLF001
+    asked.close()
+    told.close()
+    assert ended == ["who asked", "it"]
+
+
+def _waiting_for(ended: list[object]):
+    """Computes until it is ended, telling nothing."""
+
+    def compute() -> list[object]:
+        give_up = time.monotonic() + 5
+        while len(ended) < 2 and time.monotonic() < give_up:
+            time.sleep(0.001)
+        return []
+
+    return compute
