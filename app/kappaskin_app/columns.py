@@ -1,8 +1,15 @@
-"""Widgets one below the other, as the docks beside the skin hold them."""
+"""Widgets one below the other, as the docks beside the skin hold them, or beside each other."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QDockWidget,
+    QHBoxLayout,
+    QMainWindow,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
 
 _LOWEST = 240  # px of what is below the skin
 
@@ -15,6 +22,16 @@ def column(*widgets: QWidget) -> QWidget:
         stack.addWidget(widget, 1)
     whole.setLayout(stack)
     whole.setMinimumWidth(270)
+    return whole
+
+
+def row(*widgets: QWidget) -> QWidget:
+    """The widgets beside each other, as wide as they like to be."""
+    whole = QWidget()
+    beside = QHBoxLayout(whole)
+    beside.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        beside.addWidget(widget)
     return whole
 
 

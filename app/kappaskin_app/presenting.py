@@ -112,7 +112,7 @@ class Presenting(QObject):
         window = self._window
         docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
         bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-        return [*docks, *bars, window.menuBar(), window.statusBar()]
+        return [*docks, *bars, window.offer, window.menuBar(), window.statusBar()]
 
     # What comes in.
 

@@ -16,10 +16,9 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import Engine, Status, Tares, data_folder
-from kappaskin_app import guard
 from kappaskin_app.adopting import Entrusting, settings_left
 from kappaskin_app.calibrating import Calibrating
-from kappaskin_app.columns import column, widen
+from kappaskin_app.columns import column, row, widen
 from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
@@ -32,6 +31,7 @@ from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.menus import Menus
+from kappaskin_app.mishaps import Mishaps
 from kappaskin_app.naming import Naming
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
@@ -53,6 +53,7 @@ from kappaskin_app.taring import Taring
 from kappaskin_app.theme import THEMES, palette
 from kappaskin_app.views.activity import Activity
 from kappaskin_app.views.line import Line
+from kappaskin_app.views.offer import Offer
 from kappaskin_app.views.recording_mark import RecordingMark
 from kappaskin_app.views.stage import Stage
 from kappaskin_app.views.timeline import Timeline
@@ -90,6 +91,7 @@ class MainWindow(QMainWindow):
         self.compare = ComparePanel()
         self.comparing = Comparing(self.history, self.session, self)
         self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
+        self.offer = Offer()
         self.taping = Taping(self.session.engine, self)
         self.replaying = Replaying(self.history, self.session, self.transport, self)
         self.drops = Drops(self, self.replaying.open_file, self.transport.take_key)
@@ -109,8 +111,11 @@ class MainWindow(QMainWindow):
             "probability; and the principal curvatures of the skin at the contact."
         )
         self.statusBar().addPermanentWidget(self.object, 1)
-        self.activity = Activity()
-        self.statusBar().addPermanentWidget(self.activity)
+        self.activity, self.mishaps = Activity(), Mishaps(self)
+        foot = row(self.activity, self.mishaps.count)
+        # As high from the start: a bar that grows shows all again that a message hides.
+        foot.setMinimumHeight(max(w.sizeHint().height() for w in (foot, self.mishaps.count)))
+        self.statusBar().addPermanentWidget(foot)
         # What it takes of the bar, all that the rest leaves, a passing message needs.
         self.statusBar().messageChanged.connect(lambda text: self.object.setHidden(bool(text)))
         stage = Stage(self._centre())
@@ -144,6 +149,7 @@ class MainWindow(QMainWindow):
             layout.setSpacing(0)
         beside.addWidget(self.membrane, 1)
         beside.addWidget(self.display.scale)
+        above.addWidget(self.offer)
         above.addLayout(beside, 1)
         above.addWidget(self.timeline)
         above.addWidget(self.transport)
@@ -176,7 +182,7 @@ class MainWindow(QMainWindow):
     def _wire(self) -> None:
         panels, wishes, session, drag = self.panels, self.wishes, self.session, self.membrane.drag
         panels.wished.connect(guarded(wishes.wish))
-        panels.connection.connect_wanted.connect(guarded(self._connect))
+        panels.connection.connect_wanted.connect(guarded(self.connect_to))
         panels.connection.disconnect_wanted.connect(guarded(session.disconnect_from))
         panels.connection.ports_wanted.connect(guarded(self.plugs.look))
         self.plugs.found.connect(guarded(panels.connection.show_ports))
@@ -237,7 +243,6 @@ class MainWindow(QMainWindow):
         session.reported.connect(guarded(self.doing.follow))
         self.doing.told.connect(guarded(self._show_work))
         self.activity.cancel_wanted.connect(guarded(self.doing.cancel))
-        guard.on_failure(self.tell)
 
     def _show_work(self, words: str) -> None:
         """Show what takes long, and whether it can be ended."""
@@ -293,7 +298,8 @@ class MainWindow(QMainWindow):
 
     # Wishes that are no settings, or need what is shown.
 
-    def _connect(self, source: str) -> None:
+    def connect_to(self, source: str) -> None:
+        """Read from `source` from now on."""
         if self.replaying.takes(source):
             return
         self.panels.connection.show_source(source)
@@ -302,7 +308,7 @@ class MainWindow(QMainWindow):
     def simulate(self) -> None:
         """Simulate the panels' skin, whatever was read or written."""
         self.history.change("Simulated skin", -1, written=None)
-        self._connect("sim:")
+        self.connect_to("sim:")
 
     def pause(self) -> None:
         """Let what is played stand, or go on: a recording, or else a scene."""
@@ -310,7 +316,7 @@ class MainWindow(QMainWindow):
 
     def connect_chosen(self) -> None:
         """Connect what is named in the panel."""
-        self._connect(self.panels.connection.source())
+        self.connect_to(self.panels.connection.source())
 
     def _lock(self, locked: bool) -> None:
         limit = self.display.limit_shown() if locked else 0.0
@@ -329,7 +335,7 @@ class MainWindow(QMainWindow):
         self.panels.show_theme(theme)
         self.cost.show_theme(theme)
         self.scene.show_theme(theme)
-        for view in (self.timeline, self.transport, self.mark):
+        for view in (self.timeline, self.transport, self.mark, self.offer, self.mishaps):
             view.show_theme(theme)
         self.stability.show_settings(settings)
         self.compare.show_settings(settings)
@@ -402,7 +408,7 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         if not self.session.closed:
-            guard.forget(self.tell)
+            self.mishaps.close()
             self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
             self.exports.close()
