@@ -31,6 +31,7 @@ class Mishaps(QObject):
         self.failures = 0
         self.count = QToolButton()
         self.count.setToolTip(_TIP)
+        self.count.setAccessibleName("No failures")
         self.count.clicked.connect(guarded(lambda *_: window.happenings.open_list()))
         self.count.hide()
         self.report = ReportDialog(self._tell, log_folder(), window)
