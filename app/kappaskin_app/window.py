@@ -36,6 +36,7 @@ from kappaskin_app.naming import Naming
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.health import HealthPanel
+from kappaskin_app.panels.numbers import NumbersPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
@@ -50,7 +51,7 @@ from kappaskin_app.simulation import settings_for
 from kappaskin_app.staging import Staging
 from kappaskin_app.taping import Taping
 from kappaskin_app.taring import Taring
-from kappaskin_app.theme import THEMES, palette
+from kappaskin_app.theme import THEMES, letters, palette
 from kappaskin_app.views.activity import Activity
 from kappaskin_app.views.line import Line
 from kappaskin_app.views.offer import Offer
@@ -88,6 +89,7 @@ class MainWindow(QMainWindow):
         self.planning = Planning(self.session, self)
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
         self.health, self.testing = HealthPanel(), MapTesting(self)
+        self.numbers = NumbersPanel()
         self.compare = ComparePanel()
         self.comparing = Comparing(self.history, self.session, self)
         self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
@@ -176,6 +178,7 @@ class MainWindow(QMainWindow):
         docks.put_below("stability", "Stability", self.stability, "F10")
         docks.put_below("scene", "Scene", self.scene, "F2")
         docks.put_below("health", "Health", self.health, "F3")
+        docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
         docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
         return docks
 
@@ -332,6 +335,8 @@ class MainWindow(QMainWindow):
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.setPalette(palette(theme))
+            if (font := letters(settings.letters)) != application.font():
+                application.setFont(font)
         self.panels.show_theme(theme)
         self.cost.show_theme(theme)
         self.scene.show_theme(theme)
@@ -370,6 +375,8 @@ class MainWindow(QMainWindow):
         self.panels.show_status(status, simulating)
         self.stability.show_status(status, self.session.inside)
         self.health.show_status(status, self.session.inside)
+        shown = self.display.estimate_shown()
+        self.numbers.show_estimate(shown, status.sensor, self.object.text())
         self.compare.show_status(status, self.display.old)
 
     def _allow_tare(self) -> None:

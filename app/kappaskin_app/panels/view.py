@@ -9,5 +9,5 @@ class ViewPanel(Form):
     """Asks for colours, height and what is drawn beside the skin."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        names = ("colour_by", "exaggeration", "show_elements", "show_truth", "theme")
+        names = ("colour_by", "exaggeration", "show_elements", "show_truth", "theme", "letters")
         super().__init__("View", names, parent)

@@ -1,8 +1,8 @@
 """A large word that tells the truth about what is shown, and below it what else is true."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QMouseEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtGui import QFontInfo, QMouseEvent
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from kappaskin_app.theme import Theme
 
@@ -29,6 +29,7 @@ _TIPS = {
     _RECORDING: "What comes in is being recorded.",
 }
 
+_WIDTH, _LARGE = 8.6, 1.54  # of the size of letters elsewhere
 _MORE = "Click it, or F4, to read what happened."
 
 
@@ -55,7 +56,6 @@ class Badge(QLabel):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.setFixedWidth(112)
         self._theme: Theme | None = None
         self.state, self._recording = "", False
 
@@ -81,7 +81,9 @@ class Badge(QLabel):
     def _paint(self) -> None:
         if self._theme is None or not self.state:
             return
-        size, padding = (13, 0) if "\n" in self.text() else (20, 4)
+        one = QFontInfo(QApplication.font()).pixelSize()  # not its own: that is what is set
+        self.setFixedWidth(round(_WIDTH * one))
+        size, padding = (one, 0) if "\n" in self.text() else (round(_LARGE * one), 4)
         self.setStyleSheet(
             f"background: {colour_of(self.state, self._theme)}; color: white; font-weight: 700;"
             f"font-size: {size}px; border-radius: 6px; padding: {padding}px;"
