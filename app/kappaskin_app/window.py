@@ -62,6 +62,7 @@ from kappaskin_app.views.transport import Transport
 from kappaskin_app.wishes import Wishes
 
 _WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
+_PACKED = 80  # of a picture: packs a fifth less well than Qt does, in half the time
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -392,7 +393,7 @@ class MainWindow(QMainWindow):
 
     def picture(self, path: Path) -> bool:
         """Save the window, 3-D picture included, as a PNG; whether it could be written."""
-        return self.grab().save(str(path), "PNG")
+        return self.grab().save(str(path), "PNG", _PACKED)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self.presenting.on:
