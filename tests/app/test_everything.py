@@ -1,6 +1,7 @@
 """Every action and every control, used once: nothing fails, and nothing is left behind."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from PySide6.QtWidgets import (
@@ -24,8 +25,9 @@ _SPARED = ("quit",)
 
 
 @pytest.fixture
-def nothing_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let whoever is asked for a file choose none."""
+def nothing_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Let whoever is asked for a file choose none; what asks nobody writes elsewhere."""
+    monkeypatch.chdir(tmp_path)
     for ask in ("getOpenFileName", "getSaveFileName"):
         monkeypatch.setattr(QFileDialog, ask, lambda *_: ("", ""))
 
