@@ -37,6 +37,7 @@ class Menus(QObject):
             self.actions.add(name, _FIGURES, TITLES.get(name, name), partial(self._draw, name))
         self._add_export()
         self.actions.add("shortcuts", _HELP, "&Shortcuts", self._show_shortcuts, "F1")
+        window.mishaps.add_actions(self.actions, _HELP)
 
     def _add_file(self) -> None:
         add, window = self.actions.add, self._window
