@@ -16,6 +16,7 @@ from kappaskin.health import Health
 from kappaskin.keeping import Keeping
 from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.processes import Haste
 from kappaskin.publish import Publishing, State
 from kappaskin.region import Region
 from kappaskin.requests import (
@@ -69,6 +70,7 @@ class Loop:
         self._seen_beside = -math.inf
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
+        self._haste = Haste()
         self._arrivals, self._pace = Arrivals(), Pace()
         self._again = math.inf
 
@@ -125,6 +127,7 @@ class Loop:
             self._happen(Event(time.monotonic(), "note", request.text))
         elif isinstance(request, Publish):
             self._publishing.ask(request.targets)
+            self._haste(self._publishing.active)
         elif isinstance(request, Connect | Disconnect):
             self._close()
             self._status = replace(

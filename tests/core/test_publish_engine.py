@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from importlib.resources import as_file, files
 
+import psutil
 import pytest
 
 from kappaskin import Engine, Refusal, Setup
@@ -93,6 +94,23 @@ def test_nothing_is_sent_before_it_is_asked_for_nor_after(engine, receiver, port
     with pytest.raises(TimeoutError):
         receiver.recv(9999)
     assert engine.status().publishing.targets == ()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="priorities as Linux has them")
+def test_while_it_publishes_it_comes_before_others_where_it_may(engine, port) -> None:
+    process, allowed = psutil.Process(engine.pid), os.geteuid() == 0
+    usual = process.nice()
+
+    def is_at(nice: int) -> bool:
+        end = time.monotonic() + 30
+        while process.nice() != nice and time.monotonic() < end:
+            time.sleep(0.02)
+        return process.nice() == nice
+
+    engine.publish([f"udp://127.0.0.1:{port}"])
+    assert is_at(usual - 10 if allowed else usual)
+    engine.publish([])
+    assert is_at(usual)
 
 
 def test_status_tells_what_was_sent_and_how_late(engine, receiver, port) -> None:
