@@ -25,6 +25,7 @@ class Actions:
         self._window = window
         self.entries: dict[str, Entry] = {}
         self._menus: dict[str, QMenu] = {}
+        self._why_not: dict[str, str] = {}
 
     def add(
         self,
@@ -53,6 +54,17 @@ class Actions:
         self.entries[name] = Entry(name, menu, action)
         self._menu(menu).addAction(action)
         self._window.addAction(action)
+
+    def allow(self, name: str, why_not: str) -> None:
+        """Let an action be taken, or say why it cannot be now."""
+        action = self[name]
+        action.setEnabled(not why_not)
+        action.setStatusTip(why_not or action.toolTip())
+        self._why_not[name] = why_not
+
+    def why_not(self, name: str) -> str:
+        """Why an action cannot be taken now; empty where it can."""
+        return "" if self[name].isEnabled() else self._why_not.get(name) or "not now"
 
     def _menu(self, title: str) -> QMenu:
         if title not in self._menus:

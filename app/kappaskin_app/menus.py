@@ -11,6 +11,8 @@ from PySide6.QtWidgets import QMessageBox
 from kappaskin import FIGURES
 from kappaskin_app.actions import Actions
 from kappaskin_app.figures import TITLES, FigureWindow
+from kappaskin_app.finder.finder import Finder
+from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
 from kappaskin_app.settings import COLOURS
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FILE, _EDIT, _SOURCE, _VIEW = "&File", "&Edit", "&Source", "&View"
+_FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, panels"
 _FIGURES, _HELP = "Fi&gures", "&Help"
 
 
@@ -30,6 +33,7 @@ class Menus(QObject):
     def __init__(self, window: "MainWindow") -> None:
         super().__init__(window)
         self._window, self.actions = window, Actions(window)
+        self.finder = Finder(partial(things_in, window), window)
         self._shortcuts: QMessageBox | None = None
         self._add_file()
         self._add_edit()
@@ -55,6 +59,8 @@ class Menus(QObject):
         self.actions.register("undo", _EDIT, undo)
         self.actions.register("redo", _EDIT, redo)
         self.actions.add("reset", _EDIT, "&Reset settings", self._window.wishes.reset)
+        find = self.finder.open_empty
+        self.actions.add("find", _EDIT, f"&Find a command{_DOTS}", find, "Ctrl+K", _FIND)
 
     def _add_source(self) -> None:
         add, window = self.actions.add, self._window
@@ -68,7 +74,7 @@ class Menus(QObject):
         window.taping.add_actions(self.actions)
         window.replaying.add_actions(self.actions)
         add("calibrate", _SOURCE, "C&alibrate", window.panels.show_calibration, "Ctrl+L")
-        add("take-step", _SOURCE, "&Take the step of the calibration", take, "Ctrl+K")
+        add("take-step", _SOURCE, "&Take the step of the calibration", take, "Ctrl+Shift+K")
 
     def _add_view(self) -> None:
         add, window, wishes = self.actions.add, self._window, self._window.wishes

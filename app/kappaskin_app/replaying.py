@@ -335,9 +335,10 @@ class Replaying(QObject):
 
     def _show_actions(self) -> None:
         if self._actions is not None:
-            for name, entry in self._actions.entries.items():
+            why_not = "" if self._replay is not None else "no recording is played"
+            for name in self._actions.entries:
                 if name.startswith("replay-"):
-                    entry.action.setEnabled(self._replay is not None)
+                    self._actions.allow(name, why_not)
 
     def _show_title(self, replay: Replay | None) -> None:
         title = "Kappaskin"

@@ -48,7 +48,7 @@ class Staging(QObject):
 
     def _wire(self) -> None:
         panel, session, planning = self._panel, self._session, self._planning
-        panel.gallery.chosen.connect(guarded(lambda name: self._play(scene_file(name))))
+        panel.gallery.chosen.connect(guarded(lambda name: self.play(scene_file(name))))
         panel.gallery.open_wanted.connect(guarded(self.open))
         panel.editor.edited.connect(guarded(self._wishes.write))
         panel.editor.save_wanted.connect(guarded(self.save))
@@ -69,7 +69,7 @@ class Staging(QObject):
         """Ask for a file, and play the scene in it."""
         file, _ = QFileDialog.getOpenFileName(self._window, "Open a scene", "", _FILES)
         if file:
-            self._play(Path(file))
+            self.play(Path(file))
 
     def save(self) -> None:
         """Ask for a file, and write the scene as it is there."""
@@ -88,7 +88,8 @@ class Staging(QObject):
         """Let the scene stand still, or go on."""
         self._session.run(not self._session.running)
 
-    def _play(self, file: Path) -> None:
+    def play(self, file: Path) -> None:
+        """Play the scene in a file, from its beginning."""
         try:
             self._wishes.play(written(file))
             self.played.emit(self._session.source)

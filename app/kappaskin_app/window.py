@@ -115,7 +115,8 @@ class MainWindow(QMainWindow):
         self._make_header()
         self.docks = self._surround()
         self.exports = Exports(self.session, self.membrane, self)
-        self.actions_by_name = Menus(self).actions
+        self.menus = Menus(self)
+        self.actions_by_name = self.menus.actions
         self._wire()
         self._follow(self.history.settings)
         self.plugs.look()
@@ -355,9 +356,7 @@ class MainWindow(QMainWindow):
         self.compare.show_status(status, self.display.old)
 
     def _allow_tare(self) -> None:
-        action, why_not = self.actions_by_name["tare"], self.taring.why_not
-        action.setEnabled(not why_not)
-        action.setStatusTip(why_not or "Tare")
+        self.actions_by_name.allow("tare", self.taring.why_not)
 
     # Small things.
 
