@@ -5,13 +5,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Qt
-from PySide6.QtWidgets import QMessageBox
+from PySide6.QtCore import QObject
 
 from kappaskin import FIGURES
 from kappaskin_app.actions import Actions
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.finder.finder import Finder
+from kappaskin_app.finder.sheet import CheatSheet
 from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FILE, _EDIT, _SOURCE, _VIEW = "&File", "&Edit", "&Source", "&View"
 _FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, panels"
+_SHEET = "Every shortcut, to look up and to change"
 _FIGURES, _HELP = "Fi&gures", "&Help"
 
 
@@ -34,7 +35,6 @@ class Menus(QObject):
         super().__init__(window)
         self._window, self.actions = window, Actions(window)
         self.finder = Finder(partial(things_in, window), window)
-        self._shortcuts: QMessageBox | None = None
         self._add_file()
         self._add_edit()
         self._add_source()
@@ -42,7 +42,8 @@ class Menus(QObject):
         for name in FIGURES:
             self.actions.add(name, _FIGURES, TITLES.get(name, name), partial(self._draw, name))
         self._add_export()
-        self.actions.add("shortcuts", _HELP, "&Shortcuts", self._show_shortcuts, "F1")
+        self.sheet = CheatSheet(self.actions, window)
+        self.actions.add("shortcuts", _HELP, "&Shortcuts", self.sheet.open_all, "F1", _SHEET)
 
     def _add_file(self) -> None:
         add, window = self.actions.add, self._window
@@ -125,12 +126,3 @@ class Menus(QObject):
     def _draw(self, name: str) -> None:
         """Draw a figure of the paper from a run of its own, in a window beside this one."""
         FigureWindow(name, self._window).show()
-
-    def _show_shortcuts(self) -> None:
-        if self._shortcuts is None:
-            text = self.actions.cheat_sheet()
-            self._shortcuts = QMessageBox(QMessageBox.Icon.NoIcon, "Shortcuts", text)
-            self._shortcuts.setParent(self._window, Qt.WindowType.Dialog)
-            self._shortcuts.setModal(False)
-        self._shortcuts.show()
-        self._shortcuts.raise_()

@@ -1,9 +1,11 @@
 """How well a few letters name a text: they need only come in it in their order."""
 
+from collections.abc import Mapping
 from functools import lru_cache
 
 _BEGINS, _FOLLOWS, _SKIPS = 8, 5, 0.2  # points of a letter that begins a word, or has its neighbour
 _WHOLE = 4  # points more where the text begins so
+_FAR = 0.3  # of the best one's points, below which it is not what was meant
 _ELSEWHERE = 0.4  # of the points, for what is found only in where a thing stands
 
 
@@ -16,6 +18,12 @@ def score(query: str, text: str, place: str = "") -> float:
     if not points:
         return 1.0
     return sum(points) - 0.01 * len(text) if min(points) > 0 else 0.0
+
+
+def best(points: Mapping[str, float]) -> list[str]:
+    """Those that were meant, the best first; of equal ones in the order given."""
+    least = _FAR * max(points.values(), default=0.0)
+    return sorted((name for name in points if points[name] > least), key=lambda name: -points[name])
 
 
 def _best(word: str, text: str, place: str) -> float:

@@ -10,6 +10,7 @@ from PySide6.QtGui import QStandardItemModel
 from PySide6.QtWidgets import QComboBox, QDockWidget, QTabWidget, QWidget
 
 from kappaskin import scene_file
+from kappaskin_app.actions import plain
 from kappaskin_app.columns import scroll_to
 from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.panel import Panel
@@ -73,11 +74,6 @@ def _where(widget: QWidget) -> str:
     if isinstance(around, QTabWidget):
         return f"{plain(around.tabText(_page(around, widget)))} page"
     return around.windowTitle()
-
-
-def plain(text: str) -> str:
-    """The words of a menu or a button, without the mark of its letter."""
-    return text.replace("&", "").rstrip("\N{HORIZONTAL ELLIPSIS}")
 
 
 def _actions(window: "MainWindow") -> Iterator[Thing]:
