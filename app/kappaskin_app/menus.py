@@ -25,6 +25,7 @@ _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FILE, _EDIT, _SOURCE, _VIEW = "&File", "&Edit", "&Source", "&View"
 _FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, panels"
 _SHEET = "Every shortcut, to look up and to change"
+_RECENT = "Scenes, recordings, calibrations and meshes opened last; each may also be dropped here"
 _FIGURES, _HELP = "Fi&gures", "&Help"
 
 
@@ -48,6 +49,8 @@ class Menus(QObject):
     def _add_file(self) -> None:
         add, window = self.actions.add, self._window
         add("open-scene", _FILE, f"&Open scene{_DOTS}", window.staging.open, "Ctrl+O")
+        recent = add("recent", _FILE, "Open r&ecent", lambda: None, "", _RECENT)
+        recent.setMenu(window.opening.menu)
         add("save-scene", _FILE, f"Save scene &as{_DOTS}", window.staging.save, "Ctrl+Shift+S")
         add("picture", _FILE, "Save &picture", self._save_picture, "Ctrl+S")
         add("quit", _FILE, "&Quit", window.quit, "Ctrl+Q")

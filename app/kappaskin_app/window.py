@@ -32,6 +32,7 @@ from kappaskin_app.history import History
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.menus import Menus
 from kappaskin_app.naming import Naming
+from kappaskin_app.opening import Opening
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.health import HealthPanel
@@ -90,11 +91,19 @@ class MainWindow(QMainWindow):
         self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
         self.taping = Taping(self.session.engine, self)
         self.replaying = Replaying(self.history, self.session, self.transport, self)
-        self.drops = Drops(self, self.replaying.open_file, self.transport.take_key)
         self.staging = Staging(
             *(self.history, self.session, self.wishes, self.planning),
             *(self.scene, self.timeline, self),
         )
+        self.opening = Opening(
+            replaying=self.replaying,
+            staging=self.staging,
+            calibrating=self.calibrating,
+            session=self.session,
+            wishes=self.wishes,
+            window=self,
+        )
+        self.drops = Drops(self, self.opening.open, self.transport.take_key)
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._next_bargain = self._next_words = 0.0
@@ -209,6 +218,7 @@ class MainWindow(QMainWindow):
         self._attend_health()
         self._attend_recording()
         self.staging.told.connect(guarded(self.tell))
+        self.opening.told.connect(guarded(self.tell))
         self.exports.told.connect(guarded(self.tell))
         self.staging.played.connect(guarded(panels.connection.show_source))
         session.reported.connect(guarded(wishes.follow))

@@ -136,5 +136,5 @@ def test_ctrl_k_finds_every_kind_of_thing_in_the_window(window: MainWindow, unti
     names = [thing.name for thing in things_in(window)]
     assert len(set(names)) == len(names)
     assert {n.removeprefix("action:") for n in names} > set(window.actions_by_name.entries) - {
-        "recent-recordings"
+        "recent"
     }
