@@ -76,6 +76,10 @@ def launch(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: asked.append(got))
     application, window = opened(source)
+    if seconds is None:  # what a script opens is the same whatever was before
+        from kappaskin_app.layouts.file import config_file
+
+        window.keeping.begin(config_file())
     if presenting and not window.session.engine.adopted:
         window.presenting.enter()
     from PySide6.QtCore import QTimer

@@ -104,6 +104,7 @@ class Menus(QObject):
         add("next-panels", _VIEW, "&Next panels", partial(window.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", _VIEW, "&Previous panels", partial(window.panels.turn, -1), "Ctrl+PgUp")
         window.docks.add_actions(self.actions, _VIEW)
+        window.layouts.add_actions(self.actions)
 
     def _add_export(self) -> None:
         window = self._window

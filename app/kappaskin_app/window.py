@@ -29,6 +29,8 @@ from kappaskin_app.exports import Exports
 from kappaskin_app.guard import guarded
 from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
+from kappaskin_app.layouts.choosing import Layouts
+from kappaskin_app.layouts.keeping import Keeping
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.menus import Menus
 from kappaskin_app.naming import Naming
@@ -124,7 +126,10 @@ class MainWindow(QMainWindow):
         self._make_header()
         self.docks = self._surround()
         self.exports = Exports(self.session, self.membrane, self)
-        self.menus = Menus(self)
+        self.layouts = Layouts(
+            self, self.docks.by_name(), self.panels, self.presenting, self.history.stack
+        )
+        self.menus, self.keeping = Menus(self), Keeping(self)
         self.actions_by_name = self.menus.actions
         self._wire()
         self._follow(self.history.settings)
@@ -219,6 +224,7 @@ class MainWindow(QMainWindow):
         self._attend_recording()
         self.staging.told.connect(guarded(self.tell))
         self.opening.told.connect(guarded(self.tell))
+        self.layouts.told.connect(guarded(self.tell))
         self.exports.told.connect(guarded(self.tell))
         self.staging.played.connect(guarded(panels.connection.show_source))
         session.reported.connect(guarded(wishes.follow))
@@ -400,6 +406,7 @@ class MainWindow(QMainWindow):
             return
         if not self.session.closed:
             guard.forget(self.tell)
+            self.keeping.write()
             self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
             self.exports.close()

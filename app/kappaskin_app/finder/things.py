@@ -36,7 +36,13 @@ class Thing:
 
 def things_in(window: "MainWindow") -> list[Thing]:
     """All that can be found in the window now."""
-    return [*_actions(window), *_panels(window), *_settings(window), *_scenes(window)]
+    return [
+        *_actions(window),
+        *_panels(window),
+        *_settings(window),
+        *_scenes(window),
+        *_layouts(window),
+    ]
 
 
 def reveal(widget: QWidget) -> None:
@@ -143,3 +149,10 @@ def _scenes(window: "MainWindow") -> Iterator[Thing]:
     for name, card in window.scene.gallery.items.items():
         play = partial(window.staging.play, scene_file(name))
         yield Thing(f"scene:{name}", f"Play the scene {card.text()}", "Scene, Gallery", play)
+
+
+def _layouts(window: "MainWindow") -> Iterator[Thing]:
+    for name in window.layouts.own:
+        yield Thing(
+            f"layout:{name}", name, "Layout menu, Your own", partial(window.layouts.choose, name)
+        )
