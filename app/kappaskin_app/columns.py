@@ -7,17 +7,6 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QVBoxLayout
 _LOWEST = 240  # px of what is below the skin
 
 
-def column(*widgets: QWidget) -> QWidget:
-    """The widgets sharing the height evenly."""
-    whole, stack = QWidget(), QVBoxLayout()
-    stack.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        stack.addWidget(widget, 1)
-    whole.setLayout(stack)
-    whole.setMinimumWidth(270)
-    return whole
-
-
 def scrolled(*widgets: QWidget) -> QScrollArea:
     """The widgets as tall as they like to be, scrolled where the window is too low for them."""
     whole, stack = QWidget(), QVBoxLayout()

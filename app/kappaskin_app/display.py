@@ -2,19 +2,26 @@
 
 import math
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
 
 from kappaskin import COMPONENTS, WHY, Estimate, Status
+from kappaskin_app.colouring import Colouring
+from kappaskin_app.maps import Maps
+from kappaskin_app.measuring import Measuring
+from kappaskin_app.overlaying import Overlaying
 from kappaskin_app.scale import Ranges, locked_at
 from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings
-from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, PULLED, SEQUENTIAL, Colours, Theme
+from kappaskin_app.shades import SHADES, Tint
+from kappaskin_app.theme import DIVERGING, LIGHT, Theme
 from kappaskin_app.touching import touches_at
 from kappaskin_app.views.badge import GAP, LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.views.colour_bar import SkinScale
-from kappaskin_app.views.heatmap import Array, Heatmap, Mask
+from kappaskin_app.views.heatmap import coloured, legend
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.notice import Notice, warnings
 from kappaskin_app.views.readouts import Health, Readouts
@@ -23,21 +30,33 @@ _OLD = (LOST, OFF, STALE, WAITING, GAP)  # what is shown is not so now
 _HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
 _HEATMAPS = 0.06  # s between two drawings of the heatmaps
 _NUMBERS = 0.2  # s between two readouts: faster cannot be read
-_TIPS = {
-    "xx": "Bending along x as each element reads it (Eq. 3).",
-    "yy": "Bending along y as each element reads it (Eq. 4).",
-    "xy": "Twist as each element reads it (Eq. 5).",
+_UNKNOWN = {
+    "difference": "No simulation: the true surface is not known",
+    "error_bar": "Computing how sure the surface is\N{HORIZONTAL ELLIPSIS}",
 }
 
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Kinds = NDArray[np.uint8]
 
-class Display:
-    """The views, and in which colours and how high they show what the `session` brings."""
+
+class Display(QObject):
+    """The views, and in which colours and how high they show what the `session` brings.
+
+    `pointed` tells which element is pointed at, -1 none.
+    """
+
+    pointed = Signal(int)
 
     def __init__(self, session: Session) -> None:
+        super().__init__()
         self._session = session
         self.membrane, self.badge, self.readouts = MembraneView(), Badge(), Readouts()
         self.scale, self.notice = SkinScale(), Notice(_HINT)
-        self.heatmaps = {name: Heatmap(name, _TIPS[name]) for name in COMPONENTS}
+        self.maps, self.colouring = Maps(), Colouring()
+        self.heatmaps = self.maps.heatmaps
+        self.measuring = Measuring(self.membrane)
+        self.overlays = Overlaying(self.membrane, self.colouring, session)
         self.ranges = Ranges()
         self._settings = Settings()
         self._mode: Array | None = None
@@ -45,36 +64,61 @@ class Display:
         """Whether the skin's picture says why nothing comes in, as nothing else does."""
         self.old = True
         """Whether what is shown is not coming in any more."""
-        self._met, self._asked = 0, -1
+        self._missing = LIGHT.missing
+        self._met, self._asked, self._element = 0, -1, -1
         self._out = np.empty(0, np.intp)  # elements that are left out
         self._colours: object = None
         self._next_heatmaps = self._next_numbers = 0.0
 
     def point(self, element: int) -> None:
-        """Point at an element in every heatmap; -1 at none."""
+        """Point at an element in every view; -1 at none."""
+        if element == self._element:
+            return
+        self._element = element
+        self.membrane.point(element)
+        self.pointed.emit(element)
         for heatmap in self.heatmaps.values():
             heatmap.show_element(element)
         self._next_numbers = 0.0
 
     def show_settings(self, settings: Settings) -> None:
         self._settings = settings
+        self.maps.show_those(settings.maps)
         for name, heatmap in self.heatmaps.items():
             heatmap.show_lock(locked_at(name, settings) > 0)
         self.scale.lock.show_locked(locked_at(settings.colour_by, settings) > 0)
+        self._allow_lock()
+        s = settings
+        self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y))
         self.membrane.show_options(settings.show_elements, settings.show_truth)
 
     def limit_shown(self) -> float:
-        """Up to where the colours of the skin go, in SI units."""
-        largest = max(abs(limit) for limit in self.scale.bar.limits)
-        return largest * (1e-3 if self._settings.colour_by == "displacement" else 1.0)
+        """How far the colours of the skin reach, in SI units."""
+        return self.scale.bar.reach / SHADES[self._settings.colour_by].scale
+
+    def limits_shown(self) -> dict[str, float]:
+        """How far the colours of the skin and of each heatmap reach, by the setting of its range.
+
+        In SI units.
+        """
+        settings = self._settings
+        found = {name: self.heatmaps[name].limit for name in settings.maps}
+        found[settings.colour_by] = self.limit_shown()
+        return {f"range_{name}": limit for name, limit in found.items() if name != "health"}
 
     def show_mode(self, mode: Array | None, words: str = "") -> None:
         """Colour the skin by a shape (ny, nx) from -1 to 1 instead, which `words` say, or not."""
         self._mode = mode
         self.membrane.show_caption(words if mode is not None else "")
-        self.scale.lock.setEnabled(mode is None)  # these colours have no range to keep
+        self._allow_lock()
+
+    def _allow_lock(self) -> None:
+        """Some colours have no range to keep."""
+        self.scale.lock.setEnabled(self._mode is None and self._settings.colour_by != "health")
 
     def show_theme(self, theme: Theme) -> None:
+        self._missing = theme.missing
+        self.measuring.ruler.show_theme(theme)
         for view in (
             self.membrane,
             self.badge,
@@ -85,6 +129,7 @@ class Display:
             view.show_theme(theme)
 
     def show_status(self, status: Status) -> None:
+        self.colouring.follow(status)
         if status.sensor is not None and status.meetings != self._met:
             self._meet(status)
         state = self._session.badge()
@@ -93,12 +138,15 @@ class Display:
         self.old = lost = state in _OLD
         for view in (self.membrane, *self.heatmaps.values()):
             view.show_lost(lost)
+        if lost:
+            self.overlays.hide()
         self._show_numbers(status, lost)
 
     def _meet(self, status: Status) -> None:
         sensor, setup = status.sensor, status.setup
         if sensor is None:
             return
+        self._element = -1
         self._met, self._out = status.meetings, np.empty(0, np.intp)
         self.membrane.show_skin(sensor, setup.nx, setup.ny)
         self.ranges = Ranges(1e3 * max(sensor.layout.patch.a, sensor.layout.patch.b))
@@ -126,8 +174,11 @@ class Display:
         estimate = self.estimate_shown()
         self.readouts.show_estimate(estimate)
         self._warn(estimate)
-        for row, heatmap in enumerate(self.heatmaps.values()):
-            heatmap.show_reading(np.empty(0) if estimate is None else estimate.curvature[row])
+        for name in self._settings.maps:
+            values = np.empty(0)
+            if estimate is not None:
+                values = self._of_elements(name, estimate, self._kinds(estimate))
+            self.heatmaps[name].show_reading(values)
 
     def _ages(self, now: float) -> list[float]:
         """How old in s what was drawn within the last second was."""
@@ -157,38 +208,81 @@ class Display:
         if not self.membrane.ready:
             return  # a picture is due; the next tick brings a newer estimate
         settings, now = self._settings, time.monotonic()
-        colour = settings.colour_by
-        values = self._session.surface_values(estimate, colour)
-        depth = self.ranges.limit("displacement", 1e3 * estimate.surface, settings, now)
-        mode = self._mode
-        if mode is not None and mode.shape == estimate.surface.shape:
-            values, limits, colours, unit = mode, (-1.0, 1.0), DIVERGING, "shape"
-        elif colour == "displacement":
-            pulled = self.ranges.pulled(values)
-            limits = (-depth, 0.0) if pulled else (0.0, depth)
-            colours, unit = PULLED if pulled else SEQUENTIAL, "mm"
-        else:
-            readings = estimate.curvature[COMPONENTS.index(colour)]
-            limit = self.ranges.limit(colour, readings, settings, now)
-            limits, colours, unit = (-limit, limit), DIVERGING, "1/m"
-        self._show_colours(colours)
-        times = self._times()
-        self.membrane.show_estimate(estimate, values, limits, times)
+        self.ranges.limit("displacement", 1e3 * estimate.surface, settings, now)
+        kinds = self._kinds(estimate)
+        railed = self._railed(estimate, kinds)
+        self._colour_skin(estimate, kinds, railed, now)
         self._show_loads(estimate)
-        self.scale.bar.show_scale(colours, limits, unit)
-        self.scale.show_times(times)
+        self.overlays.show(estimate, settings, self._times())
+        self.measuring.show(estimate)
         if now >= self._next_heatmaps:
             self._next_heatmaps = now + _HEATMAPS
-            crossed, dotted = self.marks(estimate.curvature)
-            kinds = self._kinds(estimate)
-            self._out = np.flatnonzero(kinds.any(axis=0))
-            self.membrane.show_marked(self._out, self._asked)
-            for row, (name, heatmap) in enumerate(self.heatmaps.items()):
-                readings = estimate.curvature[row]
-                heatmap.show_marks(crossed, dotted, kinds[row])
-                heatmap.show_values(readings, self.ranges.limit(name, readings, settings, now))
+            self._show_heatmaps(estimate, kinds, railed, now)
 
-    def _kinds(self, estimate: Estimate) -> NDArray[np.uint8]:
+    def _colour_skin(self, estimate: Estimate, kinds: Kinds, railed: Mask, now: float) -> None:
+        name, times = self._settings.colour_by, self._times()
+        mode, shade, beside = self._mode, SHADES[name], ()
+        if mode is not None and mode.shape == estimate.surface.shape:
+            tint, values = Tint(DIVERGING, (-1.0, 1.0), "shape"), mode
+        elif shade.surface and self._settings.colour_from == "smooth":
+            values = self.colouring.on_surface(name, estimate)
+            tint = self._tint(name, estimate, values, now)
+        else:
+            of_elements = self._of_elements(name, estimate, kinds)
+            tint, on_rail = self._tint(name, estimate, of_elements, now), _of_row(name, railed)
+            values = coloured(of_elements, tint, self._missing, on_rail)
+            beside = legend(of_elements, tint, self._missing, on_rail)
+        self._show_colours(tint)
+        self._say_unknown(name, values)
+        self.membrane.show_estimate(estimate, values, tint.limits, times)
+        self.scale.bar.show_tint(tint, beside)
+        self.scale.show_what("" if tint.unit == "shape" else shade.symbol, shade.tip)
+        self.scale.show_times(times)
+
+    def _show_heatmaps(self, estimate: Estimate, kinds: Kinds, railed: Mask, now: float) -> None:
+        crossed, dotted = self.marks(estimate.curvature)
+        self._out = np.flatnonzero(kinds.any(axis=0))
+        self.membrane.show_marked(self._out, self._asked)
+        for name in self._settings.maps:
+            heatmap = self.heatmaps[name]
+            if heatmap.isVisible():
+                values = self._of_elements(name, estimate, kinds)
+                heatmap.show_marks(crossed, dotted, _of_row(name, kinds))
+                tint = self._tint(name, estimate, values, now)
+                heatmap.show_values(values, tint, _of_row(name, railed))
+
+    def _of_elements(self, name: str, estimate: Estimate, kinds: Kinds) -> Array:
+        """What to colour the elements (P,) by, on the screen's scale."""
+        if name == "health":
+            return kinds.max(axis=0).astype(float)
+        return self.colouring.of_elements(name, estimate)
+
+    def _tint(self, name: str, estimate: Estimate, values: Array, now: float) -> Tint:
+        shade, at_rest = SHADES[name], self.colouring.at_rest(name, estimate)
+        if name in COMPONENTS:  # whatever is shown of them, one range for the skin and the map
+            values = estimate.curvature[COMPONENTS.index(name)]
+        elif name == "displacement":
+            values = 1e3 * estimate.surface
+        limit = self.ranges.limit(name, values - at_rest, self._settings, now)
+        pulled = name == "displacement" and self.ranges.pulled(values)
+        return shade.tint(limit, at_rest, pulled)
+
+    def _say_unknown(self, name: str, values: NDArray[Any]) -> None:
+        """Say in the picture why there are no colours."""
+        known = name == "health" or values.dtype == np.uint8 or bool(np.isfinite(values).any())
+        if self._mode is None:
+            self.membrane.show_caption("" if known else _UNKNOWN.get(name, ""))
+
+    def _railed(self, estimate: Estimate, kinds: Kinds) -> Mask:
+        """Which readings (3, P) stand on a rail, as far as that is known."""
+        status = self._session.status
+        on_rail = kinds == WHY.index("saturated")
+        if status.sensor is not None and status.region.around == "off":
+            # Every channel was scanned: what lives and has no reading is at the end of its range.
+            on_rail |= np.isnan(estimate.nominal) & status.sensor.layout.live & (kinds == 0)
+        return on_rail
+
+    def _kinds(self, estimate: Estimate) -> Kinds:
         """Why each channel (3, P) is left out, by number in `WHY`; 0 where it is not."""
         found = np.zeros(estimate.curvature.shape, np.uint8)
         for finding in self._session.status.health.findings:
@@ -221,13 +315,28 @@ class Display:
         fits = self.membrane.skin.deepest / self.ranges.deepest()
         return min(self._settings.exaggeration, fits)
 
-    def _show_colours(self, colours: Colours) -> None:
-        if colours is not self._colours:
-            self._colours = colours
-            self.membrane.show_colours(colours, DARK_INK if colours is DIVERGING else LIGHT_INK)
+    def _show_colours(self, tint: Tint) -> None:
+        if tint.colours is not self._colours:
+            self._colours = tint.colours
+            self.membrane.show_colours(tint.colours, tint.ink)
 
     def _show_loads(self, estimate: Estimate) -> None:
         session = self._session
         time = session.status.playing.time(estimate.device_time)
         touches = touches_at(session.scene, time) if session.inside else ()
         self.membrane.show_loads([touch.load for touch in touches])
+
+    def close(self) -> None:
+        """Before the window goes: end what is computed beside it, and give VTK's resources back."""
+        self.colouring.close()
+        self.membrane.close_plotter()
+
+
+def _of_row(name: str, of_channels: NDArray[Any]) -> NDArray[Any]:
+    """What holds for the elements (P,), of what holds for channels (3, P).
+
+    Of that component which a quantity is made from, or of any of them.
+    """
+    component = name.removeprefix("residual_")
+    row = of_channels[COMPONENTS.index(component)] if component in COMPONENTS else None
+    return of_channels.max(axis=0) if row is None else row

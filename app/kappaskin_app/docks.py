@@ -58,17 +58,24 @@ class Docks:
                 actions.register(f"dock-{name}", menu, dock.toggleViewAction())
         for name, key in self._keys.items():
             dock = self[name]
-            turn = partial(self._turn, dock)
+            turn = partial(self._turn, name)
             action = actions.add(f"dock-{name}", menu, dock.windowTitle(), turn, key)
             action.setCheckable(True)
             dock.visibilityChanged.connect(action.setChecked)
 
-    def _turn(self, dock: QDockWidget) -> None:
+    def _turn(self, name: str) -> None:
         """Show a dock below the skin, before the other in its place; hide one that is seen."""
+        if self[name].visibleRegion().isEmpty():
+            self.reveal(name)
+        else:
+            self[name].hide()
+
+    def reveal(self, name: str) -> None:
+        """Show a dock below the skin, before the other in its place."""
+        dock = self[name]
         if not dock.visibleRegion().isEmpty():
-            dock.hide()
             return
         dock.show()
         if not dock.isFloating():
-            heighten(self._window, dock, _HEIGHTS.get(dock.objectName(), _HEIGHT))
+            heighten(self._window, dock, _HEIGHTS.get(name, _HEIGHT))
         dock.raise_()

@@ -15,8 +15,6 @@ from kappaskin_app.finder.sheet import CheatSheet
 from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
-from kappaskin_app.settings import COLOURS
-from kappaskin_app.views.camera import ABOVE, FROM_THE_LEFT, FRONT, SIDE
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
@@ -77,30 +75,18 @@ class Menus(QObject):
         add("happenings", _SOURCE, "What &happened", window.happenings.open_list, "F4")
         window.taping.add_actions(self.actions)
         window.replaying.add_actions(self.actions)
+        window.looking.add_actions(self.actions)
         add("calibrate", _SOURCE, "C&alibrate", window.panels.show_calibration, "Ctrl+L")
         add("take-step", _SOURCE, "&Take the step of the calibration", take, "Ctrl+Shift+K")
 
     def _add_view(self) -> None:
-        add, window, wishes = self.actions.add, self._window, self._window.wishes
-        for number, (value, words) in enumerate(COLOURS, 1):
-            colour = partial(wishes.wish, "colour_by", value)
-            add(f"colour-{value}", _VIEW, f"Colour by {words.lower()}", colour, f"Ctrl+{number}")
-        add("higher", _VIEW, "Draw &higher", partial(wishes.exaggerate, 1), "Ctrl++")
-        add("lower", _VIEW, "Draw &lower", partial(wishes.exaggerate, -1), "Ctrl+-")
-        for name, words, key in (("elements", "&elements", "E"), ("truth", "&true surface", "U")):
-            toggle = partial(wishes.toggle, f"show_{name}")
-            add(name, _VIEW, f"Show or hide {words}", toggle, f"Ctrl+{key}")
-        look = window.membrane.look_from
-        add("camera", _VIEW, "Reset &camera", partial(look, FROM_THE_LEFT), "Ctrl+R")
-        for key, direction in (("F6", ABOVE), ("F7", FRONT), ("F8", SIDE)):
-            words = f"Look {direction.words}"
-            add(words.lower().replace(" ", "-"), _VIEW, words, partial(look, direction), key)
+        add, window = self.actions.add, self._window
         add("pause", _VIEW, "&Pause or go on", window.pause, "Ctrl+P")
         add("present", _VIEW, "&Presenter", window.presenting.turn, "F11", TIP)
         sound = add("sound", _VIEW, "S&ound of the force", self._turn_sound, "F12", SOUND_TIP)
         sound.setCheckable(True)
         window.presenting.sound.ended.connect(guarded(self._show_sound))
-        add("theme", _VIEW, "Light or &dark", wishes.switch_theme, "Ctrl+T")
+        add("theme", _VIEW, "Light or &dark", window.wishes.switch_theme, "Ctrl+T")
         add("next-panels", _VIEW, "&Next panels", partial(window.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", _VIEW, "&Previous panels", partial(window.panels.turn, -1), "Ctrl+PgUp")
         window.docks.add_actions(self.actions, _VIEW)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import platformdirs
 
+from kappaskin import is_written
+
 _OFFERED = 8  # recent ones
 _PART = ".part"
 
@@ -37,8 +39,8 @@ def newest(folder: Path) -> list[Path]:
 
 
 def unfinished(folder: Path) -> list[Path]:
-    """Recordings in a folder that were never ended, the newest first."""
-    return _found(folder, f"*.mcap{_PART}")
+    """Recordings in a folder that were never ended, nor are written now, the newest first."""
+    return [path for path in _found(folder, f"*.mcap{_PART}") if not is_written(path)]
 
 
 def repaired(file: Path) -> Path:

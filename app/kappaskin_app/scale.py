@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import COMPONENTS
 from kappaskin_app.settings import Settings
+from kappaskin_app.shades import SHADES
 
 Array = NDArray[np.float64]
 
@@ -46,8 +46,10 @@ class Ranges:
 
     def __init__(self, side: float = 100.0) -> None:
         """`side` in mm is the skin's longer one: what moves less than a thousandth is at rest."""
-        self._steady = {name: SteadyRange(0.5) for name in COMPONENTS}
-        self._steady["displacement"] = SteadyRange(1e-3 * side)
+        least = {"gaussian": 1.0, "displacement": 1e-3 * side}
+        least |= dict.fromkeys(("error_bar", "difference"), 1e-5 * side)
+        least |= dict.fromkeys((name for name in SHADES if name.startswith("residual_")), 0.1)
+        self._steady = {name: SteadyRange(least.get(name, 0.5)) for name in SHADES}
         self._pulled = False
 
     def pulled(self, displacement: Array) -> bool:
@@ -66,12 +68,19 @@ class Ranges:
         return self._steady["displacement"].limit
 
     def limit(self, name: str, values: Array, settings: Settings, now: float) -> float:
-        """The limit in mm or 1/m for `values` of the quantity `name`, NaN among them or not."""
+        """The limit on the screen's scale for `values` of the quantity `name`, NaN or not.
+
+        They count from what they are at rest.
+        """
         largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
-        followed = self._steady[name].follow(largest, now)
-        return locked_at(name, settings) or followed
+        self._steady[name].follow(largest, now)
+        alike = (name,)
+        if settings.one_range:
+            shown = {*settings.maps, settings.colour_by}
+            alike = (name, *(other for other in SHADES[name].alike if other in shown))
+        return max(locked_at(one, settings) or self._steady[one].limit for one in alike)
 
 
 def locked_at(name: str, settings: Settings) -> float:
-    """What the range of the quantity `name` is locked to in mm or 1/m, zero when it is not."""
-    return getattr(settings, f"range_{name}") * (1e3 if name == "displacement" else 1.0)
+    """What the range of the quantity `name` is locked to on the screen's scale, zero when not."""
+    return getattr(settings, f"range_{name}", 0.0) * SHADES[name].scale

@@ -5,15 +5,12 @@ import time
 from contextlib import suppress
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from kappaskin import (
     LISTS,
     Bargain,
     Calibration,
-    CurvatureMap,
     Engine,
     Estimate,
     Left,
@@ -29,7 +26,6 @@ from kappaskin import (
     Step,
     Tare,
     bargain,
-    basis_for,
 )
 from kappaskin_app.ahead import Ahead
 from kappaskin_app.guard import guarded
@@ -37,8 +33,6 @@ from kappaskin_app.history import History
 from kappaskin_app.settings import Scanning, SceneSettings, Sending, Settings, Written, part
 from kappaskin_app.simulation import named, played, region_of, scene_of
 from kappaskin_app.views.badge import GAP, LIVE, LOST, OFF, PAUSED, REPLAY, SIM, STALE, WAITING
-
-Array = NDArray[np.float64]
 
 RECORDED = "replay:"
 """What the name of a source begins with that is a recording."""
@@ -133,7 +127,6 @@ class Session(QObject):
         self.source = ""
         self._next_status, self.closed = 0.0, False
         self._shown: tuple[int, int] = (0, -1)
-        self._values_of: tuple[object, ...] = ()
         history.changed.connect(guarded(self._follow))
         self._timer = QTimer(self, interval=_TICK, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
         self._timer.timeout.connect(self.tick)
@@ -364,19 +357,6 @@ class Session(QObject):
         if status.sensor is None or now - last > STALE_AFTER:
             return WAITING if status.computing else STALE
         return SIM if status.sensor.simulated else LIVE
-
-    def surface_values(self, estimate: Estimate, colour_by: str) -> Array:
-        """Displacement in mm or a curvature in 1/m at every surface point, (ny, nx)."""
-        if colour_by == "displacement" or self.status.sensor is None:
-            return estimate.surface * 1e3
-        key = (estimate.generation, colour_by)
-        if self._values_of[:2] != key:
-            patch = self.status.sensor.layout.patch
-            edge = self.status.setup.edge or self.status.sensor.edge
-            basis = basis_for(patch, edge, *estimate.coefficients.shape)
-            ny, nx = estimate.surface.shape
-            self._values_of = (*key, CurvatureMap(basis, colour_by, *patch.grid(nx, ny)))
-        return self._values_of[2](estimate.coefficients)  # pyright: ignore
 
     def close(self) -> None:
         self._timer.stop()

@@ -145,6 +145,9 @@ LIGHT_INK, DARK_INK = "#f4f6f8", "#16191d"
 # On the skin and beside it: an element that is left out, and one that is to be pressed.
 OUT, WANTED = "#e8267d", "#ffd400"
 
+# A reading on a rail: in none of the maps above.
+SATURATED = "#9b30d0"
+
 # Told apart in the common colour blindnesses (after Okabe and Ito), on a light and a dark ground.
 SERIES = (
     ("#0072b2", "#5ab4e8"),

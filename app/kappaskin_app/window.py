@@ -19,7 +19,7 @@ from kappaskin import Engine, Status, Tares, data_folder
 from kappaskin_app import guard
 from kappaskin_app.adopting import Entrusting, settings_left
 from kappaskin_app.calibrating import Calibrating
-from kappaskin_app.columns import column, widen
+from kappaskin_app.columns import widen
 from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
@@ -31,6 +31,7 @@ from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.layouts.choosing import Layouts
 from kappaskin_app.layouts.keeping import Keeping
+from kappaskin_app.looking import Looking
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.menus import Menus
 from kappaskin_app.naming import Naming
@@ -41,6 +42,7 @@ from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
+from kappaskin_app.picking import Picking
 from kappaskin_app.planning import Planning
 from kappaskin_app.plugs import Plugs
 from kappaskin_app.presenting import NAMED, Presenting
@@ -106,6 +108,7 @@ class MainWindow(QMainWindow):
             window=self,
         )
         self.drops = Drops(self, self.opening.open, self.transport.take_key)
+        self.picking = Picking(self.history, self.session, self.display)
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
         self._next_bargain = self._next_words = 0.0
@@ -126,6 +129,7 @@ class MainWindow(QMainWindow):
         self._make_header()
         self.docks = self._surround()
         self.exports = Exports(self.session, self.membrane, self)
+        self.looking = Looking(self.history, self.wishes, self.display)
         self.layouts = Layouts(
             self, self.docks.by_name(), self.panels, self.presenting, self.history.stack
         )
@@ -139,6 +143,7 @@ class MainWindow(QMainWindow):
         self.naming = Naming(self)
         self.naming.named.connect(guarded(self.object.show_text))
         self.naming.found.connect(guarded(self.presenting.find))
+        self.naming.found.connect(guarded(lambda what, _: self.display.overlays.find(what)))
         if handed:
             self.session.go_on(handed)
             self.taping.go_on(handed, source)
@@ -175,13 +180,14 @@ class MainWindow(QMainWindow):
     def _surround(self) -> Docks:
         docks, area = Docks(self), Qt.DockWidgetArea
         docks.put_beside("settings", "Settings", self.panels, area.LeftDockWidgetArea)
-        maps = column(*self.heatmaps.values())
-        docks.put_beside("curvature", "Curvature, by element", maps, area.RightDockWidgetArea)
+        docks.put_beside("curvature", "By element", self.display.maps, area.RightDockWidgetArea)
         docks.put_below("cost", "Cost of accuracy", self.cost, "F9")
         docks.put_below("stability", "Stability", self.stability, "F10")
         docks.put_below("scene", "Scene", self.scene, "F2")
         docks.put_below("health", "Health", self.health, "F3")
         docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
+        docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
+        docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
         return docks
 
     def _wire(self) -> None:
@@ -246,6 +252,7 @@ class MainWindow(QMainWindow):
             heatmap.pointed.connect(guarded(self.display.point))
             heatmap.chosen.connect(guarded(wishes.choose))
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
+        self.picking.picked.connect(guarded(lambda _: self.docks.reveal("element")))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
         guard.on_failure(self.tell)
 
@@ -343,6 +350,7 @@ class MainWindow(QMainWindow):
         self.health.show_theme(theme)
         self.display.show_theme(theme)
         self.presenting.show_theme(theme)
+        self.picking.show_theme(theme)
 
     def _show_shape(self) -> None:
         """Draw the shape that is looked at on the skin, while somebody looks and wants it."""
@@ -419,5 +427,5 @@ class MainWindow(QMainWindow):
             self.seeing.close()
             self.session.close()
             self.naming.close()
-            self.membrane.close_plotter()
+            self.display.close()
         super().closeEvent(event)

@@ -2,6 +2,8 @@
 
 from kappaskin.adoption import Left as Left
 from kappaskin.adoption import orphans_folder as orphans_folder
+from kappaskin.apart import Distances as Distances
+from kappaskin.apart import distances as distances
 from kappaskin.bases import EDGES as EDGES
 from kappaskin.bases import Basis as Basis
 from kappaskin.bases import CurvatureMap as CurvatureMap
@@ -82,6 +84,7 @@ from kappaskin.mechanics import DiscLoad as DiscLoad
 from kappaskin.mechanics import GaussianLoad as GaussianLoad
 from kappaskin.mechanics import LineLoad as LineLoad
 from kappaskin.mechanics import Load as Load
+from kappaskin.mechanics import Placed as Placed
 from kappaskin.mechanics import Plate as Plate
 from kappaskin.mechanics import PointLoad as PointLoad
 from kappaskin.mechanics import RectangleLoad as RectangleLoad
@@ -98,6 +101,11 @@ from kappaskin.publish import Latency as Latency
 from kappaskin.publish import Published as Published
 from kappaskin.publish import PublishNews as PublishNews
 from kappaskin.publish import Receiver as Receiver
+from kappaskin.quantities import QUANTITIES as QUANTITIES
+from kappaskin.quantities import ErrorBars as ErrorBars
+from kappaskin.quantities import Quantities as Quantities
+from kappaskin.quantities import of_form as of_form
+from kappaskin.recording.disk import is_written as is_written
 from kappaskin.recording.reading import Recording as Recording
 from kappaskin.recording.repair import Repaired as Repaired
 from kappaskin.recording.writing import Written as Written
@@ -133,6 +141,7 @@ from kappaskin.sources import Replay as Replay
 from kappaskin.sources.ports import Port as Port
 from kappaskin.sources.ports import serial_ports as serial_ports
 from kappaskin.sources.scanning import LISTS as LISTS
+from kappaskin.spectrum import amplitudes as amplitudes
 from kappaskin.status import Status as Status
 from kappaskin.studies.beside import Beside as Beside
 from kappaskin.studies.cost import Cost as Cost
@@ -152,6 +161,7 @@ from kappaskin.touch import NO_OBJECT as NO_OBJECT
 from kappaskin.touch import ContactObject as ContactObject
 from kappaskin.touch import ObjectFinder as ObjectFinder
 from kappaskin.touch import PointContact as PointContact
+from kappaskin.touch import placed as placed
 from kappaskin.transduction import FIRST_GENERATION as FIRST_GENERATION
 from kappaskin.transduction import SECOND_GENERATION as SECOND_GENERATION
 from kappaskin.transduction import Amplifier as Amplifier

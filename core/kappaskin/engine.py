@@ -15,10 +15,12 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from kappaskin.adoption import Left, Orphan, adopted
 from kappaskin.asker import Asker
 from kappaskin.errors import Refusal
-from kappaskin.frames import Estimate, Event
+from kappaskin.frames import Array, Estimate, Event
 from kappaskin.live import Loop
 from kappaskin.pipeline import Setup
 from kappaskin.processes import beginning_processes
@@ -311,6 +313,15 @@ class Engine:
         if status.slot is None:
             return None
         return self._ring.read(status.generation, status.slot, sequence)
+
+    def recent(self, status: Status, after: int) -> tuple[Array, Array, int]:
+        """Device times (T,) in s and curvature (T, 3, P) in 1/m of the estimates since `after`.
+
+        A number that the last call answered with, 0 at first; at most the last 64 are there.
+        """
+        if status.slot is None:
+            return np.empty(0), np.empty((0, 3, 0)), 0
+        return self._ring.recent(status.generation, status.slot, after)
 
     def beside(self, status: Status) -> Estimate | None:
         """The newest estimate with the setup that is compared with."""

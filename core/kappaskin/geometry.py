@@ -64,6 +64,19 @@ def surface_geometry(
     return _geometry(basis.patch, positions, jet, covariance_of(at))
 
 
+class FormMap:
+    """The curvature form on the grid of `x` (nx,), `y` (ny,), as a map from coefficients."""
+
+    def __init__(self, basis: Basis, x: Array, y: Array) -> None:
+        self._maps = [basis.on_grid(x, y, *order) for order in ORDERS]
+        self._base_curvature = basis.patch.base_curvature
+
+    def __call__(self, coefficients: Array) -> Array:
+        """xx, yy and xy of K (3, ny, nx) in 1/m for `coefficients` (Ni, Nj); NaN off the skin."""
+        jet: Jet = [derivative(coefficients) for derivative in self._maps]
+        return np.stack(_curvature_form(jet, self._base_curvature))
+
+
 def _geometry(patch: Patch, positions: Array, jet: Jet, covariance: Array) -> LocalGeometry:
     """The geometry at `positions`, given the jets there with their `covariance` (..., 6, 6).
 

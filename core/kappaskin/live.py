@@ -12,7 +12,7 @@ from kappaskin.arrivals import Arrivals
 from kappaskin.asker import Asker
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Event, Frame
-from kappaskin.health import Health, Monitor
+from kappaskin.health import Health
 from kappaskin.keeping import Keeping
 from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
@@ -39,6 +39,7 @@ from kappaskin.sources.accounting import Accounting
 from kappaskin.status import LOST, OFF, STREAMING, WAITING, Status
 from kappaskin.steer import Following, Steering, steered
 from kappaskin.tare_taking import TareTaking
+from kappaskin.watching import Watching
 
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
@@ -53,9 +54,8 @@ class Loop:
     def __init__(self, asker: Asker, ring: Ring, beside: Ring) -> None:
         self._asker, self._ring = asker, ring
         self._source: Source | None = None
-        self._monitor: Monitor | None = None
+        self._watching = Watching()
         self._place = np.full(2, math.nan)  # of the last contact, in m
-        self._spoilt: object = None  # by what, in a simulated scene
         self._keeping = Keeping()
         self._status: Status = ring.read_status() or Status()
         self._steering: Steering | Following | None = None
@@ -181,19 +181,12 @@ class Loop:
         self._report()  # another skin may take a while
         try:
             self._source.play(scene)
-            self._spoil(scene)
+            self._watching.spoil(scene)
             self._keeping.plays(self._source)
         except Refusal as refusal:
             message = str(refusal)
         self._changing = False
         self._status = replace(self._status, message=message)
-
-    def _spoil(self, scene: Scene) -> None:
-        """Begin to watch anew where other effects are simulated: they may shift every channel."""
-        spoilt = (scene.effects, scene.choice, scene.seed)
-        if spoilt != self._spoilt and self._monitor is not None:
-            self._monitor.begin_anew()
-        self._spoilt = spoilt
 
     def _steer(self) -> None:
         """Let the source scan the region asked for, or say why it does not."""
@@ -213,7 +206,8 @@ class Loop:
         self._source = None
         for side in (self._side, self._other):
             side.forget()
-        self._steering = self._monitor = None
+        self._steering = None
+        self._watching.meet(None)
         self._arrivals.clear()
         self._again = math.inf
 
@@ -325,12 +319,12 @@ class Loop:
 
     def _watch(self, frame: Frame) -> None:
         """Look after the health of the channels, and leave out of the fit which are not well."""
-        if self._monitor is not None and self._monitor(frame):
+        if self._watching(frame):
             self._leave_out(self._side)
             self._leave_out(self._other)
 
     def _leave_out(self, side: Side) -> None:
-        if self._monitor is not None and side.leave_out(self._monitor) and side is self._side:
+        if self._watching.leave_out(side) and side is self._side:
             self._keeping.leave_out(side)
 
     def _happen(self, event: Event) -> None:
@@ -348,24 +342,10 @@ class Loop:
         """End the file, if one is recorded to, and wait until it is on the disk."""
         self._keeping.close()
 
-    def _health(self) -> Health:
-        pipeline = self._side.pipeline
-        if self._monitor is None or pipeline is None:
-            return Health()
-        out, kinds = pipeline.left_out, self._monitor.kinds
-        kept = out.kept.ravel()
-        return Health(
-            self._monitor.findings(kept),
-            int(np.count_nonzero(kinds)),
-            int(np.count_nonzero(kept)),
-            out.cost,
-            out.cost_at(self._place),
-        )
-
     def _meet(self, sensor: Sensor | None) -> None:
         """A device said what it is: make the pipelines for it."""
         self._taking.give_up("another device answered, or the same one anew; tare again")
-        self._monitor = None if sensor is None else Monitor(sensor)
+        self._watching.meet(sensor)
         self._status = replace(
             self._status,
             sensor=sensor,
@@ -393,7 +373,7 @@ class Loop:
                 playing=source.playing
                 if isinstance(source, SimulatedSource)
                 else FROM_THE_BEGINNING,
-                health=self._health(),
+                health=self._watching.health(self._side.pipeline, self._place),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
             )
         self._publish(status)

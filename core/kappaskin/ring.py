@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Estimate, LocalGeometry, Touch
+from kappaskin.frames import Array, Estimate, LocalGeometry, Touch
 from kappaskin.pipeline import Pipeline
 
 _SIZE = 96 * 2**20  # pages that are never written cost no memory
@@ -234,6 +234,27 @@ class Ring:
             return None
         record = _tried(copied)
         return _estimate(record) if record is not None else None
+
+    def recent(
+        self, generation: int, slot: np.dtype[np.void], after: int
+    ) -> tuple[Array, Array, int]:
+        """Reader: times (T,) in s and curvature (T, 3, P) of all after the one numbered `after`.
+
+        As many of `generation` as are still there, and the number of the last, counted from 1.
+        """
+        if generation != self._generation or slot != self._slots.dtype:
+            self._map(slot)
+            self._generation = generation
+        written = int(self._header[self._WRITTEN])
+        tickets = np.arange(max(after, written - len(self._slots)), written) + 1
+        here = (tickets - 1) % len(self._slots)
+        closed = self._slots["closed"][here]
+        times, curvature = self._slots["device_time"][here], self._slots["curvature"][here]
+        # The tickets in the order opposite to the writer's, as above.
+        whole = (closed == tickets) & (self._slots["opened"][here] == tickets)
+        if self._header[self._GENERATION] != generation:
+            whole[:] = False
+        return times[whole], curvature[whole], written
 
     def _ticket_of(self, sequence: int) -> int:
         """Which estimate was written of that frame last, counted from 1; 0 where none is there."""

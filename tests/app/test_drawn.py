@@ -143,3 +143,47 @@ def test_a_line_of_sight_beside_an_arc_sees_its_outline() -> None:
 def test_no_skin_may_be_drawn_deeper_than_it_is_wide_or_through_its_axis() -> None:
     assert DrawnSkin(Patch(0.1, 0.2), 9, 9).deepest == pytest.approx(45)
     assert DrawnSkin(ARC, 9, 9).deepest == pytest.approx(0.7 * 12.9)
+
+
+def test_between_its_points_the_skin_is_drawn_evenly() -> None:
+    skin = DrawnSkin(FLAT, 33, 21)
+    x, y = np.meshgrid(*FLAT.grid(33, 21))
+    skin.height = 3 + 40 * x - 20 * y
+    positions = np.array([[0.0123, 0.0456], [0.1, 0.06], [0.0, 0.0]])
+    expected = 3 + 40 * positions[:, 0] - 20 * positions[:, 1]
+    np.testing.assert_allclose(skin.height_at(positions), expected)
+
+
+@PATCHES
+def test_tangents_follow_the_drawn_surface(patch: Patch) -> None:
+    skin = drawn(patch, 201, 151)
+    position = np.array([0.3 * patch.a, 0.4 * patch.b])
+    for axis, tangent in enumerate(skin.tangents(position)):
+        step = np.zeros(2)
+        step[axis] = 2 * skin.cell[axis]
+        (before, after), _ = skin.place(np.array([position - step, position + step]))
+        np.testing.assert_allclose(tangent, (after - before) / (2e3 * step[axis]), atol=0.02)
+
+
+@PATCHES
+def test_the_place_that_is_seen_is_the_one_that_is_hit(patch: Patch) -> None:
+    skin = drawn(patch)
+    position = np.array([[0.41 * patch.a, 0.37 * patch.b]])
+    points, out = skin.place(position)
+    near, far = points[0] + 300 * out[0], points[0] - 300 * out[0]
+    np.testing.assert_allclose(skin.hit(near, far), position[0], atol=0.01 * patch.b)
+
+
+def test_a_line_of_sight_beside_the_skin_hits_nothing() -> None:
+    skin = drawn(FLAT)
+    beside = np.array([-5.0, 30.0, 100.0])
+    assert skin.hit(beside, beside - (0, 0, 200)) is None
+
+
+def test_of_two_sides_of_an_arc_the_near_one_is_hit() -> None:
+    skin = DrawnSkin(ARC, 65, 33)
+    near, far = np.array([-100.0, 15.0, -5.0]), np.array([200.0, 15.0, -5.0])
+    x, _ = skin.hit(near, far)
+    assert x < ARC.a / 2
+    x, _ = skin.hit(far, near)
+    assert x > ARC.a / 2

@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt
 from kappaskin import WHY, Finding, Health, Patch, Phase, SensorLayout
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.health import HealthPanel
+from kappaskin_app.shades import SHADES
 from kappaskin_app.theme import DARK
 from kappaskin_app.views.heatmap import Heatmap
 from kappaskin_app.window import MainWindow
@@ -52,11 +53,11 @@ def test_a_finding_that_is_chosen_is_pointed_at(qapp, qtbot) -> None:
 
 
 def test_a_letter_says_why_an_element_is_left_out_and_so_does_its_value(qapp) -> None:
-    heatmap = Heatmap("xx", "tip")
+    heatmap = Heatmap("xx")
     heatmap.resize(300, 260)
     heatmap.show_theme(DARK)
     heatmap.show_layout(SensorLayout.regular(Patch(0.1, 0.1), 4, 4))
-    heatmap.show_values(np.zeros(16), 1.0)
+    heatmap.show_values(np.zeros(16), SHADES["xx"].tint(1.0))
     none, kinds = np.zeros(16, bool), np.zeros(16, np.uint8)
     heatmap.show_marks(none, none, kinds)
     bare = heatmap.cells.grab().toImage()
@@ -75,10 +76,10 @@ def test_a_letter_says_why_an_element_is_left_out_and_so_does_its_value(qapp) ->
 
 
 def test_the_element_to_press_is_framed(qapp) -> None:
-    heatmap = Heatmap("xx", "tip")
+    heatmap = Heatmap("xx")
     heatmap.resize(300, 260)
     heatmap.show_layout(SensorLayout.regular(Patch(0.1, 0.1), 4, 4))
-    heatmap.show_values(np.zeros(16), 1.0)
+    heatmap.show_values(np.zeros(16), SHADES["xx"].tint(1.0))
     bare = heatmap.cells.grab().toImage()
 
     heatmap.show_wanted(5)

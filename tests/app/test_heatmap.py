@@ -4,12 +4,15 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Patch, SensorLayout
+from kappaskin_app.shades import SHADES
 from kappaskin_app.theme import DARK, DIVERGING
 from kappaskin_app.views.heatmap import Heatmap, coloured
 
+TINT = SHADES["xx"].tint(1.0)
+
 
 def _heatmap(layout: SensorLayout) -> Heatmap:
-    heatmap = Heatmap("xx", "tip")
+    heatmap = Heatmap("xx")
     heatmap.resize(300, 260)
     heatmap.show_theme(DARK)
     heatmap.show_layout(layout)
@@ -21,12 +24,12 @@ def _picture(heatmap: Heatmap) -> QImage:
 
 
 def test_colours_are_symmetric_about_zero() -> None:
-    rgb = coloured(np.array([-2.0, 0.0, 2.0]), (-1.0, 1.0), DIVERGING, "#888888")
+    rgb = coloured(np.array([-2.0, 0.0, 2.0]), TINT, "#888888")
     assert rgb.tolist() == [DIVERGING[0].tolist(), DIVERGING[127].tolist(), DIVERGING[255].tolist()]
 
 
 def test_a_missing_reading_has_its_own_colour() -> None:
-    rgb = coloured(np.array([np.nan, np.inf]), (-1.0, 1.0), DIVERGING, "#59626d")
+    rgb = coloured(np.array([np.nan, np.inf]), TINT, "#59626d")
     assert rgb.tolist() == [[0x59, 0x62, 0x6D]] * 2
 
 
@@ -34,7 +37,7 @@ def test_each_element_is_one_cell_of_one_colour(qapp: QApplication) -> None:
     layout = SensorLayout.regular(Patch(0.1, 0.1), 4, 4)
     heatmap = _heatmap(layout)
     values = np.linspace(-1, 1, 16)
-    heatmap.show_values(values, 1.0)
+    heatmap.show_values(values, TINT)
     picture, area = _picture(heatmap), heatmap.cells.area_of_patch()
     for (x, y), value in zip(layout.positions, values, strict=True):
         at = heatmap.cells.pixel_of(area, x, y).toPoint()
@@ -43,14 +46,14 @@ def test_each_element_is_one_cell_of_one_colour(qapp: QApplication) -> None:
             for dx in (-9, 0, 9)
             for dy in (-9, 9)
         ]
-        wanted = tuple(coloured(np.array([value]), (-1.0, 1.0), DIVERGING, "#000000")[0].tolist())
+        wanted = tuple(coloured(np.array([value]), TINT, "#000000")[0].tolist())
         assert set(here) == {wanted}
 
 
 def test_scattered_elements_are_drawn_where_they_are(qapp: QApplication) -> None:
     layout = SensorLayout.scattered(Patch(0.1, 0.05), [[0.02, 0.01], [0.08, 0.04]])
     heatmap = _heatmap(layout)
-    heatmap.show_values(np.array([-1.0, 1.0]), 1.0)
+    heatmap.show_values(np.array([-1.0, 1.0]), TINT)
     picture, area = _picture(heatmap), heatmap.cells.area_of_patch()
     found = [
         picture.pixelColor(heatmap.cells.pixel_of(area, x, y).toPoint()).getRgb()[:3]
@@ -84,7 +87,7 @@ def test_the_element_under_the_mouse_is_told_and_its_value_written(
 def test_locking_asks_for_the_limit_shown_and_unlocking_for_none(qapp: QApplication, qtbot) -> None:
     heatmap, asked = _heatmap(SensorLayout.regular(Patch(0.1, 0.1), 2, 2)), []
     heatmap.lock_wanted.connect(asked.append)
-    heatmap.show_values(np.zeros(4), 3.0)
+    heatmap.show_values(np.zeros(4), SHADES["xx"].tint(3.0))
     heatmap.lock.click()
     heatmap.show_lock(True)
     heatmap.lock.click()

@@ -183,7 +183,7 @@ def test_the_worst_seen_shape_colours_the_skin_while_it_is_looked_at(
     until(lambda: caption.input == "Colours: shape 64 of 64, no measurement")
     until(lambda: bar.limits == (-1.0, 1.0))
     assert not window.display.scale.lock.isEnabled()
-    values = window.membrane._arrays["values"]  # noqa: SLF001
+    values = window.membrane.surface.mesh.point_data["value"]
     until(lambda: np.abs(values).max() == pytest.approx(1.0))
     panel.on_skin.click()
     until(lambda: bar.limits != (-1.0, 1.0))

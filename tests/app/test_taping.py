@@ -2,6 +2,8 @@
 
 import os
 import shlex
+import sys
+from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox
 
 from kappaskin import LONGEST_NOTE, Recording, Written
+from kappaskin.recording.writing import RecordingFile
 from kappaskin_app.recordings import newest, proposed, recordings_folder, unfinished
 from kappaskin_app.views.recording_mark import RecordingMark, duration_of, size_of
 from kappaskin_app.window import MainWindow
@@ -157,6 +160,15 @@ def test_what_was_never_ended_is_offered_to_be_repaired(opened, until, folder: P
         "--out",
         str(folder / "it's mine-repaired.mcap"),
     ]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing there tells who writes a file")
+def test_what_another_window_writes_is_not_offered(folder: Path) -> None:
+    folder.mkdir(parents=True)
+    with closing(RecordingFile(folder / "other.mcap")):
+        assert unfinished(folder) == []
+    (folder / "left.mcap.part").write_bytes(b"")
+    assert unfinished(folder) == [folder / "left.mcap.part"]
 
 
 # The end.

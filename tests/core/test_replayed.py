@@ -2,6 +2,7 @@
 
 import json
 import time
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -95,6 +96,18 @@ def test_it_is_as_long_as_it_was_with_its_gap_and_events(source) -> None:
     assert [event.text for event in replay.events] == ["before", "after"]
     assert replay.events[1].time == pytest.approx(end, abs=0.01)
     assert (replay.at, replay.speed, replay.looped) == (0.0, 1.0, False)
+
+
+def test_a_word_about_the_clock_ends_no_gap(tmp_path, clock) -> None:
+    path = tmp_path / "gap.mcap"
+    recorder = Recorder(path, 0.0)
+    for when in (0.0, 0.1, 0.8, 1.5, 2.2, 2.25, 2.5, 2.6, 3.5):
+        recorder.came(when, encode_information(0, 0.0, "{}"))
+        time.sleep(0.15)  # into another chunk
+    recorder.close()
+    with closing(ReplayedSource(path, clock, clock.sleep)) as source:
+        gaps = source.replay.gaps
+    assert np.array(gaps) == pytest.approx(np.array([(0.1, 2.2), (2.6, 3.5)]), abs=1e-3)
 
 
 def test_frames_come_when_they_came(source, clock) -> None:

@@ -98,6 +98,37 @@ def test_an_estimate_is_found_by_its_frame_while_it_is_there(ring, writer) -> No
     assert ring.read(1, SLOT, 50).noise == -1.0
 
 
+def test_readings_since_the_last_look_are_all_there_once_and_in_order(ring, writer) -> None:
+    estimate = estimate_of()
+    writer.lay_out(1, SLOT)
+
+    def write(times: range) -> None:
+        for t in times:
+            read = np.full(estimate.curvature.shape, float(t))
+            writer.write(replace(estimate, device_time=float(t), curvature=read))
+
+    write(range(5))
+    times, curvature, last = ring.recent(1, SLOT, 0)
+    np.testing.assert_array_equal(times, np.arange(5))
+    np.testing.assert_array_equal(curvature[:, 1, 7], np.arange(5))
+    write(range(5, 7))
+    times, curvature, last = ring.recent(1, SLOT, last)
+    assert (times.tolist(), curvature.shape) == ([5, 6], (2, *estimate.curvature.shape))
+    assert not len(ring.recent(1, SLOT, last)[0])
+    write(range(7, 200))
+    np.testing.assert_array_equal(ring.recent(1, SLOT, last)[0], np.arange(136, 200))  # the last 64
+    assert not len(ring.recent(2, SLOT, 0)[0])  # of another generation
+
+
+def test_readings_that_are_being_written_are_not_read(ring, writer) -> None:
+    writer.lay_out(1, SLOT)
+    for _ in range(3):
+        writer.write(estimate_of())
+    slots = writer._slots  # noqa: SLF001
+    slots["opened"][1] += 64  # the writer came round and began anew
+    assert len(ring.recent(1, SLOT, 0)[0]) == 2
+
+
 def test_an_estimate_read_stays_as_it_was_while_others_are_written(ring, writer) -> None:
     estimate = estimate_of()
     writer.lay_out(1, SLOT)

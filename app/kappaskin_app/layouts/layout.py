@@ -6,7 +6,7 @@ from dataclasses import dataclass
 LEFT, RIGHT, TOP, BOTTOM, FLOATING = "left", "right", "top", "bottom", "floating"
 AREAS = (LEFT, RIGHT, TOP, BOTTOM, FLOATING)
 BESIDE = ("settings", "curvature")
-BELOW = ("cost", "stability", "scene", "health", "compare")
+BELOW = ("cost", "stability", "scene", "health", "compare", "element", "traces")
 DOCKS = BESIDE + BELOW
 
 

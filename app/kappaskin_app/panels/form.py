@@ -24,7 +24,8 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.panels.keys import for_the_window
 from kappaskin_app.panels.panel import Panel
-from kappaskin_app.settings import Choice, Range, Settings, Switch, Text, ask_of
+from kappaskin_app.panels.several import SeveralButton
+from kappaskin_app.settings import Choice, Range, Settings, Several, Switch, Text, ask_of
 
 _LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
 
@@ -171,6 +172,12 @@ def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:
     return _Editor(box, lambda value: box.setCurrentIndex(box.findData(value)))
 
 
+def _several(how: Several, said: Callable[[Any], None]) -> _Editor:
+    button = SeveralButton(how.options)
+    button.chosen.connect(said)
+    return _Editor(button, button.show_chosen)
+
+
 def _switch(how: Switch, said: Callable[[Any], None]) -> _Editor:
     box = QCheckBox(how.label)
     box.toggled.connect(said)
@@ -189,6 +196,8 @@ def _editor(name: str, said: Callable[[Any], None]) -> _Editor:
         return _text(said)
     if isinstance(how, Range):
         return _range(how, said)
+    if isinstance(how, Several):
+        return _several(how, said)
     return _choice(how, said) if isinstance(how, Choice) else _switch(how, said)
 
 

@@ -7,6 +7,7 @@ from kappaskin import Calibration, Tare
 from kappaskin_app.settings.asks import Ask as Ask
 from kappaskin_app.settings.asks import Choice as Choice
 from kappaskin_app.settings.asks import Range as Range
+from kappaskin_app.settings.asks import Several as Several
 from kappaskin_app.settings.asks import Switch as Switch
 from kappaskin_app.settings.asks import Text as Text
 from kappaskin_app.settings.compared import Compared as Compared

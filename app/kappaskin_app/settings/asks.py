@@ -31,6 +31,15 @@ class Choice:
 
 
 @dataclass(frozen=True)
+class Several:
+    """How some of several values are asked for, in their order: (value, words) pairs."""
+
+    label: str
+    tip: str
+    options: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
 class Switch:
     """How yes or no is asked for."""
 
@@ -46,7 +55,7 @@ class Text:
     tip: str
 
 
-Ask = Range | Choice | Switch | Text
+Ask = Range | Choice | Several | Switch | Text
 
 
 def asked(default: Any, how: Ask) -> Any:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from kappaskin_app.settings.asks import Choice, Range, Switch, asked
+from kappaskin_app.settings.asks import Choice, Range, Several, Switch, asked
 from kappaskin_app.settings.skin import EDGE_NAMES
 
 COLOURS = (
@@ -10,6 +10,16 @@ COLOURS = (
     ("xx", "Curvature xx"),
     ("yy", "Curvature yy"),
     ("xy", "Twist xy"),
+    ("first", "Principal curvature 1"),
+    ("second", "Principal curvature 2"),
+    ("mean", "Mean curvature"),
+    ("gaussian", "Gaussian curvature"),
+    ("residual_xx", "Residual xx"),
+    ("residual_yy", "Residual yy"),
+    ("residual_xy", "Residual xy"),
+    ("error_bar", "Error bar"),
+    ("difference", "Difference to the truth"),
+    ("health", "Health"),
 )
 METHOD_NAMES = (
     ("least-squares", "Least squares"),
@@ -62,6 +72,11 @@ class Fit:
     )
 
 
+def _cut(side: str, axis: str) -> Range:
+    tip = f"Cut away what lies beyond this share of the skin, seen from above along {axis}."
+    return Range(f"{side} {axis}", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
+
+
 @dataclass(frozen=True)
 class View:
     """How the skin is shown."""
@@ -70,9 +85,37 @@ class View:
         "displacement",
         Choice(
             "Colour",
-            "What colours the skin: how far it moved, or how much it bends along x (xx), along y "
-            "(yy) or twists (xy) (Eqs. 3 to 5).",
+            "What colours the skin: how far it moved, how it bends (Eqs. 3 to 5) and curves, what "
+            "the fit leaves of the readings, how sure it is, how wrong, or which elements are "
+            "well. Above the scale of colours stands which it is, with its equation.",
             COLOURS,
+        ),
+    )
+    colour_from: str = asked(
+        "smooth",
+        Choice(
+            "Coloured",
+            "Smooth: the surface that was fitted, at every point. Per element: each element's own "
+            "cell in the colour of what it reads, nothing interpolated; residuals and health are "
+            "always so.",
+            (("smooth", "Smooth"), ("elements", "Per element")),
+        ),
+    )
+    maps: tuple[str, ...] = asked(
+        ("xx", "yy", "xy"),
+        Several(
+            "Heatmaps",
+            "Which heatmaps are shown beside the skin, one cell for each element. What is not "
+            "shown is not computed.",
+            COLOURS,
+        ),
+    )
+    one_range: bool = asked(
+        False,
+        Switch(
+            "One range for all",
+            "Let the colours of all curvatures that are shown reach as far as those of the "
+            "largest, and those of all residuals, so that they can be compared.",
         ),
     )
     exaggeration: float = asked(
@@ -93,10 +136,69 @@ class View:
         True,
         Switch("True surface", "Draw the surface the simulation knows as a wireframe."),
     )
+    show_directions: bool = asked(
+        False,
+        Switch(
+            "Principal directions",
+            "Crosses along the directions in which the skin curves most and least, as long as it "
+            "does: orange where it is convex, blue where it is hollow. tan 2\u03b1 = 2 xy / "
+            "(xx \u2212 yy).",
+        ),
+    )
+    show_band: bool = asked(
+        False,
+        Switch(
+            "Error band",
+            "Two translucent surfaces, two standard deviations of the displacement below and "
+            "above: the true one lies between them at about 95 of 100 places, as far as noise "
+            "alone errs.",
+        ),
+    )
+    show_frame: bool = asked(
+        False,
+        Switch(
+            "Contact frame",
+            "At the contact the normal of the skin (green) and its two principal directions "
+            "(orange, blue). The cone holds the normal with 95 % by the error bars of the slopes, "
+            "stretched as the skin is.",
+        ),
+    )
+    show_object: bool = asked(
+        False,
+        Switch(
+            "Object found",
+            "What the readings say touches the skin (plane, cylinder, sphere or edge), green and "
+            "translucent where it touches, stretched in height as the skin is. Of a radius known "
+            "to be below some length, it has that.",
+        ),
+    )
+    show_pressed: bool = asked(
+        False,
+        Switch(
+            "Object pressed",
+            "The rigid object of a simulated scene, red and translucent, where it is pressed in "
+            "and stretched in height as the skin is. Loads of the panels have none.",
+        ),
+    )
+    from_x: float = asked(0.0, _cut("From", "x"))
+    to_x: float = asked(1.0, _cut("To", "x"))
+    from_y: float = asked(0.0, _cut("From", "y"))
+    to_y: float = asked(1.0, _cut("To", "y"))
     theme: str = asked(
         "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
     )
-    range_displacement: float = 0.0  # m, colours up to this; 0 follows what is shown
-    range_xx: float = 0.0  # 1/m, colours from minus to plus this
+    traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
+    # How far colours reach, in SI units: on one side, or on both. 0 follows what is shown.
+    range_displacement: float = 0.0
+    range_xx: float = 0.0
     range_yy: float = 0.0
     range_xy: float = 0.0
+    range_first: float = 0.0
+    range_second: float = 0.0
+    range_mean: float = 0.0
+    range_gaussian: float = 0.0
+    range_residual_xx: float = 0.0
+    range_residual_yy: float = 0.0
+    range_residual_xy: float = 0.0
+    range_error_bar: float = 0.0
+    range_difference: float = 0.0

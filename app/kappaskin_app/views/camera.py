@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 
 _LOW = 0.2  # of the shorter side: how far in the view reaches below the skin at rest
 _MARGIN = 0.06  # of the longer side: room for the labels beside the edges and the arrow above
+_LABEL = 78.0  # px that one takes
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,18 @@ class Direction:
 
 
 FROM_THE_LEFT = Direction("from the front, a little from the left", (-0.45, -1.1, 1.1))
+ISOMETRIC = Direction("from a corner, all sides alike", (-1.0, -1.0, 1.0))
 ABOVE = Direction("from above", (0.0, 0.0, 1.6), (0.0, 1.0, 0.0))
+BELOW = Direction("from below", (0.0, 0.0, -1.6), (0.0, 1.0, 0.0))
 FRONT = Direction("along y", (0.0, -1.6, 0.0))
 SIDE = Direction("along x", (1.6, 0.0, 0.0))
 
 
-def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction) -> None:
-    """Look at the whole of `skin` from `direction`."""
+def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, wide: float) -> None:
+    """Look at the whole of `skin` from `direction`, in a picture of so many px (`wide`).
+
+    With room for the labels to its left and right, which do not shrink with it.
+    """
     camera = renderer.GetActiveCamera()
     body = _around(skin, 0.0)
     least, most = body.min(axis=0), body.max(axis=0)
@@ -47,7 +53,9 @@ def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction) -> None:
     camera.SetWindowCenter(0.0, 0.0)
     seen = np.array([_in_view(renderer, *point) for point in _around(skin, _MARGIN)])
     least, most = seen.min(axis=0), seen.max(axis=0)
-    zoom = 1.94 / float(np.max(most - least))
+    skin_alone = np.ptp([_in_view(renderer, *point)[0] for point in body])
+    beside = max(2.0 - 4.0 * _LABEL / wide, 0.5) / float(skin_alone)
+    zoom = min(1.94 / float(np.max(most - least)), beside)
     camera.Zoom(zoom)
     camera.SetWindowCenter(*(zoom * (least + most) / 2))
     renderer.ResetCameraClippingRange()

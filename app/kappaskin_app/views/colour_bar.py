@@ -2,41 +2,81 @@
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QImage, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
+from kappaskin_app.shades import Tint
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
+
+_SWATCH = 10  # px of a colour in the legend
 
 
 class ColourBar(QWidget):
-    """A vertical scale of colours with its limits and unit."""
+    """A vertical scale of colours with its limits and unit, over colours that mean something else.
+
+    Of kinds, which have no scale, there is the legend only.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._colours, self.limits, self._unit = DIVERGING, (-1.0, 1.0), "1/m"
+        self._tint = Tint(DIVERGING, (-1.0, 1.0), "1/m")
+        self.legend: tuple[tuple[str, str], ...] = ()
+        """Colours, as #rrggbb, with their words, the lowest first."""
         self.setFixedWidth(70)
 
+    @property
+    def limits(self) -> tuple[float, float]:
+        return self._tint.limits
+
+    @property
+    def reach(self) -> float:
+        """How far the colours reach, as a range is locked to it."""
+        return self._tint.limit
+
+    @property
+    def scaled(self) -> bool:
+        """Whether there is a scale."""
+        return not self._tint.kinds
+
     def show_scale(self, colours: Colours, limits: tuple[float, float], unit: str) -> None:
-        if (self.limits, self._unit) != (limits, unit) or self._colours is not colours:
-            self._colours, self.limits, self._unit = colours, limits, unit
+        self.show_tint(Tint(colours, limits, unit))
+
+    def show_tint(self, tint: Tint, legend: tuple[tuple[str, str], ...] = ()) -> None:
+        """Show a scale, and a `legend` of other colours that are seen, (#rrggbb, words)."""
+        was = self._tint
+        if (was.limits, was.unit, self.legend) != (tint.limits, tint.unit, legend) or (
+            was.colours is not tint.colours
+        ):
+            self._tint, self.legend = tint, legend
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        metrics = painter.fontMetrics()
-        line = metrics.height()
-        bar = QRectF(4, line + 4, 14, max(self.height() - line - 10, 10))
-        ramp = np.ascontiguousarray(self._colours[::-1, None])
+        painter.setPen(self.palette().windowText().color())
+        line = painter.fontMetrics().height()
+        bottom = float(self.height())
+        for colour, words in self.legend:
+            bottom -= line + 2
+            painter.fillRect(
+                QRectF(4, bottom + (line - _SWATCH) / 2, _SWATCH, _SWATCH), QColor(colour)
+            )
+            room = QRectF(8 + _SWATCH, bottom, self.width() - _SWATCH - 8, line)
+            painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, words)
+        if self.scaled:
+            self._paint_scale(painter, line, bottom)
+
+    def _paint_scale(self, painter: QPainter, line: int, bottom: float) -> None:
+        bar = QRectF(4, line + 4, 14, max(bottom - line - 10, 10))
+        ramp = np.ascontiguousarray(self._tint.colours[::-1, None])
         image = QImage(ramp.tobytes(), 1, 256, 3, QImage.Format.Format_RGB888)
         painter.drawImage(bar, image)
-        painter.setPen(self.palette().windowText().color())
-        painter.drawText(QPointF(2, metrics.ascent()), self._unit)
+        painter.drawText(QPointF(2, painter.fontMetrics().ascent()), self._tint.unit)
         low, high = self.limits
         for share in (0.0, 0.5, 1.0):
             y = bar.bottom() - share * bar.height()
             text = f"{low + share * (high - low):.3g}".replace("-", "\N{MINUS SIGN}")
             top = min(max(y - line / 2, bar.top()), bar.bottom() - line)
-            painter.drawText(QPointF(bar.right() + 4, top + metrics.ascent()), text)
+            painter.drawText(QPointF(bar.right() + 4, top + painter.fontMetrics().ascent()), text)
 
 
 class LockButton(QToolButton):
@@ -61,15 +101,17 @@ class LockButton(QToolButton):
 
 
 class SkinScale(QWidget):
-    """The colours of the skin, with their lock, and how many times larger it is drawn."""
+    """What colours the skin, on which scale, its lock, and how many times larger it is drawn."""
 
     lock_wanted = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.what = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.bar, self.lock = ColourBar(), LockButton()
         self.bar.show_scale(SEQUENTIAL, (0.0, 1.0), "mm")
         self.lock.wanted.connect(self.lock_wanted)
+        self._symbol = ""
         self.times = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.times.setToolTip(
             "How many times the displacement is drawn larger: what Height asks for, or as much of "
@@ -77,9 +119,17 @@ class SkinScale(QWidget):
         )
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 4, 0, 4)
+        around.addWidget(self.what)
         around.addWidget(self.bar, 1)
         around.addWidget(self.lock, 0, Qt.AlignmentFlag.AlignHCenter)
         around.addWidget(self.times)
+
+    def show_what(self, symbol: str, tip: str) -> None:
+        """Say by its `symbol` in HTML what colours the skin; the `tip` explains it."""
+        if symbol != self._symbol:
+            self._symbol = symbol
+            self.what.setText(f"<b>{symbol}</b>")
+            self.what.setToolTip(tip)
 
     def show_times(self, times: float) -> None:
         """Say how many `times` higher the skin is drawn."""

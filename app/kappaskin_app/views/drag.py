@@ -7,6 +7,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent
 from pyvistaqt import QtInteractor
 
 from kappaskin_app.views.drawn import NO_SKIN
+from kappaskin_app.views.sight import Sight
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ class LoadDrag(QObject):
 
     def __init__(self, plotter: QtInteractor) -> None:
         super().__init__(plotter)
-        self._plotter = plotter
+        self._plotter, self._sight = plotter, Sight(plotter)
         self.skin = NO_SKIN
         self.handles: Array = np.empty((0, 2))
         self._pressed = self._dragging = False
@@ -58,7 +59,7 @@ class LoadDrag(QObject):
         """Widget pixels (2,) of the tip and the tail of the arrow at `handle`."""
         points, out = self.skin.place(handle[None])
         tail = points[0] + out[0] * ARROW * self.skin.size
-        return self._to_screen(points[0]), self._to_screen(tail)
+        return self._sight.to_screen(points[0]), self._sight.to_screen(tail)
 
     def _handle_near(self, at: QPointF) -> Array | None:
         """The handle (2,) in m whose arrow is drawn near `at`."""
@@ -108,27 +109,10 @@ class LoadDrag(QObject):
             self.dragged.emit(*self._held)
         return True
 
-    def _to_screen(self, point: Array) -> Array:
-        """Widget pixels (2,) of a point (3,) in mm."""
-        renderer, ratio = self._plotter.renderer, self._plotter.devicePixelRatioF()
-        renderer.SetWorldPoint(*point, 1.0)
-        renderer.WorldToDisplay()
-        x, y, _ = renderer.GetDisplayPoint()
-        return np.array([x / ratio, self._plotter.height() - y / ratio])
-
     def _seen_at(self, at: QPointF, handle: Array) -> Array:
         """What lies under `at` of the skin as high as it is drawn at `handle`, (2,) in m."""
-        renderer, ratio = self._plotter.renderer, self._plotter.devicePixelRatioF()
-        ends: list[Array] = []
-        for depth in (0.0, 1.0):
-            y_up = self._plotter.height() - at.y()
-            renderer.SetDisplayPoint(at.x() * ratio, y_up * ratio, depth)
-            renderer.DisplayToWorld()
-            x, y, z, w = renderer.GetWorldPoint()
-            ends.append(np.array([x, y, z]) / w)
-        return self.skin.seen_at(
-            ends[0], ends[1], float(self.skin.height_at(handle[None])[0]), handle
-        )
+        near, far = self._sight.line(at)
+        return self.skin.seen_at(near, far, float(self.skin.height_at(handle[None])[0]), handle)
 
     def on_screen(self) -> QPointF | None:
         """Where in the plotter the first load's arrow ends, None without a load."""

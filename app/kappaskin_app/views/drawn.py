@@ -1,6 +1,7 @@
 """A skin as it is drawn: its points at rest, moved in and out along its normals, in mm."""
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ _DEEPEST = 0.45  # of the shorter side that a skin is drawn deep at most, to sta
 _NEAREST = 0.7  # of the base radius, so that no skin is drawn through its own axis
 
 
+_SEAM = 1e-9  # of a side: or a line passes between two triangles
+
+
 class DrawnSkin:
     """`patch` by nx x ny points; where it ends inside its rectangle, those off it are not drawn.
 
@@ -24,7 +28,8 @@ class DrawnSkin:
     def __init__(self, patch: Patch, nx: int, ny: int) -> None:
         self.patch = patch
         x, y = patch.grid(nx, ny)
-        self._cell = np.array([x[1] - x[0], y[1] - y[0]])
+        self.cell = np.array([x[1] - x[0], y[1] - y[0]])
+        """How far apart the points are along x and y, in m."""
         grid = np.stack(np.meshgrid(x, y), axis=-1)
         self.on = patch.contains(grid.reshape(-1, 2)).reshape(ny, nx)
         """Which points (ny, nx) are on the skin."""
@@ -32,6 +37,8 @@ class DrawnSkin:
         if not self.on.all():
             grid, self._shown = onto_rim(patch, grid, self.on)
         self._rest, self._out = self.at_rest(grid.reshape(-1, 2))
+        self.shares: Array = grid.reshape(-1, 2) / (patch.a, patch.b)
+        """Where each point (points, 2) is, as shares of the sides."""
         self.height: Array = np.zeros((ny, nx))
         """How far out each point is drawn, in mm."""
 
@@ -55,6 +62,12 @@ class DrawnSkin:
         """How far in mm the skin may be drawn from where it rests."""
         patch = self.patch
         return MM * min(_DEEPEST * min(patch.a, patch.b), _NEAREST * patch.radius)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """From where to where in mm it reaches at rest, along x and along y in space."""
+        low, high = self._rest.min(axis=0), self._rest.max(axis=0)
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
     # Its faces and lines, over the points of the grid.
 
@@ -97,7 +110,7 @@ class DrawnSkin:
         (1 + h H) T + h_x N and Y + h_y N; their product is the normal.
         """
         h = self.height
-        h_y, h_x = (d.ravel() for d in np.gradient(h, self._cell[1] * MM, self._cell[0] * MM))
+        h_y, h_x = (d.ravel() for d in np.gradient(h, self.cell[1] * MM, self.cell[0] * MM))
         wider = 1 + h.ravel() * self.patch.base_curvature / MM
         sine, _, cosine = self._out.T  # N = (sine, 0, cosine), so that T = (cosine, 0, -sine)
         normals = np.stack(
@@ -108,18 +121,60 @@ class DrawnSkin:
 
     def nearest(self, positions: Array) -> Indices:
         """The points of the grid nearest to `positions`."""
-        p, q = np.rint(positions / self._cell).astype(int).T
+        p, q = np.rint(positions / self.cell).astype(int).T
         ny, nx = self.on.shape
         return np.clip(q, 0, ny - 1) * nx + np.clip(p, 0, nx - 1)
 
     def height_at(self, positions: Array) -> Array:
-        """How far out (k,) in mm the skin is drawn at `positions`."""
-        return self.height.ravel()[self.nearest(positions)]
+        """How far out (k,) in mm the skin is drawn at `positions`, evenly between its points."""
+        ny, nx = self.on.shape
+        (p, q) = np.clip(positions / self.cell, 0, (nx - 1, ny - 1)).T
+        i, j = np.minimum(p.astype(int), nx - 2), np.minimum(q.astype(int), ny - 2)
+        u, v, h = p - i, q - j, self.height
+        low, high = (h[k, i] * (1 - u) + h[k, i + 1] * u for k in (j, j + 1))
+        return low * (1 - v) + high * v
 
     def place(self, positions: Array, above: float = 0.0) -> tuple[Array, Array]:
         """Points `above` mm over the drawn skin at `positions`, and the normals at rest there."""
         points, out = self.at_rest(positions)
         return points + out * (self.height_at(positions) + above)[:, None], out
+
+    def tangents(self, position: Array) -> tuple[Array, Array]:
+        """How the drawn surface runs on along x and along y at `position` (2,), each (3,)."""
+        nearest = int(self.nearest(position[None])[0])
+        q, p = divmod(nearest, self.on.shape[1])
+        (out,) = self.at_rest(position[None])[1]
+        rows, columns = (slice(max(at - 1, 0), at + 2) for at in (q, p))
+        along, across = self.height[q, columns], self.height[rows, p]
+        h_x = (along[-1] - along[0]) / ((len(along) - 1) * self.cell[0] * MM)
+        h_y = (across[-1] - across[0]) / ((len(across) - 1) * self.cell[1] * MM)
+        wider = 1 + self.height[q, p] * self.patch.base_curvature / MM
+        x = wider * np.array([out[2], 0.0, -out[0]]) + h_x * out
+        return x, np.array([0.0, 1.0, 0.0]) + h_y * out
+
+    @cached_property
+    def _triangles(self) -> Indices:
+        corners = self.faces()[:, 1:]
+        return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+
+    def hit(self, near: Array, far: Array) -> Array | None:
+        """Where the line of sight from `near` to `far` first meets the drawn skin, (2,) in m.
+
+        None where it passes it by. Moeller and Trumbore's way, for all triangles at once.
+        """
+        a, b, c = np.moveaxis(self.points()[self._triangles], 1, 0)
+        along, ab, ac, start = far - near, b - a, c - a, near - a
+        p, q = np.cross(along, ac), np.cross(start, ab)
+        area = np.vecdot(ab, p)
+        area[area == 0] = np.nan  # seen edge-on
+        u, v = np.vecdot(start, p) / area, np.vecdot(along[None], q) / area
+        met = np.flatnonzero((u >= -_SEAM) & (v >= -_SEAM) & (u + v <= 1 + _SEAM))
+        if not len(met):
+            return None
+        first = met[np.argmin(np.vecdot(ac[met], q[met]) / area[met])]
+        share = np.array([1 - u[first] - v[first], u[first], v[first]])
+        sides = self.patch.a, self.patch.b
+        return share @ self.shares[self._triangles[first]] * sides
 
     def seen_at(self, near: Array, far: Array, height: float, beside: Array) -> Array:
         """Where the line of sight from `near` to `far` meets the skin `height` mm out, (2,) in m.

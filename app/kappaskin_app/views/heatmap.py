@@ -1,4 +1,4 @@
-"""Curvature of every element as one cell, not interpolated, with its scale and its value."""
+"""A quantity of every element as one cell, not interpolated, with its scale and its value."""
 
 import math
 
@@ -9,7 +9,8 @@ from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, Q
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from kappaskin import WHY, SensorLayout
-from kappaskin_app.theme import DARK_INK, DIVERGING, WANTED, Colours, Theme
+from kappaskin_app.shades import SHADES, Tint
+from kappaskin_app.theme import DARK_INK, SATURATED, WANTED, Colours, Theme
 from kappaskin_app.views.colour_bar import ColourBar, LockButton
 from kappaskin_app.views.line import Line
 
@@ -19,7 +20,8 @@ Indices = NDArray[np.intp]
 
 
 _LEGEND = (
-    "One cell for each element. Grey: no reading, dead or at the end of the converter's range. "
+    "One cell for each element. Grey: no reading. Violet: on a rail, the end of the converter's "
+    "range, beyond which nothing is known. "
     "Crossed: bent beyond 1 % strain, where the gage is not elastic any more. Dotted: chosen to be "
     "in every frame. A letter: left out, and why: D dead, S stuck, N noisy, "
     "R on a rail, X swapped, T drifting, O off by the same, P a spike. Framed: to be pressed now."
@@ -37,16 +39,12 @@ _LEGIBLE = 9  # px at least, of a letter
 _ROOM = 18.0  # px of a cell with room for a letter in a ring
 
 
-def coloured(values: Array, limits: tuple[float, float], colours: Colours, missing: str) -> Colours:
-    """RGB (..., 3) of `values` (...) between `limits`; NaN in the colour `missing`."""
-    low, high = limits
-    share = (values - low) / (high - low) if high > low else np.full_like(values, 0.5)
-    index = (np.clip(np.nan_to_num(share), 0, 1) * 255).astype(np.uint8)
-    rgb = colours[index]
-    gone = ~np.isfinite(values)
-    if gone.any():
-        grey = QColor(missing)
-        rgb[gone] = grey.red(), grey.green(), grey.blue()
+def coloured(values: Array, tint: Tint, missing: str, railed: Mask | None = None) -> Colours:
+    """RGB (..., 3) of `values` (...); NaN is `missing`, and what is `railed` in its own colour."""
+    rgb = tint.rgb(values, missing)
+    if railed is not None and railed.any():
+        rail = QColor(SATURATED)
+        rgb[railed] = rail.red(), rail.green(), rail.blue()
     return rgb
 
 
@@ -241,26 +239,31 @@ class _Cells(QWidget):
 
 
 class Heatmap(QWidget):
-    """One curvature component, element by element; says which element is pointed at."""
+    """One quantity, element by element; says which element is pointed at.
+
+    `picked` says which one is to be told all about.
+    """
 
     pointed = Signal(int)
     chosen = Signal(int)
     lock_wanted = Signal(float)
 
-    def __init__(self, component: str, tip: str, parent: QWidget | None = None) -> None:
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.component = component
-        self._title = QLabel(f"<b>\N{GREEK SMALL LETTER KAPPA}<sub>{component}</sub></b>")
-        self._title.setToolTip(tip)
+        self.name, self._shade = name, SHADES[name]
+        self._title = QLabel(f"<b>{self._shade.symbol}</b>")
+        self._title.setToolTip(self._shade.tip)
         self.value = Line()
         self.value.setToolTip("The element under the mouse, else the largest reading.")
         self.lock = LockButton()
-        self.lock.wanted.connect(lambda locked: self.lock_wanted.emit(self._limit * locked))
+        self.lock.wanted.connect(self._ask_lock)
+        self.lock.setVisible(name != "health")  # whose colours are no range
         self.cells, self.bar = _Cells(), ColourBar()
         self.cells.setToolTip(_LEGEND)
+        self.cells.setAccessibleName(f"Heatmap of {name.replace('_', ' ')}")
         self.cells.pointed.connect(self.pointed)
         self.cells.chosen.connect(self.chosen)
-        self._limit, self._layout, self._element = 1.0, None, -1
+        self._tint, self._layout, self._element = self._shade.tint(1.0), None, -1
         self._missing = "#888888"
         self._kinds: dict[int, str] = {}
         top = QHBoxLayout()
@@ -289,12 +292,19 @@ class Heatmap(QWidget):
         self._element = element
         self.cells.point_at(element)
 
-    def show_values(self, values: Array, limit: float) -> None:
-        """Colour `values` (P,) in 1/m from minus to plus `limit`."""
-        self._limit = limit
-        limits = (-limit, limit)
-        self.cells.show_cells(coloured(values, limits, DIVERGING, self._missing))
-        self.bar.show_scale(DIVERGING, limits, "1/m")
+    @property
+    def limit(self) -> float:
+        """How far the colours reach, in SI units."""
+        return self._tint.limit / self._shade.scale
+
+    def _ask_lock(self, locked: bool) -> None:
+        self.lock_wanted.emit(self.limit * locked)
+
+    def show_values(self, values: Array, tint: Tint, railed: Mask | None = None) -> None:
+        """Colour `values` (P,) on the screen's scale by `tint`, but those that are `railed`."""
+        self._tint = tint
+        self.cells.show_cells(coloured(values, tint, self._missing, railed))
+        self.bar.show_tint(tint, legend(values, tint, self._missing, railed))
 
     def show_marks(self, crossed: Mask, dotted: Mask, kinds: NDArray[np.uint8]) -> None:
         """Cross out elements (P,) bent too far, dot those chosen to scan, ring those left out.
@@ -316,21 +326,40 @@ class Heatmap(QWidget):
         """Write the value of the element pointed at, else the largest."""
         if self._layout is None or len(values) != len(self._layout):
             self.value.show_text("")
-            return
-        element = self._element
-        if element >= 0:
-            x, y = self._layout.positions[element] * 1e3
-            reading = values[element]
-            what = f"{reading:+.2f} 1/m" if math.isfinite(reading) else "no reading"
-            why = f", {self._kinds[element]}" if element in self._kinds else ""
-            text = f"{what} at ({x:.0f}, {y:.0f}) mm{why}"
+        elif self._element >= 0:
+            self.value.show_text(self._of_one(self._element, values[self._element], self._layout))
         else:
-            finite = values[np.isfinite(values)]
-            peak = f"peak {finite[np.argmax(np.abs(finite))]:+.2f} 1/m" if len(finite) else ""
-            missing = len(values) - len(finite)
-            text = ", ".join(filter(None, [peak, f"{missing} missing" if missing else ""]))
-        self.value.show_text(text.replace("-", "\N{MINUS SIGN}"))
+            self.value.show_text(self._of_all(values))
+
+    def _of_one(self, element: int, value: float, layout: SensorLayout) -> str:
+        x, y = layout.positions[element] * 1e3
+        what = self._shade.written(value) if math.isfinite(value) else "no reading"
+        why = f", {self._kinds[element]}" if element in self._kinds and self.bar.scaled else ""
+        return f"{what} at ({x:.0f}, {y:.0f}) mm{why}"
+
+    def _of_all(self, values: Array) -> str:
+        finite = values[np.isfinite(values)]
+        if not self.bar.scaled:
+            ill = int(np.count_nonzero(finite))
+            return f"{ill} not well" if ill else "all well"
+        peak = finite[np.argmax(np.abs(finite))] if len(finite) else math.nan
+        missing = len(values) - len(finite)
+        told = [f"peak {self._shade.written(peak)}"] if len(finite) else []
+        return ", ".join(told + [f"{missing} missing"] * bool(missing))
 
     def show_theme(self, theme: Theme) -> None:
         self._missing = theme.missing
         self.cells.show_line(theme.line)
+
+
+def legend(
+    values: Array, tint: Tint, missing: str, railed: Mask | None = None
+) -> tuple[tuple[str, str], ...]:
+    """What is seen beside the scale's own colours, or without a scale: colours and words."""
+    if tint.kinds:
+        seen = np.unique(values[np.isfinite(values)].astype(int))
+        return tuple((QColor(*tint.colours[k].tolist()).name(), tint.kinds[k]) for k in seen)
+    gone = ~np.isfinite(values)
+    on_rail = np.zeros(len(values), bool) if railed is None else railed
+    beside = (on_rail.any(), SATURATED, "on rail"), ((gone & ~on_rail).any(), missing, "none")
+    return tuple((colour, words) for there, colour, words in beside if there)

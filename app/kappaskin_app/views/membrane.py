@@ -15,13 +15,16 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, Load, Sensor
-from kappaskin_app.theme import OUT, WANTED, Colours, Theme
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
+from kappaskin_app.views.box import WHOLE, Box, Shares
 from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
-from kappaskin_app.views.drag import ARROW, LoadDrag
+from kappaskin_app.views.drag import LoadDrag
 from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
-from kappaskin_app.views.footprint import footprint
+from kappaskin_app.views.loads import DrawnLoads, put_upright
 from kappaskin_app.views.marks import Marks
+from kappaskin_app.views.pointing import Pointing
+from kappaskin_app.views.surface import Surface
 
 Array = NDArray[np.float64]
 
@@ -45,9 +48,13 @@ class MembraneView(QWidget):
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 0, 0, 0)
         around.addWidget(self.plotter)
+        # Blending in any order adds 8 ms to each picture, as soon as anything is translucent.
+        self.plotter.renderer.SetUseOIT(False)
         self._make_actors()
         self._make_lights()
+        self.pointing = Pointing(self.plotter)  # after the drag: of filters the last goes first
         self.drag = LoadDrag(self.plotter)
+        self._box = Box()
         self.setMinimumSize(320, 240)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
         """(when, age of its frame in s) of each drawing completed."""
@@ -57,12 +64,13 @@ class MembraneView(QWidget):
         self._drawn = True
         self.plotter.renderer.AddObserver("EndEvent", self._note_drawing)
         self.skin = self.drag.skin
-        self._lift, self._want_elements, self._want_truth = 0.0, True, True
+        self.lift = 0.0
+        """How far above the skin, in mm, lines and points are drawn."""
+        self._want_elements = self._want_truth = True
         self._of_elements: Indices = np.empty(0, np.intp)
         self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
         self._positions, self._marked = np.empty((0, 2)), (b"", -1)
         self._arrays: dict[str, Any] = {}
-        self._lost = False
         self._fitted, self._from = True, FROM_THE_LEFT
         for turning in ("InteractionEvent", "MouseWheelForwardEvent", "MouseWheelBackwardEvent"):
             self.plotter.iren.interactor.AddObserver(turning, self._note_turning)
@@ -71,25 +79,18 @@ class MembraneView(QWidget):
 
     def _make_actors(self) -> None:
         plotter = self.plotter
-        self._colours = pv.LookupTable()
-        # Any: what PyVista says of its own types is too narrow to write into arrays in place.
-        self._mesh: Any = pv.PolyData()
+        self.surface = Surface(plotter)
         self._wire: Any = pv.PolyData()
         self._elements: Any = pv.PolyData(np.zeros((1, 3)))
-        self._line: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
-        self._surface_actor: Any = None
         self._wire_actor: Any = None
         unlit = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
         self._elements_actor = plotter.add_mesh(
             self._elements, style="points", point_size=5, **unlit
         )
         self.out, self.asked = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
-        self._line_actor = plotter.add_mesh(self._line, line_width=5, color="#e8543f", **unlit)
-        # Sized for a skin of size 1; `show_skin` scales them to the one there is.
-        self._arrow = pv.Arrow(
-            start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35
-        )
-        self._arrows: list[pv.Actor] = []
+        # Seen on every colour.
+        self.pointed = Marks(plotter, 17, DARK_INK), Marks(plotter, 12, LIGHT_INK)
+        self._loads = DrawnLoads(plotter)
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
@@ -131,59 +132,37 @@ class MembraneView(QWidget):
     def show_skin(self, sensor: Sensor, nx: int, ny: int) -> None:
         """Draw a surface of nx x ny points for the skin of `sensor`, at rest until an estimate."""
         patch = sensor.layout.patch
-        another = self._surface_actor is None or self.skin.patch != patch
-        self.skin = self.drag.skin = skin = DrawnSkin(patch, nx, ny)
-        self._mesh = pv.PolyData(skin.points(), faces=skin.faces().ravel())
-        self._mesh.point_data["value"] = np.zeros(nx * ny)
-        self._mesh.point_data.active_normals = skin.shading()
-        self._lift = _LIFT * skin.size
+        another = self.surface.actor is None or self.skin.patch != patch
+        self.skin = self.drag.skin = self.pointing.skin = skin = DrawnSkin(patch, nx, ny)
+        self.surface.show_skin(skin, sensor.layout)
+        self.lift = _LIFT * skin.size
         self._wire = self._wireframe(skin)
-        self._put_into_scene()
+        self._show_wire()
         self._positions = sensor.layout.positions
         self._marked = (b"", -1)
         self.show_marked(np.empty(0, np.intp), -1)
+        self.point(-1)
         self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
         self._contact.scale = skin.size
         self._arrays = self._changing()
         self._place_labels(skin)
+        self.show_box(self._box.shares)
         if another:
             self.look_from(self._from)
         if self._theme:
             self.show_theme(self._theme)
 
-    def _put_into_scene(self) -> None:
-        plotter = self.plotter
-        for actor in (self._surface_actor, self._wire_actor):
-            if actor is not None:
-                plotter.remove_actor(actor, render=False)
-        self._surface_actor = plotter.add_mesh(
-            self._mesh,
-            scalars="value",
-            cmap=self._colours,
-            show_scalar_bar=False,
-            smooth_shading=False,
-            reset_camera=False,
-            render=False,
-            specular=0.0,
-            ambient=0.6,
-            diffuse=0.42,
-        )
-        self._surface_actor.prop.interpolation = "Gouraud"
-        self._surface_actor.mapper.scalar_visibility = not self._lost
-        self._wire_actor = plotter.add_mesh(
+    def _show_wire(self) -> None:
+        if self._wire_actor is not None:
+            self.plotter.remove_actor(self._wire_actor, render=False)
+        self._wire_actor = self.plotter.add_mesh(
             self._wire, line_width=1, lighting=False, reset_camera=False, render=False
         )
         self._wire_actor.prop.color = self._ink
 
     def _changing(self) -> dict[str, Any]:
         """VTK's own arrays of what changes; looking them up takes longer than to fill them."""
-        return {
-            "points": self._mesh.points,
-            "normals": self._mesh.point_data.active_normals,
-            "values": self._mesh.point_data["value"],
-            "wire": self._wire.points,
-            "elements": self._elements.points,
-        }
+        return {"wire": self._wire.points, "elements": self._elements.points}
 
     def _wireframe(self, skin: DrawnSkin) -> pv.PolyData:
         """Every few lines of the grid, as lines through their own points alone."""
@@ -191,7 +170,7 @@ class MembraneView(QWidget):
         self._wire_points = np.concatenate(lines)
         ends = np.cumsum([len(line) for line in lines])
         cells = [np.r_[len(x), np.arange(e - len(x), e)] for x, e in zip(lines, ends, strict=True)]
-        points = skin.points(self._wire_points, np.full(len(self._wire_points), self._lift))
+        points = skin.points(self._wire_points, np.full(len(self._wire_points), self.lift))
         return pv.PolyData(points, lines=np.concatenate(cells))
 
     def _place_elements(self, positions: Array) -> None:
@@ -199,7 +178,7 @@ class MembraneView(QWidget):
         self._of_elements = self.skin.nearest(positions)
         points, out = self._elements_at_rest
         self._elements_actor.visibility = self._want_elements
-        self._elements.points = points + self._lift * out
+        self._elements.points = points + self.lift * out
         self._elements.verts = np.column_stack(
             [np.ones(len(points), int), np.arange(len(points))]
         ).ravel()
@@ -212,6 +191,18 @@ class MembraneView(QWidget):
             self.out.place(self.skin, self._positions[out])
             self.asked.place(self.skin, self._positions[[asked] if asked >= 0 else []])
             self.plotter.update()
+
+    def point(self, element: int) -> None:
+        """Mark the element that is pointed at; -1 for none."""
+        there = [element] if 0 <= element < len(self._positions) else []
+        for marks in self.pointed:
+            marks.place(self.skin, self._positions[there])
+        self._follow_pointed()
+        self.plotter.update()
+
+    def _follow_pointed(self) -> None:
+        for above, marks in enumerate(self.pointed, 2):
+            marks.follow(self.skin, above * self.lift)  # the inner one is not to sink into the rim
 
     def _place_labels(self, skin: DrawnSkin) -> None:
         a, b = skin.patch.a, skin.patch.b
@@ -228,7 +219,7 @@ class MembraneView(QWidget):
     def look_from(self, direction: Direction) -> None:
         """Look at the whole skin, as large as it fits, and again whenever the size changes."""
         self._from = direction
-        fit_camera(self.plotter.renderer, self.skin, direction)
+        fit_camera(self.plotter.renderer, self.skin, direction, self.plotter.width())
         self._fitted = True
         self._show_labels(direction.sees(0), direction.sees(1))
         self.plotter.update()
@@ -242,28 +233,30 @@ class MembraneView(QWidget):
     # What changes with every estimate.
 
     def show_estimate(
-        self, estimate: Estimate, values: Array, limits: tuple[float, float], times: float
+        self, estimate: Estimate, values: NDArray[Any], limits: tuple[float, float], times: float
     ) -> None:
-        """Draw a shape so many `times` higher than it is, coloured by `values` (ny, nx).
+        """Draw a shape so many `times` higher than it is, coloured by `values`.
 
-        The colours go between `limits`, in any unit.
+        Those (ny, nx) of the surface are coloured between `limits`, in any unit; colours (P, 3)
+        are those of the elements.
         """
         skin = self.skin
-        if estimate.surface.shape != skin.height.shape or self._lost:
+        if estimate.surface.shape != skin.height.shape or self.surface.lost:
             return  # of another skin, or a last one that came after the news
         skin.height = -MM * times * np.nan_to_num(estimate.surface)
-        self._arrays["points"][:] = skin.points()
-        self._arrays["normals"][:] = skin.shading()
-        self._arrays["values"][:] = skin.values(values)
-        self._surface_actor.mapper.scalar_range = limits
+        self.surface.show_shape(skin)
+        self.surface.show_values(skin, values, limits)
         self._show_truth(skin, estimate.true_surface, times)
         if self._elements_actor.visibility:
             points, out = self._elements_at_rest
-            height = skin.height.ravel()[self._of_elements] + self._lift
+            height = skin.height.ravel()[self._of_elements] + self.lift
             self._arrays["elements"][:] = points + out * height[:, None]
         for marks in (self.out, self.asked):
-            marks.follow(skin, self._lift)
-        self._place(self._contact, estimate.touch.position)
+            marks.follow(skin, self.lift)
+        self._follow_pointed()
+        put_upright(self._contact, skin, estimate.touch.position)
+        if self._box.shares != WHOLE:
+            self._box.cut(self.plotter.actors.values())  # some may be new
         known = math.isfinite(estimate.taken)
         # It was taken before it came: where nothing else is known, it is at least so old.
         self._taken = estimate.taken if known else estimate.host_time
@@ -274,7 +267,7 @@ class MembraneView(QWidget):
         true = surface.ravel()[self._wire_points]
         self._wire_actor.visibility = bool(np.isfinite(true).any()) and self._want_truth
         if self._wire_actor.visibility:
-            height = -MM * times * np.nan_to_num(true) + self._lift
+            height = -MM * times * np.nan_to_num(true) + self.lift
             self._arrays["wire"][:] = skin.points(self._wire_points, height)
 
     def _request(self) -> None:
@@ -287,48 +280,23 @@ class MembraneView(QWidget):
         """Whether the picture asked for last has been drawn."""
         return self._drawn
 
-    def _place(self, actor: pv.Actor, position: Array, above: float = 0.0) -> None:
-        """Put an actor on the drawn skin, upright on it, or hide it at NaN."""
-        actor.visibility = shown = bool(np.isfinite(position).all())
-        if shown:
-            points, out = self.skin.place(position[None], above)
-            actor.position = tuple(points[0])
-            actor.orientation = (0.0, np.degrees(np.arctan2(out[0, 0], out[0, 2])), 0.0)
-
     def show_loads(self, loads: Sequence[Load]) -> None:
         """Draw the simulated loads where they are now; none for a real sensor, or a lost one."""
-        loads = [load for load in loads if load.force and not self._lost]
-        centres = [load.centre() for load in loads]
-        self.drag.handles = np.array(centres).reshape(-1, 2)
-        size = self.skin.size
-        while len(self._arrows) < len(centres):
-            self._arrows.append(
-                self.plotter.add_mesh(
-                    self._arrow, color="#e8543f", reset_camera=False, render=False
-                )
-            )
-        for number, arrow in enumerate(self._arrows):
-            there = number < len(centres)
-            # Inwards for a push; for a pull outwards, from the surface.
-            pulls = there and loads[number].force < 0
-            arrow.scale = (size, size, -size if pulls else size)
-            place = self.drag.handles[number] if there else np.full(2, np.nan)
-            self._place(arrow, place, ARROW * size if pulls else 0.0)
-        lines = [line for line in map(footprint, loads) if line is not None]
-        self._line_actor.visibility = bool(lines)
-        if lines:
-            points, _ = self.skin.place(np.concatenate(lines), self._lift)
-            if len(points) != self._line.n_points:
-                each = np.arange(len(points)).reshape(len(lines), -1)
-                self._line.points = points
-                self._line.lines = np.insert(each, 0, each.shape[1], axis=1).ravel()
-            self._line.points[:] = points
+        loads = [load for load in loads if load.force and not self.surface.lost]
+        self.drag.handles = self._loads.show(loads, self.skin, self.lift)
 
     # How it is shown.
 
     def show_options(self, elements: bool, truth: bool) -> None:
         self._want_elements, self._want_truth = elements, truth
-        self._elements_actor.visibility = elements and self._surface_actor is not None
+        self._elements_actor.visibility = elements and self.surface.actor is not None
+        self.plotter.update()
+
+    def show_box(self, shares: Shares) -> None:
+        """Draw only what is within these shares of the skin: from and to, along x and along y."""
+        self._box.shares = shares
+        self._box.show(self.skin)
+        self._box.cut(self.plotter.actors.values())
         self.plotter.update()
 
     def show_caption(self, text: str) -> None:
@@ -339,8 +307,7 @@ class MembraneView(QWidget):
 
     def show_colours(self, colours: Colours, ink: str) -> None:
         """Colour by a map of 256 colours (256, 3), with points and lines in `ink`."""
-        opaque = np.full((len(colours), 1), 255, np.uint8)
-        self._colours.values = np.hstack([colours, opaque])
+        self.surface.show_colours(colours)
         self._ink = ink
         self._elements_actor.prop.color = ink
         if self._wire_actor:
@@ -349,16 +316,15 @@ class MembraneView(QWidget):
     @property
     def greyed(self) -> bool:
         """Whether the skin is drawn without colours."""
-        return self._surface_actor is not None and not self._surface_actor.mapper.scalar_visibility
+        return self.surface.lost
 
     def show_lost(self, lost: bool) -> None:
         """Grey the skin while what it shows is not coming in any more."""
-        if self._surface_actor is None or lost == self._lost:
+        if self.surface.actor is None or lost == self.surface.lost:
             return
         if lost:
             self.show_loads(())
-        self._lost = lost
-        self._surface_actor.mapper.scalar_visibility = not lost
+        self.surface.show_lost(lost)
         self._contact.visibility = not lost
         self.plotter.update()
 
@@ -368,8 +334,7 @@ class MembraneView(QWidget):
         for text in (*self.labels, self.caption):
             text.prop.color = theme.text
         self.alarm.show_theme(theme)
-        if self._surface_actor:
-            self._surface_actor.prop.color = theme.missing
+        self.surface.show_theme(theme)
         self.plotter.update()
 
     def close_plotter(self) -> None:

@@ -6,6 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
+from kappaskin_app.shades import Tint
 from kappaskin_app.theme import LIGHT, SEQUENTIAL, Colours, Theme
 from kappaskin_app.views.colour_bar import ColourBar
 from kappaskin_app.views.heatmap import coloured
@@ -110,7 +111,7 @@ class SurfaceMap(QWidget):
         """Show `values` (ny, nx) in the unit of the scale, NaN off the skin; None for nothing."""
         rgb = None
         if values is not None:
-            rgb = coloured(values, limits, colours, self._theme.window)
+            rgb = coloured(values, Tint(colours, limits, self._unit), self._theme.window)
         self.map.show_map(rgb, contact, sides)
         self.bar.show_scale(colours, limits, self._unit)
 

@@ -10,6 +10,7 @@ from kappaskin.mechanics.rigid import Cylinder as Cylinder
 from kappaskin.mechanics.rigid import HeightMap as HeightMap
 from kappaskin.mechanics.rigid import Indentation as Indentation
 from kappaskin.mechanics.rigid import Mesh as Mesh
+from kappaskin.mechanics.rigid import Placed as Placed
 from kappaskin.mechanics.rigid import Press as Press
 from kappaskin.mechanics.rigid import Punch as Punch
 from kappaskin.mechanics.rigid import RigidObject as RigidObject

@@ -1,6 +1,7 @@
 """A file on a disk that may fill: whatever is written to it stands there whole, or not at all."""
 
 import os
+import sys
 import tempfile
 from pathlib import Path
 from typing import IO, cast
@@ -25,6 +26,7 @@ class Disk:
             self._file = path.open("xb", buffering=0)
         except OSError as error:
             raise Refusal(f"{path}: cannot be written ({_why(error)}); {_ELSEWHERE}") from error
+        _locked(self._file)
         self._reserved = self._at = 0
         try:
             self._reserve = tempfile.TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115
@@ -95,6 +97,29 @@ class Disk:
 
 
 _ELSEWHERE = "choose another place"
+
+
+def is_written(path: Path) -> bool:
+    """Whether a process is writing the file at `path`; never known on Windows."""
+    try:
+        with path.open("rb") as file:
+            return not _locked(file)
+    except OSError:
+        return False
+
+
+def _locked(file: IO[bytes]) -> bool:
+    """Whether this process could mark `file` as its own, as long as it is open."""
+    if sys.platform != "win32":
+        import fcntl
+
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        except OSError:  # a disk that knows no such marks
+            return True
+    return True
 
 
 def is_there(path: Path) -> bool:

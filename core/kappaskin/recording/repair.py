@@ -15,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 from kappaskin.errors import Refusal
 from kappaskin.recording.disk import Disk, is_there
 from kappaskin.recording.messages import TOPICS
-from kappaskin.recording.reading import (
+from kappaskin.recording.records import (
     LARGEST,
     MAGIC,
     Record,

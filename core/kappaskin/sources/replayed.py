@@ -26,6 +26,7 @@ _NAP = 0.02  # s
 _MOST = 512  # frames given at once
 _BACK = 0.25  # s that are looked through at first for frames to step back over
 _GAP = 0.5  # s without a message that is a gap
+_BRIEF = 0.1  # s of messages between two of them that leave it one
 _TOLD = 500  # gaps, and events, that are told of at most: each status brings them
 _LONGEST = 200  # characters of an event
 
@@ -95,17 +96,18 @@ class ReplayedSource:
         self._go_to(0.0)
 
     def _landmarks(self) -> tuple[tuple[tuple[float, float], ...], tuple[Event, ...]]:
-        chunks = self._recording.chunks
-        gaps = (
-            (self._place(a.last), self._place(b.first))
-            for a, b in pairwise(chunks)
-            if b.first - a.last > _GAP * 1e9
-        )
+        gaps: list[tuple[float, float]] = []
+        for a, b in pairwise(self._recording.chunks):
+            begin, end = self._place(a.last), self._place(b.first)
+            if end - begin > _GAP:
+                # An answer about the device's clock alone is no end of a gap.
+                brief = gaps and begin - gaps[-1][1] < _BRIEF
+                gaps.append((gaps.pop()[0] if brief else begin, end))
         events: list[Event] = []
         with suppress(Refusal):  # damage is told of where it is played
             for message in islice(self._recording.messages_on(m.EVENTS), _TOLD):
                 events.append(self._event(message, self._place(message.stamp)))
-        return tuple(islice(gaps, _TOLD)), tuple(events)
+        return tuple(gaps[:_TOLD]), tuple(events)
 
     def _event(self, message: Message, when: float) -> Event:
         said = decode(m.LOG, message.data)

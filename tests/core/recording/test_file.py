@@ -17,7 +17,7 @@ from mcap.writer import Writer
 from kappaskin import Damaged, Refusal, Wanted
 from kappaskin.recording import disk as disk_room
 from kappaskin.recording import messages as m
-from kappaskin.recording import reading, writing
+from kappaskin.recording import records, writing
 from kappaskin.recording.reading import Recording
 from kappaskin.recording.repair import repairing
 from kappaskin.recording.writing import RecordingFile, part_of
@@ -120,7 +120,7 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
         for read in (Recording, lambda pipe: list(repairing(pipe, path))):
             with pytest.raises(Refusal, match="expected a file"):
                 read(tmp_path / "pipe")
-    for data in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), reading.MAGIC, reading.MAGIC * 20):
+    for data in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), records.MAGIC, records.MAGIC * 20):
         path.write_bytes(data)
         with pytest.raises(Refusal, match="recording"):
             Recording(path)
@@ -145,7 +145,7 @@ def test_one_of_a_later_version_is_refused(later: int, tmp_path, monkeypatch) ->
 
 def test_a_header_that_is_cut_off_is_said_to_be(tmp_path) -> None:
     path = tmp_path / "broken.mcap"
-    path.write_bytes(reading.MAGIC + struct.pack("<BQI", 1, 7, 2**32 - 1) + b"abc")
+    path.write_bytes(records.MAGIC + struct.pack("<BQI", 1, 7, 2**32 - 1) + b"abc")
     with pytest.raises(Damaged, match=r"a header cannot be read \(it is cut off\)"):
         Recording(path)
 
@@ -175,7 +175,7 @@ def test_a_bomb_takes_no_memory(whole, tmp_path) -> None:
     def chunk(size):
         body = struct.pack("<QQQII4sQ", 0, 1, size, 0, 4, b"zstd", len(bomb)) + bomb
         return (
-            reading.MAGIC
+            records.MAGIC
             + b"\1"
             + struct.pack("<QII", 8, 0, 0)
             + b"\6"
@@ -189,8 +189,8 @@ def test_a_bomb_takes_no_memory(whole, tmp_path) -> None:
             Recording(path)
     body = chunk(1000)
     for size in (2**27, 1000):
-        with pytest.raises(reading.Spoilt):
-            reading.unpacked(chunk(size)[len(body) - len(bomb) - 44 :])
+        with pytest.raises(records.Spoilt):
+            records.unpacked(chunk(size)[len(body) - len(bomb) - 44 :])
 
 
 def test_no_size_that_a_file_claims_is_believed(whole, tmp_path) -> None:

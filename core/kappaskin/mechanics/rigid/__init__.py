@@ -8,5 +8,6 @@ from kappaskin.mechanics.rigid.objects import Punch as Punch
 from kappaskin.mechanics.rigid.objects import RigidObject as RigidObject
 from kappaskin.mechanics.rigid.objects import Sphere as Sphere
 from kappaskin.mechanics.rigid.objects import Wedge as Wedge
+from kappaskin.mechanics.rigid.press import Placed as Placed
 from kappaskin.mechanics.rigid.press import Press as Press
 from kappaskin.mechanics.rigid.relief import HeightMap as HeightMap

@@ -28,7 +28,7 @@ def _turned(points: Array, angle: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Placed:
+class Placed:
     """An object at a `place` (2,) in m, turned by `turn` in rad; up is the skin's normal there."""
 
     object_: RigidObject
@@ -94,7 +94,7 @@ class Press:
         answer `after` which it moves saves time and changes nothing else.
         """
         self._check(x, y, turn, depth, force)
-        placed = _Placed(object_, np.array([x, y], float), turn)
+        placed = Placed(object_, np.array([x, y], float), turn)
         keel = placed.keel(self._patch)
         height, slant = placed.over(self._patch, np.vstack([self._nodes.points, keel]))
         under = np.flatnonzero(np.isfinite(height) & (slant > 0))
@@ -128,7 +128,7 @@ class Press:
                 f"{depth}; depths are in metres"
             )
 
-    def _moved(self, support: Support, placed: _Placed, after: Indentation) -> Array:
+    def _moved(self, support: Support, placed: Placed, after: Indentation) -> Array:
         """Forces (n,) to start from: those of `after`, carried along."""
         ny, nx = self._nodes.shape
         candidate = np.full(nx * ny, -1)
@@ -141,7 +141,7 @@ class Press:
         return forces
 
     def _answer(
-        self, support: Support, under: Underside, placed: _Placed, found: Bearing
+        self, support: Support, under: Underside, placed: Placed, found: Bearing
     ) -> Indentation:
         if abs(found.depth) > self._deepest:
             raise Refusal(

@@ -1,0 +1,70 @@
+"""Two places on the skin and how far they are apart, drawn and written in the picture."""
+
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from kappaskin import Distances
+from kappaskin_app.theme import WANTED, Theme
+from kappaskin_app.views.drawn import DrawnSkin
+
+Array = NDArray[np.float64]
+
+_STEPS = 48  # of the line along the skin
+
+
+class Ruler:
+    """A line along the skin and one through the air, with their lengths."""
+
+    def __init__(self, plotter: Any) -> None:
+        shared = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
+        along = np.insert(np.arange(_STEPS), 0, _STEPS)
+        straight = [2, 0, _STEPS - 1]
+        self._lines: Any = pv.PolyData(
+            np.zeros((_STEPS, 3)), lines=np.concatenate([along, straight])
+        )
+        self._ends: Any = pv.PolyData(np.zeros((2, 3)))
+        self.actor = plotter.add_mesh(self._lines, color=WANTED, line_width=3, **shared)
+        self._ends_actor = plotter.add_mesh(
+            self._ends, style="points", point_size=11, color=WANTED, **shared
+        )
+        self.text: Any = pv.Text("")
+        self.text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+        self.text.position = 0.015, 0.03  # of the picture, from its lower left corner
+        self.text.prop.font_size = 15
+        plotter.add_actor(self.text, reset_camera=False, render=False)
+        self.hide()
+
+    def hide(self) -> None:
+        self.actor.visibility = self._ends_actor.visibility = False
+        self.text.input = ""
+
+    def ask(self, words: str) -> None:
+        """Say what is to be done; nothing is measured yet."""
+        self.hide()
+        self.text.input = words
+
+    def show(self, skin: DrawnSkin, places: Array, lift: float, found: Distances | None) -> None:
+        """Draw it between `places` (k, 2) in m, one or two, `lift` mm above the skin."""
+        line = places[0] + np.linspace(0, 1, _STEPS)[:, None] * (places[-1] - places[0])
+        points, _ = skin.place(line, lift)
+        self._lines.points[:] = points
+        self._ends.points[:] = points[[0, -1]]
+        self._ends_actor.visibility = True
+        self.actor.visibility = found is not None
+        if found is not None:
+            self.text.input = told(found)
+
+    def show_theme(self, theme: Theme) -> None:
+        self.text.prop.color = theme.text
+
+
+def told(found: Distances) -> str:
+    """The distances in words."""
+    higher = f"{1e3 * found.higher:+.2f}".replace("-", "\N{MINUS SIGN}")
+    return (
+        f"straight {1e3 * found.straight:.2f} mm, along the skin {1e3 * found.along:.2f} mm, "
+        f"height {higher} mm"
+    )

@@ -1,0 +1,42 @@
+"""How far two places of a skin are apart, through the air and along it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kappaskin.frames import Array
+from kappaskin.patch import Patch
+
+_STEPS = 256  # of the line along the skin
+
+
+@dataclass(frozen=True)
+class Distances:
+    """From a first place to a second, in m: `straight`, `along` the skin, and how much `higher`.
+
+    Along the line that is straight in the skin's own coordinates, on the skin as it is bent.
+    """
+
+    straight: float
+    along: float
+    higher: float
+
+
+def distances(patch: Patch, surface: Array, first: Array, second: Array) -> Distances:
+    """Those between the places `first` and `second` (2,) in m, displaced by `surface` (ny, nx)."""
+    places = first + np.linspace(0.0, 1.0, _STEPS + 1)[:, None] * (second - first)
+    rest, out = patch.at_rest(places)
+    points = rest - out * _between(patch, surface, places)[:, None]
+    whole = points[-1] - points[0]
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return Distances(float(np.linalg.norm(whole)), float(steps.sum()), float(whole[2]))
+
+
+def _between(patch: Patch, surface: Array, places: Array) -> Array:
+    """The displacement (P,) at `places` (P, 2), evenly between the points of the grid."""
+    ny, nx = surface.shape
+    known = np.nan_to_num(surface)
+    p, q = np.clip(places / (patch.a, patch.b) * (nx - 1, ny - 1), 0, (nx - 1, ny - 1)).T
+    i, j = np.minimum(p.astype(int), nx - 2), np.minimum(q.astype(int), ny - 2)
+    low, high = (known[k, i] * (1 - p + i) + known[k, i + 1] * (p - i) for k in (j, j + 1))
+    return low * (1 - q + j) + high * (q - j)

@@ -1,0 +1,59 @@
+"""Clicks on the skin: what is measured, and what is cut away."""
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from kappaskin import Distances
+from kappaskin_app.views.ruler import told
+from kappaskin_app.views.sight import Sight
+from kappaskin_app.window import MainWindow
+
+
+def pixel_of(window: MainWindow, x: float, y: float) -> QPoint:
+    """Where (x, y) in m of the skin is seen."""
+    view = window.membrane
+    points, _ = view.skin.place(np.array([[x, y]]))
+    return QPoint(*(round(v) for v in Sight(view.plotter).to_screen(points[0]).tolist()))
+
+
+def test_distances_are_told_with_their_units() -> None:
+    text = told(Distances(0.0421, 0.0433, -0.00212))
+    assert text == "straight 42.10 mm, along the skin 43.30 mm, height \N{MINUS SIGN}2.12 mm"
+
+
+def test_two_clicks_measure_a_third_begins_anew_and_escape_ends(
+    window: MainWindow, until, qtbot
+) -> None:
+    left, plotter = Qt.MouseButton.LeftButton, window.membrane.plotter
+    window.history.change("Rest", -1, load_case="point", force=0.0, noise_kind="none")
+    until(lambda: np.abs(window.session.estimate.surface).max() < 1e-6)
+    ruler, action = window.display.measuring.ruler, window.actions_by_name["measure"]
+    action.trigger()
+    assert action.isChecked()
+    assert "click a place" in ruler.text.input
+    qtbot.mouseClick(plotter, left, pos=pixel_of(window, 0.02, 0.03))
+    assert "another" in ruler.text.input
+    qtbot.mouseClick(plotter, left, pos=pixel_of(window, 0.06, 0.06))
+    until(lambda: ruler.text.input.startswith("straight"))
+    assert float(ruler.text.input.split()[1]) == pytest.approx(50.0, abs=0.8)
+    assert ruler.actor.visibility
+    qtbot.mouseClick(plotter, left, pos=pixel_of(window, 0.05, 0.05))
+    assert "another" in ruler.text.input
+    qtbot.keyClick(window, Qt.Key.Key_Escape)
+    assert not action.isChecked()
+    assert ruler.text.input == ""
+
+
+def test_what_is_beyond_the_box_is_cut_away_and_comes_back(
+    window: MainWindow, until, colours_in
+) -> None:
+    whole = colours_in(window, window.membrane)
+    window.history.change("Cut", -1, from_x=0.5, to_x=0.5)
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 2)
+    assert colours_in(window, window.membrane) < 0.7 * whole
+    window.history.stack.undo()
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 2)
+    assert colours_in(window, window.membrane) > 0.7 * whole
