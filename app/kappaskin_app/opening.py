@@ -2,20 +2,20 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtWidgets import QMenu
 
 from kappaskin import Refusal
-from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.guard import guarded
 from kappaskin_app.objects import may_choose
 from kappaskin_app.recordings import newest, recordings_folder
-from kappaskin_app.replaying import Replaying
-from kappaskin_app.session import RECORDED, Session
-from kappaskin_app.staging import Staging
+from kappaskin_app.session import RECORDED
 from kappaskin_app.touching import touches_at
-from kappaskin_app.wishes import Wishes
+
+if TYPE_CHECKING:
+    from kappaskin_app.window import MainWindow
 
 MOST_RECENT = 12
 _KINDS = {
@@ -51,26 +51,18 @@ class Opening(QObject):
     told = Signal(str)
     changed = Signal()
 
-    def __init__(
-        self,
-        *,
-        replaying: Replaying,
-        staging: Staging,
-        calibrating: Calibrating,
-        session: Session,
-        wishes: Wishes,
-        window: QWidget,
-    ) -> None:
+    def __init__(self, window: "MainWindow") -> None:
         super().__init__(window)
-        self._replaying, self._staging, self._calibrating = replaying, staging, calibrating
-        self._session, self._wishes = session, wishes
+        self._replaying, self._staging = window.replaying, window.staging
+        self._calibrating = window.calibrating
+        self._session, self._wishes = window.session, window.wishes
         self.recent: list[Path] = []
         self.menu = QMenu(window)
         self.menu.setToolTipsVisible(True)
         self.menu.aboutToShow.connect(guarded(self._list))
-        replaying.opened.connect(guarded(self._note_recording))
-        staging.used.connect(guarded(self.note))
-        calibrating.used.connect(guarded(self.note))
+        self._replaying.opened.connect(guarded(self._note_recording))
+        self._staging.used.connect(guarded(self.note))
+        self._calibrating.used.connect(guarded(self.note))
 
     def open(self, file: Path) -> None:
         """Play a recording or a scene, use a calibration, or let a mesh touch the skin."""

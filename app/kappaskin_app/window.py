@@ -99,14 +99,7 @@ class MainWindow(QMainWindow):
             *(self.history, self.session, self.wishes, self.planning),
             *(self.scene, self.timeline, self),
         )
-        self.opening = Opening(
-            replaying=self.replaying,
-            staging=self.staging,
-            calibrating=self.calibrating,
-            session=self.session,
-            wishes=self.wishes,
-            window=self,
-        )
+        self.opening = Opening(self)
         self.drops = Drops(self, self.opening.open, self.transport.take_key)
         self.picking = Picking(self.history, self.session, self.display)
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
@@ -130,9 +123,7 @@ class MainWindow(QMainWindow):
         self.docks = self._surround()
         self.exports = Exports(self.session, self.membrane, self)
         self.looking = Looking(self.history, self.wishes, self.display)
-        self.layouts = Layouts(
-            self, self.docks.by_name(), self.panels, self.presenting, self.history.stack
-        )
+        self.layouts = Layouts(self)
         self.menus, self.keeping = Menus(self), Keeping(self)
         self.actions_by_name = self.menus.actions
         self._wire()

@@ -2,17 +2,19 @@
 
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtGui import QUndoCommand, QUndoStack
-from PySide6.QtWidgets import QInputDialog, QMainWindow, QMenu
+from PySide6.QtGui import QUndoCommand
+from PySide6.QtWidgets import QInputDialog, QMenu
 
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
-from kappaskin_app.layouts.arranging import Docks, arrange, layout_of
+from kappaskin_app.layouts.arranging import arrange, layout_of
 from kappaskin_app.layouts.layout import LIVE, PRESENTER, READY, Layout
-from kappaskin_app.panels.panels import Panels
-from kappaskin_app.presenting import Presenting
+
+if TYPE_CHECKING:
+    from kappaskin_app.window import MainWindow
 
 _MENU = "La&yout"
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
@@ -43,22 +45,15 @@ class _Choice(QUndoCommand):
 
 
 class Layouts(QObject):
-    """Arranges the `docks` of a window; `own` are those saved, `changed` tells that they did."""
+    """Arranges the docks of a `window`; `own` are those saved, `changed` tells that they did."""
 
     told = Signal(str)
     changed = Signal()
 
-    def __init__(
-        self,
-        window: QMainWindow,
-        docks: Docks,
-        panels: Panels,
-        presenting: Presenting,
-        stack: QUndoStack,
-    ) -> None:
+    def __init__(self, window: "MainWindow") -> None:
         super().__init__(window)
-        self._window, self._docks, self._panels = window, docks, panels
-        self._presenting, self._stack = presenting, stack
+        self._window, self._docks, self._panels = window, window.docks.by_name(), window.panels
+        self._presenting, self._stack = window.presenting, window.history.stack
         self.own: dict[str, Layout] = {}
         self._menu = QMenu(window)
         self._menu.aboutToShow.connect(guarded(self._list))
