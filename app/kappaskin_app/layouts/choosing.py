@@ -68,8 +68,8 @@ class Layouts(QObject):
         own.setMenu(self._menu)
         for name, text, act, tip in (
             ("save", f"Sa&ve this layout{_DOTS}", self.ask_name, "Keep it under a name"),
-            ("rename", f"Re&name one{_DOTS}", self.ask_rename, "Call one of your own otherwise"),
-            ("delete", f"&Delete one{_DOTS}", self.ask_delete, "Forget one of your own"),
+            ("rename", f"Re&name a layout{_DOTS}", self.ask_rename, "Give it another name"),
+            ("delete", f"&Delete a layout{_DOTS}", self.ask_delete, "Forget one of your own"),
             ("reset", "&Reset the layout", self.reset, "Every panel where it is at first"),
         ):
             add(f"layout-{name}", text=text, act=act, tip=tip)
