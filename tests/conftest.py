@@ -129,7 +129,16 @@ def _children_of(pid: int) -> set[int]:
     return {int(child) for child in found.split()}
 
 
-_NO_WINDOW = ("drawn", "footprint", "history", "scale", "scene_picture", "scene_text", "simulation")
+_NO_WINDOW = (
+    "drawn",
+    "footprint",
+    "history",
+    "lesson_files",
+    "scale",
+    "scene_picture",
+    "scene_text",
+    "simulation",
+)
 """Of the app's tests, files that open no window."""
 
 

@@ -10,6 +10,7 @@ from kappaskin_app.columns import heighten
 
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38, "compare": 0.36}
+_UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that one
 _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 
 
@@ -20,6 +21,7 @@ class Docks:
         self._window = window
         self._docks: dict[str, QDockWidget] = {}
         self._keys: dict[str, str] = {}
+        self._above: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> QDockWidget:
         return self._docks[name]
@@ -30,7 +32,7 @@ class Docks:
     @property
     def below(self) -> list[QDockWidget]:
         """Those that share the place below the skin."""
-        return [self._docks[name] for name in self._keys]
+        return [self._docks[name] for name in self._keys if name not in self._above]
 
     def put_beside(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
         """Show a widget in a column beside the skin."""
@@ -51,6 +53,13 @@ class Docks:
         dock.setAllowedAreas(Qt.DockWidgetArea.TopDockWidgetArea | _BELOW)
         dock.hide()  # so that a small window is left to the skin
 
+    def put_above(self, name: str, title: str, widget: QWidget, other: str, key: str) -> None:
+        """Have a widget above the `other` in its column, hidden until asked for with `key`."""
+        self.put_beside(name, title, widget, self._window.dockWidgetArea(self[other]))
+        self._keys[name], self._above[name] = key, other
+        self._window.splitDockWidget(self[name], self[other], Qt.Orientation.Vertical)
+        self[name].hide()
+
     def add_actions(self, actions: Actions, menu: str) -> None:
         """Register how each is shown and hidden."""
         for name, dock in self._docks.items():
@@ -64,18 +73,25 @@ class Docks:
             dock.visibilityChanged.connect(action.setChecked)
 
     def _turn(self, name: str) -> None:
-        """Show a dock below the skin, before the other in its place; hide one that is seen."""
+        """Show a dock, before the other in its place; hide one that is seen."""
         if self[name].visibleRegion().isEmpty():
             self.reveal(name)
         else:
             self[name].hide()
 
     def reveal(self, name: str) -> None:
-        """Show a dock below the skin, before the other in its place."""
+        """Show a dock, before the other in its place."""
         dock = self[name]
         if not dock.visibleRegion().isEmpty():
             return
         dock.show()
-        if not dock.isFloating():
+        if dock in self.below and not dock.isFloating():
             heighten(self._window, dock, _HEIGHTS.get(name, _HEIGHT))
+        self._share_columns()
         dock.raise_()
+
+    def _share_columns(self) -> None:
+        heights = [round(share * self._window.height()) for share in _UPPER]
+        for above, other in self._above.items():
+            both = [self[above], self[other]]
+            self._window.resizeDocks(both, heights, Qt.Orientation.Vertical)

@@ -125,9 +125,14 @@ class Seeing(QObject):
         self._watched = watched
         self.changed.emit()
 
+    @property
+    def seen(self) -> Spectrum | None:
+        """The spectrum while somebody looks at it."""
+        return self.spectrum if self._watched else None
+
     def telling(self) -> Spectrum | None:
         """The spectrum while somebody looks at a shape that tells something, or chose it."""
-        spectrum = self.spectrum if self._watched else None
+        spectrum = self.seen
         return None if spectrum is None or (spectrum.alike and not self._picked) else spectrum
 
     def follow(self, status: Status) -> None:

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QHBoxLayout,
@@ -31,6 +31,9 @@ from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.layouts.choosing import Layouts
 from kappaskin_app.layouts.keeping import Keeping
+from kappaskin_app.lessons.pointing import Pointing
+from kappaskin_app.lessons.reading import DOCKS
+from kappaskin_app.lessons.teaching import Teaching
 from kappaskin_app.looking import Looking
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.menus import Menus
@@ -38,7 +41,9 @@ from kappaskin_app.naming import Naming
 from kappaskin_app.opening import Opening
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
+from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.health import HealthPanel
+from kappaskin_app.panels.lesson import LessonPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
@@ -120,8 +125,14 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(stage)
         self.presenting = Presenting(self, stage, self.session, self.display, self.wishes)
         self._make_header()
+        self.lesson = LessonPanel()
         self.docks = self._surround()
         self.exports = Exports(self.session, self.membrane, self)
+        self.teaching = Teaching(
+            *(self.history, self.session, self.seeing, self),
+            *(self._connect, self._seen, self.exports.caption),
+        )
+        self.pointing = self._pointing()
         self.looking = Looking(self.history, self.wishes, self.display)
         self.layouts = Layouts(self)
         self.menus, self.keeping = Menus(self), Keeping(self)
@@ -171,6 +182,7 @@ class MainWindow(QMainWindow):
     def _surround(self) -> Docks:
         docks, area = Docks(self), Qt.DockWidgetArea
         docks.put_beside("settings", "Settings", self.panels, area.LeftDockWidgetArea)
+        docks.put_above("lesson", "Lessons", self.lesson, "settings", "Shift+F1")
         docks.put_beside("curvature", "By element", self.display.maps, area.RightDockWidgetArea)
         docks.put_below("cost", "Cost of accuracy", self.cost, "F9")
         docks.put_below("stability", "Stability", self.stability, "F10")
@@ -180,6 +192,12 @@ class MainWindow(QMainWindow):
         docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
         docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
         return docks
+
+    def _pointing(self) -> Pointing:
+        docks = {name: [self.docks[name].widget()] for name in DOCKS}
+        numbers = {f"readout-{name}": parts for name, parts in self.readouts.parts.items()}
+        forms = [panel for panel in self.panels.all() if isinstance(panel, Form)]
+        return Pointing(forms, docks | numbers, self.docks.reveal, self)
 
     def _wire(self) -> None:
         panels, wishes, session, drag = self.panels, self.wishes, self.session, self.membrane.drag
@@ -219,6 +237,9 @@ class MainWindow(QMainWindow):
         self.stability.demonstrated.connect(guarded(wishes.demonstrate))
         self._attend_health()
         self._attend_recording()
+        self.lesson.attend(self.teaching)
+        self.teaching.pointed.connect(guarded(self.pointing.point))
+        self.teaching.told.connect(guarded(self.tell))
         self.staging.told.connect(guarded(self.tell))
         self.opening.told.connect(guarded(self.tell))
         self.layouts.told.connect(guarded(self.tell))
@@ -339,6 +360,8 @@ class MainWindow(QMainWindow):
         self.compare.show_theme(theme)
         self.stability.show_theme(theme)
         self.health.show_theme(theme)
+        self.lesson.show_theme(theme)
+        self.pointing.show_theme(theme)
         self.display.show_theme(theme)
         self.presenting.show_theme(theme)
         self.picking.show_theme(theme)
@@ -378,6 +401,15 @@ class MainWindow(QMainWindow):
     def tell(self, text: str) -> None:
         """Say something in passing."""
         self.statusBar().showMessage(text, 10_000)
+
+    def _seen(self) -> list[QPixmap]:
+        """Pictures of the numbers, and of the skin with the maps and what is shown below them."""
+        docks = [self.docks["curvature"], *self.docks.below]
+        whole = self.presenting.stage.geometry()
+        for dock in docks:
+            if not dock.visibleRegion().isEmpty():
+                whole = whole.united(dock.geometry())
+        return [self.readouts.grab(), self.grab(whole)]
 
     def picture(self, path: Path) -> bool:
         """Save the window, 3-D picture included, as a PNG; whether it could be written."""

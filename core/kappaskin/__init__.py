@@ -3,6 +3,7 @@
 from kappaskin.adoption import Left as Left
 from kappaskin.adoption import orphans_folder as orphans_folder
 from kappaskin.apart import Distances as Distances
+from kappaskin.apart import between as between
 from kappaskin.apart import distances as distances
 from kappaskin.bases import EDGES as EDGES
 from kappaskin.bases import Basis as Basis

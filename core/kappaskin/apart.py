@@ -26,16 +26,19 @@ def distances(patch: Patch, surface: Array, first: Array, second: Array) -> Dist
     """Those between the places `first` and `second` (2,) in m, displaced by `surface` (ny, nx)."""
     places = first + np.linspace(0.0, 1.0, _STEPS + 1)[:, None] * (second - first)
     rest, out = patch.at_rest(places)
-    points = rest - out * _between(patch, surface, places)[:, None]
+    points = rest - out * between(patch, surface, places)[:, None]
     whole = points[-1] - points[0]
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return Distances(float(np.linalg.norm(whole)), float(steps.sum()), float(whole[2]))
 
 
-def _between(patch: Patch, surface: Array, places: Array) -> Array:
-    """The displacement (P,) at `places` (P, 2), evenly between the points of the grid."""
-    ny, nx = surface.shape
-    known = np.nan_to_num(surface)
+def between(patch: Patch, values: Array, places: Array) -> Array:
+    """What `values` (ny, nx) on the grid of a patch are at `places` (P, 2), evenly between them.
+
+    Zero where they are NaN, as off the skin.
+    """
+    ny, nx = values.shape
+    known = np.nan_to_num(values)
     p, q = np.clip(places / (patch.a, patch.b) * (nx - 1, ny - 1), 0, (nx - 1, ny - 1)).T
     i, j = np.minimum(p.astype(int), nx - 2), np.minimum(q.astype(int), ny - 2)
     low, high = (known[k, i] * (1 - p + i) + known[k, i + 1] * (p - i) for k in (j, j + 1))

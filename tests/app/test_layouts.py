@@ -76,6 +76,7 @@ def bare() -> Iterator[tuple[QMainWindow, Docks, QTabWidget]]:
         pages.addTab(QLabel(), str(page))
     docks = Docks(window)
     docks.put_beside("settings", "Settings", pages, Qt.DockWidgetArea.LeftDockWidgetArea)
+    docks.put_beside("lesson", "Lessons", QLabel(), Qt.DockWidgetArea.LeftDockWidgetArea)
     docks.put_beside("curvature", "Maps", QLabel(), Qt.DockWidgetArea.RightDockWidgetArea)
     for name in BELOW:
         docks.put_below(name, name, QLabel(), "")
@@ -255,10 +256,12 @@ def test_a_window_that_was_not_asked_to_keeps_nothing(window: MainWindow, tmp_pa
 
 def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: MainWindow) -> None:
     assert set(window.docks.by_name()) == set(DOCKS)
-    for name, shown in (("Teach", window.scene), ("Calibrate", window.health), ("Live", None)):
+    for name, shown in (("Study", window.cost), ("Calibrate", window.health), ("Live", None)):
         window.layouts.choose(name)
         seen = [dock for dock in window.docks.below if not dock.isHidden()]
         assert [dock.widget() for dock in seen] == ([shown] if shown else [])
+    window.layouts.choose("Teach")
+    assert window.lesson.isVisible()
     window.layouts.choose("Presenter")
     assert window.presenting.on
     window.layouts.save("Live")

@@ -51,6 +51,7 @@ from kappaskin.sources.wire import (
     encode_samples,
 )
 from kappaskin.verify import Verdict, verifying
+from kappaskin_app.lessons.reading import READY, read_lesson
 
 Read = Callable[[bytes, Path], object]
 
@@ -166,6 +167,12 @@ _PIECES = (
 
 def _scene(data: bytes, _: Path) -> None:
     read_scene(data.decode(errors="replace"), SCENE_FOLDER / "a.toml")
+
+
+def _lesson(data: bytes, folder: Path) -> object:
+    file = folder / "lesson.md"
+    file.write_bytes(data)
+    return read_lesson(file)
 
 
 def _resealed(data: bytes) -> bytes:
@@ -354,6 +361,12 @@ TARGETS = (
     Target("information", _information, (_PIECES[0][22:-4],), _JSON),
     Target(
         "scene", _scene, tuple((SCENE_FOLDER / f"{n}.toml").read_bytes() for n in SCENES), _TOML
+    ),
+    Target(
+        "lesson",
+        _lesson,
+        tuple(file.read_bytes() for file in READY),
+        (*_TOML, b"+++\n", b"\n## ", b"\n```toml\n", b"\n```\n", b" and ", b"(", b")", b"force"),
     ),
     Target("calibration", _calibration, (_calibrated(3), _calibrated(1)), _TOML),
     Target("tares", _tares, (_tared(),), _TOML),

@@ -25,9 +25,14 @@ def layout_of(window: QMainWindow, docks: Docks, panels: Panels) -> Layout:
     for area, side in _SIDES.items():
         here = [d for d in shown if not d.isFloating() and window.dockWidgetArea(d) == side]
         placed += _along(window, here, area)
-    hidden = [dock for dock in docks.values() if dock.isHidden()]
-    placed += [(d.objectName(), Place(_area(window, d), shown=False)) for d in hidden]
-    return Layout(panels.currentIndex(), tuple(placed))
+    hidden = [d for d in docks.values() if d.isHidden()]
+    away = [(d.objectName(), Place(_area(window, d), shown=False)) for d in hidden]
+    # In a column a hidden one comes back above the others, else as a tab of the last.
+    above = [each for each in away if each[1].area in _BESIDE]
+    return Layout(
+        panels.currentIndex(),
+        (*above, *placed, *(each for each in away if each not in above)),
+    )
 
 
 def _area(window: QMainWindow, dock: QDockWidget) -> str:
@@ -79,7 +84,7 @@ def arrange(window: QMainWindow, docks: Docks, panels: Panels, layout: Layout) -
         area = _taken(dock, place)
         window.addDockWidget(_SIDES[area], dock)
         # A hidden one comes back before the others above or below the skin, where they share one
-        # place, and after them in a column.
+        # place.
         joins = place.tabbed if place.shown else area not in _BESIDE
         if joins and area in last:
             window.tabifyDockWidget(last[area], dock)

@@ -21,7 +21,7 @@ _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _LONGEST = 60  # characters of a name
 _TIPS = {
     LIVE: "Settings and curvature beside the skin: how the window begins",
-    "Teach": "The scenes below the skin, to choose and to change",
+    "Teach": "The lessons above the settings",
     "Calibrate": "The page Calibrate, and the health of the elements below the skin",
     "Study": "What accuracy costs below the skin",
     PRESENTER: "The skin and what is felt fill the screen; Esc leaves",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 LEFT, RIGHT, TOP, BOTTOM, FLOATING = "left", "right", "top", "bottom", "floating"
 AREAS = (LEFT, RIGHT, TOP, BOTTOM, FLOATING)
-BESIDE = ("settings", "curvature")
+BESIDE = ("lesson", "settings", "curvature")
 BELOW = ("cost", "stability", "scene", "health", "compare", "element", "traces")
 DOCKS = BESIDE + BELOW
 
@@ -35,9 +35,10 @@ class Layout:
     docks: tuple[tuple[str, Place], ...]
 
 
-def _ready(page: int, *below: str, share: float = 0.0) -> Layout:
+def _ready(page: int, *below: str, share: float = 0.0, lesson: bool = False) -> Layout:
     """Settings and curvature beside the skin, and below it at most one dock, so high."""
-    docks = [("settings", Place(LEFT, share=0.25)), ("curvature", Place(RIGHT, share=0.22))]
+    docks = [("lesson", Place(LEFT, shown=lesson, share=0.25 if lesson else 0.0))]
+    docks += [("settings", Place(LEFT, share=0.25)), ("curvature", Place(RIGHT, share=0.22))]
     docks += [(name, Place(BOTTOM, share=share)) for name in below]
     docks += [(name, Place(BOTTOM, shown=False)) for name in BELOW if name not in below]
     return Layout(page, tuple(docks))
@@ -46,7 +47,7 @@ def _ready(page: int, *below: str, share: float = 0.0) -> Layout:
 LIVE, PRESENTER = "Live", "Presenter"
 READY: Mapping[str, Layout] = {
     LIVE: _ready(0),
-    "Teach": _ready(0, "scene", share=0.38),
+    "Teach": _ready(0, lesson=True),
     "Calibrate": _ready(3, "health", share=0.3),
     "Study": _ready(0, "cost", share=0.36),
     PRESENTER: _ready(0),

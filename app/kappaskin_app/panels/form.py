@@ -227,6 +227,11 @@ class Form(Panel):
         label.setToolTip(how.tip)
         self.form.addRow(label, editor.widget)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The settings that it asks for."""
+        return tuple(self._editors)
+
     def editors(self) -> list[QWidget]:
         return [editor.widget for editor in self._editors.values()]
 

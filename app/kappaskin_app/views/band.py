@@ -7,6 +7,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from kappaskin_app.views.drawn import MM, DrawnSkin
+from kappaskin_app.views.unlit import UNLIT
 
 Array = NDArray[np.float64]
 
@@ -46,10 +47,7 @@ class Band:
                 mesh,
                 color=_COLOUR,
                 opacity=0.3,
-                lighting=False,
-                pickable=False,
-                reset_camera=False,
-                render=False,
+                **UNLIT,
             )
             for mesh in self._meshes
         ]

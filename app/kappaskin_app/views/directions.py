@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from kappaskin_app.theme import DIVERGING
 from kappaskin_app.views.drawn import MM, DrawnSkin
+from kappaskin_app.views.unlit import UNLIT
 
 Array = NDArray[np.float64]
 
@@ -82,8 +83,5 @@ class Directions:
             scalars="rgb",
             rgb=True,
             line_width=3,
-            lighting=False,
-            pickable=False,
-            reset_camera=False,
-            render=False,
+            **UNLIT,
         )

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import Patch, onto_rim
+from kappaskin import Patch, between, onto_rim
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -127,12 +127,7 @@ class DrawnSkin:
 
     def height_at(self, positions: Array) -> Array:
         """How far out (k,) in mm the skin is drawn at `positions`, evenly between its points."""
-        ny, nx = self.on.shape
-        (p, q) = np.clip(positions / self.cell, 0, (nx - 1, ny - 1)).T
-        i, j = np.minimum(p.astype(int), nx - 2), np.minimum(q.astype(int), ny - 2)
-        u, v, h = p - i, q - j, self.height
-        low, high = (h[k, i] * (1 - u) + h[k, i + 1] * u for k in (j, j + 1))
-        return low * (1 - v) + high * v
+        return between(self.patch, self.height, positions)
 
     def place(self, positions: Array, above: float = 0.0) -> tuple[Array, Array]:
         """Points `above` mm over the drawn skin at `positions`, and the normals at rest there."""

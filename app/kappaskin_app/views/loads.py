@@ -11,6 +11,7 @@ from kappaskin import Load
 from kappaskin_app.views.drag import ARROW
 from kappaskin_app.views.drawn import DrawnSkin
 from kappaskin_app.views.footprint import footprint
+from kappaskin_app.views.unlit import UNLIT
 
 Array = NDArray[np.float64]
 
@@ -32,10 +33,7 @@ class DrawnLoads:
             self._line,
             line_width=5,
             color=_RED,
-            lighting=False,
-            pickable=False,
-            reset_camera=False,
-            render=False,
+            **UNLIT,
         )
 
     def show(self, loads: Sequence[Load], skin: DrawnSkin, lift: float) -> Array:

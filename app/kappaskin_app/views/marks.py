@@ -7,6 +7,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from kappaskin_app.views.drawn import DrawnSkin, Indices
+from kappaskin_app.views.unlit import UNLIT
 
 Array = NDArray[np.float64]
 
@@ -23,10 +24,7 @@ class Marks:
             style="points",
             point_size=size,
             color=colour,
-            lighting=False,
-            pickable=False,
-            reset_camera=False,
-            render=False,
+            **UNLIT,
         )
         self.actor.visibility = False
         self._at_rest = (np.empty((0, 3)), np.empty((0, 3)))

@@ -25,6 +25,7 @@ from kappaskin_app.views.loads import DrawnLoads, put_upright
 from kappaskin_app.views.marks import Marks
 from kappaskin_app.views.pointing import Pointing
 from kappaskin_app.views.surface import Surface
+from kappaskin_app.views.unlit import UNLIT
 
 Array = NDArray[np.float64]
 
@@ -83,9 +84,8 @@ class MembraneView(QWidget):
         self._wire: Any = pv.PolyData()
         self._elements: Any = pv.PolyData(np.zeros((1, 3)))
         self._wire_actor: Any = None
-        unlit = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
         self._elements_actor = plotter.add_mesh(
-            self._elements, style="points", point_size=5, **unlit
+            self._elements, style="points", point_size=5, **UNLIT
         )
         self.out, self.asked = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
         # Seen on every colour.

@@ -146,6 +146,14 @@ class Readouts(QWidget):
     def text(self, key: str) -> str:
         return self._numbers[key].text()
 
+    @property
+    def parts(self) -> dict[str, list[QWidget]]:
+        """Each number with what stands above it, by name."""
+        return {
+            key: [number, name]
+            for (key, number), name in zip(self._numbers.items(), self._names, strict=True)
+        }
+
     def show_health(self, health: Health) -> None:
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
         self._write("age", _age(1e3 * health.age, 1e3 * health.age_sd))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from kappaskin import Distances
 from kappaskin_app.theme import WANTED, Theme
 from kappaskin_app.views.drawn import DrawnSkin
+from kappaskin_app.views.unlit import UNLIT
 
 Array = NDArray[np.float64]
 
@@ -19,16 +20,15 @@ class Ruler:
     """A line along the skin and one through the air, with their lengths."""
 
     def __init__(self, plotter: Any) -> None:
-        shared = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
         along = np.insert(np.arange(_STEPS), 0, _STEPS)
         straight = [2, 0, _STEPS - 1]
         self._lines: Any = pv.PolyData(
             np.zeros((_STEPS, 3)), lines=np.concatenate([along, straight])
         )
         self._ends: Any = pv.PolyData(np.zeros((2, 3)))
-        self.actor = plotter.add_mesh(self._lines, color=WANTED, line_width=3, **shared)
+        self.actor = plotter.add_mesh(self._lines, color=WANTED, line_width=3, **UNLIT)
         self._ends_actor = plotter.add_mesh(
-            self._ends, style="points", point_size=11, color=WANTED, **shared
+            self._ends, style="points", point_size=11, color=WANTED, **UNLIT
         )
         self.text: Any = pv.Text("")
         self.text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()

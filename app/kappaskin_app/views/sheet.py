@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from kappaskin import Placed
 from kappaskin_app.views.drawn import MM, DrawnSkin
+from kappaskin_app.views.unlit import UNLIT
 
 Array = NDArray[np.float64]
 
@@ -26,11 +27,7 @@ class Sheet:
             self._mesh,
             color=colour,
             opacity=0.35,
-            lighting=False,
-            show_edges=False,
-            pickable=False,
-            reset_camera=False,
-            render=False,
+            **UNLIT,
         )
         self.actor.visibility = False
 

@@ -1,0 +1,1 @@
+"""Lessons: read from files, judged by what the window shows, played on it."""

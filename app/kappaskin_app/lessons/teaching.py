@@ -1,0 +1,190 @@
+"""A lesson on the window: its steps as undoable settings, its questions judged by what is seen."""
+
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QPixmap
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from kappaskin import Estimate, Refusal
+from kappaskin_app.guard import guarded
+from kappaskin_app.history import History
+from kappaskin_app.lessons.figures import Watch
+from kappaskin_app.lessons.lesson import Task, whole
+from kappaskin_app.lessons.progress import Progress
+from kappaskin_app.lessons.reading import READY, read_lesson
+from kappaskin_app.lessons.sheet import sheet
+from kappaskin_app.pictures import chosen_file, save_view
+from kappaskin_app.seeing import Seeing
+from kappaskin_app.session import Session
+from kappaskin_app.settings import Settings
+
+_FILES = "Lesson (*.md)"
+
+
+class Teaching(QObject):
+    """Knows the lessons, by file, and how far each is; `changed` tells when that is another.
+
+    `progress` is that of the lesson that is taken, None while none is; `message` says why an answer
+    could not be judged, or a file not be read. `told` says what came of a wish, `pointed` at what
+    to point. It is told how to `connect` to a source, and gets pictures of what is seen and the
+    words below them.
+    """
+
+    changed = Signal()
+    told = Signal(str)
+    pointed = Signal(tuple)
+
+    def __init__(
+        self,
+        history: History,
+        session: Session,
+        seeing: Seeing,
+        window: QWidget,
+        connect: Callable[[str], None],
+        views: Callable[[], list[QPixmap]],
+        caption: Callable[[], str],
+    ) -> None:
+        super().__init__(window)
+        self._history, self._session, self._seeing = history, session, seeing
+        self._window, self._connect = window, connect
+        self._views, self._caption = views, caption
+        self.taken: dict[str, Progress] = {}
+        self.progress: Progress | None = None
+        self.message = ""
+        self._watch = Watch()
+        self._before: tuple[Settings, str] | None = None
+        session.estimated.connect(guarded(self._receive))
+        history.changed.connect(guarded(lambda *_: self._watch.forget()))
+
+    def _receive(self, estimate: Estimate) -> None:
+        if self.progress is not None:
+            self._watch.receive(estimate)
+
+    def look(self) -> None:
+        """Read the lessons that come with the program, the first time that somebody asks."""
+        if not self.taken:
+            self.taken = {str(file): Progress(read_lesson(file)) for file in READY}
+            self.changed.emit()
+
+    # What a person wishes.
+
+    def open(self) -> None:
+        """Ask for a file, and take the lesson in it."""
+        file, _ = QFileDialog.getOpenFileName(self._window, "Open a lesson", "", _FILES)
+        if file:
+            self.open_file(Path(file))
+
+    def open_file(self, file: Path) -> None:
+        """Take the lesson in a file of one's own, or say why there is none."""
+        self.look()
+        try:
+            self.taken[str(file)] = Progress(read_lesson(file))
+        except Refusal as refusal:
+            self.message = str(refusal)
+            self.changed.emit()
+            return
+        self.take(str(file))
+
+    def take(self, file: str) -> None:
+        """Begin the lesson in `file`, or go on where it was left."""
+        progress = self.taken[file]
+        if self._before is None:
+            self._before = self._history.settings, self._session.source
+        self.progress = progress
+        self._go(0 if progress.at_end else progress.step)
+
+    def leave(self) -> None:
+        """Have the settings, and the source, from before the lesson."""
+        if self._before is None:
+            return
+        (settings, source), self._before = self._before, None
+        self.progress, self.message = None, ""
+        before = {name: getattr(settings, name) for name in whole({})}
+        self._history.change("Leave the lesson", -1, **before)
+        if source != self._session.source and not source.startswith("sim:"):
+            self._connect(source)
+        self.pointed.emit(())
+        self.changed.emit()
+
+    def go(self, step: int) -> None:
+        """Go to another step of the lesson."""
+        if self.progress is not None and step != self.progress.step:
+            self._go(step)
+
+    def _go(self, step: int) -> None:
+        progress = self.progress
+        if progress is None:
+            return
+        back = step <= progress.step
+        progress.go(step)
+        self.message = ""
+        there = None if progress.at_end else progress.lesson.steps[progress.step]
+        sets = None if there is None else there.sets
+        if back and there is not None:
+            sets = progress.lesson.begins(progress.step)
+        if sets is not None:
+            self._put(f"Lesson step {progress.step + 1}", sets)
+        self.pointed.emit(there.point if there else ())
+        self.changed.emit()
+
+    def answer(self, given: str) -> None:
+        """Judge an answer by what the window shows now."""
+        if self.progress is None:
+            return
+        try:
+            self.message = ""
+            self.progress.give(given, self.figures())
+        except Refusal as refusal:
+            self.message = str(refusal)
+        self.changed.emit()
+
+    def press(self, number: int) -> None:
+        """Break something, or mend it, as the button of this step says."""
+        if self.progress is not None and not self.progress.at_end:
+            button = self.progress.lesson.steps[self.progress.step].buttons[number]
+            self._put(button.label, button.sets)
+
+    def show_how(self) -> None:
+        """Do what was to be done."""
+        question = None if self.progress is None else self.progress.question
+        if question is not None and isinstance(question.how, Task):
+            self._history.change("Show how it is done", -1, **question.how.solution)
+
+    def hand_in(self, student: str) -> None:
+        """Ask for a file, and write the figure of this lesson to it."""
+        progress, now = self.progress, datetime.now()
+        if progress is None:
+            return
+        settings, views, caption = self._history.settings, self._views(), self._caption()
+        path = chosen_file(self._window, "the figure", flat=True)
+        if path is None:
+            return
+        made = sheet(progress, student, views, settings, now)
+        try:
+            save_view(made, path, progress.lesson.title, f"{student.strip()}: {caption}")
+            self.told.emit(f"Saved {path}")
+        except Refusal as refusal:
+            self.told.emit(str(refusal))
+        made.deleteLater()
+
+    def _put(self, text: str, sets: Mapping[str, Any]) -> None:
+        """Have the settings that a step or a button says, on the simulated skin."""
+        session = self._session
+        if not session.inside or session.status.state in ("off", "lost"):
+            self._connect("sim:")
+        self._history.change(text, -1, **whole(sets))
+        if "scene" in sets:
+            session.seek(0.0)
+        if not session.running:
+            session.run(True)
+
+    # What is so.
+
+    def figures(self) -> dict[str, float | str]:
+        """What the window shows now, by name."""
+        session = self._session
+        return self._watch.figures(self._history.settings, session.status, self._seeing.seen)

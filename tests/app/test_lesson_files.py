@@ -1,0 +1,272 @@
+"""Lessons as files: what is read, what is refused and where, how answers are judged."""
+
+import math
+import textwrap
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin import Refusal
+from kappaskin_app.lessons.expression import NUMBER, TRUTH, WORD, expression
+from kappaskin_app.lessons.figures import KINDS, SETTINGS, Watch
+from kappaskin_app.lessons.lesson import UNITS, Number, Task, whole
+from kappaskin_app.lessons.progress import Answer, Progress, judged, number_in
+from kappaskin_app.lessons.reading import DOCKS, READY, lesson_of, read_lesson
+from kappaskin_app.lessons.setting import SETTABLE, checked_setting
+from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.settings.asks import Range
+
+FIGURES_SEEN = [name for name in KINDS if name not in SETTINGS]
+FIGURES = {"force": 0.2, "method": "bayes", "noise": math.nan, "functions_x": 8.0}
+HEAD = '+++\nformat = 1\ntitle = "A"\nminutes = 5\nlearn = "B"\n+++\n'
+ASK = 'question = "Q?"\nhint = "h"\nexplain = "e"\n'
+
+
+def lesson(block: str):
+    return lesson_of(f"{HEAD}## One\nText\n```toml\n{block}\n```\n", "x")
+
+
+@pytest.mark.parametrize("file", READY, ids=lambda file: file.stem)
+def test_a_lesson_takes_ten_minutes_or_so_in_short_steps(file: Path) -> None:
+    read = read_lesson(file)
+    assert 10 <= read.minutes <= 15
+    assert 5 <= len(read.steps) <= 10
+    assert read.questions >= 5
+    for step in read.steps:
+        sentences = step.text.replace(":", ".").split(".")
+        assert max(len(sentence.split()) for sentence in sentences) <= 30, step.title
+        assert len(step.text) <= 800, step.title
+
+
+def test_there_are_lessons_of_everything_asked_for() -> None:
+    titles = " ".join(read_lesson(file).title.lower() for file in READY)
+    for word in [
+        "gage",
+        "shape",
+        "sines",
+        "functions",
+        "noise",
+        "cost",
+        "silent",
+        "hysteresis",
+        "contact",
+        "region",
+        "mend",
+    ]:
+        assert word in titles
+    assert len(READY) >= 11
+
+
+@pytest.mark.parametrize("file", READY, ids=lambda file: file.stem)
+def test_what_an_answer_is_right_by_says_no_to_a_plain_window(file: Path) -> None:
+    nothing_seen = dict.fromkeys(KINDS, math.nan) | {
+        name: "" for name, kind in KINDS.items() if kind == WORD
+    }
+    for step in read_lesson(file).steps:
+        if step.question is not None and isinstance(step.question.how, Task):
+            assert not step.question.how.check(nothing_seen), step.title
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("force > 0.1 and functions_x == 8", True),
+        ("force > 0.1 and not method == 'bayes'", False),
+        ("noise < 1 or noise > 1", False),
+        ("0.1 < force < 0.3", True),
+        ("-force + 2 * 0.2 - 0.2 / 1 == 0", True),
+        ("1 / 0 > 1", False),
+    ],
+)
+def test_an_expression_asks_of_figures_what_it_says(text: str, value: bool) -> None:
+    assert expression(text, KINDS, TRUTH)(FIGURES) is value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os').system('true')",
+        "force.real",
+        "force[0]",
+        "[x for x in (1, 2)]",
+        "force ** 9 ** 9",
+        "(lambda: 1)()",
+        "force if 1 else 2",
+        "f'{force}'",
+        "force := 2",
+        "unknown > 1",
+        "method > 'a'",
+        "method == 1",
+        "force and 1",
+        "not force",
+        "True",
+        "force",
+        "force >",
+        "1 is 2",
+        "force\0 > 1",
+        "(" * 150 + "force",
+        "force > 1 " + "or force > 1 " * 40,
+        "",
+    ],
+)
+def test_an_expression_that_is_anything_else_is_refused(text: str) -> None:
+    with pytest.raises(Refusal, match="expected"):
+        expression(text, KINDS, TRUTH)
+
+
+@given(st.text(max_size=60))
+def test_no_text_is_an_expression_that_breaks(text: str) -> None:
+    try:
+        found = expression(text, KINDS, NUMBER)
+    except Refusal:
+        return
+    assert isinstance(found(dict.fromkeys(KINDS, 1.0)), float)
+
+
+@pytest.mark.parametrize(
+    ("block", "line", "said"),
+    [
+        ("sett = {}", 10, "left out or spelt as one of"),
+        ("\nset = { force = 99 }", 11, "force from -50 to 50"),
+        ("set = { send_udp = true }", 10, "the name of a setting"),
+        ("set = { theme = 'light' }", 10, "the name of a setting"),
+        ("set = { functions_x = 2.5 }", 10, "whole number"),
+        ("set = { functions_x = true }", 10, "from 1 to 64"),
+        ("set = { force = nan }", 10, "from -50 to 50"),
+        ("set = { dead_elements = [-1] }", 10, "a list of elements"),
+        ("scene = '../secret'", 10, "one of bolt"),
+        ("point = ['nowhere']", 10, "settings by their names"),
+        (f"{ASK}number = 1\ntolerance = 0", 14, "a number above zero"),
+        (f"{ASK}number = 'method'\ntolerance = 1", 13, "which comes to a word"),
+        (f"{ASK}number = 1\ntolerance = 1\nunit = 'furlong'", 15, "one of m, mm"),
+        (f"{ASK}choices = ['a']\nright = 1", 13, "2 to 6 answers"),
+        (f"{ASK}choices = ['a', 'b']\nright = 3", 14, "from 1 to 2"),
+        (f"{ASK}choices = ['a', 'b']\nright = 1\nunit = 'mm'", 15, "only choices, right"),
+        (f"{ASK}check = 'force'", 13, "yes or no"),
+        (ASK, 10, "one of choices, number or check"),
+        ("hint = 'h'", 10, "one of choices, number or check"),
+        ("question = 1", 10, "one of choices"),
+        ("set = 1 2", 10, "a mistake"),
+        ("button = [1]", 10, "a table"),
+    ],
+)
+def test_a_mistake_is_told_with_its_line(block: str, line: int, said: str) -> None:
+    with pytest.raises(Refusal, match="expected") as refused:
+        lesson(block)
+    assert str(refused.value).startswith(f"x, line {line}: ")
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "line 1: expected a head"),
+        (HEAD.replace("1", "2", 1), "line 2: expected format to be 1"),
+        (HEAD, "1 to 40 steps"),
+        (HEAD + "Hello\n## One\nText", "before any text"),
+        (HEAD + "## One\n", "a text of 1 to"),
+        (HEAD + "## One\nA\n```toml\n```\n```toml\n```\n", "one block"),
+        (HEAD + "## One\nA\n```toml\nset = {}", "closed by"),
+        (HEAD + "## One\nA\n" * 41, "1 to 40 steps"),
+        (HEAD.replace("5", '"5"') + "## One\nA", "line 4: expected minutes to be a whole number"),
+    ],
+)
+def test_a_text_that_is_no_lesson_is_refused(text: str, said: str) -> None:
+    with pytest.raises(Refusal, match="expected") as refused:
+        lesson_of(text, "x")
+    assert said in str(refused.value)
+
+
+def test_a_file_that_is_too_large_or_not_there_is_refused(tmp_path: Path) -> None:
+    large = tmp_path / "large.md"
+    large.write_bytes(b"a" * 300_000)
+    for file, said in ((large, "at most"), (tmp_path / "none.md", "none.md"), (tmp_path, "none")):
+        with pytest.raises(Refusal, match=said):
+            read_lesson(file)
+
+
+@pytest.mark.parametrize("name", sorted(SETTABLE))
+def test_a_lesson_may_say_of_a_setting_what_a_person_may(name: str) -> None:
+    usual, how = getattr(Settings(), name), ask_of(name)
+    said = list(usual) if isinstance(usual, tuple) else usual
+    assert checked_setting(name, said) == usual
+    if isinstance(how, Range):
+        assert checked_setting(name, how.most) == how.most
+    for wrong in ("no such", [1], None, 1e99):
+        with pytest.raises(Refusal):
+            checked_setting(name, wrong)
+
+
+def test_a_shape_brings_its_size_and_what_is_said_goes_before() -> None:
+    sets = whole({"shape": "strip", "side_y": 0.01})
+    assert sets["base_radius"] == 0.0129
+    assert sets["side_y"] == 0.01
+    assert sets["exaggeration"] == 30.0
+    assert whole({"scene": "coin"})["written"].file.stem == "coin"
+    assert whole({"scene": "coin", "functions_x": 3})["functions_x"] == 3
+
+
+def test_a_number_is_right_within_its_tolerance_in_its_unit() -> None:
+    question = lesson(f"{ASK}number = 'force * 0.01'\ntolerance = 0.0001\nunit = 'mm'").steps[0]
+    for text, right in (("2", True), ("2,09", True), ("1.91", True), ("2.2", False), ("-2", False)):
+        assert judged(question.question, text, FIGURES, Answer()).right is right
+    for text in ("", "two", "nan", "inf"):
+        with pytest.raises(Refusal, match="number"):
+            judged(question.question, text, FIGURES, Answer())
+
+
+def test_nothing_is_judged_by_a_number_that_is_not_there() -> None:
+    question = lesson(f"{ASK}number = 'noise'\ntolerance = 1").steps[0].question
+    assert isinstance(question.how, Number)
+    with pytest.raises(Refusal, match="wait"):
+        judged(question, "1", FIGURES, Answer())
+
+
+def test_a_minus_may_be_a_real_one() -> None:
+    assert number_in(" \N{MINUS SIGN}0,53 ") == -0.53
+
+
+def test_two_wrong_answers_are_explained_and_then_nothing_is_judged_any_more() -> None:
+    progress = Progress(lesson(f"{ASK}choices = ['a', 'b']\nright = 2"))
+    assert progress.rows() == [("One", "Q?", "", "not answered")]
+    for told in (False, True, True):
+        progress.give("0", FIGURES)
+        assert progress.answer.told is told
+    progress.give("1", FIGURES)
+    assert progress.rows() == [("One", "Q?", "a", "explained")]
+    progress.go(5)
+    assert progress.at_end
+    assert progress.describe() == "done, 0 of 1 right"
+
+
+def test_a_step_without_settings_begins_with_those_of_one_before() -> None:
+    read = lesson_of(HEAD + "## A\nT\n```toml\nset = { force = 0.1 }\n```\n## B\nT\n## C\nT\n", "x")
+    assert [step.sets for step in read.steps] == [{"force": 0.1}, None, None]
+    assert read.begins(2) == {"force": 0.1}
+
+
+def test_the_guide_tells_of_all_there_is_and_its_example_is_a_lesson() -> None:
+    guide = READY[0].with_name("README.md").read_text("utf-8")
+    for name in (*FIGURES_SEEN, *SETTABLE, *DOCKS):
+        assert f"`{name}`" in guide
+    for unit in filter(None, UNITS):
+        assert unit in guide
+    lines = guide.split("    +++", 1)[1].split("\nEach step", 1)[0]
+    example = lesson_of(textwrap.dedent("    +++" + lines), "example")
+    assert example.steps[0].question is not None
+
+
+def test_windows_line_ends_are_read_too() -> None:
+    text = f"{HEAD}## One\nText\n```toml\nset = {{ force = 0.1 }}\n```\n"
+    assert lesson_of(text.replace("\n", "\r\n"), "x") == lesson_of(text, "x")
+
+
+def test_figures_without_an_estimate_are_settings_and_nothing_else() -> None:
+    from kappaskin import Status
+
+    found = Watch().figures(Settings(), Status(), None)
+    assert set(found) == set(KINDS)
+    assert found["functions_x"] == 8.0
+    assert math.isnan(found["error_rms"])

@@ -1,0 +1,203 @@
+"""Every lesson played through on the window, and what the panel says meanwhile."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QDockWidget, QFileDialog
+
+from kappaskin_app.lessons.lesson import UNITS, Choice, Number, Question, Task
+from kappaskin_app.lessons.progress import DONE
+from kappaskin_app.lessons.reading import DOCKS, READOUTS
+from kappaskin_app.lessons.setting import SETTABLE
+from kappaskin_app.window import MainWindow
+
+
+def take(window: MainWindow, name: str) -> None:
+    if not window.lesson.isVisible():
+        window.actions_by_name["dock-lesson"].trigger()
+    window.teaching.take(next(file for file in window.teaching.taken if name in file))
+
+
+def number_seen(window: MainWindow, how: Number) -> float:
+    return float(how.expected(window.teaching.figures()))
+
+
+def given(window: MainWindow, how: Choice | Number | Task, right: bool) -> str:
+    """What a person gives as a right answer, or as a wrong one."""
+    if isinstance(how, Choice):
+        return str(how.right if right else (how.right + 1) % len(how.options))
+    if isinstance(how, Number):
+        off = 0.0 if right else 20 * how.tolerance
+        return repr((number_seen(window, how) + off) / UNITS[how.unit])
+    return DONE
+
+
+def answer_wrongly_then_rightly(window: MainWindow, question: Question, until) -> None:
+    teaching, how = window.teaching, question.how
+    feedback = window.lesson.step.asking.feedback
+    if isinstance(how, Number):
+        until(lambda: math.isfinite(number_seen(window, how)))
+    if isinstance(how, Task):
+        until(lambda: not how.check(teaching.figures()))
+    teaching.answer(given(window, how, right=False))
+    assert not teaching.progress.answer.right
+    assert question.hint in feedback.text()
+    if isinstance(how, Task):
+        teaching.show_how()
+        until(lambda: how.check(teaching.figures()))
+    teaching.answer(given(window, how, right=True))
+    assert teaching.progress.answer.right
+    assert question.explain in feedback.text()
+
+
+def play(window: MainWindow, name: str, until) -> None:
+    take(window, name)
+    progress = window.teaching.progress
+    for number, step in enumerate(progress.lesson.steps):
+        window.teaching.go(number)
+        assert window.lesson.step.title.text() == step.title
+        for target in [window.pointing.targets(place)[0] for place in step.point]:
+            assert target.isVisible(), (name, step.title)
+        assert [ring.isVisible() for ring in window.pointing.rings] == [True] * len(step.point)
+        for button in range(len(step.buttons)):
+            window.teaching.press(button)
+        if step.question is not None:
+            answer_wrongly_then_rightly(window, step.question, until)
+        assert not window.session.refusal, (name, step.title)
+    window.teaching.go(len(progress.lesson.steps))
+    assert progress.describe().startswith("done")
+    assert {row[3] for row in progress.rows()} == {"right at try 2"}
+
+
+def test_every_lesson_can_be_played_through(window: MainWindow, until) -> None:
+    before = window.history.settings
+    window.teaching.look()
+    assert len(window.teaching.taken) >= 11
+    for name in list(window.teaching.taken):
+        play(window, name, until)
+        window.teaching.leave()
+        assert window.history.settings == before, name
+    below = [window.findChild(QDockWidget, name) for name in DOCKS[1:]]
+    assert all(dock.isHidden() for dock in below)
+
+
+def test_steps_are_undone_one_by_one_and_back_gives_them_again(window: MainWindow) -> None:
+    history, teaching = window.history, window.teaching
+    before = history.settings
+    take(window, "03-why-sines")
+    first = history.settings
+    for number in range(1, 6):
+        teaching.go(number)
+    assert history.settings.functions_x == 8
+    teaching.go(4)
+    assert history.settings.functions_x == 2
+    teaching.go(0)
+    assert history.settings == first
+    while history.stack.canUndo():
+        history.stack.undo()
+    assert history.settings == before
+
+
+def test_settings_and_source_from_before_come_back_and_a_theme_stays(window: MainWindow) -> None:
+    window.panels.connection.connect_wanted.emit("/dev/none")
+    window.history.change("Mine", -1, functions_x=5, noise_seed=7)
+    mine = window.history.settings
+    take(window, "07-silent-mode")
+    assert window.history.settings.functions_x == 8
+    assert window.session.source == "sim:"
+    window.wishes.switch_theme()
+    window.lesson.leave.click()
+    assert window.history.settings == replace(mine, theme="light")
+    assert window.session.source == "/dev/none"
+    assert window.lesson.list.isVisible()
+    assert not window.pointing.rings
+
+
+def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindow, qtbot) -> None:
+    window.actions_by_name["dock-lesson"].trigger()
+    lessons = window.lesson.list.list
+    lessons.setFocus()
+    qtbot.keyClick(lessons, Qt.Key.Key_Return)
+    window.lesson.next.setFocus()
+    qtbot.keyClick(window.lesson.next, Qt.Key.Key_Space)
+    asking = window.lesson.step.asking
+    for typed, said in (("much", "Type a number"), ("2", "Not so."), ("20", "Right.")):
+        asking.number.clear()
+        qtbot.keyClicks(asking.number, typed)
+        qtbot.keyClick(asking.number, Qt.Key.Key_Return)
+        assert asking.feedback.text().startswith(said)
+    assert not asking.check.isEnabled()
+    assert window.teaching.progress.answer.outcome() == "right at try 2"
+
+
+def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWindow, until) -> None:
+    take(window, "04-how-many-functions")
+    until(lambda: window.teaching.figures()["error_rms"] > 1e-5)
+    asking = window.lesson.step.asking
+    for _ in range(2):
+        asking.check.click()
+    assert "makes the dent a little sharper" in asking.feedback.text()
+    assert asking.show_how.isVisible()
+    asking.show_how.click()
+    assert window.history.settings.functions_x == 6
+    window.teaching.go(3)
+    window.teaching.leave()
+    window.lesson.list.list.setCurrentRow(3)
+    assert "step 4 of 7" in window.lesson.list.about.text()
+    window.lesson.list.begin.click()
+    assert window.teaching.progress.step == 3
+    window.teaching.go(0)
+    assert "makes the dent a little sharper" in window.lesson.step.asking.feedback.text()
+
+
+def test_what_is_said_to_an_answer_is_scrolled_to(window: MainWindow, until) -> None:
+    take(window, "07-silent-mode")
+    window.teaching.go(4)
+    until(lambda: window.teaching.figures()["silent"] == 0)
+    asking = window.lesson.step.asking
+    assert asking.feedback.visibleRegion().isEmpty()
+    window.teaching.answer("5")
+    until(lambda: not asking.feedback.visibleRegion().isEmpty())
+
+
+def test_the_figure_holds_the_name_and_the_window(
+    window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    take(window, "01-curvature-gage")
+    window.teaching.answer("1")
+    window.teaching.go(99)
+    window.lesson.end.name.setText("Ada <Lovelace>")
+    files = {end: tmp_path / f"figure.{end}" for end in ("png", "svg")}
+    for file in files.values():
+        monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, file=file: (str(file), ""))
+        window.lesson.end.save.click()
+    picture = QImage(str(files["png"]))
+    assert picture.text("Title") == "What a curvature gage feels"
+    assert picture.text("Description").startswith("Ada <Lovelace>: kappaskin ")
+    assert picture.width() == 1000
+    assert picture.height() > 600
+    drawing = files["svg"].read_text("utf-8")
+    assert "Ada &lt;Lovelace&gt;" in drawing
+    assert "Under the arrow" in drawing
+
+
+def test_whatever_a_lesson_may_point_at_is_in_the_window_and_own_ones_are_taken(
+    window: MainWindow, tmp_path: Path
+) -> None:
+    for place in (*DOCKS, *READOUTS, *SETTABLE):
+        assert window.pointing.targets(place)
+    file = tmp_path / "own.md"
+    head = '+++\nformat = 1\ntitle = "Mine"\nminutes = 3\nlearn = "It."\n+++\n'
+    file.write_text(head + "## One\nText.\n```toml\nset = { functions_x = 99 }\n```\n")
+    window.teaching.open_file(file)
+    window.actions_by_name["dock-lesson"].trigger()
+    assert window.lesson.list.message.isVisible()
+    assert window.lesson.list.message.text().startswith("own.md, line 10: ")
+    assert "functions_x from 1 to 64" in window.lesson.list.message.text()
+    file.write_text(head + "## One\nText.\n```toml\nset = { functions_x = 9 }\n```\n")
+    window.teaching.open_file(file)
+    assert window.history.settings.functions_x == 9
