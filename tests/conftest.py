@@ -137,6 +137,7 @@ _NO_WINDOW = (
     "scale",
     "scene_picture",
     "scene_text",
+    "settings_text",
     "simulation",
 )
 """Of the app's tests, files that open no window."""

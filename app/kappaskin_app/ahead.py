@@ -26,6 +26,10 @@ class Ahead:
             self._job = self._pool.submit(scene_of, settings)
         return self._job is None
 
+    @property
+    def busy(self) -> bool:
+        return self._job is not None
+
     def finished(self) -> bool:
         """Whether what was begun is finished; true once."""
         if self._job is None or not self._job.done():

@@ -1,10 +1,27 @@
-"""Widgets one below the other, as the docks beside the skin hold them."""
+"""Widgets one below the other, as the docks beside the skin hold them, or beside each other."""
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QDockWidget,
+    QHBoxLayout,
+    QMainWindow,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
 
 _LOWEST = 240  # px of what is below the skin
+
+
+def row(*widgets: QWidget) -> QWidget:
+    """The widgets beside each other, as wide as they like to be."""
+    whole = QWidget()
+    beside = QHBoxLayout(whole)
+    beside.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        beside.addWidget(widget)
+    return whole
 
 
 def scrolled(*widgets: QWidget) -> QScrollArea:
@@ -14,14 +31,32 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
         stack.addWidget(widget)
     stack.addStretch(1)
     whole.setLayout(stack)
-    area = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
+    area = _Scrolled()
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # a stop on the way of Tab that nobody sees
     area.setFrameShape(QScrollArea.Shape.NoFrame)
     area.setWidget(whole)
-    bar = area.verticalScrollBar().sizeHint().width()
-    area.setMinimumWidth(whole.minimumSizeHint().width() + bar)
+    area.widen()
     return area
+
+
+class _Scrolled(QScrollArea):
+    """As wide as what is in it needs with the letters of now."""
+
+    def __init__(self) -> None:
+        super().__init__(widgetResizable=True)  # pyright: ignore[reportCallIssue]
+        self._letters = -1.0
+
+    def widen(self) -> None:
+        self._letters = self.font().pointSizeF()
+        bar = self.verticalScrollBar().sizeHint().width()
+        self.setMinimumWidth(self.widget().minimumSizeHint().width() + bar)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        laid_out = event.type() == QEvent.Type.LayoutRequest
+        if laid_out and self.widget() and self._letters != self.font().pointSizeF():
+            self.widen()
+        return super().eventFilter(watched, event)
 
 
 def scroll_to(widget: QWidget) -> None:

@@ -136,6 +136,12 @@ class Costing(QObject):
         while self._recent[0][0] < now - _SMOOTHED:
             self._recent.popleft()
 
+    def cancel(self) -> None:
+        """Measure no more, until that is asked for again."""
+        self._stop()
+        self.refusal = "Cancelled; Measure begins anew."
+        self.changed.emit()
+
     def choose(self, cost: Cost) -> None:
         """Switch to the setting of `cost`."""
         self._wishes.take(cost.setting)

@@ -133,7 +133,7 @@ class Display(QObject):
         if status.sensor is not None and status.meetings != self._met:
             self._meet(status)
         state = self._session.badge()
-        self.badge.show_state(state)
+        self.badge.show_state(state, status.recording.active)
         self.membrane.alarm.show(self._session.alarm() if self.alarming else "")
         self.old = lost = state in _OLD
         for view in (self.membrane, *self.heatmaps.values()):

@@ -20,6 +20,13 @@ def forget(listener: Callable[[str], None]) -> None:
         _listeners.remove(listener)
 
 
+def failed(error: Exception, where: object) -> None:
+    """Log an exception, and tell of it."""
+    log.error("in %s", where, exc_info=error)
+    for listener in list(_listeners):
+        listener(f"Something went wrong: {error or type(error).__name__}")
+
+
 def guarded(slot: Callable[..., Any]) -> Callable[..., Any]:
     """`slot`, with whatever it raises logged and told rather than lost in Qt or fatal."""
 
@@ -28,9 +35,7 @@ def guarded(slot: Callable[..., Any]) -> Callable[..., Any]:
         try:
             return slot(*arguments)
         except Exception as error:  # a slot has no caller that could do better
-            log.exception("in %s", getattr(slot, "__qualname__", slot))
-            for listener in list(_listeners):
-                listener(f"Something went wrong: {error}")
+            failed(error, getattr(slot, "__qualname__", slot))
             return None
 
     return safe

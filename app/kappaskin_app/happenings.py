@@ -53,9 +53,16 @@ class Happenings(QDialog):
         if status.happened == self._happened or not new:
             return
         self._happened = status.happened
-        self._lines.extendleft(line for line in _lines(new))
-        self.list.setPlainText("\n".join(self._lines))
+        self._add(new)
         self.told.emit("; ".join(dict.fromkeys(_sentence(event.text) for event in new[-2:])))
+
+    def note(self, kind: str, text: str) -> None:
+        """Take up something that no device told."""
+        self._add([Event(time.monotonic(), kind, text)])
+
+    def _add(self, events: Sequence[Event]) -> None:
+        self._lines.extendleft(line for line in _lines(events))
+        self.list.setPlainText("\n".join(self._lines))
 
     def open_list(self) -> None:
         self.show()

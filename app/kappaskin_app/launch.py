@@ -1,5 +1,6 @@
 """Starts the engine, Qt and the window, and ends them in order."""
 
+import logging
 import os
 import signal
 import sys
@@ -12,8 +13,11 @@ from kappaskin import Engine, Refusal, orphans_folder
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
+    from kappaskin_app.logbook import Logbook
+    from kappaskin_app.recovering import Recovering
     from kappaskin_app.window import MainWindow
 
+log = logging.getLogger("kappaskin")
 
 _BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want a core
 
@@ -75,11 +79,13 @@ def launch(
     asked: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: asked.append(got))
+    logbook = _logbook()
     application, window = opened(source)
     if seconds is None:  # what a script opens is the same whatever was before
         from kappaskin_app.layouts.file import config_file
 
         window.keeping.begin(config_file())
+    recovering = _recovering(window)
     if presenting and not window.session.engine.adopted:
         window.presenting.enter()
     from PySide6.QtCore import QTimer
@@ -97,5 +103,30 @@ def launch(
     if seconds is not None:
         QTimer.singleShot(round(seconds * 1e3), end)
     application.exec()
+    for kept in (recovering, logbook):
+        if kept is not None:
+            kept.close()
     if saved == [False]:
         raise Refusal(f"{screenshot}: the picture cannot be written; choose another place")
+
+
+def _logbook() -> "Logbook | None":
+    """What goes wrong to files, or nothing where none can be written."""
+    from kappaskin_app.logbook import Logbook, log_folder
+
+    try:
+        return Logbook(log_folder())
+    except OSError as error:
+        log.warning("no log is written: %s", error)
+        return None
+
+
+def _recovering(window: "MainWindow") -> "Recovering | None":
+    """What helps the next window after a crash of this one, or nothing where it cannot be kept."""
+    from kappaskin_app.recovering import Recovering, state_folder
+
+    try:
+        return Recovering(window, state_folder())
+    except OSError as error:
+        log.warning("what this window is at is not kept: %s", error)
+        return None

@@ -43,6 +43,7 @@ class Menus(QObject):
         self._add_export()
         self.sheet = CheatSheet(self.actions, window)
         self.actions.add("shortcuts", _HELP, "&Shortcuts", self.sheet.open_all, "F1", _SHEET)
+        window.mishaps.add_actions(self.actions, _HELP)
 
     def _add_file(self) -> None:
         add, window = self.actions.add, self._window

@@ -38,13 +38,13 @@ class Naming(QObject):
         self._busy: Future[tuple[str, ContactObject, Estimate]] | None = None
         self._key: tuple[int, str] | None = None
         self._finder: ObjectFinder | str = ""
-        self._learning = False
+        self.learning = False
 
     def look(self, status: Status, estimate: Estimate | None) -> None:
         """Take up what was named, and the next estimate to be named."""
         if self._busy is not None:
             if not self._busy.done():
-                if self._learning:
+                if self.learning:
                     self.named.emit(_LEARNING)
                 return
             # Forgotten first: what failed once is told once, and the next estimate is named.
@@ -72,13 +72,13 @@ class Naming(QObject):
             return
         key = status.meetings, status.setup.edge or sensor.edge
         if key != self._key:
-            self._key, self._learning = key, True
+            self._key, self.learning = key, True
             try:
                 self._finder = ObjectFinder(sensor.plate, sensor.layout, key[1])
             except Refusal as refusal:
                 self._finder = str(refusal)
             finally:
-                self._learning = False
+                self.learning = False
 
     def close(self) -> None:
         self._thread.shutdown(wait=True, cancel_futures=True)

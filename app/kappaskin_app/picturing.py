@@ -56,6 +56,10 @@ class Picturing(QObject):
         if not self._closed:
             self._timer.start(after)
 
+    @property
+    def busy(self) -> bool:
+        return self._timer.isActive()
+
     def rest(self) -> None:
         """Begin nothing more until something is to be painted."""
         self._timer.stop()

@@ -35,6 +35,8 @@ class Planning(QObject):
         """Plan while somebody looks, and only then."""
         self._watched = watched
         if watched:
+            if self.refusal:
+                self.scene = None  # it may have been cancelled: begin anew
             self.follow(self._session.status)
         elif self._measuring is not None:
             self._end(self._measuring)
@@ -50,6 +52,12 @@ class Planning(QObject):
             self.scene, self.refusal = self._session.scene, ""
             self._measuring = Beside("kappaskin-plan", plan_told, self.scene)
             self.changed.emit()
+
+    def cancel(self) -> None:
+        """Plan this scene no more, until somebody looks again."""
+        if self._measuring is not None:
+            self.rows, self.refusal = [], "Cancelled; it is planned when this is shown again."
+            self._end(self._measuring)
 
     def close(self) -> None:
         self.watch(False)

@@ -16,7 +16,7 @@ from kappaskin_app.session import Session
 from kappaskin_app.sound import Sound
 from kappaskin_app.theme import Theme
 from kappaskin_app.touching import touches_at
-from kappaskin_app.views.badge import SIM
+from kappaskin_app.views.badge import SIM, origin
 from kappaskin_app.views.banner import REMEDIES
 from kappaskin_app.views.pad import Hand
 from kappaskin_app.views.stage import Stage
@@ -112,7 +112,7 @@ class Presenting(QObject):
         window = self._window
         docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
         bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-        return [*docks, *bars, window.menuBar(), window.statusBar()]
+        return [*docks, *bars, window.offer, window.menuBar(), window.statusBar()]
 
     # What comes in.
 
@@ -157,7 +157,7 @@ class Presenting(QObject):
     def _show_hand(self) -> None:
         """Show where the simulated hand is, if there is one."""
         session = self._session
-        scene, inside = session.scene, session.inside and session.badge() == SIM
+        scene, inside = session.scene, session.inside and origin(session.badge()) == SIM
         there = touches_at(scene, session.time) if inside else []
         self.stage.show_operating(bool(there) or (inside and self.stage.operator.pad.holding))
         if there:

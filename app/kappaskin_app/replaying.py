@@ -122,6 +122,16 @@ class Replaying(QObject):
         self._looking = self._thread.submit(seen, path), path, connects
         QTimer.singleShot(_LOOK, self, guarded(self._take))
 
+    @property
+    def reading(self) -> bool:
+        """Whether a file is looked into."""
+        return self._looking is not None
+
+    def stop_reading(self) -> None:
+        """Play what was played before instead."""
+        self._looking = None
+        self.told.emit("Cancelled; it is not opened")
+
     def _take(self) -> None:
         if self._looking is None:
             return

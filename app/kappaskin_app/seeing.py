@@ -155,6 +155,15 @@ class Seeing(QObject):
             else:
                 self._show(None, f"Shown for up to {MOST} functions.")
 
+    @property
+    def computing(self) -> bool:
+        return self._job is not None and not self._job.done()
+
+    def cancel(self) -> None:
+        """Wait no more for what is computed."""
+        self._job = None
+        self._show(None, "Cancelled; another basis or edge is computed again.")
+
     def choose(self, number: int) -> None:
         """Look at the shape `number`, from 1."""
         if self.spectrum is not None and 1 <= number <= len(self.spectrum.values):

@@ -18,7 +18,6 @@ from kappaskin import (
     Presentation,
     Refusal,
     Region,
-    Replay,
     Scene,
     Sensor,
     Setup,
@@ -32,11 +31,10 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.settings import Scanning, SceneSettings, Sending, Settings, Written, part
 from kappaskin_app.simulation import named, played, region_of, scene_of
-from kappaskin_app.views.badge import GAP, LIVE, LOST, OFF, PAUSED, REPLAY, SIM, STALE, WAITING
+from kappaskin_app.states import state_of
 
 RECORDED = "replay:"
 """What the name of a source begins with that is a recording."""
-STALE_AFTER = 0.5  # s without a frame
 _TICK = 4  # ms between two looks for a new estimate
 _ARRIVES = 0.3  # s after which what was asked of the engine shows in its status
 _LATE = 1.2  # times as long as the lists take, for what comes late
@@ -73,14 +71,6 @@ def _turn(region: Region) -> float:
     if region.around not in ("elements", "skin") or not region.share:
         return 0.0
     return _LATE / (LISTS * region.share)
-
-
-def _replayed(replay: Replay) -> str:
-    """What is true of a recording."""
-    if any(begin < replay.at < end for begin, end in replay.gaps):
-        return GAP
-    over = replay.at >= replay.length and not replay.looped
-    return PAUSED if over or not replay.speed else REPLAY
 
 
 class Session(QObject):
@@ -141,6 +131,11 @@ class Session(QObject):
     def simulating(self) -> bool:
         """Whether the loads and the noise are the panels' to choose: not in a written scene."""
         return self.inside and self._history.settings.written is None
+
+    @property
+    def making(self) -> bool:
+        """Whether the scene that is asked for is still being made."""
+        return self._ahead.busy
 
     @property
     def replaying(self) -> bool:
@@ -342,21 +337,10 @@ class Session(QObject):
         return others[-1][:1].upper() + others[-1][1:] if others else ""
 
     def badge(self) -> str:
-        """The one word that is true now."""
-        status, now = self.status, time.monotonic()
-        if status.state == "off":
-            return OFF
-        if self._lost:
-            return LOST
-        waits = status.state == "waiting" and status.replay is None
-        if waits or (status.computing and self.estimate is None):
-            return WAITING
-        if status.replay is not None:
-            return _replayed(status.replay)
-        last = max(status.last_frame, self.estimate.host_time if self.estimate else 0.0)
-        if status.sensor is None or now - last > STALE_AFTER:
-            return WAITING if status.computing else STALE
-        return SIM if status.sensor.simulated else LIVE
+        """The word that is true now, and the gravest of what is true besides."""
+        computed = None if self.estimate is None else self.estimate.host_time
+        paused = self.inside and not self.running
+        return state_of(self.status, computed, time.monotonic(), paused)
 
     def close(self) -> None:
         self._timer.stop()

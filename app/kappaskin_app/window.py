@@ -16,14 +16,14 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import Engine, Status, Tares, data_folder
-from kappaskin_app import guard
 from kappaskin_app.adopting import Entrusting, settings_left
 from kappaskin_app.calibrating import Calibrating
-from kappaskin_app.columns import widen
+from kappaskin_app.columns import row, widen
 from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
 from kappaskin_app.display import Display
 from kappaskin_app.docks import Docks
+from kappaskin_app.doing import Doing, tasks_of
 from kappaskin_app.drops import Drops
 from kappaskin_app.exports import Exports
 from kappaskin_app.guard import guarded
@@ -37,6 +37,7 @@ from kappaskin_app.lessons.teaching import Teaching
 from kappaskin_app.looking import Looking
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.menus import Menus
+from kappaskin_app.mishaps import Mishaps
 from kappaskin_app.naming import Naming
 from kappaskin_app.opening import Opening
 from kappaskin_app.panels.compare import ComparePanel
@@ -44,6 +45,7 @@ from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.lesson import LessonPanel
+from kappaskin_app.panels.numbers import NumbersPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
 from kappaskin_app.panels.stability import StabilityPanel
@@ -59,8 +61,10 @@ from kappaskin_app.simulation import settings_for
 from kappaskin_app.staging import Staging
 from kappaskin_app.taping import Taping
 from kappaskin_app.taring import Taring
-from kappaskin_app.theme import THEMES, palette
+from kappaskin_app.theme import THEMES, letters, palette
+from kappaskin_app.views.activity import Activity
 from kappaskin_app.views.line import Line
+from kappaskin_app.views.offer import Offer
 from kappaskin_app.views.recording_mark import RecordingMark
 from kappaskin_app.views.stage import Stage
 from kappaskin_app.views.timeline import Timeline
@@ -68,6 +72,7 @@ from kappaskin_app.views.transport import Transport
 from kappaskin_app.wishes import Wishes
 
 _WORDS = 1.0  # s between two looks at what touches the skin: as fast as one can read
+_PACKED = 80  # of a picture: packs a fifth less well than Qt does, in half the time
 _BARGAIN = 1.0  # s between two looks at what a region buys
 
 
@@ -95,9 +100,11 @@ class MainWindow(QMainWindow):
         self.planning = Planning(self.session, self)
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
         self.health, self.testing = HealthPanel(), MapTesting(self)
+        self.numbers = NumbersPanel()
         self.compare = ComparePanel()
         self.comparing = Comparing(self.history, self.session, self)
         self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
+        self.offer = Offer()
         self.taping = Taping(self.session.engine, self)
         self.replaying = Replaying(self.history, self.session, self.transport, self)
         self.staging = Staging(
@@ -119,6 +126,11 @@ class MainWindow(QMainWindow):
             "probability; and the principal curvatures of the skin at the contact."
         )
         self.statusBar().addPermanentWidget(self.object, 1)
+        self.activity, self.mishaps = Activity(), Mishaps(self)
+        foot = row(self.activity, self.mishaps.count)
+        # As high from the start: a bar that grows shows all again that a message hides.
+        foot.setMinimumHeight(max(w.sizeHint().height() for w in (foot, self.mishaps.count)))
+        self.statusBar().addPermanentWidget(foot)
         # What it takes of the bar, all that the rest leaves, a passing message needs.
         self.statusBar().messageChanged.connect(lambda text: self.object.setHidden(bool(text)))
         stage = Stage(self._centre())
@@ -126,23 +138,23 @@ class MainWindow(QMainWindow):
         self.presenting = Presenting(self, stage, self.session, self.display, self.wishes)
         self._make_header()
         self.lesson = LessonPanel()
-        self.docks = self._surround()
+        self.docks, self.naming = self._surround(), Naming(self)
         self.exports = Exports(self.session, self.membrane, self)
         self.teaching = Teaching(
             *(self.history, self.session, self.seeing, self),
-            *(self._connect, self._seen, self.exports.caption),
+            *(self.connect_to, self._seen, self.exports.caption),
         )
         self.pointing = self._pointing()
         self.looking = Looking(self.history, self.wishes, self.display)
         self.layouts = Layouts(self)
         self.menus, self.keeping = Menus(self), Keeping(self)
         self.actions_by_name = self.menus.actions
+        self.doing = Doing(tasks_of(self), self)
         self._wire()
         self._follow(self.history.settings)
         self.plugs.look()
         self.resize(1280, 800)
         self.panels.connection.show_source(source)
-        self.naming = Naming(self)
         self.naming.named.connect(guarded(self.object.show_text))
         self.naming.found.connect(guarded(self.presenting.find))
         self.naming.found.connect(guarded(lambda what, _: self.display.overlays.find(what)))
@@ -162,6 +174,7 @@ class MainWindow(QMainWindow):
             layout.setSpacing(0)
         beside.addWidget(self.membrane, 1)
         beside.addWidget(self.display.scale)
+        above.addWidget(self.offer)
         above.addLayout(beside, 1)
         above.addWidget(self.timeline)
         above.addWidget(self.transport)
@@ -188,6 +201,7 @@ class MainWindow(QMainWindow):
         docks.put_below("stability", "Stability", self.stability, "F10")
         docks.put_below("scene", "Scene", self.scene, "F2")
         docks.put_below("health", "Health", self.health, "F3")
+        docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
         docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
         docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
         docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
@@ -202,7 +216,7 @@ class MainWindow(QMainWindow):
     def _wire(self) -> None:
         panels, wishes, session, drag = self.panels, self.wishes, self.session, self.membrane.drag
         panels.wished.connect(guarded(wishes.wish))
-        panels.connection.connect_wanted.connect(guarded(self._connect))
+        panels.connection.connect_wanted.connect(guarded(self.connect_to))
         panels.connection.disconnect_wanted.connect(guarded(session.disconnect_from))
         panels.connection.ports_wanted.connect(guarded(self.plugs.look))
         self.plugs.found.connect(guarded(panels.connection.show_ports))
@@ -266,7 +280,14 @@ class MainWindow(QMainWindow):
             heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
         self.picking.picked.connect(guarded(lambda _: self.docks.reveal("element")))
         self.display.scale.lock_wanted.connect(guarded(self._lock))
-        guard.on_failure(self.tell)
+        session.reported.connect(guarded(self.doing.follow))
+        self.doing.told.connect(guarded(self._show_work))
+        self.activity.cancel_wanted.connect(guarded(self.doing.cancel))
+
+    def _show_work(self, words: str) -> None:
+        """Show what takes long, and whether it can be ended."""
+        task = self.doing.task
+        self.activity.show_work(words, task is not None and task.cancel is not None)
 
     def _attend_recording(self) -> None:
         session, taping, replaying = self.session, self.taping, self.replaying
@@ -317,7 +338,8 @@ class MainWindow(QMainWindow):
 
     # Wishes that are no settings, or need what is shown.
 
-    def _connect(self, source: str) -> None:
+    def connect_to(self, source: str) -> None:
+        """Read from `source` from now on."""
         if self.replaying.takes(source):
             return
         self.panels.connection.show_source(source)
@@ -326,7 +348,7 @@ class MainWindow(QMainWindow):
     def simulate(self) -> None:
         """Simulate the panels' skin, whatever was read or written."""
         self.history.change("Simulated skin", -1, written=None)
-        self._connect("sim:")
+        self.connect_to("sim:")
 
     def pause(self) -> None:
         """Let what is played stand, or go on: a recording, or else a scene."""
@@ -334,7 +356,7 @@ class MainWindow(QMainWindow):
 
     def connect_chosen(self) -> None:
         """Connect what is named in the panel."""
-        self._connect(self.panels.connection.source())
+        self.connect_to(self.panels.connection.source())
 
     def _lock(self, locked: bool) -> None:
         limit = self.display.limit_shown() if locked else 0.0
@@ -350,10 +372,12 @@ class MainWindow(QMainWindow):
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.setPalette(palette(theme))
+            if (font := letters(settings.letters)) != application.font():
+                application.setFont(font)
         self.panels.show_theme(theme)
         self.cost.show_theme(theme)
         self.scene.show_theme(theme)
-        for view in (self.timeline, self.transport, self.mark):
+        for view in (self.timeline, self.transport, self.mark, self.offer, self.mishaps):
             view.show_theme(theme)
         self.stability.show_settings(settings)
         self.compare.show_settings(settings)
@@ -391,6 +415,8 @@ class MainWindow(QMainWindow):
         self.panels.show_status(status, simulating)
         self.stability.show_status(status, self.session.inside)
         self.health.show_status(status, self.session.inside)
+        shown = self.display.estimate_shown()
+        self.numbers.show_estimate(shown, status.sensor, self.object.text())
         self.compare.show_status(status, self.display.old)
 
     def _allow_tare(self) -> None:
@@ -413,7 +439,7 @@ class MainWindow(QMainWindow):
 
     def picture(self, path: Path) -> bool:
         """Save the window, 3-D picture included, as a PNG; whether it could be written."""
-        return self.grab().save(str(path), "PNG")
+        return self.grab().save(str(path), "PNG", _PACKED)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self.presenting.on:
@@ -436,8 +462,8 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         if not self.session.closed:
-            guard.forget(self.tell)
             self.keeping.write()
+            self.mishaps.close()
             self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
             self.exports.close()

@@ -52,7 +52,7 @@ class WorkDialog(QDialog):
         self._timer.setInterval(_POLL)
         self._timer.timeout.connect(guarded(self._follow))
         self.begin_button.clicked.connect(guarded(lambda *_: self._begin()))
-        self.cancel_button.clicked.connect(guarded(lambda *_: self._cancel()))
+        self.cancel_button.clicked.connect(guarded(lambda *_: self.cancel()))
 
     def _add_buttons(self) -> None:
         """Lay out what is below the form, once that is there: Tab goes from above to below."""
@@ -120,7 +120,8 @@ class WorkDialog(QDialog):
             self.bar.reset()
             self._end(str(refusal))
 
-    def _cancel(self) -> None:
+    def cancel(self) -> None:
+        """End what is at work, or close."""
         if self._going is None:
             self.reject()
         else:
@@ -140,7 +141,7 @@ class WorkDialog(QDialog):
 
     def done(self, result: int) -> None:
         if self.busy:
-            self._cancel()
+            self.cancel()
         super().done(result)
 
 

@@ -29,6 +29,7 @@ from kappaskin.calibration import load_calibration as load_calibration
 from kappaskin.calibration import radii_for as radii_for
 from kappaskin.calibration import save_calibration as save_calibration
 from kappaskin.calibration import schedule as schedule
+from kappaskin.doctor import examine as examine
 from kappaskin.effects import EFFECTS as EFFECTS
 from kappaskin.effects import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
 from kappaskin.effects import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS

@@ -45,6 +45,7 @@ class ConnectionPanel(Panel):
         self._next_losses = 0.0
         self.sources = QComboBox(editable=True, insertPolicy=QComboBox.InsertPolicy.NoInsert)  # pyright: ignore[reportCallIssue]
         self.sources.setObjectName("source")
+        self.sources.setAccessibleName("Source of readings")
         self.sources.setMinimumContentsLength(12)
         self.sources.currentTextChanged.connect(self._note_choice)
         # A port's name is at its beginning.

@@ -192,7 +192,7 @@ class GalleryPanel(QWidget):
         self._begin()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        self._picturing.rest()
+        self.rest()
         super().hideEvent(event)
 
     def event(self, event: QEvent) -> bool:
@@ -204,6 +204,15 @@ class GalleryPanel(QWidget):
         """End what makes the pictures, at most a picture later, and close."""
         self._picturing.close()
         return super().close()
+
+    @property
+    def painting(self) -> bool:
+        """Whether pictures are still to be made."""
+        return self._picturing.busy
+
+    def rest(self) -> None:
+        """Make no more pictures until it is shown again."""
+        self._picturing.rest()
 
     def _begin(self, after: int = 0) -> None:
         """Have what is missing made where it is seen, beginning `after` so many ms."""

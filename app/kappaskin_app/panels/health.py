@@ -54,6 +54,7 @@ class HealthPanel(QWidget):
     def _made_table(self) -> QTableWidget:
         table = QTableWidget(0, len(_COLUMNS))
         table.setObjectName("findings")
+        table.setAccessibleName("Channels that are found wanting")
         table.setToolTip(_TIP)
         table.setHorizontalHeaderLabels(_COLUMNS)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)

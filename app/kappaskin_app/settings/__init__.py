@@ -20,6 +20,7 @@ from kappaskin_app.settings.load import TABLE_1_CASES as TABLE_1_CASES
 from kappaskin_app.settings.load import TWO_ENDED as TWO_ENDED
 from kappaskin_app.settings.load import Load, Noise
 from kappaskin_app.settings.publishing import Sending as Sending
+from kappaskin_app.settings.reading import Reading
 from kappaskin_app.settings.scene import Own
 from kappaskin_app.settings.scene import Written as Written
 from kappaskin_app.settings.sensor import Electronics as Electronics
@@ -39,7 +40,7 @@ class SceneSettings(Skin, Load, Noise, Electronics, Spoils, Own):
 
 
 @dataclass(frozen=True)
-class Settings(SceneSettings, Fit, View, Scanning, Sending, Compared):
+class Settings(SceneSettings, Fit, View, Reading, Scanning, Sending, Compared):
     """Everything a person may change, in SI units; a change is a new `Settings`.
 
     `calibration` and `tare` are in use whenever the sensor that they are of is connected.

@@ -1,17 +1,19 @@
-"""One large word that always tells the truth about what is shown."""
+"""A large word that tells the truth about what is shown, and below it what else is true."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QMouseEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtGui import QFontInfo, QMouseEvent
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from kappaskin_app.theme import Theme
 
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
 _BESIDE = " \N{MIDDLE DOT} "  # parts a state from what more is true of it, below it
-REPLAY, PAUSED, GAP = "REPLAY", f"REPLAY{_BESIDE}paused", f"REPLAY{_BESIDE}gap"
+_GAP, _SATURATED, _PAUSED, _RECORDING = "gap", "saturated", "paused", "recording"
+REPLAY = "REPLAY"
+GAP = f"{REPLAY}{_BESIDE}{_GAP}"
 
-TIPS = {
+_TIPS = {
     LIVE: "Readings of a real sensor, as they come.",
     SIM: "Readings of a simulation, not of a real sensor.",
     WAITING: "Connecting, or computing what this skin needs: the first reading is still to come.",
@@ -20,12 +22,30 @@ TIPS = {
     "A device that comes back is gone on with by itself.",
     OFF: "Nothing is connected.",
     REPLAY: "A recording is played: what is shown was once so.",
-    PAUSED: "A recording stands still: what is shown was once so.",
-    GAP: "A recording, where nothing came for a while: what is shown is old.",
+    _GAP: "Nothing came for a while here: what is shown is old.",
+    _SATURATED: "Elements are at the end of what their electronics can tell: there the skin may be "
+    "bent more than is shown.",
+    _PAUSED: "It stands still until it is let go on: Ctrl+P.",
+    _RECORDING: "What comes in is being recorded.",
 }
 
-
+_WIDTH, _LARGE = 8.6, 1.54  # of the size of letters elsewhere
 _MORE = "Click it, or F4, to read what happened."
+
+
+def is_now(word: str, *, gap: bool = False, saturated: bool = False, paused: bool = False) -> str:
+    """The state of readings from where `word` says, with the gravest of what is true of them.
+
+    Where they come from is never left out: nobody may take a simulation for a skin. Below it, what
+    makes them old wins over what makes them wrong, and that over what makes them rest.
+    """
+    true = ((_GAP, gap), (_SATURATED, saturated), (_PAUSED, paused))
+    return _BESIDE.join([word, *[below for below, holds in true if holds][:1]])
+
+
+def origin(state: str) -> str:
+    """The state without what is true of it besides."""
+    return state.partition(_BESIDE)[0]
 
 
 class Badge(QLabel):
@@ -36,16 +56,18 @@ class Badge(QLabel):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.setFixedWidth(112)
         self._theme: Theme | None = None
-        self.state = ""
+        self.state, self._recording = "", False
 
-    def show_state(self, state: str) -> None:
-        if state != self.state:
-            self.state = state
-            self.setText(state.replace(_BESIDE, "\n"))
-            self.setAccessibleName(state)
-            self.setToolTip(f"{TIPS[state]}\n{_MORE}")
+    def show_state(self, state: str, recording: bool = False) -> None:
+        """Show a state; whether it is `recording` stands below it where nothing graver does."""
+        if (state, recording) != (self.state, self._recording):
+            self.state, self._recording = state, recording
+            also = [_RECORDING] if recording else []
+            parts = [*state.split(_BESIDE), *also]
+            self.setText("\n".join(parts[:2]))
+            self.setAccessibleName(", ".join(parts))
+            self.setToolTip("\n".join([*(_TIPS[part] for part in parts), _MORE]))
             self._paint()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -59,7 +81,9 @@ class Badge(QLabel):
     def _paint(self) -> None:
         if self._theme is None or not self.state:
             return
-        size, padding = (13, 0) if _BESIDE in self.state else (20, 4)
+        one = QFontInfo(QApplication.font()).pixelSize()  # not its own: that is what is set
+        self.setFixedWidth(round(_WIDTH * one))
+        size, padding = (one, 0) if "\n" in self.text() else (round(_LARGE * one), 4)
         self.setStyleSheet(
             f"background: {colour_of(self.state, self._theme)}; color: white; font-weight: 700;"
             f"font-size: {size}px; border-radius: 6px; padding: {padding}px;"
@@ -68,6 +92,9 @@ class Badge(QLabel):
 
 def colour_of(state: str, theme: Theme) -> str:
     """The ground on which a state is written in white."""
+    word, _, below = state.partition(_BESIDE)
+    if below in (_GAP, _SATURATED):
+        return theme.warning
     return {
         LIVE: theme.good,
         SIM: theme.simulated,
@@ -76,6 +103,4 @@ def colour_of(state: str, theme: Theme) -> str:
         LOST: theme.bad,
         OFF: theme.off,
         REPLAY: theme.replayed,
-        PAUSED: theme.replayed,
-        GAP: theme.warning,
-    }[state]
+    }[word]

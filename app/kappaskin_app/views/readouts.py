@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtGui import QFont
-from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+from PySide6.QtGui import QFont, QFontInfo
+from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QWidget
 
 from kappaskin import Estimate, Touch
 from kappaskin_app.theme import Theme
@@ -61,6 +61,7 @@ FIELDS = {
     "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
 }
 
+_SMALL = 0.85  # of a number's letters are those of its name
 _WIDTHS = {
     "contact": 13,
     "rate": 10,
@@ -180,5 +181,6 @@ class Readouts(QWidget):
         self._numbers[key].show_text(text)
 
     def show_theme(self, theme: Theme) -> None:
+        size = round(_SMALL * QFontInfo(QApplication.font()).pixelSize())
         for label in self._names:
-            label.setStyleSheet(f"color: {theme.faint}; font-size: 11px;")
+            label.setStyleSheet(f"color: {theme.faint}; font-size: {size}px;")

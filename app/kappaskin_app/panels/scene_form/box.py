@@ -100,6 +100,9 @@ class SectionBox(QGroupBox):
 
     def _editor(self, row: Row, small: bool = False) -> Editor:
         editor = editor_for(row, lambda value: self._wish(lambda t: row.changed(t, value)), small)
+        for number, stop in enumerate(editor.stops, 1):
+            which = f", {number} of {len(editor.stops)}" if len(editor.stops) > 1 else ""
+            stop.setAccessibleName(stop.accessibleName() or f"{row.how.label}{which}")
         self.editors[row.place] = editor
         self.stops += editor.stops
         return editor

@@ -1,0 +1,57 @@
+"""What the skin's picture shows, as tables of text: contact, what touches, every element."""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+
+from kappaskin import COMPONENTS, WHY, Estimate, Sensor
+
+FACTS = ("What", "Value", "95 % within", "Unit")
+ELEMENTS = ("Element", "x [mm]", "y [mm]", *(f"{name} [1/m]" for name in COMPONENTS), "Left out")
+
+Rows = list[tuple[str, ...]]
+
+
+def facts_of(estimate: Estimate, touches: str) -> Rows:
+    """The contact, what `touches` there in words, and how well the shape is known."""
+    touch = estimate.touch
+    (x, y), (x_95, y_95) = 1e3 * touch.position, 1e3 * touch.position_95
+    return [
+        ("Contact, x", _told(x, 2), _told(x_95, 2), "mm"),
+        ("Contact, y", _told(y, 2), _told(y_95, 2), "mm"),
+        ("Force", _told(1e3 * touch.force, 1), _told(1e3 * touch.force_95, 1), "mN"),
+        ("Depth", _told(1e3 * touch.displacement, 3), _told(1e3 * touch.displacement_95, 3), "mm"),
+        ("Noise of a reading", _told(estimate.noise, 3), "", "1/m"),
+        ("Touches", touches or "nothing known", "", ""),
+    ]
+
+
+def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:
+    """Where every element is, what it reads, and why it is left out."""
+    places = 1e3 * sensor.layout.positions
+    if estimate.curvature.shape[1] != len(places):
+        return []  # of the skin before
+    return [
+        (
+            str(number),
+            *(_told(value, 1) for value in place),
+            *(_told(value, 2) for value in estimate.curvature[:, number]),
+            WHY[estimate.suspect[number]],
+        )
+        for number, place in enumerate(places)
+    ]
+
+
+def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
+    """Tables of a head and rows each as CSV, an empty line between them."""
+    text = io.StringIO()
+    for number, (head, rows) in enumerate(tables):
+        text.write("\n" if number else "")
+        csv.writer(text, lineterminator="\n").writerows([head, *rows])
+    return text.getvalue()
+
+
+def _told(value: float, digits: int) -> str:
+    """A number, or nothing where there is none; a program reads its minus."""
+    return f"{value + 0.0:.{digits}f}" if math.isfinite(value) else ""

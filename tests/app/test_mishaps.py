@@ -1,0 +1,138 @@
+import faulthandler
+import io
+import json
+import logging
+import sys
+import threading
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import qWarning
+from PySide6.QtWidgets import QApplication
+
+from kappaskin import Refusal
+from kappaskin_app import guard
+from kappaskin_app.logbook import CRASHES, LOG, Logbook
+from kappaskin_app.reporting import Reporting, Told
+from kappaskin_app.window import MainWindow
+
+
+def fail() -> None:
+    raise RuntimeError("no such thing")
+
+
+def test_what_goes_wrong_is_in_the_log_whoever_missed_it(tmp_path: Path, monkeypatch) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(guard, "_listeners", [told.append])
+    hooks = sys.excepthook, threading.excepthook
+    was_on = faulthandler.is_enabled()
+    logbook = Logbook(tmp_path / "log")
+    guard.guarded(fail)()
+    sys.excepthook(ValueError, ValueError("in a slot"), None)
+    thread = threading.Thread(target=fail, name="beside")
+    thread.start()
+    thread.join()
+    qWarning("a warning of Qt's")
+    logbook.close()
+    logged = (tmp_path / "log" / LOG).read_text()
+    for words in ("in fail", "no such thing", "in a slot", "in beside", "a warning of Qt's"):
+        assert words in logged
+    assert told == ["Something went wrong: no such thing", "Something went wrong: in a slot"]
+    assert "begun as" in (tmp_path / "log" / CRASHES).read_text()
+    assert (sys.excepthook, threading.excepthook) == hooks
+    if was_on:
+        faulthandler.enable()
+
+
+def test_the_log_never_grows_beyond_its_files(tmp_path: Path) -> None:
+    logbook = Logbook(tmp_path)
+    for handler in logging.getLogger().handlers[-1:]:
+        logging.getLogger().removeHandler(handler)  # not on the screen too
+    for _ in range(60):
+        logging.getLogger("kappaskin").error("x" * 100_000)
+    logbook.close()
+    sizes = [file.stat().st_size for file in tmp_path.glob(f"{LOG}*")]
+    assert len(sizes) == 4
+    assert max(sizes) <= 1_000_000
+
+
+@pytest.mark.fails_inside
+def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
+    window: MainWindow, until
+) -> None:
+    window.plugs.found.connect(guard.guarded(lambda *_: fail()))
+    window.plugs.found.emit([])
+    window.plugs.found.emit([])
+    assert window.mishaps.count.text() == "2 failures"
+    assert window.mishaps.count.isVisible()
+    window.tell("in passing")
+    window.activity.show_work("Counting: 1 s", True)
+    for _ in range(5):
+        QApplication.processEvents()
+    assert not window.display.notice.isVisible()  # or the two would stand over each other
+    assert "failure:  Something went wrong: no such thing" in window.happenings.list.toPlainText()
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 2)
+
+
+@pytest.mark.parametrize("ticked", [False, True])
+def test_a_report_holds_readings_only_if_that_is_ticked(
+    window: MainWindow, tmp_path: Path, until, ticked: bool
+) -> None:
+    window.actions_by_name["report"].trigger()
+    dialog = window.mishaps.report
+    assert not dialog.readings.isChecked()
+    dialog.to.setText(str(tmp_path / "report.zip"))
+    dialog.readings.setChecked(ticked)
+    dialog.begin_button.click()
+    until(lambda: not dialog.busy)
+    assert dialog.words.text().startswith("Saved")
+    with zipfile.ZipFile(tmp_path / "report.zip") as report:
+        names = set(report.namelist())
+        assert {"settings.json", "happened.txt", "state.txt", "doctor.json"} <= names
+        assert ("shown.npz" in names) == ticked
+        assert "numpy" in json.loads(report.read("doctor.json"))["packages"]
+        if ticked:
+            shown = np.load(io.BytesIO(report.read("shown.npz")))
+            assert shown["curvature"].shape == (3, 100)
+    dialog.close()
+
+
+def finished(reporting: Reporting) -> object:
+    while not (told := reporting.poll()):
+        pass
+    return told[0]
+
+
+def test_a_report_names_no_home_folder_and_takes_the_log_along(tmp_path: Path) -> None:
+    logs, path = tmp_path / "logs", tmp_path / "report.zip"
+    logs.mkdir()
+    (logs / LOG).write_text(f"in {Path.home()}/secret")
+    (logs / f"{LOG}.1").write_text("older")
+    told = Told({"happened.txt": f"{Path.home()} it was"})
+    finished(Reporting(path, told, logs, dict))
+    with zipfile.ZipFile(path) as report:
+        assert set(report.namelist()) == {"happened.txt", "doctor.json", LOG, f"{LOG}.1"}
+        assert report.read("happened.txt") == b"~ it was"
+        assert report.read(LOG) == b"in ~/secret"
+
+
+def test_a_report_that_is_cancelled_leaves_nothing(tmp_path: Path) -> None:
+    go_on = threading.Event()
+    reporting = Reporting(
+        tmp_path / "report.zip", Told({}), tmp_path, lambda: {"waited": go_on.wait(10)}
+    )
+    reporting.close()
+    go_on.set()
+    finished(reporting)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_report_is_written_over_nothing(tmp_path: Path) -> None:
+    (tmp_path / "report.zip").write_bytes(b"mine")
+    with pytest.raises(Refusal, match="is there already"):
+        Reporting(tmp_path / "report.zip", Told({}), tmp_path)
+    with pytest.raises(Refusal, match="ends in"):
+        Reporting(tmp_path / "report.txt", Told({}), tmp_path)

@@ -1,0 +1,88 @@
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from kappaskin_app.recovering import Last, Recovering, Running, crashed
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings_text import settings_text
+from kappaskin_app.window import MainWindow
+
+LAST = Last(Settings(functions_x=5), "sim:circle", "there.mcap")
+
+
+def leave(folder: Path, last: Last = LAST) -> None:
+    """As a window does that dies."""
+    folder.mkdir(exist_ok=True)
+    said = {"settings": json.loads(settings_text(last.settings)), "source": last.source}
+    file = folder / "window-123456.json"
+    file.write_text(json.dumps({**said, "recording": last.recording}))
+
+
+def test_a_window_that_is_killed_leaves_what_it_was_at_once(tmp_path: Path) -> None:
+    lines = (
+        "import os, pathlib; from kappaskin_app.recovering import *;"
+        f"Running(pathlib.Path({str(tmp_path)!r})).keep(Last(Settings(functions_x=5),"
+        " 'sim:circle', 'there.mcap')); os.kill(os.getpid(), 9)"
+    )
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    killed = subprocess.run([sys.executable, "-c", lines], env=env, timeout=60)
+    assert killed.returncode < 0
+    assert crashed(tmp_path) == LAST
+    assert crashed(tmp_path) is None
+    assert not list(tmp_path.glob("*.json"))
+
+
+def test_a_window_that_is_open_or_was_closed_has_not_crashed(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    running.keep(LAST)
+    assert crashed(tmp_path) is None
+    running.close()
+    assert crashed(tmp_path) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cannot_be_read_is_forgotten(tmp_path: Path) -> None:
+    (tmp_path / "window-1.json").write_text("{")
+    assert crashed(tmp_path) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
+    window: MainWindow, tmp_path: Path, until
+) -> None:
+    leave(tmp_path)
+    recovering = Recovering(window, tmp_path)
+    assert window.offer.isVisible()
+    texts = [button.text().replace("&", "") for button in window.offer.buttons]
+    assert texts == ["Its settings", "Report\N{HORIZONTAL ELLIPSIS}"]  # the recording is gone
+    window.offer.buttons[0].click()
+    assert not window.offer.isVisible()
+    assert window.history.settings.functions_x == 5
+    window.history.stack.undo()
+    assert window.history.settings.functions_x == 8
+    until(lambda: any(tmp_path.glob("window-*.json")))  # what this one is at
+    recovering.close()
+
+
+def test_after_an_orderly_end_nothing_is_offered(window: MainWindow, tmp_path: Path) -> None:
+    recovering = Recovering(window, tmp_path)
+    assert not window.offer.isVisible()
+    recovering.close()
+
+
+@pytest.mark.parametrize("suffix", ["", ".part"])
+def test_a_recording_that_is_left_is_offered(
+    window: MainWindow, tmp_path: Path, recording: Path, suffix: str, until
+) -> None:
+    there = tmp_path / "there.mcap"
+    Path(f"{there}{suffix}").write_bytes(recording.read_bytes())
+    leave(tmp_path / "open", Last(Settings(), "", str(there)))
+    recovering = Recovering(window, tmp_path / "open")
+    take = next(b for b in window.offer.buttons if "recording" in b.text().replace("&", ""))
+    take.click()
+    until(lambda: window.badge.state.startswith("REPLAY"))
+    recovering.close()

@@ -1,0 +1,70 @@
+from dataclasses import replace
+
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from kappaskin import Finding, Health, Replay, Status, load_scene
+from kappaskin_app.states import state_of
+from kappaskin_app.theme import LIGHT
+from kappaskin_app.views.badge import Badge, colour_of, origin
+
+NOW = 100.0
+SENSOR = load_scene("circle").sensor()
+RAILED = Health((Finding(0, 0, "xx", "saturated", 0.0, "on a rail"),), 1)
+STREAMING = Status(state="streaming", sensor=SENSOR, last_frame=NOW - 0.1)
+PLAYED = Replay(1.0, 2.0, 1.0, False, ((0.2, 0.4),), (), 0.0, True)
+
+
+@pytest.mark.parametrize("truths", [{}, {"health": RAILED}])
+@pytest.mark.parametrize(
+    ("news", "expected"),
+    [
+        ({"state": "off", "replay": PLAYED}, "OFF"),
+        ({"state": "lost", "replay": PLAYED}, "LOST"),
+        ({"state": "waiting", "last_frame": 0.0}, "WAITING"),
+        ({"last_frame": NOW - 0.6}, "STALE"),
+        ({"last_frame": NOW - 0.6, "computing": True}, "WAITING"),
+        ({"replay": replace(PLAYED, at=0.3, speed=0.0)}, "REPLAY \N{MIDDLE DOT} gap"),
+    ],
+)
+def test_what_makes_readings_old_wins_over_all_else(
+    news: dict[str, object], expected: str, truths: dict[str, object]
+) -> None:
+    status = replace(STREAMING, **{**truths, **news})
+    assert state_of(status, NOW - 0.7, NOW, paused=True) == expected
+
+
+@pytest.mark.parametrize(
+    ("source", "word"),
+    [
+        ({}, "SIM"),
+        ({"sensor": replace(SENSOR, simulated=False)}, "LIVE"),
+        ({"replay": PLAYED}, "REPLAY"),
+    ],
+)
+def test_a_reading_on_a_rail_is_told_below_where_it_comes_from(
+    source: dict[str, object], word: str
+) -> None:
+    status = replace(STREAMING, **source)
+    assert state_of(status, NOW, NOW, paused=False) == word
+    railed = state_of(replace(status, health=RAILED), NOW, NOW, paused=False)
+    assert railed == f"{word} \N{MIDDLE DOT} saturated"
+    assert origin(railed) == word
+    assert colour_of(railed, LIGHT) == LIGHT.warning
+
+
+def test_a_rail_wins_over_a_pause() -> None:
+    assert state_of(STREAMING, NOW, NOW, paused=True) == "SIM \N{MIDDLE DOT} paused"
+    railed = replace(STREAMING, health=RAILED)
+    assert state_of(railed, NOW, NOW, paused=True) == "SIM \N{MIDDLE DOT} saturated"
+
+
+def test_the_badge_says_recording_below_what_nothing_graver_is_true_of(qapp: QApplication) -> None:
+    badge = Badge()
+    badge.show_state("LIVE", recording=True)
+    assert badge.text() == "LIVE\nrecording"
+    badge.show_state("SIM \N{MIDDLE DOT} paused", recording=True)
+    assert badge.text() == "SIM\npaused"
+    assert badge.accessibleName() == "SIM, paused, recording"
+    badge.show_state("SIM")
+    assert badge.text() == "SIM"

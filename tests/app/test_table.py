@@ -1,0 +1,38 @@
+import csv
+
+import numpy as np
+import pytest
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication
+
+from kappaskin_app.table import ELEMENTS, FACTS
+from kappaskin_app.window import MainWindow
+
+
+def test_the_table_has_what_the_picture_shows_and_can_be_copied(window: MainWindow, until) -> None:
+    window.actions_by_name["dock-numbers"].trigger()
+    numbers = window.numbers
+    until(lambda: numbers.elements.rowCount() == 100)
+    until(lambda: numbers.facts.rowCount() == 6 and numbers.facts.item(2, 1).text())
+    numbers.copy.click()
+    rows = list(csv.reader(QGuiApplication.clipboard().text().splitlines()))
+    assert rows[0] == list(FACTS)
+    assert rows[len(rows) - 101] == list(ELEMENTS)
+    read = np.array([row[3:6] for row in rows[-100:]], float)
+    assert np.abs(read).max() > 1.0
+    assert [row[1:3] for row in rows[-100:-98]] == [["5.0", "5.0"], ["15.0", "5.0"]]
+    window.actions_by_name["disconnect"].trigger()
+    until(lambda: numbers.elements.rowCount() == 0)  # what is old is no reading
+
+
+def test_larger_letters_enlarge_the_window_and_are_taken_back(
+    window: MainWindow, qapp: QApplication
+) -> None:
+    plain, badge = qapp.font().pointSizeF(), window.badge.width()
+    window.history.change("Letters", -1, letters=200.0)
+    assert qapp.font().pointSizeF() == pytest.approx(2 * plain)
+    assert window.panels.basis.message.fontInfo().pixelSize() > 20
+    assert window.badge.width() > 1.8 * badge
+    window.history.stack.undo()
+    assert qapp.font().pointSizeF() == plain
+    assert window.badge.width() == badge
