@@ -1,21 +1,26 @@
 """Every action a person can take, registered once: menus, shortcuts and palette come from here."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMainWindow, QMenu
 
+from kappaskin import Refusal
 from kappaskin_app.guard import guarded
+
+_TYPES_NOTHING = re.compile(r".*(Ctrl|Alt|Meta)\+.+|(Shift\+)?F\d+")
 
 
 @dataclass(frozen=True)
 class Entry:
-    """An action with the menu it stands in."""
+    """An action with the menu it stands in, and the shortcut that it has by itself."""
 
     name: str
     menu: str
     action: QAction
+    key: str
 
 
 class Actions:
@@ -25,6 +30,7 @@ class Actions:
         self._window = window
         self.entries: dict[str, Entry] = {}
         self._menus: dict[str, QMenu] = {}
+        self._why_not: dict[str, str] = {}
 
     def add(
         self,
@@ -50,9 +56,20 @@ class Actions:
         if name in self.entries:
             raise ValueError(f"expected a new name for an action, got {name!r} twice")
         action.setObjectName(name)
-        self.entries[name] = Entry(name, menu, action)
+        self.entries[name] = Entry(name, menu, action, action.shortcut().toString())
         self._menu(menu).addAction(action)
         self._window.addAction(action)
+
+    def allow(self, name: str, why_not: str) -> None:
+        """Let an action be taken, or say why it cannot be now."""
+        action = self[name]
+        action.setEnabled(not why_not)
+        action.setStatusTip(why_not or action.toolTip())
+        self._why_not[name] = why_not
+
+    def why_not(self, name: str) -> str:
+        """Why an action cannot be taken now; empty where it can."""
+        return "" if self[name].isEnabled() else self._why_not.get(name) or "not now"
 
     def _menu(self, title: str) -> QMenu:
         if title not in self._menus:
@@ -62,20 +79,54 @@ class Actions:
     def __getitem__(self, name: str) -> QAction:
         return self.entries[name].action
 
-    def cheat_sheet(self) -> str:
-        """Every shortcut with what it does, menu by menu in two columns, as HTML."""
-        menus: dict[str, list[str]] = {}
-        for entry in self.entries.values():
-            if key := entry.action.shortcut().toString():
-                does = entry.action.text().replace("&", "")
-                row = f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td><nobr>{does}</nobr></td></tr>"
-                menus.setdefault(entry.menu.replace("&", ""), []).append(row)
-        half = sum(1 + len(rows) for rows in menus.values()) / 2
-        columns, count = ["", ""], 0
-        for menu, rows in menus.items():
-            head = f'<tr><td colspan="2"><u>{menu}</u></td></tr>'
-            columns[count + len(rows) / 2 > half] += "".join([head, *rows])
-            count += 1 + len(rows)
-        left, right = (f'<td><table cellpadding="1">{rows}</table></td>' for rows in columns)
-        mouse = "<p>Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom.</p>"
-        return f"<table><tr>{left}<td>{8 * '&nbsp;'}</td>{right}</tr></table>{mouse}"
+    # Shortcuts.
+
+    def key(self, name: str) -> str:
+        """The shortcut of an action, as it is written: "Ctrl+S"; empty where it has none."""
+        return self[name].shortcut().toString()
+
+    def own_key(self, name: str) -> str:
+        """The shortcut that an action has unless a person changes it."""
+        return self.entries[name].key
+
+    def changed_keys(self) -> dict[str, str]:
+        """The shortcuts that a person changed, by name."""
+        return {
+            name: self.key(name) for name in self.entries if self.key(name) != self.own_key(name)
+        }
+
+    def change_key(self, name: str, key: str) -> None:
+        """Give an action another shortcut, or none; refused where another action has it."""
+        if why_not := self.why_no_key(name, key):
+            raise Refusal(why_not)
+        self[name].setShortcut(QKeySequence(key))
+
+    def why_no_key(self, name: str, key: str) -> str:
+        """Why an action cannot have a shortcut; empty where it can."""
+        if not key:
+            return ""
+        wanted = QKeySequence(key)
+        if wanted.count() != 1 or not _TYPES_NOTHING.fullmatch(key):
+            return f"{key} is for typing: take a key with Ctrl or Alt, or a function key"
+        for other, entry in self.entries.items():
+            if other != name and entry.action.shortcut() == wanted:
+                return f"{key} is the shortcut of {plain(entry.action.text())}: change that first"
+        return ""
+
+    def take_keys(self, changed: dict[str, str]) -> list[str]:
+        """Change shortcuts all at once, the rest as their own; why those left out cannot be."""
+        for name, entry in self.entries.items():
+            entry.action.setShortcut(QKeySequence("" if name in changed else entry.key))
+        known = {name: key for name, key in changed.items() if name in self.entries}
+        refused: list[str] = []
+        for name, key in known.items():
+            try:
+                self.change_key(name, key)
+            except Refusal as refusal:
+                refused.append(str(refusal))
+        return refused
+
+
+def plain(text: str) -> str:
+    """The words of a menu or a button, without the mark of its letter."""
+    return text.replace("&", "").rstrip("\N{HORIZONTAL ELLIPSIS}")

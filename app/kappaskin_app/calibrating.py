@@ -59,12 +59,14 @@ class Calibrating(QObject):
     It has a `procedure` while steps are taken, is `computing` after the last, and then has a
     `result`; `message` says why a step or the whole was refused, `file_refused` why a file was, and
     `done` what else was done with the result. `changed` tells of anything new,
-    `laid` of the step that a simulated skin is to lie on, None when it need not any more. From the
-    first to the last, readings are to come without any calibration.
+    `laid` of the step that a simulated skin is to lie on, None when it need not any more, `used`
+    of a file that was loaded or saved. From the first to the last, readings are to come without
+    any calibration.
     """
 
     changed = Signal()
     laid = Signal(object)
+    used = Signal(object)
 
     def __init__(
         self,
@@ -183,6 +185,7 @@ class Calibrating(QObject):
         if self.result is not None:
             try:
                 save_calibration(self.result.report.calibration, path)
+                self.used.emit(path)
                 self._tell("", f"saved as {path}")
             except Refusal as refusal:
                 self._tell(str(refusal))
@@ -199,6 +202,7 @@ class Calibrating(QObject):
             self.changed.emit()
             return
         self._history.change("Load a calibration", calibration=calibration)
+        self.used.emit(path)
         self._tell("")
 
     # News.

@@ -26,6 +26,9 @@ class Docks:
     def __getitem__(self, name: str) -> QDockWidget:
         return self._docks[name]
 
+    def by_name(self) -> dict[str, QDockWidget]:
+        return dict(self._docks)
+
     @property
     def below(self) -> list[QDockWidget]:
         """Those that share the place below the skin."""

@@ -8,18 +8,17 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeyEvent
 from PySide6.QtWidgets import QWidget
 
 from kappaskin_app.guard import guarded
-
-_RECORDINGS = (".mcap", ".part")
+from kappaskin_app.opening import opens
 
 
 def dropped_on(data: QMimeData) -> Path | None:
-    """The recording among what is dragged, if there is one."""
+    """The file among what is dragged that can be opened, if there is one."""
     files = [Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()]
-    return next((file for file in files if file.suffix.lower() in _RECORDINGS), None)
+    return next((file for file in files if opens(file)), None)
 
 
 class Drops(QObject):
-    """Watches `window`; a recording dropped there is opened, a key left over is taken."""
+    """Watches `window`; a file dropped there is opened, a key left over is taken."""
 
     def __init__(
         self,

@@ -81,6 +81,10 @@ def launch(
         signal.signal(number, lambda got, _: asked.append(got))
     logbook = _logbook()
     application, window = opened(source)
+    if seconds is None:  # what a script opens is the same whatever was before
+        from kappaskin_app.layouts.file import config_file
+
+        window.keeping.begin(config_file())
     recovering = _recovering(window)
     if presenting and not window.session.engine.adopted:
         window.presenting.enter()

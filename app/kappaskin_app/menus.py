@@ -5,12 +5,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Qt
-from PySide6.QtWidgets import QMessageBox
+from PySide6.QtCore import QObject
 
 from kappaskin import FIGURES
 from kappaskin_app.actions import Actions
 from kappaskin_app.figures import TITLES, FigureWindow
+from kappaskin_app.finder.finder import Finder
+from kappaskin_app.finder.sheet import CheatSheet
+from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
 
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FILE, _EDIT, _SOURCE, _VIEW = "&File", "&Edit", "&Source", "&View"
+_FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, panels"
+_SHEET = "Every shortcut, to look up and to change"
+_RECENT = "Scenes, recordings, calibrations and meshes opened last; each may also be dropped here"
 _FIGURES, _HELP = "Fi&gures", "&Help"
 
 
@@ -28,7 +33,7 @@ class Menus(QObject):
     def __init__(self, window: "MainWindow") -> None:
         super().__init__(window)
         self._window, self.actions = window, Actions(window)
-        self._shortcuts: QMessageBox | None = None
+        self.finder = Finder(partial(things_in, window), window)
         self._add_file()
         self._add_edit()
         self._add_source()
@@ -36,12 +41,15 @@ class Menus(QObject):
         for name in FIGURES:
             self.actions.add(name, _FIGURES, TITLES.get(name, name), partial(self._draw, name))
         self._add_export()
-        self.actions.add("shortcuts", _HELP, "&Shortcuts", self._show_shortcuts, "F1")
+        self.sheet = CheatSheet(self.actions, window)
+        self.actions.add("shortcuts", _HELP, "&Shortcuts", self.sheet.open_all, "F1", _SHEET)
         window.mishaps.add_actions(self.actions, _HELP)
 
     def _add_file(self) -> None:
         add, window = self.actions.add, self._window
         add("open-scene", _FILE, f"&Open scene{_DOTS}", window.staging.open, "Ctrl+O")
+        recent = add("recent", _FILE, "Open r&ecent", lambda: None, "", _RECENT)
+        recent.setMenu(window.opening.menu)
         add("save-scene", _FILE, f"Save scene &as{_DOTS}", window.staging.save, "Ctrl+Shift+S")
         add("picture", _FILE, "Save &picture", self._save_picture, "Ctrl+S")
         add("quit", _FILE, "&Quit", window.quit, "Ctrl+Q")
@@ -54,6 +62,8 @@ class Menus(QObject):
         self.actions.register("undo", _EDIT, undo)
         self.actions.register("redo", _EDIT, redo)
         self.actions.add("reset", _EDIT, "&Reset settings", self._window.wishes.reset)
+        find = self.finder.open_empty
+        self.actions.add("find", _EDIT, f"&Find a command{_DOTS}", find, "Ctrl+K", _FIND)
 
     def _add_source(self) -> None:
         add, window = self.actions.add, self._window
@@ -68,7 +78,7 @@ class Menus(QObject):
         window.replaying.add_actions(self.actions)
         window.looking.add_actions(self.actions)
         add("calibrate", _SOURCE, "C&alibrate", window.panels.show_calibration, "Ctrl+L")
-        add("take-step", _SOURCE, "&Take the step of the calibration", take, "Ctrl+K")
+        add("take-step", _SOURCE, "&Take the step of the calibration", take, "Ctrl+Shift+K")
 
     def _add_view(self) -> None:
         add, window = self.actions.add, self._window
@@ -81,6 +91,7 @@ class Menus(QObject):
         add("next-panels", _VIEW, "&Next panels", partial(window.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", _VIEW, "&Previous panels", partial(window.panels.turn, -1), "Ctrl+PgUp")
         window.docks.add_actions(self.actions, _VIEW)
+        window.layouts.add_actions(self.actions)
 
     def _add_export(self) -> None:
         window = self._window
@@ -106,12 +117,3 @@ class Menus(QObject):
     def _draw(self, name: str) -> None:
         """Draw a figure of the paper from a run of its own, in a window beside this one."""
         FigureWindow(name, self._window).show()
-
-    def _show_shortcuts(self) -> None:
-        if self._shortcuts is None:
-            text = self.actions.cheat_sheet()
-            self._shortcuts = QMessageBox(QMessageBox.Icon.NoIcon, "Shortcuts", text)
-            self._shortcuts.setParent(self._window, Qt.WindowType.Dialog)
-            self._shortcuts.setModal(False)
-        self._shortcuts.show()
-        self._shortcuts.raise_()

@@ -6,14 +6,14 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
-from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
+from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin import Damaged, Event, Refusal, Replay, Setup, Status
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.newest import Newest
-from kappaskin_app.recordings import newest, recordings_folder
+from kappaskin_app.recordings import recordings_folder
 from kappaskin_app.seen import Seen, seen, told_of
 from kappaskin_app.session import RECORDED, Session
 from kappaskin_app.views.landmarks import day
@@ -58,8 +58,7 @@ class Replaying(QObject):
         self._changes: list[Event] = []
         self._thread = ThreadPoolExecutor(1, "recording-reader")
         self._looking: tuple[Future[Seen], Path, bool] | None = None
-        self._send, self._recent = Newest(self), QMenu(window)
-        self._opened: list[Path] = []
+        self._send, self._folder = Newest(self), recordings_folder()
         self._actions: Actions | None = None
         self._wire()
 
@@ -74,7 +73,6 @@ class Replaying(QObject):
         transport.loop_wanted.connect(guarded(self.loop))
         session.turning.connect(guarded(self._leave))
         session.reported.connect(guarded(self.follow))
-        self._recent.aboutToShow.connect(guarded(self._list_recent))
 
     def add_actions(self, actions: Actions) -> None:
         """Register what a person can do."""
@@ -82,8 +80,6 @@ class Replaying(QObject):
         tip = "Play a recording as if it were live; one may also be dropped on the window"
         add = partial(actions.add, menu=_MENU)
         add("open-recording", text=f"&Open{_DOTS}", act=self.open, shortcut="Ctrl+Shift+O", tip=tip)
-        recent = add("recent-recordings", text="Open r&ecent", act=lambda: None)
-        recent.setMenu(self._recent)
         for name, text, act, shortcut in (
             ("replay-forward", "One frame &forward", partial(self.step, 1), "Ctrl+."),
             ("replay-back", "One frame &back", partial(self.step, -1), "Ctrl+,"),
@@ -101,7 +97,7 @@ class Replaying(QObject):
 
     def open(self) -> None:
         """Ask for a file, and play it."""
-        folder = str(self._opened[0].parent if self._opened else recordings_folder())
+        folder = str(self._folder)
         file, _ = QFileDialog.getOpenFileName(self._window, "Open a recording", folder, FILES)
         if file:
             self.open_file(Path(file))
@@ -160,7 +156,7 @@ class Replaying(QObject):
         self.seen, self._changes = found, found.changes()
         self._goes, self._begins, self._sought = True, True, None
         self.speed, self._looped = 1.0, False
-        self._opened = [found.path, *(path for path in self._opened if path != found.path)]
+        self._folder = found.path.parent
         self._session.engine.seek(0.0, 0.0, False)  # until the settings are in use
         now = self._history.settings
         self._before = {"calibration": now.calibration, "tare": now.tare}
@@ -345,9 +341,10 @@ class Replaying(QObject):
 
     def _show_actions(self) -> None:
         if self._actions is not None:
-            for name, entry in self._actions.entries.items():
+            why_not = "" if self._replay is not None else "no recording is played"
+            for name in self._actions.entries:
                 if name.startswith("replay-"):
-                    entry.action.setEnabled(self._replay is not None)
+                    self._actions.allow(name, why_not)
 
     def _show_title(self, replay: Replay | None) -> None:
         title = "Kappaskin"
@@ -355,16 +352,6 @@ class Replaying(QObject):
             title = f"{self.seen.path.name}, recorded {day(replay)} \N{EN DASH} Kappaskin"
         if title != self._window.windowTitle():
             self._window.setWindowTitle(title)
-
-    def _list_recent(self) -> None:
-        self._recent.clear()
-        others = [path for path in newest(recordings_folder()) if path not in self._opened]
-        for path in [*self._opened, *others]:
-            action = self._recent.addAction(path.name)
-            action.setToolTip(str(path))
-            action.triggered.connect(guarded(lambda *_, path=path: self.open_file(path)))
-        if self._recent.isEmpty():
-            self._recent.addAction("None yet").setEnabled(False)
 
     def _say(self, message: str, alarming: bool = False, damaged: Path | None = None) -> None:
         self.message, self.alarming, self.damaged = message, alarming, damaged

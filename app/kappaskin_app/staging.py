@@ -24,11 +24,12 @@ _PLANNING = "Each effect is sized and timed\N{HORIZONTAL ELLIPSIS}"
 class Staging(QObject):
     """Shows in `panel`, `timeline` and plan what is played; `told` says what came of a wish.
 
-    `played` names the source when a scene in a file is played.
+    `played` names the source when a scene in a file is played, `used` the file of a person's own.
     """
 
     told = Signal(str)
     played = Signal(str)
+    used = Signal(object)
 
     def __init__(
         self,
@@ -48,7 +49,7 @@ class Staging(QObject):
 
     def _wire(self) -> None:
         panel, session, planning = self._panel, self._session, self._planning
-        panel.gallery.chosen.connect(guarded(lambda name: self._play(scene_file(name))))
+        panel.gallery.chosen.connect(guarded(lambda name: self.play(scene_file(name))))
         panel.gallery.open_wanted.connect(guarded(self.open))
         panel.editor.edited.connect(guarded(self._wishes.write))
         panel.editor.save_wanted.connect(guarded(self.save))
@@ -69,7 +70,7 @@ class Staging(QObject):
         """Ask for a file, and play the scene in it."""
         file, _ = QFileDialog.getOpenFileName(self._window, "Open a scene", "", _FILES)
         if file:
-            self._play(Path(file))
+            self.play(Path(file))
 
     def save(self) -> None:
         """Ask for a file, and write the scene as it is there."""
@@ -80,6 +81,7 @@ class Staging(QObject):
             path = Path(file).with_suffix(".toml")
             try:
                 self._wishes.save(path)
+                self.used.emit(path)
                 self.told.emit(f"Saved {path}")
             except (OSError, Refusal) as error:
                 self.told.emit(f"Could not write {path}: {error}")
@@ -88,10 +90,13 @@ class Staging(QObject):
         """Let the scene stand still, or go on."""
         self._session.run(not self._session.running)
 
-    def _play(self, file: Path) -> None:
+    def play(self, file: Path) -> None:
+        """Play the scene in a file, from its beginning."""
         try:
             self._wishes.play(written(file))
             self.played.emit(self._session.source)
+            if not _ready(file):
+                self.used.emit(file)
         except Refusal as refusal:
             self.told.emit(str(refusal))
 
@@ -121,8 +126,8 @@ class Staging(QObject):
         """Mark the ready scene that is played: none for a file of one's own of its name."""
         written = self._history.settings.written
         file = written.file if written else OWN
-        ready = file.stem in SCENES and file == scene_file(file.stem)
-        self._panel.gallery.show_playing(file.stem if ready and self._session.inside else "")
+        shown = file.stem if _ready(file) and self._session.inside else ""
+        self._panel.gallery.show_playing(shown)
 
     def _show_text(self, settings: Settings) -> None:
         editor, written = self._panel.editor, settings.written
@@ -146,3 +151,8 @@ class Staging(QObject):
             self._timeline.show_scene(None)
             return
         self._timeline.show_time(self._session.time, self._session.running)
+
+
+def _ready(file: Path) -> bool:
+    """Whether a file is that of a ready scene."""
+    return file.stem in SCENES and file == scene_file(file.stem)

@@ -183,9 +183,8 @@ class Taping(QObject):
 
     def _show_actions(self) -> None:
         if self._actions is not None:
-            action = self._actions["record"]
-            action.setText(_STOP if self.recording else _RECORD)
-            action.setEnabled(not self.why_not)
+            self._actions["record"].setText(_STOP if self.recording else _RECORD)
+            self._actions.allow("record", self.why_not)
 
     def close(self) -> None:
         """End what is being repaired: it is not there then; and ask no more."""

@@ -29,6 +29,8 @@ from kappaskin_app.exports import Exports
 from kappaskin_app.guard import guarded
 from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
+from kappaskin_app.layouts.choosing import Layouts
+from kappaskin_app.layouts.keeping import Keeping
 from kappaskin_app.lessons.pointing import Pointing
 from kappaskin_app.lessons.reading import DOCKS
 from kappaskin_app.lessons.teaching import Teaching
@@ -37,6 +39,7 @@ from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.menus import Menus
 from kappaskin_app.mishaps import Mishaps
 from kappaskin_app.naming import Naming
+from kappaskin_app.opening import Opening
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.form import Form
@@ -104,11 +107,12 @@ class MainWindow(QMainWindow):
         self.offer = Offer()
         self.taping = Taping(self.session.engine, self)
         self.replaying = Replaying(self.history, self.session, self.transport, self)
-        self.drops = Drops(self, self.replaying.open_file, self.transport.take_key)
         self.staging = Staging(
             *(self.history, self.session, self.wishes, self.planning),
             *(self.scene, self.timeline, self),
         )
+        self.opening = Opening(self)
+        self.drops = Drops(self, self.opening.open, self.transport.take_key)
         self.picking = Picking(self.history, self.session, self.display)
         self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
         self.badge, self.readouts = self.display.badge, self.display.readouts
@@ -142,7 +146,9 @@ class MainWindow(QMainWindow):
         )
         self.pointing = self._pointing()
         self.looking = Looking(self.history, self.wishes, self.display)
-        self.actions_by_name = Menus(self).actions
+        self.layouts = Layouts(self)
+        self.menus, self.keeping = Menus(self), Keeping(self)
+        self.actions_by_name = self.menus.actions
         self.doing = Doing(tasks_of(self), self)
         self._wire()
         self._follow(self.history.settings)
@@ -249,6 +255,8 @@ class MainWindow(QMainWindow):
         self.teaching.pointed.connect(guarded(self.pointing.point))
         self.teaching.told.connect(guarded(self.tell))
         self.staging.told.connect(guarded(self.tell))
+        self.opening.told.connect(guarded(self.tell))
+        self.layouts.told.connect(guarded(self.tell))
         self.exports.told.connect(guarded(self.tell))
         self.staging.played.connect(guarded(panels.connection.show_source))
         session.reported.connect(guarded(wishes.follow))
@@ -412,9 +420,7 @@ class MainWindow(QMainWindow):
         self.compare.show_status(status, self.display.old)
 
     def _allow_tare(self) -> None:
-        action, why_not = self.actions_by_name["tare"], self.taring.why_not
-        action.setEnabled(not why_not)
-        action.setStatusTip(why_not or "Tare")
+        self.actions_by_name.allow("tare", self.taring.why_not)
 
     # Small things.
 
@@ -456,6 +462,7 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         if not self.session.closed:
+            self.keeping.write()
             self.mishaps.close()
             self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart

@@ -232,7 +232,7 @@ def test_a_recording_dropped_on_the_window_is_played(
 
 def test_another_file_dropped_is_not_taken(window: MainWindow, tmp_path: Path) -> None:
     data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(tmp_path / "mesh.stl"))])
+    data.setUrls([QUrl.fromLocalFile(str(tmp_path / "notes.txt"))])
     copy, none = Qt.DropAction.CopyAction, Qt.KeyboardModifier.NoModifier
     left = Qt.MouseButton.LeftButton
     enter = QDragEnterEvent(QPointF(9, 9).toPoint(), copy, data, left, none)
@@ -248,9 +248,9 @@ def test_one_is_opened_by_the_dialog_and_is_recent_then(
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(recording), ""))
     window.actions_by_name["open-recording"].trigger()
     until(lambda: window.badge.state == "REPLAY")
-    menu = window.actions_by_name["recent-recordings"].menu()
+    menu = window.actions_by_name["recent"].menu()
     menu.aboutToShow.emit()
-    assert [action.text() for action in menu.actions()] == ["example.mcap"]
+    assert [action.text() for action in menu.actions()] == ["example.mcap", "", "&Clear this list"]
     assert window.panels.connection.source() == f"replay:{recording}"
 
 

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin import Calibration, Port, Sensor, Status
 from kappaskin_app.panels.calibration.parts import said
+from kappaskin_app.panels.form import well_behaved
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.views.landmarks import day
 
@@ -78,6 +79,7 @@ class ConnectionPanel(Panel):
         self.body.addWidget(self.device)
         self.body.addWidget(self.losses)
         self._around.addWidget(self.copy_button, alignment=Qt.AlignmentFlag.AlignRight)
+        well_behaved(self.sources)
         self._list()
 
     def source(self) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt
-from PySide6.QtGui import QKeyEvent, QKeySequence, QPaintEvent, QStandardItemModel, QValidator
+from PySide6.QtGui import QPaintEvent, QStandardItemModel, QValidator
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin_app.panels.keys import for_the_window
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.panels.several import SeveralButton
 from kappaskin_app.settings import Choice, Range, Settings, Several, Switch, Text, ask_of
@@ -92,18 +93,17 @@ def _typing(box: QSpinBox | QDoubleSpinBox, text: str) -> QValidator.State:
 
 
 class _Manners(QObject):
-    """Makes an editor leave undo to the window, and the wheel to the panel it scrolls in."""
+    """Makes an editor leave its keys to the window, and the wheel to the panel it scrolls in."""
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        kind, standard = event.type(), QKeySequence.StandardKey
-        if (
-            kind == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and (event.matches(standard.Undo) or event.matches(standard.Redo))
-        ):
+        if for_the_window(event):
             event.ignore()  # else a line edit would take it for its own text
             return True
-        if kind == QEvent.Type.Wheel and isinstance(watched, QWidget) and not watched.hasFocus():
+        if (
+            event.type() == QEvent.Type.Wheel
+            and isinstance(watched, QWidget)
+            and not watched.hasFocus()
+        ):
             event.ignore()
             return True
         return False

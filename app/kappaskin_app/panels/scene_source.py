@@ -5,8 +5,6 @@ from PySide6.QtGui import (
     QColor,
     QFocusEvent,
     QFontDatabase,
-    QKeyEvent,
-    QKeySequence,
     QPainter,
     QPaintEvent,
     QResizeEvent,
@@ -16,6 +14,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QPlainTextEdit, QTextEdit, QWidget
 
 from kappaskin_app.guard import guarded
+from kappaskin_app.panels.keys import for_the_window
 from kappaskin_app.theme import LIGHT, Theme
 
 _PAUSE = 300  # ms without a key before what is typed counts
@@ -119,12 +118,7 @@ class SceneText(QPlainTextEdit):
         self._numbers.update()
 
     def event(self, event: QEvent) -> bool:
-        standard = QKeySequence.StandardKey
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and (event.matches(standard.Undo) or event.matches(standard.Redo))
-        ):
+        if for_the_window(event):
             if self._pause.isActive():
                 self.tell()  # or what was just typed would come after it was undone
             event.ignore()

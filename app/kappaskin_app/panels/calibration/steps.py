@@ -41,7 +41,7 @@ class Steps(QWidget):
         self.how = text_label()
         self.drawing = CylinderView()
         self.take = button(
-            "Take", "take", "Take what the skin reads now, and go on (Enter, Space, Ctrl+K)."
+            "Take", "take", "Take what the skin reads now, and go on (Enter, Space, Ctrl+Shift+K)."
         )
         self.redo = button("Take the last one again", "redo", "Go back by one step.")
         self.cancel = button("Cancel", "cancel", "End here, and forget what was taken.")

@@ -1,0 +1,1 @@
+"""What is shown where in the window, in words: kept as text, put back, chosen by name."""

@@ -1,0 +1,276 @@
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtWidgets import QLabel, QMainWindow, QTabWidget
+
+from kappaskin import Refusal
+from kappaskin_app.docks import Docks
+from kappaskin_app.layouts.arranging import arrange, layout_of
+from kappaskin_app.layouts.file import KeptFile
+from kappaskin_app.layouts.keeping import clamped
+from kappaskin_app.layouts.kept import Kept, from_text, to_text
+from kappaskin_app.layouts.layout import (
+    AREAS,
+    BELOW,
+    DOCKS,
+    FLOATING,
+    READY,
+    Layout,
+    Place,
+)
+from kappaskin_app.window import MainWindow
+
+RECTANGLES = st.tuples(*[st.integers(0, 400)] * 2, *[st.integers(120, 500)] * 2)
+
+
+def _place(name: str) -> st.SearchStrategy[Place]:
+    areas = ("top", "bottom", FLOATING) if name in BELOW else AREAS
+    made = st.builds(
+        Place,
+        st.sampled_from(areas),
+        st.booleans(),
+        st.booleans(),
+        st.booleans(),
+        st.integers(50, 600).map(lambda share: share / 1000),
+        RECTANGLES,
+    )
+    return made.map(lambda place: place if place.area == FLOATING else replace(place, at=None))
+
+
+LAYOUTS = st.builds(
+    lambda page, order, places: Layout(page, tuple((name, places[name]) for name in order)),
+    st.integers(0, 3),
+    st.permutations(DOCKS),
+    st.fixed_dictionaries({name: _place(name) for name in DOCKS}),
+)
+NAMES = st.text(min_size=1, max_size=20)
+KEPT = st.builds(
+    Kept,
+    st.sampled_from(["", "light", "dark"]),
+    st.none() | RECTANGLES,
+    st.booleans(),
+    st.dictionaries(NAMES, NAMES, max_size=4),
+    st.lists(NAMES, max_size=4).map(tuple),
+    st.lists(NAMES, max_size=4).map(tuple),
+    LAYOUTS,
+    st.dictionaries(NAMES, LAYOUTS, max_size=2),
+)
+
+
+@given(KEPT)
+def test_whatever_is_kept_comes_back_from_its_text(kept: Kept) -> None:
+    assert from_text(to_text(kept)) == kept
+
+
+@pytest.fixture(scope="module")
+def bare() -> Iterator[tuple[QMainWindow, Docks, QTabWidget]]:
+    """A window with the docks of the real one, and nothing in them."""
+    window, pages = QMainWindow(), QTabWidget()
+    window.setCentralWidget(QLabel("skin"))
+    for page in range(4):
+        pages.addTab(QLabel(), str(page))
+    docks = Docks(window)
+    docks.put_beside("settings", "Settings", pages, Qt.DockWidgetArea.LeftDockWidgetArea)
+    docks.put_beside("lesson", "Lessons", QLabel(), Qt.DockWidgetArea.LeftDockWidgetArea)
+    docks.put_beside("curvature", "Maps", QLabel(), Qt.DockWidgetArea.RightDockWidgetArea)
+    for name in BELOW:
+        docks.put_below(name, name, QLabel(), "")
+    window.resize(1400, 900)
+    yield window, docks, pages
+    window.close()
+    window.deleteLater()
+
+
+def _words(layout: Layout) -> dict[str, tuple[object, ...]]:
+    """What can be said of each dock without px."""
+    return {name: (p.area, p.shown, p.tabbed, p.front, p.at) for name, p in layout.docks}
+
+
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(LAYOUTS)
+def test_any_layout_goes_through_text_and_window_and_back(bare, qapp, layout: Layout) -> None:
+    window, docks, pages = bare
+    window.show()
+    arrange(window, docks.by_name(), pages, layout)
+    qapp.processEvents()
+    once = layout_of(window, docks.by_name(), pages)
+    wished = {name: (p.area if p.shown else "", p.shown) for name, p in layout.docks}
+    assert {n: (p.area if p.shown else "", p.shown) for n, p in once.docks} == wished
+    assert once.page == layout.page
+    arrange(window, docks.by_name(), pages, READY["Live"])
+    qapp.processEvents()
+    again = from_text(to_text(Kept(now=once))).now
+    arrange(window, docks.by_name(), pages, again)
+    qapp.processEvents()
+    twice = layout_of(window, docks.by_name(), pages)
+    arrange(window, docks.by_name(), pages, READY["Live"])  # or what floats would stay
+    window.hide()
+    assert _words(twice) == _words(once)
+    shares = dict(once.docks)
+    for name, place in twice.docks:
+        assert place.share == pytest.approx(shares[name].share, abs=0.004)
+
+
+HOSTILE = (
+    "",
+    "format = 2",
+    "format = '1'",
+    "format = 1\nwindow = 3",
+    "format = 1\n[window]\ntheme = 'neon'",
+    "format = 1\n[window]\nplace = [0, 0, 0, 5]",
+    "format = 1\n[window]\nplace = [0, 0, 9999999999, 5]",
+    "format = 1\n[window]\nplace = [0, 0, 'a', true]",
+    "format = 1\n[window]\nfiles = [1]",
+    "format = 1\n[layout]\npage = -1",
+    "format = 1\n[layout]\ncost = 'left'",
+    "format = 1\n[layout]\ncost = { area = 'inside' }",
+    "format = 1\n[layout]\ncost = { area = 'left', share = nan }",
+    "format = 1\n[layout]\ncost = { area = 'left', shown = 1 }",
+    "format = 1\n[layouts]\nA = 3",
+    "format = 1\n[shortcuts]\npicture = ['Ctrl+S']",
+    "a = " + 5000 * "[" + 5000 * "]",
+    "\x00",
+    "format = 1\n" + "\n".join(f"[layouts.a{n}]" for n in range(200)),
+)
+
+
+@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
+def test_a_file_that_cannot_be_used_is_told_and_put_aside(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "window.toml"
+    path.write_text(text)
+    kept, told = KeptFile(path).read()
+    assert kept == Kept()
+    assert "window.toml.1.aside" in told
+    assert (tmp_path / "window.toml.1.aside").read_text() == text
+    assert not path.exists()
+
+
+@given(st.text() | st.binary())
+def test_no_text_at_all_ends_the_start(tmp_path_factory, text: str | bytes) -> None:
+    path = tmp_path_factory.mktemp("kept") / "window.toml"
+    data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
+    path.write_bytes(data)
+    kept, told = KeptFile(path).read()
+    assert kept == Kept()
+    assert told
+
+
+def test_a_file_that_is_not_there_is_no_news_and_one_that_cannot_be_written_is(
+    tmp_path: Path,
+) -> None:
+    assert KeptFile(tmp_path / "none.toml").read() == (Kept(), "")
+    (tmp_path / "file").touch()
+    assert "cannot be written" in KeptFile(tmp_path / "file" / "window.toml").write(Kept())
+
+
+def test_an_earlier_one_put_aside_stays(tmp_path: Path) -> None:
+    path = tmp_path / "window.toml"
+    for text in ("first", "second"):
+        path.write_text(text)
+        KeptFile(path).read()
+    aside = [(tmp_path / f"window.toml.{number}.aside").read_text() for number in (1, 2)]
+    assert aside == ["first", "second"]
+
+
+def test_the_text_is_read_by_a_person() -> None:
+    text = to_text(Kept(theme="dark", keys={"picture": "F12"}))
+    assert 'theme = "dark"' in text
+    assert 'picture = "F12"' in text
+    assert 'settings = {area = "left", shown = true, share = 0.25}' in text
+
+
+@pytest.mark.parametrize(
+    ("place", "seen"),
+    [
+        ((10, 20, 300, 200), (10, 20, 300, 200)),
+        ((-50, -60, 300, 200), (0, 0, 300, 200)),
+        ((900, 700, 300, 200), (700, 600, 300, 200)),
+        ((5000, 5000, 300, 200), (700, 600, 300, 200)),
+        ((0, 0, 4000, 3000), (0, 0, 1000, 800)),
+        ((1500, 100, 300, 200), (1500, 100, 300, 200)),
+    ],
+)
+def test_a_window_comes_back_on_a_screen_that_is_there(place, seen) -> None:
+    screens = [QRect(0, 0, 1000, 800), QRect(1000, 0, 1000, 800)]
+    if place[0] in (900, 5000):
+        screens = screens[:1]
+    assert clamped(QRect(*place), screens) == QRect(*seen)
+
+
+def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) -> None:
+    path = tmp_path / "deep" / "window.toml"
+    window = opened("sim:")
+    window.keeping.begin(path)
+    window.wishes.wish("theme", "light")
+    window.layouts.choose("Study")
+    assert window.cost.isVisible()
+    window.layouts.save("Mine")
+    window.history.stack.undo()
+    assert not window.cost.isVisible()
+    window.history.stack.redo()
+    window.actions_by_name.change_key("theme", "Ctrl+J")
+    window.opening.note(tmp_path / "a.toml")
+    window.menus.finder.recent = ["action:tare"]
+    window.panels.setCurrentIndex(2)
+    left = window.layouts.now
+    window.close()
+    other = opened("sim:")
+    other.keeping.begin(path)
+    qapp.processEvents()
+    assert other.history.settings.theme == "light"
+    assert _words(other.layouts.now) == _words(left)
+    assert other.panels.currentIndex() == 2
+    assert list(other.layouts.own) == ["Mine"]
+    assert other.actions_by_name.key("theme") == "Ctrl+J"
+    assert other.opening.recent == [tmp_path / "a.toml"]
+    assert other.menus.finder.recent == ["action:tare"]
+    other.layouts.rename("Mine", "Ours")
+    other.layouts.rename("Ours", "Live")
+    assert list(other.layouts.own) == ["Ours"]
+    other.layouts.reset()
+    assert not other.cost.isVisible()
+    other.layouts.choose("Ours")
+    assert other.cost.isVisible()
+    other.layouts.delete("Ours")
+    assert from_text(path.read_text()).own == {}
+
+
+def test_a_dock_of_another_version_is_passed_over(bare) -> None:
+    window, docks, pages = bare
+    text = "format = 1\n[layout]\nholograms = { area = 'left' }\ncost = { area = 'top' }"
+    arrange(window, docks.by_name(), pages, from_text(text).now)
+    seen = [name for name, dock in docks.by_name().items() if not dock.isHidden()]
+    assert seen == ["cost"]
+
+
+def test_a_window_that_was_not_asked_to_keeps_nothing(window: MainWindow, tmp_path: Path) -> None:
+    window.layouts.save("Mine")
+    window.keeping.write()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: MainWindow) -> None:
+    assert set(window.docks.by_name()) == set(DOCKS)
+    for name, shown in (("Study", window.cost), ("Calibrate", window.health), ("Live", None)):
+        window.layouts.choose(name)
+        seen = [dock for dock in window.docks.below if not dock.isHidden()]
+        assert [dock.widget() for dock in seen] == ([shown] if shown else [])
+    window.layouts.choose("Teach")
+    assert window.lesson.isVisible()
+    window.layouts.choose("Presenter")
+    assert window.presenting.on
+    window.layouts.save("Live")
+    assert "Expected a name" in window.statusBar().currentMessage()
+    assert window.layouts.own == {}
+    window.layouts.choose("Live")
+    assert not window.presenting.on
+
+
+def test_what_refuses_says_what_was_expected() -> None:
+    with pytest.raises(Refusal, match="expected format 1, got 7: another version wrote it"):
+        from_text("format = 7")

@@ -1,0 +1,90 @@
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QMainWindow
+
+from kappaskin import Refusal
+from kappaskin_app.actions import Actions
+from kappaskin_app.finder.sheet import CheatSheet
+
+CONTROL = Qt.KeyboardModifier.ControlModifier
+
+
+@pytest.fixture
+def actions(qtbot) -> Actions:
+    window = QMainWindow()
+    qtbot.addWidget(window)
+    actions = Actions(window)
+    actions.window = window  # type: ignore[attr-defined]
+    for name, key in (("picture", "Ctrl+S"), ("theme", "Ctrl+T"), ("reset", "")):
+        actions.add(name, "&View", f"&{name.title()}", lambda: None, key)
+    return actions
+
+
+@pytest.fixture
+def sheet(actions: Actions) -> Iterator[CheatSheet]:
+    sheet = CheatSheet(actions, actions.window)
+    sheet.open_all()
+    yield sheet
+    sheet.close()
+
+
+def _shown(sheet: CheatSheet) -> list[str]:
+    rows = (sheet.list.topLevelItem(row) for row in range(sheet.list.topLevelItemCount()))
+    return [row.text(2) for row in rows]
+
+
+def test_a_clash_is_told_with_what_has_the_key_and_changes_nothing(actions: Actions) -> None:
+    with pytest.raises(Refusal, match=r"Ctrl\+S is the shortcut of Picture"):
+        actions.change_key("theme", "Ctrl+S")
+    assert actions.key("theme") == "Ctrl+T"
+
+
+@pytest.mark.parametrize("key", ["A", "Shift+A", "Space", "1", "Left", "Ctrl+K, Ctrl+S"])
+def test_a_key_that_types_is_no_shortcut(actions: Actions, key: str) -> None:
+    with pytest.raises(Refusal, match="for typing"):
+        actions.change_key("theme", key)
+
+
+@pytest.mark.parametrize("key", ["F7", "Shift+F7", "Ctrl+Shift+A", "Alt+Left", "Meta+1", ""])
+def test_any_other_key_is_one(actions: Actions, key: str) -> None:
+    actions.change_key("theme", key)
+    assert actions.changed_keys() == {"theme": key}
+
+
+def test_keys_kept_may_change_places(actions: Actions) -> None:
+    assert actions.take_keys({"picture": "Ctrl+T", "theme": "Ctrl+S"}) == []
+    assert (actions.key("picture"), actions.key("theme")) == ("Ctrl+T", "Ctrl+S")
+
+
+def test_of_two_that_want_one_key_the_second_is_told_and_has_none(actions: Actions) -> None:
+    (told,) = actions.take_keys({"reset": "Ctrl+J", "theme": "Ctrl+J", "unknown": "Ctrl+U"})
+    assert told == "Ctrl+J is the shortcut of Reset: change that first"
+    assert actions.key("theme") == ""
+
+
+def test_a_shortcut_is_found_changed_and_reset_with_the_keyboard(
+    sheet: CheatSheet, actions: Actions, qtbot
+) -> None:
+    qtbot.keyClicks(sheet.line, "them")
+    assert _shown(sheet) == ["Ctrl+T"]
+    qtbot.keyClick(sheet.line, Qt.Key.Key_Return)
+    qtbot.keyClick(sheet.edit, Qt.Key.Key_J, CONTROL)
+    qtbot.waitUntil(lambda: _shown(sheet) == ["Ctrl+J *"])
+    assert actions.key("theme") == "Ctrl+J"
+    assert "Theme is Ctrl+J now." in sheet.message.text()
+    qtbot.keyClick(sheet.edit, Qt.Key.Key_S, CONTROL)
+    qtbot.waitUntil(lambda: "Ctrl+S is the shortcut of Picture" in sheet.message.text())
+    assert sheet.edit.keySequence().toString() == "Ctrl+J"
+    sheet.reset.click()
+    assert actions.key("theme") == "Ctrl+T"
+    assert not sheet.reset.isEnabled()
+
+
+def test_all_are_reset_at_once(sheet: CheatSheet, actions: Actions) -> None:
+    actions.take_keys({"picture": "Ctrl+T", "theme": "Ctrl+S"})
+    sheet.open_all()
+    sheet.reset_all.click()
+    assert actions.changed_keys() == {}
+    assert _shown(sheet) == ["Ctrl+S", "Ctrl+T", ""]
