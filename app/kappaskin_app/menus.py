@@ -15,6 +15,7 @@ from kappaskin_app.finder.sheet import CheatSheet
 from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
+from kappaskin_app.settings import COLOURS
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
@@ -96,7 +97,8 @@ class Menus(QObject):
     def _add_export(self) -> None:
         window = self._window
         solid = {"the window": window, "the skin": window.centralWidget()}
-        maps = {f"curvature {name}": view for name, view in window.heatmaps.items()}
+        words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
+        maps = {f"the map of {words[name]}": view for name, view in window.heatmaps.items()}
         docks = {dock.windowTitle(): dock.widget() for dock in window.docks.below}
         window.exports.register(self.actions, solid, maps | docks)
 

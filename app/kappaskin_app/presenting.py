@@ -16,7 +16,7 @@ from kappaskin_app.session import Session
 from kappaskin_app.sound import Sound
 from kappaskin_app.theme import Theme
 from kappaskin_app.touching import touches_at
-from kappaskin_app.views.badge import SIM, origin
+from kappaskin_app.views.badge import GAP, SIM, origin
 from kappaskin_app.views.banner import REMEDIES
 from kappaskin_app.views.pad import Hand
 from kappaskin_app.views.stage import Stage
@@ -147,7 +147,8 @@ class Presenting(QObject):
             age = "" if self._display.old else age_in_words(*self._display.age())
             self.stage.show_trouble("", "", "")
         else:
-            age = age_in_words(now - status.last_frame)
+            # What was recorded has a time in the recording, and no age.
+            age = "" if state == GAP else age_in_words(now - status.last_frame)
             since = self._session.alarm().partition("\n")[0].removeprefix(state).strip()
             self.stage.show_trouble(state, since, status.message.replace("`", ""))
         self._feel(now)  # a recording that stands, or has a gap, brings no estimate

@@ -37,7 +37,7 @@ def recording(window: MainWindow, until, tmp_path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["the window", "the skin", "curvature xx"])
+@pytest.mark.parametrize("name", ["the window", "the skin", "the map of curvature xx"])
 def test_a_png_is_what_was_seen_with_what_it_is(name: str, window, named, tmp_path) -> None:
     named(tmp_path / "out", "Picture (*.png)")
     window.actions_by_name[f"picture-of-{name}"].trigger()
@@ -55,10 +55,10 @@ def test_a_png_is_what_was_seen_with_what_it_is(name: str, window, named, tmp_pa
 
 def test_an_svg_of_a_heatmap_has_its_cells_and_a_title(window, named, tmp_path) -> None:
     named(tmp_path / "out.svg")
-    window.actions_by_name["picture-of-curvature xx"].trigger()
+    window.actions_by_name["picture-of-the map of curvature xx"].trigger()
     root = ElementTree.parse(tmp_path / "out.svg").getroot()
     told = {child.tag.split("}")[1]: child.text for child in root}
-    assert told["title"] == "curvature xx"
+    assert told["title"] == "the map of curvature xx"
     assert "SIM-0001" in told["desc"]
     texts = [text for part in root.iter() if part.tag.endswith("text") for text in part.itertext()]
     assert any("functions" in text for text in texts)
