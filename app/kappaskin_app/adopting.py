@@ -1,14 +1,13 @@
 """A recording that outlives its window: what is left to the next one, and what that says."""
 
-import pickle
+from dataclasses import replace
 from pathlib import Path
 
-from kappaskin import Engine, Left, Status
+from kappaskin import Engine, Left, Refusal, Status
 from kappaskin_app.history import History
 from kappaskin_app.settings import Settings
+from kappaskin_app.settings_text import settings_in, settings_text
 from kappaskin_app.simulation import settings_for
-
-_UNREADABLE = (pickle.UnpicklingError, AttributeError, EOFError, ImportError, IndexError, TypeError)
 
 
 class Entrusting:
@@ -22,16 +21,17 @@ class Entrusting:
         settings = self._history.settings
         if status.recording.active and settings is not self._left:
             self._left = settings
-            self._engine.entrust(pickle.dumps(settings))
+            self._engine.entrust(settings_text(settings).encode())
 
 
 def settings_left(left: Left) -> Settings:
     """The settings of the window that is gone; those to begin with where they cannot be read."""
+    setup = left.asked.setup
     try:
-        settings = pickle.loads(left.asked.entrusted)  # a window's, by way of our own process
-    except _UNREADABLE:
-        settings = None
-    return settings if isinstance(settings, Settings) else settings_for(left.asked.source or "")
+        settings = settings_in(left.asked.entrusted.decode(errors="replace"))
+    except Refusal:
+        return settings_for(left.asked.source or "")
+    return replace(settings, calibration=setup.calibration, tare=setup.tare)
 
 
 def words(left: Left, wanted: str) -> str:

@@ -50,11 +50,12 @@ class _Scrolled(QScrollArea):
     def widen(self) -> None:
         self._letters = self.font().pointSizeF()
         bar = self.verticalScrollBar().sizeHint().width()
-        self.setMinimumWidth(self.widget().minimumSizeHint().width() + bar)
+        if (inside := self.widget()) is not None:
+            self.setMinimumWidth(inside.minimumSizeHint().width() + bar)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         laid_out = event.type() == QEvent.Type.LayoutRequest
-        if laid_out and self.widget() and self._letters != self.font().pointSizeF():
+        if laid_out and self._letters != self.font().pointSizeF():
             self.widen()
         return super().eventFilter(watched, event)
 

@@ -22,7 +22,7 @@ class ExportDialog(WorkDialog):
     """Asks what of a recording is to be written where, and writes it."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Export a recording", "&Export", parent)
+        super().__init__("Export a recording", "&Export", self._begun, self._told, parent)
         self.setObjectName("export")
         self.recording, self.to = QLineEdit(), QLineEdit()
         self.settings = QComboBox()
@@ -105,12 +105,12 @@ class ExportDialog(WorkDialog):
         until = self.until.value() or math.inf
         return Wanted(*files, self.begin.value(), until, self.every.value(), setup=setup)
 
-    def _work(self) -> Exporting:
+    def _begun(self) -> Exporting:
         exporting = Exporting(self.wanted)
         self._files = exporting.files
         return exporting
 
-    def _said(self, result: object) -> str:
+    def _told(self, result: object) -> str:
         words = result.words if isinstance(result, Exported) else ""
         return f"Written: {', '.join(map(str, self._files))} ({words})"
 

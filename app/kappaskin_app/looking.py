@@ -21,7 +21,7 @@ from kappaskin_app.views.camera import (
 )
 from kappaskin_app.wishes import Wishes
 
-_MENU = "S&kin"
+_MENU = "Sk&in"
 _LOOKS = (
     *(("F6", ABOVE), ("F7", FRONT), ("F8", SIDE)),
     *(("Shift+F6", BELOW), ("Shift+F7", ISOMETRIC)),

@@ -18,6 +18,7 @@ from kappaskin_app.theme import Theme
 from kappaskin_app.touching import touches_at
 from kappaskin_app.views.badge import GAP, SIM, origin
 from kappaskin_app.views.banner import REMEDIES
+from kappaskin_app.views.offer import Offer
 from kappaskin_app.views.pad import Hand
 from kappaskin_app.views.stage import Stage
 from kappaskin_app.views.strip import age_in_words
@@ -112,7 +113,7 @@ class Presenting(QObject):
         window = self._window
         docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
         bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-        return [*docks, *bars, window.offer, window.menuBar(), window.statusBar()]
+        return [*docks, *bars, *window.findChildren(Offer), window.menuBar(), window.statusBar()]
 
     # What comes in.
 

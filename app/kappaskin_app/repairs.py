@@ -17,7 +17,7 @@ class RepairDialog(WorkDialog):
     saved = Signal(Path)
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Repair a recording", "&Repair", parent)
+        super().__init__("Repair a recording", "&Repair", self._begun, self._told, parent)
         self.setObjectName("repair")
         self.recording, self.to = QLineEdit(), QLineEdit()
         self.recording.setReadOnly(True)
@@ -51,10 +51,10 @@ class RepairDialog(WorkDialog):
             widget.setEnabled(not self.busy)
         self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
-    def _work(self) -> Repairing:
+    def _begun(self) -> Repairing:
         return Repairing(path_in(self.recording), path_in(self.to))
 
-    def _said(self, result: object) -> str:
+    def _told(self, result: object) -> str:
         if not isinstance(result, Repaired):
             return ""
         if not (result.total or result.attachments):

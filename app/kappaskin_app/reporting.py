@@ -107,7 +107,7 @@ class ReportDialog(WorkDialog):
     """
 
     def __init__(self, tell: Callable[[bool], Told], logs: Path, parent: QWidget) -> None:
-        super().__init__("Report what went wrong", "&Save", parent)
+        super().__init__("Report what went wrong", "&Save", self._begun, self._told, parent)
         self.setObjectName("report")
         self._tell, self._logs = tell, logs
         self.to, self.readings = QLineEdit(), QCheckBox("&With the readings that are shown")
@@ -141,9 +141,9 @@ class ReportDialog(WorkDialog):
             widget.setEnabled(not self.busy)
         self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
-    def _work(self) -> Reporting:
+    def _begun(self) -> Reporting:
         told = self._tell(self.readings.isChecked())
         return Reporting(path_in(self.to), told, self._logs)
 
-    def _said(self, result: object) -> str:
+    def _told(self, result: object) -> str:
         return f"Saved {result}"

@@ -33,13 +33,22 @@ class Work(Protocol):
 
 
 class WorkDialog(QDialog):
-    """Asks in a `form`, begins what `_work` makes of it, and shows how far that is.
+    """Asks in a `form`, begins the `work` made of it, and shows how far that is.
 
-    It can be cancelled, and is, when it closes.
+    `work` raises a `Refusal` where it cannot begin, `said` puts what came of it into words. It can
+    be cancelled, and is, when it closes.
     """
 
-    def __init__(self, title: str, verb: str, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        title: str,
+        verb: str,
+        work: Callable[[], Work],
+        said: Callable[[object], str],
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
+        self._work, self._said = work, said
         self.setWindowTitle(title)
         self.setMinimumWidth(_WIDTH)
         self.form, self.bar, self.words = QFormLayout(), QProgressBar(), QLabel()
@@ -65,21 +74,9 @@ class WorkDialog(QDialog):
             layout.addWidget(widget)
         layout.addLayout(buttons)
 
-    # What differs.
-
-    def _work(self) -> Work:
-        """What is begun; a `Refusal` where that cannot be."""
-        raise NotImplementedError
-
-    def _said(self, result: object) -> str:
-        """What came of it, in words."""
-        raise NotImplementedError
-
     def _allow(self) -> None:
         """Ask only for what makes sense."""
         self.cancel_button.setText("&Cancel" if self.busy else "C&lose")
-
-    # What is the same.
 
     @property
     def busy(self) -> bool:

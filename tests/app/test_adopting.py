@@ -1,6 +1,5 @@
 """A window that takes over a recording which the last one left."""
 
-import pickle
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +11,7 @@ from kappaskin.requests import Asked
 from kappaskin_app.adopting import Entrusting, settings_left, words
 from kappaskin_app.history import History
 from kappaskin_app.settings import Settings
+from kappaskin_app.settings_text import settings_in, settings_text
 from kappaskin_app.window import MainWindow
 
 BEFORE = Settings(
@@ -20,7 +20,7 @@ BEFORE = Settings(
 
 
 def left(source: str | None, entrusted: bytes = b"") -> Left:
-    asked = Asked(source=source, recording=Path("/tmp/press.mcap"), entrusted=entrusted)
+    asked = Asked(source=source, recording=Path("press.mcap"), entrusted=entrusted)
     return Left(asked, ("", ""), 1, 5.0)
 
 
@@ -33,7 +33,7 @@ def folder() -> Iterator[Path]:
 def test_the_next_window_goes_on_as_the_last_one_was(
     opened, abandoned, folder: Path, tmp_path: Path, until
 ) -> None:
-    alone = abandoned(folder, tmp_path / "press.mcap", entrusted=pickle.dumps(BEFORE))
+    alone = abandoned(folder, tmp_path / "press.mcap", entrusted=settings_text(BEFORE).encode())
     until(lambda: bool(list(folder.glob("*.note"))))
     window: MainWindow = opened("/dev/ttyABSENT7", Engine(orphans=folder))
     until(lambda: window.badge.state == "SIM" and window.taping.recording)
@@ -57,7 +57,7 @@ def test_the_next_window_goes_on_as_the_last_one_was(
     assert (tmp_path / "press.mcap").exists()
 
 
-@pytest.mark.parametrize("data", [b"", b"garbage", pickle.dumps("no settings")])
+@pytest.mark.parametrize("data", [b"", b"garbage", b"{}", b"\xff"])
 def test_settings_that_cannot_be_read_are_those_of_the_source(data: bytes) -> None:
     assert settings_left(left("sim:line", data)).load_case == "line"
     assert settings_left(left("/dev/ttyACM0", data)) == Settings()
@@ -93,4 +93,4 @@ def test_settings_are_entrusted_once_each_and_only_while_it_records(qapp) -> Non
         entrusting.follow(status)
     history.change("x", -1, functions_x=6)
     entrusting.follow(recording)
-    assert [pickle.loads(data).functions_x for data in engine.data] == [8, 6]
+    assert [settings_in(data.decode()).functions_x for data in engine.data] == [8, 6]

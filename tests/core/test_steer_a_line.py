@@ -61,7 +61,7 @@ def source(device):
     made.close()
 
 
-def read_until(source, holds, within=5.0):
+def read_until(source, holds, within=30.0):
     """The first frame for which something holds."""
     end = time.monotonic() + within
     while time.monotonic() < end:

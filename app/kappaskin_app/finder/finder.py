@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.finder.listing import Listing, row
+from kappaskin_app.finder.listing import Listing, clearable, row
 from kappaskin_app.finder.matching import best, score
 from kappaskin_app.finder.things import Thing
 from kappaskin_app.guard import guarded
@@ -43,7 +43,7 @@ class Finder(QDialog):
         self.line.setToolTip(
             "A few letters of its name are enough, in their order: nogau is Noise: Gaussian."
         )
-        self.line.setClearButtonEnabled(True)
+        clearable(self.line)
         self.list.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the line keeps it
         self.list.setAccessibleName("What was found")
         self.list.setToolTip("What was found, where it stands, and its shortcut.")

@@ -6,7 +6,9 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
     QHeaderView,
+    QKeySequenceEdit,
     QLineEdit,
+    QToolButton,
     QTreeWidget,
     QTreeWidgetItem,
     QWidget,
@@ -14,6 +16,13 @@ from PySide6.QtWidgets import (
 
 _LED = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 _ROOM = 5  # px between two rows
+
+
+def clearable(editor: QLineEdit | QKeySequenceEdit) -> None:
+    """Give an `editor` a button that clears it, and the button a name."""
+    editor.setClearButtonEnabled(True)
+    for made in editor.findChildren(QToolButton):
+        made.setAccessibleName("Clear")
 
 
 class Listing(QTreeWidget):

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin import Refusal
 from kappaskin_app.actions import Actions, plain
-from kappaskin_app.finder.listing import Listing, row
+from kappaskin_app.finder.listing import Listing, clearable, row
 from kappaskin_app.finder.matching import best, score
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import button, in_a_row
@@ -37,7 +37,7 @@ class CheatSheet(QDialog):
         self.resize(*_SIZE)
         self._actions = actions
         self.line = QLineEdit(placeholderText="Look for a command, a menu or a key")  # pyright: ignore[reportCallIssue]
-        self.line.setClearButtonEnabled(True)
+        clearable(self.line)
         self.line.setAccessibleName("Look for a shortcut")
         self.line.setToolTip("A few letters of a command, of its menu, or its key.")
         self.list = Listing(self.line)
@@ -46,7 +46,7 @@ class CheatSheet(QDialog):
         self.list.header().resizeSection(1, _MENU)
         self.edit = QKeySequenceEdit()
         self.edit.setMaximumSequenceLength(1)
-        self.edit.setClearButtonEnabled(True)
+        clearable(self.edit)
         self.edit.setAccessibleName("Shortcut of the chosen command")
         self.edit.setToolTip("Press the keys that the chosen command is to have.")
         self.name, self.message = QLabel(), QLabel(_MOUSE, wordWrap=True)  # pyright: ignore[reportCallIssue]

@@ -16,7 +16,7 @@ from kappaskin_app.layouts.layout import LIVE, PRESENTER, READY, Layout
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
 
-_MENU = "La&yout"
+_MENU = "Layo&ut"
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _LONGEST = 60  # characters of a name
 _TIPS = {

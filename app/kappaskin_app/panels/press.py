@@ -36,7 +36,7 @@ class PressPage(QWidget):
             "Ask for two elements in each row and column: tells whether rows, columns or "
             "components are exchanged, but not every two elements.",
         )
-        self.skip = button("Sk&ip", "press-skip", "Go on without this element.")
+        self.skip = button("Ski&p", "press-skip", "Go on without this element.")
         self.nothing = button(
             "N&othing came", "press-nothing", "You pressed it, but nothing was noticed."
         )

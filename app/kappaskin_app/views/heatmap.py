@@ -258,6 +258,7 @@ class Heatmap(QWidget):
         self.lock = LockButton()
         self.lock.wanted.connect(self._ask_lock)
         self.lock.setVisible(name != "health")  # whose colours are no range
+        self.lock.setEnabled(name != "health")
         self.cells, self.bar = _Cells(), ColourBar()
         self.cells.setToolTip(_LEGEND)
         self.cells.setAccessibleName(f"Heatmap of {name.replace('_', ' ')}")
