@@ -65,8 +65,7 @@ def _begin_deaf() -> None:
 class Haste:
     """Lets this process come before others that want a core, where the system allows it.
 
-    On two cores that also draw, what waits for messages has them in half the time. Linux alone, and
-    there for whom the limits (`nice` in limits.conf, or root) let ask for it.
+    Linux alone, and there for whom the limits (`nice` in limits.conf, or root) let ask for it.
     """
 
     def __init__(self) -> None:
