@@ -81,10 +81,11 @@ def _application() -> "QApplication":
 
 def _splash(kept: Path) -> "Splash":
     from kappaskin_app.layouts.file import KeptFile
-    from kappaskin_app.theme import LIGHT, THEMES
+    from kappaskin_app.settings import Settings
+    from kappaskin_app.theme import THEMES
     from kappaskin_app.views.splash import Splash
 
-    splash = Splash(THEMES.get(KeptFile(kept).theme(), LIGHT))
+    splash = Splash(THEMES[KeptFile(kept).theme() or Settings().theme])
     splash.show()
     return splash
 
@@ -124,6 +125,8 @@ def launch(
     recovering = _recovering(window)
     if presenting and not window.session.engine.adopted:
         window.presenting.enter()
+    if seconds is None:
+        window.beginning.begin()
     from PySide6.QtCore import QTimer
 
     watch = QTimer(window, interval=50)  # pyright: ignore[reportCallIssue]

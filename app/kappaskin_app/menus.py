@@ -24,6 +24,7 @@ _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FILE, _EDIT, _SOURCE, _VIEW = "&File", "&Edit", "&Source", "&View"
 _FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, panels"
 _SHEET = "Every shortcut, to look up and to change"
+_BEGIN = "Offer above the skin what one may begin with: a scene, a sensor, a lesson, a recording"
 _RECENT = "Scenes, recordings, calibrations and meshes opened last; each may also be dropped here"
 _FIGURES, _HELP = "Fi&gures", "&Help"
 
@@ -44,6 +45,8 @@ class Menus(QObject):
         self._add_export()
         self.sheet = CheatSheet(self.actions, window)
         self.actions.add("shortcuts", _HELP, "&Shortcuts", self.sheet.open_all, "F1", _SHEET)
+        begin = window.beginning.offer
+        self.actions.add("begin", _HELP, "&Ways to begin", begin, "", _BEGIN)
         window.mishaps.add_actions(self.actions, _HELP)
 
     def _add_file(self) -> None:

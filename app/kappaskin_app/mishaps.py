@@ -16,6 +16,7 @@ from kappaskin_app.theme import Theme
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
 
+REPORT_TIP = "Save what helps to find out what went wrong, in one file"
 _TIP = (
     "Things that went wrong inside, while the rest goes on. Click to read them; Help > Report "
     "saves what helps to find out why."
@@ -39,8 +40,9 @@ class Mishaps(QObject):
 
     def add_actions(self, actions: Actions, menu: str) -> None:
         """Register what a person can do."""
-        tip = "Save what helps to find out what went wrong, in one file"
-        actions.add("report", menu, "&Report\N{HORIZONTAL ELLIPSIS}", self.report.ask, "", tip)
+        actions.add(
+            "report", menu, "&Report\N{HORIZONTAL ELLIPSIS}", self.report.ask, "", REPORT_TIP
+        )
 
     def _take(self, words: str) -> None:
         self.failures += 1

@@ -4,7 +4,6 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import partial
@@ -16,8 +15,10 @@ from PySide6.QtCore import QLockFile, QObject
 
 from kappaskin import Refusal, Status
 from kappaskin_app.guard import guarded
+from kappaskin_app.mishaps import REPORT_TIP
 from kappaskin_app.settings import Settings
 from kappaskin_app.settings_text import OF_SENSORS, settings_in, settings_text
+from kappaskin_app.views.offer import Offered
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
@@ -28,6 +29,7 @@ _TIP = (
     "The program was ended, by itself or by the system, before it was closed. What you take up of "
     "it can be undone (Ctrl+Z); Report saves what helps to find out why."
 )
+_SETTINGS = "Every setting as it was then, but for the calibration and tare of a sensor."
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class Recovering(QObject):
         window.session.reported.connect(guarded(self._keep))
         # What went on recording by itself was taken over with its settings already.
         if last is not None and window.session.engine.adopted is None:
-            self._offer(last)
+            self.offer(last)
 
     def _keep(self, status: Status) -> None:
         now = time.monotonic()
@@ -113,15 +115,18 @@ class Recovering(QObject):
             window = self._window
             self._running.keep(Last(window.history.settings, window.session.source, recording))
 
-    def _offer(self, last: Last) -> None:
+    def offer(self, last: Last) -> None:
         """Offer what is left of the last session: whoever wants none of it goes on."""
         window = self._window
-        offered: dict[str, Callable[[], object]] = {"Its se&ttings": partial(self._use, last)}
+        offered = [Offered("Its se&ttings", _SETTINGS, partial(self._use, last))]
         if last.source and not last.source.startswith("sim:"):
-            offered["Its &source"] = partial(window.connect_to, last.source)
+            connect = partial(window.connect_to, last.source)
+            offered.append(Offered("Its s&ource", f"Connect {last.source} again.", connect))
         if (recording := _left(last.recording)) is not None:
-            offered["Its re&cording"] = partial(window.replaying.open_file, recording)
-        offered["Re&port\N{HORIZONTAL ELLIPSIS}"] = window.mishaps.report.ask
+            play = partial(window.replaying.open_file, recording)
+            offered.append(Offered("Its recordin&g", f"Play {recording}.", play))
+        report = window.mishaps.report.ask
+        offered.append(Offered("Re&port\N{HORIZONTAL ELLIPSIS}", REPORT_TIP, report))
         window.offer.show_offer("The last session ended unexpectedly. Take up:", _TIP, offered)
 
     def _use(self, last: Last) -> None:

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin import Engine, Tares, data_folder
 from kappaskin_app.adopting import settings_left
+from kappaskin_app.beginning import Beginning
 from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.columns import widen
 from kappaskin_app.comparing import Comparing
@@ -129,6 +130,7 @@ class MainWindow(QMainWindow):
         self.pointing = self._pointing()
         self.looking = Looking(self.history, self.wishes, self.display)
         self.layouts = Layouts(self)
+        self.beginning = Beginning(self)
         self.menus, self.keeping = Menus(self), Keeping(self)
         self.actions_by_name = self.menus.actions
         self.doing = Doing(tasks_of(self), self)
@@ -225,6 +227,8 @@ class MainWindow(QMainWindow):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self.presenting.on:
             self.presenting.leave()
+        elif event.key() == Qt.Key.Key_Escape and self.offer.isVisible():
+            self.offer.hide()
         else:
             super().keyPressEvent(event)
 

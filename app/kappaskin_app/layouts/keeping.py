@@ -48,8 +48,8 @@ class Keeping(QObject):
             window.setGeometry(clamped(QRect(*kept.place), screens))
         if kept.full:
             window.showMaximized()
-        if kept.theme:
-            window.history.apply(replace(window.history.settings, theme=kept.theme))
+        chosen = {"theme": kept.theme} if kept.theme else {}
+        window.history.apply(replace(window.history.settings, **chosen, show_start=kept.start))
         window.opening.recent = [Path(file) for file in kept.files]
         window.menus.finder.recent = list(kept.done)
         window.layouts.own = dict(kept.own)
@@ -61,6 +61,7 @@ class Keeping(QObject):
         layout, place = window.layouts.now, window.normalGeometry()
         return Kept(
             theme=window.history.settings.theme,
+            start=window.history.settings.show_start,
             place=(place.x(), place.y(), place.width(), place.height()),
             full=window.isMaximized(),
             keys=window.actions_by_name.changed_keys(),

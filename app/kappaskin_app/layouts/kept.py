@@ -25,7 +25,8 @@ class Kept:
     """What a person chose of the window; all but the theme begins as if nothing ever was.
 
     `place` is (x, y, width, height) in px, `keys` are the shortcuts changed, `done` and `files`
-    what was done and opened last, `own` the layouts saved under a name, `now` the last one.
+    what was done and opened last, `own` the layouts saved under a name, `now` the last one, and
+    `start` whether ways to begin are offered.
     """
 
     theme: str = ""
@@ -36,6 +37,7 @@ class Kept:
     files: tuple[str, ...] = ()
     now: Layout = READY[LIVE]
     own: Mapping[str, Layout] = field(default_factory=dict)
+    start: bool = True
 
 
 # To text.
@@ -54,7 +56,7 @@ def to_text(kept: Kept) -> str:
 
 
 def _window(kept: Kept) -> dict[str, Any]:
-    said: dict[str, Any] = {"theme": kept.theme, "full": kept.full}
+    said: dict[str, Any] = {"theme": kept.theme, "start": kept.start, "full": kept.full}
     said |= {"done": list(kept.done), "files": list(kept.files)}
     return said | ({"place": list(kept.place)} if kept.place else {})
 
@@ -97,6 +99,7 @@ def from_text(text: str) -> Kept:
         _names(window, "files"),
         _layout(_part(document, "layout", dict, {})) if "layout" in document else READY[LIVE],
         _layouts(document),
+        _part(window, "start", bool, True),
     )
 
 

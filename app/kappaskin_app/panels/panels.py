@@ -75,10 +75,18 @@ class Panels(QTabWidget):
 
     def show_recording(self) -> None:
         """Show the panel on recordings."""
+        self._show_live(self.recording)
+
+    def show_connection(self) -> None:
+        """Show the panel on connections, ready to choose a source."""
+        self._show_live(self.connection)
+        self.connection.sources.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _show_live(self, panel: Panel) -> None:
         self.setCurrentIndex(list(self._pages).index(_LIVE))
         page = self.currentWidget()
         if isinstance(page, QScrollArea):
-            page.ensureWidgetVisible(self.recording)
+            page.ensureWidgetVisible(panel)
 
     def show_settings(self, settings: Settings) -> None:
         for panel in self.all():

@@ -187,6 +187,14 @@ class View:
     theme: str = asked(
         "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
     )
+    show_start: bool = asked(
+        True,
+        Switch(
+            "Ways to begin",
+            "Offer above the skin, whenever the window opens, what one may begin with: a scene, a "
+            "sensor, a lesson, a recording.",
+        ),
+    )
     traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
     # How far colours reach, in SI units: on one side, or on both. 0 follows what is shown.
     range_displacement: float = 0.0

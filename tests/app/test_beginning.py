@@ -1,0 +1,130 @@
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QMenu, QVBoxLayout, QWidget
+
+from kappaskin_app.layouts.file import KeptFile
+from kappaskin_app.recovering import Last, Recovering
+from kappaskin_app.views.offer import Offer, Offered
+from kappaskin_app.window import MainWindow
+
+
+class Bench(QWidget):
+    """An offer above something else, and what was taken of it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.taken: list[str] = []
+        self.offer, self.menu = Offer(), QMenu(self)
+        self.recent = self.menu.addAction("press.mcap")
+        column = QVBoxLayout(self)
+        column.addWidget(self.offer)
+        column.addWidget(QWidget(), 1)
+        self.resize(900, 300)
+        self.show()
+
+    def show_offer(self, seconds: float = 0.0) -> None:
+        one = Offered("&Open a scene", "Simulate it", lambda: self.taken.append("scene"))
+        two = Offered("Begin a &lesson", "Learn it", lambda: self.taken.append("lesson"))
+        three = Offered("&Recently opened", "The last ones", self.menu)
+        self.offer.show_offer("To begin:", "What moves is simulated", [one, two, three], seconds)
+
+
+@pytest.fixture
+def bench(qapp: QApplication) -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.close()
+    made.deleteLater()
+
+
+def test_what_does_not_fit_in_a_line_goes_into_the_next_and_nothing_is_cut(bench: Bench, until):
+    bench.show_offer()
+    until(lambda: bench.offer.height() > 0)
+    low = bench.offer.height()
+    bench.resize(260, 300)
+    until(lambda: bench.offer.height() > low)
+    parts = [bench.offer.words, *bench.offer.buttons, bench.offer.away]
+    places = [part.geometry() for part in parts]
+    assert all(bench.offer.rect().contains(place) for place in places)
+    assert all(p.width() >= w.sizeHint().width() for p, w in zip(places, parts, strict=True))
+    overlaps = [a for n, a in enumerate(places) for b in places[:n] if a.intersects(b)]
+    assert overlaps == []
+
+
+def test_tab_goes_from_one_to_the_next_and_to_what_puts_it_away(bench: Bench, until) -> None:
+    bench.show_offer()
+    bench.activateWindow()
+    bench.offer.buttons[0].setFocus()
+    until(bench.offer.buttons[0].hasFocus)
+    for widget in [*bench.offer.buttons[1:], bench.offer.away]:
+        QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+        assert QApplication.focusWidget() is widget
+
+
+def test_what_is_taken_is_done_and_the_offer_goes(bench: Bench) -> None:
+    bench.show_offer()
+    QTest.mouseClick(bench.offer.buttons[1], Qt.MouseButton.LeftButton)
+    assert bench.taken == ["lesson"]
+    assert not bench.offer.isVisible()
+
+
+def test_what_is_chosen_from_its_menu_puts_it_away(bench: Bench) -> None:
+    bench.show_offer()
+    bench.recent.trigger()
+    assert not bench.offer.isVisible()
+
+
+def test_it_goes_by_itself_but_not_while_somebody_is_at_it(bench: Bench, until) -> None:
+    bench.show_offer(0.05)
+    bench.activateWindow()
+    bench.offer.buttons[0].setFocus()
+    until(bench.offer.buttons[0].hasFocus)
+    QTest.qWait(120)
+    assert bench.offer.isVisible()
+    bench.offer.buttons[0].clearFocus()
+    until(lambda: not bench.offer.isVisible())
+
+
+def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwanted(
+    window: MainWindow, tmp_path: Path, until
+) -> None:
+    window.beginning.begin()
+    until(lambda: window.offer.height() > 20)
+    QApplication.processEvents()
+    assert len(window.offer.buttons) == 6
+    above = window.offer.mapTo(window, QPoint(0, window.offer.height())).y()
+    assert above <= window.membrane.mapTo(window, QPoint(0, 0)).y()
+    QTest.keyClick(window.offer.buttons[0], Qt.Key.Key_Escape)
+    assert not window.offer.isVisible()
+    window.keeping.begin(tmp_path / "window.toml")
+    window.beginning.begin()
+    window.offer.buttons[-1].click()
+    window.keeping.write()
+    assert not KeptFile(tmp_path / "window.toml").read()[0].start
+    window.beginning.begin()
+    assert not window.offer.isVisible()
+    window.history.stack.undo()
+    window.beginning.begin()
+    assert window.offer.isVisible()
+    window.offer.buttons[2].click()
+    until(lambda: window.lesson.isVisible())
+
+
+def test_ways_to_begin_go_when_something_is_begun_and_give_way_to_what_a_crash_left(
+    window: MainWindow, tmp_path: Path
+) -> None:
+    window.beginning.begin()
+    window.wishes.wish("functions_x", 5)
+    assert not window.offer.isVisible()
+    (tmp_path / "window-1.json").write_text("{}")
+    recovering = Recovering(window, tmp_path)
+    recovering.offer(Last(window.history.settings))
+    window.beginning.begin()
+    assert window.offer.words.text().startswith("The last session")
+    window.wishes.wish("functions_x", 6)
+    assert window.offer.isVisible()
+    recovering.close()
