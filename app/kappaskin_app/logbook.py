@@ -45,6 +45,7 @@ class Logbook:
             logging.StreamHandler(),  # as without a log
         )
         for handler in self._handlers:
+            handler.setLevel(logging.WARNING)
             handler.setFormatter(logging.Formatter(_LINE))
             logging.getLogger().addHandler(handler)
         self._crashes = (folder / CRASHES).open("a", encoding="utf-8")

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 REPORT_TIP = "Save what helps to find out what went wrong, in one file"
 _TIP = (
-    "Things that went wrong inside, while the rest goes on. Click to read them; Help > Report "
-    "saves what helps to find out why."
+    "Things that went wrong inside, while the rest goes on. Click to read them in the Log; "
+    "Help > Report saves what helps to find out why."
 )
 
 
@@ -33,7 +33,7 @@ class Mishaps(QObject):
         self.count = QToolButton()
         self.count.setToolTip(_TIP)
         self.count.setAccessibleName("No failures")
-        self.count.clicked.connect(guarded(lambda *_: window.happenings.open_list()))
+        self.count.clicked.connect(guarded(lambda *_: window.docks.reveal("log")))
         self.count.hide()
         self.report = ReportDialog(self._tell, log_folder(), window)
         guard.on_failure(self._take)

@@ -32,7 +32,7 @@ class News(QObject):
         self._themed = (
             *(window.panels, window.cost, window.scene, window.timeline, window.transport),
             *(window.mark, window.offer, window.mishaps, window.compare, window.stability),
-            *(window.health, window.lesson, window.pointing, window.display),
+            *(window.log, window.health, window.lesson, window.pointing, window.display),
             *(window.presenting, window.picking),
         )
 
@@ -76,4 +76,5 @@ class News(QObject):
         window.stability.show_status(status, session.inside)
         window.health.show_status(status, session.inside)
         window.numbers.show_estimate(shown, status.sensor, window.object.text())
+        window.log.look()
         window.compare.show_status(status, window.display.old)

@@ -23,6 +23,7 @@ from kappaskin_app.docks import Docks
 from kappaskin_app.doing import Doing, tasks_of
 from kappaskin_app.drops import Drops
 from kappaskin_app.exports import Exports
+from kappaskin_app.guard import log
 from kappaskin_app.happenings import Happenings
 from kappaskin_app.history import History
 from kappaskin_app.layouts.choosing import Layouts
@@ -30,6 +31,7 @@ from kappaskin_app.layouts.keeping import Keeping
 from kappaskin_app.lessons.pointing import Pointing
 from kappaskin_app.lessons.reading import DOCKS
 from kappaskin_app.lessons.teaching import Teaching
+from kappaskin_app.logged import Logged
 from kappaskin_app.looking import Looking
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.menus import Menus
@@ -42,6 +44,7 @@ from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.lesson import LessonPanel
+from kappaskin_app.panels.log import LogPanel
 from kappaskin_app.panels.numbers import NumbersPanel
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.panels.scene import ScenePanel
@@ -96,6 +99,8 @@ class MainWindow(QMainWindow):
         self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
         self.health, self.testing = HealthPanel(), MapTesting(self)
         self.numbers = NumbersPanel()
+        self.logged = Logged()
+        self.log = LogPanel(self.logged)
         self.compare = ComparePanel()
         self.comparing = Comparing(self.history, self.session, self)
         self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
@@ -172,6 +177,7 @@ class MainWindow(QMainWindow):
         docks.put_below("scene", "Scene", self.scene, "F2")
         docks.put_below("health", "Health", self.health, "F3")
         docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
+        docks.put_below("log", "Log", self.log, "Ctrl+Alt+G")
         docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
         docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
         docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
@@ -210,6 +216,8 @@ class MainWindow(QMainWindow):
     def tell(self, text: str) -> None:
         """Say something in passing."""
         self.statusBar().showMessage(text, 10_000)
+        if text:
+            log.info("%s", text)
 
     def _seen(self) -> list[QPixmap]:
         """Pictures of the numbers, and of the skin with the maps and what is shown below them."""
@@ -262,4 +270,5 @@ class MainWindow(QMainWindow):
             self.session.close()
             self.naming.close()
             self.display.close()
+            self.logged.close()
         super().closeEvent(event)

@@ -73,6 +73,10 @@ def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
         QApplication.processEvents()
     assert not window.display.notice.isVisible()  # or the two would stand over each other
     assert "failure:  Something went wrong: no such thing" in window.happenings.list.toPlainText()
+    window.mishaps.count.click()
+    until(lambda: window.log.table.rowCount() >= 4)
+    texts = [window.log.table.item(row, 2).text() for row in range(window.log.table.rowCount())]
+    assert any("RuntimeError: no such thing" in text for text in texts)
     drawn = len(window.membrane.ages)
     until(lambda: len(window.membrane.ages) > drawn + 2)
 
