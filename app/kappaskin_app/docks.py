@@ -5,6 +5,7 @@ from functools import partial
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QWidget
 
+from kappaskin_app.about import DOCKS
 from kappaskin_app.actions import Actions
 from kappaskin_app.columns import heighten
 
@@ -38,6 +39,7 @@ class Docks:
         """Show a widget in a column beside the skin."""
         dock = self._docks[name] = QDockWidget(title, self._window)
         dock.setObjectName(name)
+        dock.setToolTip(DOCKS.get(name, ""))  # also of what in it explains nothing itself
         dock.setWidget(widget)
         self._window.addDockWidget(area, dock)
 
@@ -64,11 +66,16 @@ class Docks:
         """Register how each is shown and hidden."""
         for name, dock in self._docks.items():
             if name not in self._keys:
-                actions.register(f"dock-{name}", menu, dock.toggleViewAction())
+                action = dock.toggleViewAction()
+                action.setToolTip(dock.toolTip())
+                action.setStatusTip(dock.toolTip())
+                actions.register(f"dock-{name}", menu, action)
         for name, key in self._keys.items():
             dock = self[name]
             turn = partial(self._turn, name)
-            action = actions.add(f"dock-{name}", menu, dock.windowTitle(), turn, key)
+            action = actions.add(
+                f"dock-{name}", menu, dock.windowTitle(), turn, key, dock.toolTip()
+            )
             action.setCheckable(True)
             dock.visibilityChanged.connect(action.setChecked)
 

@@ -34,6 +34,8 @@ def _connection(window: "MainWindow") -> None:
 
 def _settings(window: "MainWindow") -> None:
     window.panels.wished.connect(guarded(window.wishes.wish))
+    window.panels.reset_wanted.connect(guarded(window.wishes.reset_panel))
+    window.compare.form.reset_wanted.connect(guarded(window.wishes.reset_panel))
     window.history.changed.connect(guarded(window.news.follow_settings))
 
 

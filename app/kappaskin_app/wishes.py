@@ -1,7 +1,7 @@
 """What a person wants, as undoable changes of the settings."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -95,6 +95,15 @@ class Wishes:
         kept = Settings(calibration=now.calibration, tare=now.tare)  # no matter of taste
         sending = {field.name: getattr(now, field.name) for field in fields(Sending)}  # nor this
         self._history.change("Reset settings", -1, **vars(kept) | sending)
+
+    def reset_panel(self, title: str, names: Sequence[str]) -> None:
+        """Have some settings as they are at first, with what follows from each."""
+        now, first = self._history.settings, Settings()
+        for name in names:
+            if getattr(now, name) != (value := getattr(first, name)):
+                now = replace(now, **with_consequences(now, self._session.scene, name, value))
+        changed = {field.name: getattr(now, field.name) for field in fields(Settings)}
+        self._history.change(f"Reset {title}", -1, **changed)
 
     # Scenes as they are written.
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt
+from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QPaintEvent, QStandardItemModel, QValidator
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QStyle,
     QStyleOptionComboBox,
     QStylePainter,
+    QToolButton,
     QWidget,
 )
 
@@ -27,6 +28,7 @@ from kappaskin_app.panels.panel import Panel
 from kappaskin_app.panels.several import SeveralButton
 from kappaskin_app.settings import Choice, Range, Settings, Several, Switch, Text, ask_of
 
+_AT_FIRST = Settings()
 _LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
 
 
@@ -202,7 +204,9 @@ def _editor(name: str, said: Callable[[Any], None]) -> _Editor:
 
 
 class Form(Panel):
-    """A panel with an editor for each of some settings."""
+    """A panel with an editor for each of some settings; `reset_wanted` names those to reset."""
+
+    reset_wanted = Signal(str, tuple)
 
     def __init__(self, title: str, names: tuple[str, ...], parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
@@ -213,6 +217,14 @@ class Form(Panel):
         self._editors: dict[str, _Editor] = {}
         for name in names:
             self._add(name)
+        self.reset = QToolButton(text="Reset")  # pyright: ignore[reportCallIssue]
+        self.reset.setAccessibleName(f"Reset {title}")
+        self.reset.setToolTip(
+            "Every setting of this panel as it is at first; Ctrl+Z takes it back."
+        )
+        self.reset.clicked.connect(lambda: self.reset_wanted.emit(title, self.names))
+        self.reset.hide()
+        self._corner.insertWidget(0, self.reset)
 
     def _add(self, name: str) -> None:
         how = ask_of(name)
@@ -242,6 +254,10 @@ class Form(Panel):
         for name, editor in self._editors.items():
             with QSignalBlocker(editor.widget):
                 editor.show(getattr(settings, name))
+        self.reset.setVisible(
+            any(getattr(settings, name) != getattr(_AT_FIRST, name) for name in self._editors)
+        )
+        self.place_corner()
 
     def show_rows(self, names: set[str]) -> None:
         """Show only the rows of these settings."""

@@ -1,10 +1,19 @@
 """What every panel is: a titled box that shows what is so and says what a person wishes."""
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QApplication, QGroupBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from kappaskin import Status
+from kappaskin_app.about import PANELS
 from kappaskin_app.columns import scroll_to
 from kappaskin_app.guard import guarded
 from kappaskin_app.settings import Settings
@@ -14,7 +23,10 @@ _GROWN = 20  # ms after which the page of a panel that grew has grown too
 
 
 class Panel(QGroupBox):
-    """A titled box with a message at its foot; `wished` says which setting is to be what."""
+    """A titled box with a message at its foot; `wished` says which setting is to be what.
+
+    In its corner a button says what it is for, at its head.
+    """
 
     wished = Signal(str, object)
 
@@ -28,9 +40,20 @@ class Panel(QGroupBox):
         self._theme, self._hint = LIGHT, False
         self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
         self._grown.timeout.connect(guarded(self._answer))
+        self.about = QLabel(PANELS.get(title, ""), wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.help = QToolButton(text="?", checkable=True)  # pyright: ignore[reportCallIssue]
+        self.help.setAccessibleName(f"What {title} is for")
+        self.help.setToolTip(f"What this panel is for: {self.about.text()}")
+        self.help.toggled.connect(self.about.setVisible)
+        self.help.setVisible(bool(self.about.text()))
+        self.corner = QWidget(self)
+        self._corner = QHBoxLayout(self.corner)
+        self._corner.setContentsMargins(0, 0, 0, 0)
+        self._corner.addWidget(self.help)
         self.body = QVBoxLayout()
         self._around = QVBoxLayout(self)
         self._around.setContentsMargins(8, 6, 8, 8)
+        self._around.addWidget(self.about)
         self._around.addLayout(self.body)
         self._around.addWidget(self.message)
 
@@ -55,9 +78,18 @@ class Panel(QGroupBox):
     def _paint(self) -> None:
         colour = self._theme.faint if self._hint else self._theme.alert
         self.message.setStyleSheet(f"color: {colour};")
+        self.about.setStyleSheet(f"color: {self._theme.faint};")
+        for button in self.corner.findChildren(QToolButton):
+            button.setStyleSheet(_corner_style(self._theme))
+
+    def place_corner(self) -> None:
+        """Put the corner's buttons beside the title."""
+        size = self.corner.sizeHint().boundedTo(QSize(self.width(), self.fontMetrics().height()))
+        self.corner.setGeometry(self.width() - size.width(), 0, size.width(), size.height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        self.place_corner()
         if 0 < event.oldSize().height() < event.size().height():
             self._grown.start()
 
@@ -67,3 +99,13 @@ class Panel(QGroupBox):
         if asked is not None and self.isAncestorOf(asked):
             scroll_to(self)
             scroll_to(asked)
+
+
+def _corner_style(theme: Theme) -> str:
+    """Words without a frame, until they are pointed at or reached by Tab."""
+    seen = f"color: {theme.text}; border-color: {theme.accent};"
+    return (
+        f"QToolButton {{ color: {theme.faint}; border: 1px solid transparent; border-radius: 3px;"
+        " padding: 0 4px; }"
+        f"QToolButton:hover, QToolButton:focus, QToolButton:checked {{ {seen} }}"
+    )

@@ -11,6 +11,7 @@ from kappaskin_app.panels.basis import BasisPanel
 from kappaskin_app.panels.calibrate import CalibratePanel
 from kappaskin_app.panels.calibration.in_use import InUsePanel
 from kappaskin_app.panels.connection import ConnectionPanel
+from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.load import LoadPanel, NoisePanel
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.panels.publish import PublishPanel
@@ -27,9 +28,13 @@ _LIVE, _SKIN, _SENSOR, _CALIBRATE = "&Live", "S&kin", "Se&nsor", "C&alibrate"
 
 
 class Panels(QTabWidget):
-    """The panels by name; `wished` says which setting is to be what."""
+    """The panels by name; `wished` says which setting is to be what.
+
+    `reset_wanted` says of which panel, and which, are to be as they are at first.
+    """
 
     wished = Signal(str, object)
+    reset_wanted = Signal(str, tuple)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -59,6 +64,8 @@ class Panels(QTabWidget):
         """A panel at the end of the page with this title."""
         self._pages.setdefault(page, []).append(panel)
         panel.wished.connect(self.wished)
+        if isinstance(panel, Form):
+            panel.reset_wanted.connect(self.reset_wanted)
         return panel
 
     def all(self) -> list[Panel]:

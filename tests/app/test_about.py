@@ -1,0 +1,87 @@
+from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from kappaskin_app.about import DOCKS as ABOUT_DOCKS
+from kappaskin_app.about import PANELS as ABOUT_PANELS
+from kappaskin_app.history import History
+from kappaskin_app.layouts.layout import DOCKS
+from kappaskin_app.panels.compare import OtherForm
+from kappaskin_app.panels.form import Form
+from kappaskin_app.panels.panels import Panels
+from kappaskin_app.settings import Settings
+from kappaskin_app.simulation import scene_of
+from kappaskin_app.theme import THEMES
+from kappaskin_app.wishes import Wishes
+
+
+@pytest.fixture
+def panels(qapp: QApplication) -> Iterator[Panels]:
+    made = Panels()
+    made.show_settings(Settings())
+    made.resize(340, 900)
+    made.show()
+    yield made
+    made.close()
+    made.deleteLater()
+
+
+def test_every_panel_and_every_dock_says_what_it_is_for(panels: Panels) -> None:
+    titles = {panel.title() for panel in panels.all()} | {OtherForm().title()}
+    assert titles == set(ABOUT_PANELS)
+    assert set(DOCKS) == set(ABOUT_DOCKS)
+    assert all(len(text) > 40 for text in (*ABOUT_PANELS.values(), *ABOUT_DOCKS.values()))
+
+
+def test_what_a_panel_is_for_is_shown_in_it_as_long_as_wanted(panels: Panels) -> None:
+    for panel in panels.all():
+        assert not panel.about.isVisibleTo(panel)
+        panel.help.click()
+        assert panel.about.isVisibleTo(panel)
+        panel.help.click()
+        assert not panel.about.isVisibleTo(panel)
+
+
+def test_its_buttons_stand_beside_the_title_and_inside(panels: Panels, until) -> None:
+    for theme in THEMES.values():
+        panels.show_theme(theme)
+        panels.show_settings(replace(Settings(), functions_x=5))
+        basis = panels.basis
+        until(lambda: panels.basis.corner.geometry().right() == panels.basis.rect().right())
+        assert basis.rect().contains(basis.corner.geometry())
+        assert basis.corner.width() >= basis.corner.sizeHint().width()
+        words = basis.fontMetrics().horizontalAdvance(basis.title())
+        assert basis.corner.x() > words
+
+
+def test_a_panel_is_reset_in_one_step_and_offers_it_only_where_something_was_changed(
+    panels: Panels,
+) -> None:
+    history = History(Settings())
+    wishes = Wishes(history, SimpleNamespace(scene=scene_of(Settings())))
+    history.changed.connect(panels.show_settings)
+    panels.reset_wanted.connect(wishes.reset_panel)
+    assert not any(p.reset.isVisibleTo(p) for p in panels.all() if isinstance(p, Form))
+    wishes.wish("functions_x", 5)
+    wishes.wish("functions_y", 6)
+    wishes.wish("noise_rms", 0.5)
+    panels.basis.reset.click()
+    assert history.settings == replace(Settings(), noise_rms=0.5)
+    assert not panels.basis.reset.isVisibleTo(panels.basis)
+    assert panels.noise.reset.isVisibleTo(panels.noise)
+    history.stack.undo()
+    assert (history.settings.functions_x, history.settings.functions_y) == (5, 6)
+
+
+def test_what_follows_from_a_setting_is_reset_with_it(qapp: QApplication) -> None:
+    history = History(Settings())
+    wishes = Wishes(history, SimpleNamespace(scene=scene_of(Settings())))
+    wishes.wish("shape", "cylinder")
+    assert history.settings.x != Settings().x
+    wishes.reset_panel("Shape", Panels().shape.names)
+    assert history.settings.shape == Settings().shape
+    assert history.settings.side_x == Settings().side_x
+    assert history.settings.x == pytest.approx(Settings().x)
