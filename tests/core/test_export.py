@@ -473,10 +473,11 @@ def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
 )
 def test_what_makes_no_file_is_refused(name: str, asked: dict, why: str, taps, tmp_path) -> None:
     with (
-        pytest.raises(Refusal, match=why),
+        pytest.raises(Refusal, match=why) as refused,
         Exporting(Wanted(taps[0], tmp_path / name, **asked)) as work,
     ):
         deque(work.wait(), 0)
+    assert "--" not in str(refused.value)  # it is told in the window too
     assert not list(tmp_path.iterdir())
 
 

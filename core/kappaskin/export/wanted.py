@@ -81,18 +81,21 @@ class Wanted:
             )
         if self.format in TABLES and self.at is not None:
             raise Refusal(
-                f"a {self.format} has a row for each frame: give a span (--from, --until) instead "
-                "of a moment"
+                f"a {self.format} has a row for each frame: give from when until when instead of "
+                "a moment"
             )
         if self.format == ".vtp" and self.at is None:
             raise Refusal(
-                "a .vtp is the skin at one moment: give it (--at S), or export a series to a .pvd "
-                "(--every S)"
+                "a .vtp is the skin at one moment: give it, or export a series to a .pvd, with "
+                "the time between two surfaces"
             )
         if self.format == ".pvd" and not self.every:
-            raise Refusal("a .pvd is a series: give the time between two surfaces (--every S)")
+            raise Refusal("a .pvd is a series: give the time between two surfaces")
         if self.format == ".stl" and self.at is None and not self.every:
-            raise Refusal("an .stl is the skin at one moment (--at S), or a series (--every S)")
+            raise Refusal(
+                "an .stl is the skin at one moment, or a series: give the moment, or the time "
+                "between two surfaces"
+            )
 
     def _check_place(self) -> None:
         for place in self.files:
