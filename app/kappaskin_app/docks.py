@@ -2,7 +2,8 @@
 
 from functools import partial
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QWidget
 
 from kappaskin_app.about import DOCKS
@@ -15,20 +16,30 @@ _UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that 
 _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 
 
+class Dock(QDockWidget):
+    """A dock that tells when a person closed it, as hiding or covering it is not."""
+
+    closed = Signal()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        super().closeEvent(event)
+        self.closed.emit()
+
+
 class Docks:
     """The docks of a `window`, by name."""
 
     def __init__(self, window: QMainWindow) -> None:
         self._window = window
-        self._docks: dict[str, QDockWidget] = {}
+        self._docks: dict[str, Dock] = {}
         self._keys: dict[str, str] = {}
         self._above: dict[str, str] = {}
 
-    def __getitem__(self, name: str) -> QDockWidget:
+    def __getitem__(self, name: str) -> Dock:
         return self._docks[name]
 
     def by_name(self) -> dict[str, QDockWidget]:
-        return dict(self._docks)
+        return {**self._docks}
 
     @property
     def below(self) -> list[QDockWidget]:
@@ -37,7 +48,7 @@ class Docks:
 
     def put_beside(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
         """Show a widget in a column beside the skin."""
-        dock = self._docks[name] = QDockWidget(title, self._window)
+        dock = self._docks[name] = Dock(title, self._window)
         dock.setObjectName(name)
         dock.setToolTip(DOCKS.get(name, ""))  # also of what in it explains nothing itself
         dock.setWidget(widget)

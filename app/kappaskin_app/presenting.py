@@ -137,7 +137,8 @@ class Presenting(QObject):
         self.sound.follow(self.stage.bar.share)
         if now >= self._next_figures:
             self._next_figures = now + _READ
-            self.stage.show_cue(self.cue, "no reading" if estimate is None else "nothing felt")
+            why_none = "no reading" if estimate is None else "nothing felt"
+            self.stage.show_cue(self.cue, why_none, self._session.replaying)
 
     def follow(self, status: Status) -> None:
         """Show how live it is, and what to do if it is not."""

@@ -45,6 +45,8 @@ def _views(window: "MainWindow") -> None:
     session.reported.connect(guarded(window.news.follow))
     session.estimated.connect(guarded(presenting.receive))
     session.reported.connect(guarded(presenting.follow))
+    presenting.stage.fitted.connect(guarded(window.display.scale.show_unit))
+    presenting.stage.fitted.connect(guarded(window.timeline.clock.show_unit))
     window.naming.named.connect(guarded(window.object.show_text))
     window.naming.found.connect(guarded(presenting.find))
     overlays = window.display.overlays
@@ -122,6 +124,7 @@ def _recordings(window: "MainWindow") -> None:
 
 def _lessons(window: "MainWindow") -> None:
     window.lesson.attend(window.teaching)
+    window.docks["lesson"].closed.connect(guarded(window.teaching.leave))
     window.teaching.pointed.connect(guarded(window.pointing.point))
 
 

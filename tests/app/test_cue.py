@@ -125,6 +125,13 @@ def test_a_radius_is_told_as_far_as_it_is_known(between, radius, words) -> None:
     assert told == (*words, "Radius of the ball")
 
 
+def test_nobody_is_told_to_press_what_is_recorded_harder() -> None:
+    cue = replace(cue_of(_estimate(0.3)), kind="sphere")
+    light = replace(cue, roundness=Roundness("sphere", math.nan, (0.0, 0.0265)))
+    assert radius_in_words(light)[1] == "press harder"
+    assert radius_in_words(light, recorded=True)[:2] == ("< 26.5 mm", "pressed too lightly")
+
+
 def test_an_edge_has_a_length_and_no_radius() -> None:
     cue = replace(cue_of(_estimate(0.3)), kind="edge", length=0.04, roundness=None)
     assert radius_in_words(cue) == ("edge", "40 mm long", "What touches")

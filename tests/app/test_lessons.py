@@ -117,6 +117,21 @@ def test_settings_and_source_from_before_come_back_and_a_theme_stays(window: Mai
     assert not window.pointing.rings
 
 
+def test_closing_the_lessons_leaves_the_lesson_and_covering_them_does_not(
+    window: MainWindow,
+) -> None:
+    before = window.history.settings
+    take(window, "noise")
+    window.teaching.go(1)
+    assert window.history.settings != before
+    window.docks["lesson"].hide()
+    assert window.teaching.progress is not None
+    window.docks.reveal("lesson")
+    window.docks["lesson"].close()
+    assert window.teaching.progress is None
+    assert window.history.settings == before
+
+
 def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindow, qtbot) -> None:
     window.actions_by_name["dock-lesson"].trigger()
     lessons = window.lesson.list.list

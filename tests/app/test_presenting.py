@@ -15,7 +15,9 @@ from kappaskin_app.cue import Cue, Roundness
 from kappaskin_app.theme import THEMES
 from kappaskin_app.views.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.views.banner import REMEDIES
-from kappaskin_app.views.lettering import PRIMARY
+from kappaskin_app.views.clock import Clock
+from kappaskin_app.views.colour_bar import SkinScale
+from kappaskin_app.views.lettering import CAPTION, PRIMARY
 from kappaskin_app.views.pad import Hand
 from kappaskin_app.views.stage import Stage
 from kappaskin_app.views.strip import age_in_words
@@ -64,6 +66,28 @@ def _Skin():
 
 def boards(stage):
     return [board for board in stage.boards if board.isVisible()] + [stage.operator.told]
+
+
+def test_the_scale_of_the_colours_is_read_from_afar_and_asks_for_nothing(qtbot) -> None:
+    stage, scale, clock = Stage(_Skin()), SkinScale(), Clock("Time")
+    for widget in (stage, scale, clock):
+        qtbot.addWidget(widget)
+    clock.show_text("0.50 s of 4.00 s", "0.00 s of 4.00 s")
+    for part in (scale, clock):
+        stage.fitted.connect(part.show_unit)
+    usual = [QFontMetricsF(part.font()).capHeight() for part in (scale.bar, clock)]
+    widths = scale.bar.width(), clock.width()
+    stage.resize(1920, 1080)
+    stage.present(True)
+    heights = [QFontMetricsF(part.font()).capHeight() for part in (scale.bar, clock)]
+    assert min(heights) >= CAPTION - 1
+    assert not scale.lock.isVisibleTo(scale)
+    assert scale.bar.width() > widths[0]
+    assert clock.width() > widths[1]
+    stage.present(False)
+    assert [QFontMetricsF(part.font()).capHeight() for part in (scale.bar, clock)] == usual
+    assert (scale.bar.width(), clock.width()) == widths
+    assert scale.lock.isVisibleTo(scale)
 
 
 SIZES = [(1280, 720), (1280, 800), (1920, 1080), (2560, 1440), (1024, 768)]

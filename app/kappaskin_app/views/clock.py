@@ -7,6 +7,7 @@ from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
 from kappaskin_app.views.course import HEIGHT
+from kappaskin_app.views.lettering import read_from_afar
 
 
 class Clock(QWidget):
@@ -25,6 +26,10 @@ class Clock(QWidget):
         if text != self.text:
             self.text = text
             self.update()
+
+    def show_unit(self, unit: float) -> None:
+        """Be read from afar where a unit is so many px; else as usual."""
+        self.setFont(read_from_afar(unit))
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)

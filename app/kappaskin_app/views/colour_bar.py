@@ -2,12 +2,14 @@
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
 from kappaskin_app.shades import Tint
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
+from kappaskin_app.views.lettering import read_from_afar
 
+_WIDTH, _COLOURS = 70, 22  # px of the bar with its numbers, and without
 _SWATCH = 10  # px of a colour in the legend
 
 
@@ -22,7 +24,7 @@ class ColourBar(QWidget):
         self._tint = Tint(DIVERGING, (-1.0, 1.0), "1/m")
         self.legend: tuple[tuple[str, str], ...] = ()
         """Colours, as #rrggbb, with their words, the lowest first."""
-        self.setFixedWidth(70)
+        self.setFixedWidth(_WIDTH)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -123,6 +125,14 @@ class SkinScale(QWidget):
         around.addWidget(self.bar, 1)
         around.addWidget(self.lock, 0, Qt.AlignmentFlag.AlignHCenter)
         around.addWidget(self.times)
+
+    def show_unit(self, unit: float) -> None:
+        """Be read from afar where a unit is so many px, and ask nothing then; else as usual."""
+        for part in (self.lock, self.times):
+            part.setVisible(not unit)
+        self.setFont(read_from_afar(unit))
+        larger = self.fontMetrics().height() / QFontMetrics(QFont()).height() if unit else 1.0
+        self.bar.setFixedWidth(round(_COLOURS + larger * (_WIDTH - _COLOURS)))
 
     def show_what(self, symbol: str, tip: str) -> None:
         """Say by its `symbol` in HTML what colours the skin; the `tip` explains it."""

@@ -23,6 +23,11 @@ def letters(font: QFont, capital: float, bold: bool = False) -> QFont:
     return made
 
 
+def read_from_afar(unit: float) -> QFont:
+    """The letters of captions where a unit of the picture is so many px; as usual where it is 0."""
+    return letters(QFont(), CAPTION * unit) if unit else QFont()
+
+
 @dataclass(frozen=True)
 class Words:
     """A text in a place of a picture; `lines` says whether it may be broken into several."""

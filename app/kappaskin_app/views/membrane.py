@@ -227,8 +227,12 @@ class MembraneView(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if self._fitted:
-            # After VTK has its new size.
-            QTimer.singleShot(0, lambda: self._fitted and self.look_from(self._from))
+            # After VTK has its new size, and not when this view is gone by then.
+            QTimer.singleShot(0, self, self._fit_again)
+
+    def _fit_again(self) -> None:
+        if self._fitted:
+            self.look_from(self._from)
 
     # What changes with every estimate.
 
@@ -339,4 +343,5 @@ class MembraneView(QWidget):
 
     def close_plotter(self) -> None:
         """Before the window goes: give VTK's resources back."""
+        self._fitted = False  # a size that it had last is not looked at any more
         self.plotter.close()

@@ -2,6 +2,7 @@
 
 import math
 
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
@@ -24,7 +25,12 @@ _TOUCHES = {"sphere": "ball", "cylinder": "pipe", "plane": "flat face"}
 
 
 class Stage(QWidget):
-    """Holds the `skin` and, while `presenting`, all that is read from afar around it."""
+    """Holds the `skin` and, while `presenting`, all that is read from afar around it.
+
+    `fitted` tells the px of a unit then, and 0 when it is over.
+    """
+
+    fitted = Signal(float)
 
     def __init__(self, skin: QWidget) -> None:
         super().__init__()
@@ -63,6 +69,8 @@ class Stage(QWidget):
     def present(self, presenting: bool) -> None:
         self.presenting = presenting
         self._fit()
+        if not presenting:
+            self.fitted.emit(0.0)
         self._show_parts()
 
     def _show_parts(self) -> None:
@@ -94,11 +102,14 @@ class Stage(QWidget):
         self._column.setContentsMargins(edge, 0, edge, edge)
         self.strip.edge = edge
         self._column.setSpacing(round(8 * self.unit))
+        self.fitted.emit(self.unit)
 
     # What it shows.
 
-    def show_cue(self, cue: Cue | None, why_none: str = "nothing felt") -> None:
-        """Write what is felt, or `why_none` is."""
+    def show_cue(
+        self, cue: Cue | None, why_none: str = "nothing felt", recorded: bool = False
+    ) -> None:
+        """Write what is felt, or `why_none` is; of what is `recorded` nothing can be done."""
         self.operator.pad.show_cue(cue)
         if cue is None:
             for figure in (self.force, self.displacement, self.place):
@@ -111,7 +122,7 @@ class Stage(QWidget):
         x, y = (_number(1e3 * value, 1) for value in cue.position)
         where = "near the rim: not sure" if cue.near_rim else _off(1e3 * cue.position_95, 1, "mm")
         self.place.show_figure(f"{x}, {y} mm", where)
-        self.radius.show_figure(*radius_in_words(cue))
+        self.radius.show_figure(*radius_in_words(cue, recorded))
 
     def show_felt(self, cue: Cue | None, now: float) -> None:
         """Draw the bar and the circle, as often as there is a picture."""
@@ -130,7 +141,7 @@ class Stage(QWidget):
             part.show_theme(theme)
 
 
-def radius_in_words(cue: Cue) -> tuple[str, str, str]:
+def radius_in_words(cue: Cue, recorded: bool = False) -> tuple[str, str, str]:
     """Value, note and name of the radius that is felt."""
     if cue.kind == "edge":
         return "edge", f"{_number(1e3 * cue.length, 0)} mm long", "What touches"
@@ -138,17 +149,17 @@ def radius_in_words(cue: Cue) -> tuple[str, str, str]:
         return _TOUCHES.get(cue.kind, cue.kind), "", "What touches"
     skin = cue.roundness.what == "skin"
     what = "skin there" if skin else _TOUCHES.get(cue.roundness.what, cue.roundness.what)
-    return *_radius(cue.roundness), f"Radius of the {what}"
+    return *_radius(cue.roundness, recorded), f"Radius of the {what}"
 
 
-def _radius(round_: Roundness) -> tuple[str, str]:
+def _radius(round_: Roundness, recorded: bool) -> tuple[str, str]:
     low, high = (_digits(1e3 * radius) for radius in round_.between)
     if round_.between[0] == math.inf:
         return "flat", ""
     if round_.between[1] == math.inf:
         return (f"> {low} mm", "") if round_.between[0] > 0 else (NONE, "unknown")
     if not round_.between[0] > 0:
-        return f"< {high} mm", "press harder"
+        return f"< {high} mm", "pressed too lightly" if recorded else "press harder"
     return f"{_digits(1e3 * round_.radius)} mm", f"{low} to {high} mm"
 
 
