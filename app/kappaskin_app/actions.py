@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QMainWindow, QMenu
 
 from kappaskin import Refusal
 from kappaskin_app.guard import guarded
+from kappaskin_app.tips import tip_of
 
 _TYPES_NOTHING = re.compile(r".*(Ctrl|Alt|Meta)\+.+|(Shift\+)?F\d+")
 
@@ -43,8 +44,8 @@ class Actions:
     ) -> QAction:
         """An action called `name` that calls `act`."""
         action = QAction(text, self._window)
-        action.setToolTip(tip or text)
-        action.setStatusTip(tip or text)
+        if tip:
+            action.setToolTip(tip)
         if shortcut:
             action.setShortcut(QKeySequence(shortcut))
         action.triggered.connect(guarded(lambda *_: act()))
@@ -56,6 +57,9 @@ class Actions:
         if name in self.entries:
             raise ValueError(f"expected a new name for an action, got {name!r} twice")
         action.setObjectName(name)
+        if action.toolTip() == plain(action.text()):  # which Qt makes of the text
+            action.setToolTip(tip_of(name, action.toolTip()))
+        action.setStatusTip(action.toolTip())
         self.entries[name] = Entry(name, menu, action, action.shortcut().toString())
         self._menu(menu).addAction(action)
         self._window.addAction(action)

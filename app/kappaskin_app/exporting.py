@@ -16,6 +16,16 @@ _FORMATS = (
     "Surface for ParaView, PyVista (*.vtp);;Series of surfaces for ParaView (*.pvd);;"
     "Surface for CAD (*.stl)"
 )
+_EXPLAINED = {
+    "recording": "The recording to write from; it is only read.",
+    "to": "The file to write; its ending says in which format.",
+    "settings": "Fit as it was recorded, or all of it with the settings in use now.",
+    "begin": "The first frame that is written, in s since the recording began.",
+    "until": "The last frame that is written, in s since the recording began.",
+    "every": "The time between two surfaces, or rows, in s; 0 writes every frame.",
+    "at": "The moment whose surface is written, in s since the recording began.",
+}
+"""What each field asks for."""
 
 
 class ExportDialog(WorkDialog):
@@ -52,6 +62,8 @@ class ExportDialog(WorkDialog):
         form.addRow("&Until", self.until)
         form.addRow("E&very", self.every)
         form.addRow("&At", self.at)
+        for name, tip in _EXPLAINED.items():
+            getattr(self, name).setToolTip(tip)
         self._add_buttons()
 
     def ask_of(self, source: str, at: float, setup: Setup) -> None:

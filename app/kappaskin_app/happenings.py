@@ -36,8 +36,12 @@ class Happenings(QDialog):
         self.list = QPlainTextEdit(readOnly=True, placeholderText=_NOTHING)  # pyright: ignore[reportCallIssue]
         self.list.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
         self.list.setAccessibleName("What happened, newest first")
+        self.list.setToolTip("Each with its time of day; the last 64 are kept.")
         self.copy_button = QPushButton("&Copy all")
+        self.copy_button.setToolTip("Copy the list as text.")
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        for button in buttons.buttons():
+            button.setToolTip("Put this away (Esc); F4 brings it back.")
         buttons.addButton(self.copy_button, QDialogButtonBox.ButtonRole.ActionRole)
         buttons.rejected.connect(self.reject)
         self.copy_button.clicked.connect(

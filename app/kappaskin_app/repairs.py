@@ -21,6 +21,8 @@ class RepairDialog(WorkDialog):
         self.setObjectName("repair")
         self.recording, self.to = QLineEdit(), QLineEdit()
         self.recording.setReadOnly(True)
+        self.recording.setToolTip("The file that its writer did not finish; it is left as it is.")
+        self.to.setToolTip("The file to write: all that can be read of the damaged one.")
         self.form.addRow(named("&Damaged", self.recording), self.recording)
         self.choose_file = choosing(self._choose)
         self.form.addRow(named("&Whole one", self.to), beside(self.to, self.choose_file))

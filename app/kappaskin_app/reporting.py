@@ -114,6 +114,8 @@ class ReportDialog(WorkDialog):
         self.choose_file = choosing(self._choose)
         contents = QLabel(_CONTENTS)
         contents.setWordWrap(True)
+        self.to.setToolTip("The zip to write; look into it before you send it.")
+        self.readings.setToolTip("What the elements read just now, as numbers: one frame.")
         self.form.addRow(contents)
         self.form.addRow(named("&File", self.to), beside(self.to, self.choose_file))
         self.form.addRow(self.readings)

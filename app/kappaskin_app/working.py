@@ -56,6 +56,7 @@ class WorkDialog(QDialog):
         self.words.setWordWrap(True)
         self.begin_button, self.cancel_button = QPushButton(verb), QPushButton("&Cancel")
         self.cancel_button.setAutoDefault(False)
+        self.begin_button.setToolTip("Begin, beside the window; what is in the way is told below.")
         self._going: Work | None = None
         self._timer = QTimer(self)
         self._timer.setInterval(_POLL)
@@ -77,6 +78,8 @@ class WorkDialog(QDialog):
     def _allow(self) -> None:
         """Ask only for what makes sense."""
         self.cancel_button.setText("&Cancel" if self.busy else "C&lose")
+        tip = "End it; nothing half done is left." if self.busy else "Put this away (Esc)."
+        self.cancel_button.setToolTip(tip)
 
     @property
     def busy(self) -> bool:
@@ -156,6 +159,7 @@ def named(words: str, line: QLineEdit) -> QLabel:
 def choosing(choose: Callable[[], None]) -> QPushButton:
     """A button that lets one choose a file."""
     button = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}")
+    button.setToolTip("Look for the file, instead of typing its name.")
     button.setAutoDefault(False)  # or Enter in a line would press the first of them
     button.clicked.connect(guarded(lambda *_: choose()))
     return button

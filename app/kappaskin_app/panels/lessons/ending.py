@@ -26,6 +26,7 @@ class EndPage(QWidget):
         self.name.setObjectName("student")
         self.name.setMaxLength(80)
         self.name.setAccessibleName("Your name")
+        self.name.setToolTip("It stands below the figure, and is kept nowhere else.")
         asked.setBuddy(self.name)
         well_behaved(self.name)
         self.save = button(

@@ -25,6 +25,7 @@ _BUTTON, _EDGE = 20, 9  # px: the size of a small button, and how far in the las
 _NO_ARROW = "QToolButton::menu-indicator { image: none; }"
 
 Wish = Callable[[Change], None]
+_ADDING = "Choose from a list what is added to the scene; its text shows it at once."
 
 
 class SectionBox(QGroupBox):
@@ -75,9 +76,7 @@ class SectionBox(QGroupBox):
             self._add_across(self._steps(steps))
         if section.adding:
             self.grid.addWidget(
-                self._menu_button(
-                    f"+ {section.adding}", section.tip or section.adding, section.more
-                ),
+                self._menu_button(f"+ {section.adding}", section.tip or _ADDING, section.more),
                 *(self.grid.rowCount(), 0, 1, 2),
                 Qt.AlignmentFlag.AlignLeft,
             )
