@@ -24,6 +24,7 @@ from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
 from kappaskin_app.views.loads import DrawnLoads, put_upright
 from kappaskin_app.views.marks import Marks
 from kappaskin_app.views.pointing import Pointing
+from kappaskin_app.views.sides import Sides
 from kappaskin_app.views.surface import Surface
 from kappaskin_app.views.unlit import UNLIT
 
@@ -94,9 +95,7 @@ class MembraneView(QWidget):
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
-        self.labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
-        for label in self.labels:
-            plotter.add_actor(label, reset_camera=False, render=False)
+        self.sides = Sides(plotter)
         self.caption: Any = pv.Text("")
         self.caption.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
         self.caption.position = 0.015, 0.94  # of the picture, from its lower left corner
@@ -120,12 +119,7 @@ class MembraneView(QWidget):
 
     def _note_turning(self, *_: object) -> None:
         self._fitted = False  # the person chose this view: a new size must not undo it
-        self._show_labels(True, True)
-
-    def _show_labels(self, x: bool, y: bool) -> None:
-        """Whether the sides' lengths are written: seen end-on, a text lies on the skin's rim."""
-        for label, shown in zip(self.labels[1:], (x, y), strict=True):
-            label.SetVisibility(shown)
+        self.sides.show_from(None)
 
     # What a skin looks like: rebuilt only when another one appears.
 
@@ -145,7 +139,7 @@ class MembraneView(QWidget):
         self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
         self._contact.scale = skin.size
         self._arrays = self._changing()
-        self._place_labels(skin)
+        self.sides.show_skin(skin)
         self.show_box(self._box.shares)
         if another:
             self.look_from(self._from)
@@ -204,24 +198,12 @@ class MembraneView(QWidget):
         for above, marks in enumerate(self.pointed, 2):
             marks.follow(self.skin, above * self.lift)  # the inner one is not to sink into the rim
 
-    def _place_labels(self, skin: DrawnSkin) -> None:
-        a, b = skin.patch.a, skin.patch.b
-        corners, _ = skin.at_rest(np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]))
-        beside = MM * np.array([(-0.04 * a, -0.04 * b, 0), (0, -0.06 * b, 0), (0, 0.05 * b, 0)])
-        texts = ("0", f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm")
-        for label, text, at in zip(self.labels, texts, corners + beside, strict=True):
-            label.input = text
-            label.position = tuple(at)
-        # Where the skin rises steeply beside it, a text in the middle would lie below it.
-        y_at = "right" if skin.patch.base_curvature else "center"
-        self.labels[2].prop.justification_horizontal = y_at
-
     def look_from(self, direction: Direction) -> None:
         """Look at the whole skin, as large as it fits, and again whenever the size changes."""
         self._from = direction
         fit_camera(self.plotter.renderer, self.skin, direction, self.plotter.width())
         self._fitted = True
-        self._show_labels(direction.sees(0), direction.sees(1))
+        self.sides.show_from(direction)
         self.plotter.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -293,7 +275,7 @@ class MembraneView(QWidget):
         self.plotter.update()
 
     def show_box(self, shares: Shares) -> None:
-        """Draw only what is within these shares of the skin: from and to, along x and along y."""
+        """Draw only what is these shares of the skin: from and to, along x, y and upwards."""
         self._box.shares = shares
         self._box.show(self.skin)
         self._box.cut(self.plotter.actors.values())
@@ -331,8 +313,8 @@ class MembraneView(QWidget):
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
         self.plotter.set_background(theme.scene, top=theme.scene_top)
-        for text in (*self.labels, self.caption):
-            text.prop.color = theme.text
+        self.sides.show_colour(theme.text)
+        self.caption.prop.color = theme.text
         self.alarm.show_theme(theme)
         self.surface.show_theme(theme)
         self.plotter.update()
