@@ -26,12 +26,17 @@ from kappaskin_app.views.marks import Marks
 from kappaskin_app.views.pointing import Pointing
 from kappaskin_app.views.sides import Sides
 from kappaskin_app.views.surface import Surface
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
 _LIFT = 0.006  # of the skin's size above the surface, or half of a line drowns in it
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
+
+
+def _spare(length: int, ratio: float) -> int:
+    """How many px of a length to do without, to end between two pixels of the screen."""
+    return next((spare for spare in range(4) if (length - spare) * ratio % 1 == 0), 0)
 
 
 class MembraneView(QWidget):
@@ -47,9 +52,9 @@ class MembraneView(QWidget):
         self.plotter.setAttribute(Qt.WidgetAttribute.WA_DontCreateNativeAncestors)
         self.plotter.setAttribute(Qt.WidgetAttribute.WA_NativeWindow)
         self.plotter.setAcceptDrops(False)  # or it would take any file for a mesh to draw
-        around = QVBoxLayout(self)
-        around.setContentsMargins(0, 0, 0, 0)
-        around.addWidget(self.plotter)
+        self._around = QVBoxLayout(self)
+        self._around.setContentsMargins(0, 0, 0, 0)
+        self._around.addWidget(self.plotter)
         # Blending in any order adds 8 ms to each picture, as soon as anything is translucent.
         self.plotter.renderer.SetUseOIT(False)
         self._make_actors()
@@ -86,7 +91,7 @@ class MembraneView(QWidget):
         self._elements: Any = pv.PolyData(np.zeros((1, 3)))
         self._wire_actor: Any = None
         self._elements_actor = plotter.add_mesh(
-            self._elements, style="points", point_size=5, **UNLIT
+            self._elements, style="points", point_size=pixels(plotter, 5), **UNLIT
         )
         self.out, self.asked = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
         # Seen on every colour.
@@ -150,7 +155,7 @@ class MembraneView(QWidget):
         if self._wire_actor is not None:
             self.plotter.remove_actor(self._wire_actor, render=False)
         self._wire_actor = self.plotter.add_mesh(
-            self._wire, line_width=1, lighting=False, reset_camera=False, render=False
+            self._wire, line_width=pixels(self.plotter, 1), **UNLIT
         )
         self._wire_actor.prop.color = self._ink
 
@@ -207,6 +212,9 @@ class MembraneView(QWidget):
         self.plotter.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
+        # A picture that ends within a pixel of the screen would have a black edge there.
+        right, upper = (_spare(side, self.devicePixelRatioF()) for side in event.size().toTuple())
+        self._around.setContentsMargins(0, upper, right, 0)
         super().resizeEvent(event)
         if self._fitted:
             # After VTK has its new size.

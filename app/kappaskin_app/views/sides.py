@@ -7,7 +7,7 @@ import pyvista as pv
 
 from kappaskin_app.views.camera import Direction
 from kappaskin_app.views.drawn import MM, DrawnSkin
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 
 class Sides:
@@ -18,7 +18,7 @@ class Sides:
 
     def __init__(self, plotter: Any) -> None:
         self._lines: Any = pv.PolyData(np.zeros((3, 3)), lines=[3, 1, 0, 2])
-        self.actor = plotter.add_mesh(self._lines, line_width=1, **UNLIT)
+        self.actor = plotter.add_mesh(self._lines, line_width=pixels(plotter, 1), **UNLIT)
         self.actor.visibility = False
         self.labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
         for label in self.labels:
