@@ -25,6 +25,7 @@ from kappaskin_app.layouts.layout import (
 )
 from kappaskin_app.window import MainWindow
 
+SHARES = st.integers(50, 600).map(lambda share: share / 1000)
 RECTANGLES = st.tuples(*[st.integers(0, 400)] * 2, *[st.integers(120, 500)] * 2)
 
 
@@ -36,7 +37,9 @@ def _place(name: str) -> st.SearchStrategy[Place]:
         st.booleans(),
         st.booleans(),
         st.booleans(),
-        st.integers(50, 600).map(lambda share: share / 1000),
+        st.booleans(),
+        SHARES,
+        SHARES,
         RECTANGLES,
     )
     return made.map(lambda place: place if place.area == FLOATING else replace(place, at=None))
@@ -88,7 +91,7 @@ def bare() -> Iterator[tuple[QMainWindow, Docks, QTabWidget]]:
 
 def _words(layout: Layout) -> dict[str, tuple[object, ...]]:
     """What can be said of each dock without px."""
-    return {name: (p.area, p.shown, p.tabbed, p.front, p.at) for name, p in layout.docks}
+    return {name: (p.area, p.shown, p.tabbed, p.front, p.beside, p.at) for name, p in layout.docks}
 
 
 @settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -110,10 +113,11 @@ def test_any_layout_goes_through_text_and_window_and_back(bare, qapp, layout: La
     twice = layout_of(window, docks.by_name(), pages)
     arrange(window, docks.by_name(), pages, READY["Live"])  # or what floats would stay
     window.hide()
-    assert _words(twice) == _words(once)
+    assert list(_words(twice).items()) == list(_words(once).items())  # in their order too
     shares = dict(once.docks)
     for name, place in twice.docks:
         assert place.share == pytest.approx(shares[name].share, abs=0.004)
+        assert place.along == pytest.approx(shares[name].along, abs=0.004)
 
 
 HOSTILE = (
@@ -211,8 +215,11 @@ def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) ->
     assert window.cost.isVisible()
     window.layouts.save("Mine")
     window.history.stack.undo()
+    assert window.layouts.own == {}
+    window.history.stack.undo()
     assert not window.cost.isVisible()
-    window.history.stack.redo()
+    for _ in range(2):
+        window.history.stack.redo()
     window.actions_by_name.change_key("theme", "Ctrl+J")
     window.opening.note(tmp_path / "a.toml")
     window.menus.finder.recent = ["action:tare"]
