@@ -16,6 +16,7 @@ from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
 from kappaskin_app.settings import COLOURS
+from kappaskin_app.undoing import Undoing
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
@@ -42,7 +43,7 @@ class Menus(QObject):
         for name in FIGURES:
             self.actions.add(name, _FIGURES, TITLES.get(name, name), partial(self._draw, name))
         self._add_export()
-        self.sheet = CheatSheet(self.actions, window)
+        self.sheet = CheatSheet(self.actions, window.history, window)
         self.actions.add("shortcuts", _HELP, "&Shortcuts", self.sheet.open_all, "F1", _SHEET)
         window.mishaps.add_actions(self.actions, _HELP)
 
@@ -56,12 +57,8 @@ class Menus(QObject):
         add("quit", _FILE, "&Quit", window.quit, "Ctrl+Q")
 
     def _add_edit(self) -> None:
-        stack = self._window.history.stack
-        undo, redo = stack.createUndoAction(self._window), stack.createRedoAction(self._window)
-        undo.setShortcut("Ctrl+Z")
-        redo.setShortcut("Ctrl+Shift+Z")
-        self.actions.register("undo", _EDIT, undo)
-        self.actions.register("redo", _EDIT, redo)
+        window = self._window
+        self.undoing = Undoing(window.history.stack, window.layouts.note, self.actions, _EDIT)
         self.actions.add("reset", _EDIT, "&Reset settings", self._window.wishes.reset)
         find = self.finder.open_empty
         self.actions.add("find", _EDIT, f"&Find a command{_DOTS}", find, "Ctrl+K", _FIND)

@@ -54,7 +54,7 @@ class Opening(QObject):
     def __init__(self, window: "MainWindow") -> None:
         super().__init__(window)
         self._replaying, self._staging = window.replaying, window.staging
-        self._calibrating = window.calibrating
+        self._calibrating, self._history = window.calibrating, window.history
         self._session, self._wishes = window.session, window.wishes
         self.recent: list[Path] = []
         self.menu = QMenu(window)
@@ -115,7 +115,10 @@ class Opening(QObject):
 
     def clear(self) -> None:
         """Forget the last ones."""
-        self.recent = []
+        self._history.step("clear the files opened last", self._have, self.recent, [])
+
+    def _have(self, recent: list[Path]) -> None:
+        self.recent = recent
         self.changed.emit()
 
     def _list(self) -> None:

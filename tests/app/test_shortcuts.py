@@ -7,6 +7,8 @@ from PySide6.QtWidgets import QMainWindow
 from kappaskin import Refusal
 from kappaskin_app.actions import Actions
 from kappaskin_app.finder.sheet import CheatSheet
+from kappaskin_app.history import History
+from kappaskin_app.settings import Settings
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 
@@ -24,7 +26,7 @@ def actions(qtbot) -> Actions:
 
 @pytest.fixture
 def sheet(actions: Actions) -> Iterator[CheatSheet]:
-    sheet = CheatSheet(actions, actions.window)
+    sheet = CheatSheet(actions, History(Settings(), actions.window), actions.window)
     sheet.open_all()
     yield sheet
     sheet.close()
@@ -88,3 +90,21 @@ def test_all_are_reset_at_once(sheet: CheatSheet, actions: Actions) -> None:
     sheet.reset_all.click()
     assert actions.changed_keys() == {}
     assert _shown(sheet) == ["Ctrl+S", "Ctrl+T", ""]
+
+
+def test_a_changed_shortcut_and_all_that_were_reset_come_back(
+    sheet: CheatSheet, actions: Actions, qtbot
+) -> None:
+    stack, told = sheet.history.stack, []
+    sheet.changed.connect(lambda: told.append(actions.changed_keys()))
+    qtbot.keyClicks(sheet.line, "theme")
+    sheet.edit.setKeySequence("Ctrl+J")
+    qtbot.waitUntil(lambda: actions.key("theme") == "Ctrl+J")
+    assert stack.undoText() == "shortcut of Theme"
+    sheet.reset_all.click()
+    stack.undo()
+    assert actions.changed_keys() == {"theme": "Ctrl+J"}
+    stack.undo()
+    assert actions.changed_keys() == {}
+    stack.redo()
+    assert told == [{"theme": "Ctrl+J"}, {}, {"theme": "Ctrl+J"}, {}, {"theme": "Ctrl+J"}]

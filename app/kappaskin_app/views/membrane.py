@@ -18,7 +18,13 @@ from kappaskin import Estimate, Load, Sensor
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.box import WHOLE, Box, Shares
-from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
+from kappaskin_app.views.camera import (
+    DIRECTIONS,
+    FROM_THE_LEFT,
+    camera_of,
+    fit_camera,
+    place_camera,
+)
 from kappaskin_app.views.drag import LoadDrag
 from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
 from kappaskin_app.views.loads import DrawnLoads, put_upright
@@ -34,9 +40,13 @@ _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
 class MembraneView(QWidget):
-    """Shows estimates, the skin pressed in along its normals; `drag` says when a load is moved."""
+    """Shows estimates, the skin pressed in along its normals; `drag` says when a load is moved.
+
+    `turned` brings how the camera stands after it was dragged, or else after a turn of the wheel.
+    """
 
     drawn = Signal()
+    turned = Signal(tuple, bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -72,9 +82,15 @@ class MembraneView(QWidget):
         self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
         self._positions, self._marked = np.empty((0, 2)), (b"", -1)
         self._arrays: dict[str, Any] = {}
-        self._fitted, self._from = True, FROM_THE_LEFT
-        for turning in ("InteractionEvent", "MouseWheelForwardEvent", "MouseWheelBackwardEvent"):
-            self.plotter.iren.interactor.AddObserver(turning, self._note_turning)
+        self._look, self._camera = "left", ()
+        self._stood: tuple[float, ...] = ()  # how the camera stood when the mouse took hold of it
+        self._dragged = False
+        for event, note in (
+            ("StartInteractionEvent", self._note_taken),
+            ("InteractionEvent", self._note_turning),
+            ("EndInteractionEvent", self._note_turned),
+        ):
+            self.plotter.iren.interactor.AddObserver(event, note)
         self._theme: Theme | None = None
         self._ink = "#ffffff"
 
@@ -118,9 +134,19 @@ class MembraneView(QWidget):
         self.ages.append((now, now - self._taken))
         self.drawn.emit()
 
+    def _note_taken(self, *_: object) -> None:
+        self._stood, self._dragged = camera_of(self.plotter.renderer, self.skin), False
+
     def _note_turning(self, *_: object) -> None:
-        self._fitted = False  # the person chose this view: a new size must not undo it
+        self._dragged = True
         self._show_labels(True, True)
+
+    def _note_turned(self, *_: object) -> None:
+        stands = camera_of(self.plotter.renderer, self.skin)
+        if stands != self._stood:
+            self._camera = stands
+            self._show_labels(True, True)
+            self.turned.emit(stands, self._dragged)
 
     def _show_labels(self, x: bool, y: bool) -> None:
         """Whether the sides' lengths are written: seen end-on, a text lies on the skin's rim."""
@@ -148,7 +174,7 @@ class MembraneView(QWidget):
         self._place_labels(skin)
         self.show_box(self._box.shares)
         if another:
-            self.look_from(self._from)
+            self._place_camera()
         if self._theme:
             self.show_theme(self._theme)
 
@@ -216,19 +242,27 @@ class MembraneView(QWidget):
         y_at = "right" if skin.patch.base_curvature else "center"
         self.labels[2].prop.justification_horizontal = y_at
 
-    def look_from(self, direction: Direction) -> None:
-        """Look at the whole skin, as large as it fits, and again whenever the size changes."""
-        self._from = direction
-        fit_camera(self.plotter.renderer, self.skin, direction, self.plotter.width())
-        self._fitted = True
-        self._show_labels(direction.sees(0), direction.sees(1))
+    def show_look(self, look: str, camera: tuple[float, ...]) -> None:
+        """Look at the whole skin from a direction, or as the `camera` stood that was turned."""
+        if (look, camera) != (self._look, self._camera):
+            self._look, self._camera = look, camera
+            self._place_camera()
+
+    def _place_camera(self) -> None:
+        """Look as is asked for; a direction fits the skin in, and again whenever the size does."""
+        renderer, direction = self.plotter.renderer, DIRECTIONS.get(self._look, FROM_THE_LEFT)
+        if self._camera:
+            place_camera(renderer, self.skin, self._camera)
+        else:
+            fit_camera(renderer, self.skin, direction, self.plotter.width())
+        turned = bool(self._camera)
+        self._show_labels(turned or direction.sees(0), turned or direction.sees(1))
         self.plotter.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        if self._fitted:
-            # After VTK has its new size.
-            QTimer.singleShot(0, lambda: self._fitted and self.look_from(self._from))
+        # After VTK has its new size.
+        QTimer.singleShot(0, lambda: self._camera or self._place_camera())
 
     # What changes with every estimate.
 
