@@ -155,13 +155,10 @@ def _layout(table: Mapping[str, Any]) -> Layout:
 
 def _place(table: Mapping[str, Any]) -> Place:
     area = _one_of(_part(table, "area", str, ""), AREAS)
-    return Place(
-        area,
-        _part(table, "shown", bool, True),
-        **{name: _part(table, name, bool, False) for name in _WAYS},
-        **{name: _share(table, name) for name in _SHARES},
-        at=_rectangle(table, "at") if area == FLOATING else None,
-    )
+    tabbed, front, beside = (_part(table, name, bool, False) for name in _WAYS)
+    share, along = (_share(table, name) for name in _SHARES)
+    at = _rectangle(table, "at") if area == FLOATING else None
+    return Place(area, _part(table, "shown", bool, True), tabbed, front, beside, share, along, at)
 
 
 def _share(table: Mapping[str, Any], key: str) -> float:
