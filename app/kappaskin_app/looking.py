@@ -5,7 +5,7 @@ from functools import partial
 
 from PySide6.QtGui import QKeySequence, QShortcut
 
-from kappaskin_app.actions import Actions
+from kappaskin_app.actions import WITHIN, Actions
 from kappaskin_app.display import Display
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
@@ -14,6 +14,7 @@ from kappaskin_app.views.camera import DIRECTIONS
 from kappaskin_app.wishes import Wishes
 
 _MENU = "Sk&in"
+_COLOURS = f"{_MENU}{WITHIN}&Colour"
 _LOOKS = (
     *(("F6", "above"), ("F7", "front"), ("F8", "side")),
     *(("Shift+F6", "below"), ("Shift+F7", "corner")),
@@ -42,7 +43,7 @@ class Looking:
         for number, (value, words) in enumerate(COLOURS, 1):
             colour = partial(wishes.wish, "colour_by", value)
             key = f"Ctrl+{number}" if number <= _DIGITS else ""
-            add(f"colour-{value}", _MENU, f"Colour by {words.lower()}", colour, key)
+            add(f"colour-{value}", _COLOURS, f"Colour by {words.lower()}", colour, key)
         add("lock-ranges", _MENU, "&Lock or free all ranges", self.lock_all, "Ctrl+Alt+L")
         add("higher", _MENU, "Draw &higher", partial(wishes.exaggerate, 1), "Ctrl++")
         add("lower", _MENU, "Draw &lower", partial(wishes.exaggerate, -1), "Ctrl+-")

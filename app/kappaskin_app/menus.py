@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
+from PySide6.QtGui import QGuiApplication
 
-from kappaskin import FIGURES
+from kappaskin import FIGURES, Refusal, data_folder
 from kappaskin_app.actions import Actions
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.finder.finder import Finder
@@ -15,6 +16,7 @@ from kappaskin_app.finder.sheet import CheatSheet
 from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
+from kappaskin_app.scripting import script_of
 from kappaskin_app.settings import COLOURS
 from kappaskin_app.undoing import Undoing
 
@@ -23,8 +25,9 @@ if TYPE_CHECKING:
 
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FILE, _EDIT, _SOURCE, _VIEW = "&File", "&Edit", "&Source", "&View"
-_FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, panels"
+_FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, files"
 _SHEET = "Every shortcut, to look up and to change"
+_PYTHON = "A script that does what the window does now: source, scene, setup; it prints the contact"
 _RECENT = "Scenes, recordings, calibrations and meshes opened last; each may also be dropped here"
 _FIGURES, _HELP = "Fi&gures", "&Help"
 
@@ -61,7 +64,9 @@ class Menus(QObject):
         self.undoing = Undoing(window.history.stack, window.layouts.note, self.actions, _EDIT)
         self.actions.add("reset", _EDIT, "&Reset settings", self._window.wishes.reset)
         find = self.finder.open_empty
-        self.actions.add("find", _EDIT, f"&Find a command{_DOTS}", find, "Ctrl+K", _FIND)
+        add = self.actions.add
+        add("copy-python", _EDIT, "Copy as P&ython", self._copy_python, "Ctrl+Shift+C", _PYTHON)
+        add("find", _EDIT, f"&Find a command{_DOTS}", find, "Ctrl+K", _FIND)
 
     def _add_source(self) -> None:
         add, window = self.actions.add, self._window
@@ -97,7 +102,8 @@ class Menus(QObject):
         words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
         maps = {f"the map of {words[name]}": view for name, view in window.heatmaps.items()}
         docks = {dock.windowTitle(): dock.widget() for dock in window.docks.below}
-        window.exports.register(self.actions, solid, maps | docks)
+        flat = {"Picture of a &map": maps, "Picture of a &panel": docks}
+        window.exports.register(self.actions, solid, flat)
 
     def _turn_sound(self) -> None:
         self._show_sound(self._window.presenting.sound.turn())
@@ -112,6 +118,20 @@ class Menus(QObject):
         self._window.tell(
             f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}"
         )
+
+    def _copy_python(self) -> None:
+        """Put a script on the clipboard, and what it reads into a folder."""
+        window, folder = self._window, data_folder().parent / "scripts"
+        try:
+            script = script_of(window.session, window.history.settings, folder)
+            for name, content in script.files.items():
+                folder.mkdir(parents=True, exist_ok=True)
+                (folder / name).write_bytes(content)
+        except (Refusal, OSError) as error:
+            window.tell(f"Nothing was copied: {error}")
+            return
+        QGuiApplication.clipboard().setText(script.text)
+        window.tell(f"Copied a script of {script.text.count(chr(10))} lines: paste it into a file")
 
     def _draw(self, name: str) -> None:
         """Draw a figure of the paper from a run of its own, in a window beside this one."""

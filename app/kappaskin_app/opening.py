@@ -121,10 +121,14 @@ class Opening(QObject):
         self.recent = recent
         self.changed.emit()
 
+    def last_ones(self) -> list[Path]:
+        """The files opened last, and the newest recordings besides."""
+        others = [file for file in newest(recordings_folder()) if file not in self.recent]
+        return [*self.recent, *others]
+
     def _list(self) -> None:
         self.menu.clear()
-        others = [file for file in newest(recordings_folder()) if file not in self.recent]
-        for file in [*self.recent, *others]:
+        for file in self.last_ones():
             self._list_one(file)
         if self.menu.isEmpty():
             self.menu.addAction("None yet").setEnabled(False)

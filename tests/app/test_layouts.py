@@ -1,4 +1,5 @@
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -179,6 +180,39 @@ def test_an_earlier_one_put_aside_stays(tmp_path: Path) -> None:
         KeptFile(path).read()
     aside = [(tmp_path / f"window.toml.{number}.aside").read_text() for number in (1, 2)]
     assert aside == ["first", "second"]
+
+
+def test_two_windows_that_write_at_once_leave_one_whole_file_and_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "window.toml"
+    kept = [Kept(theme="dark"), Kept(theme="light", files=("a",) * 50)]
+
+    def write(which: Kept) -> set[str]:
+        return {KeptFile(path).write(which) for _ in range(40)}
+
+    with ThreadPoolExecutor(2) as windows:
+        assert set().union(*windows.map(write, kept)) == {""}
+    assert KeptFile(path).read() in [(each, "") for each in kept]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_was_cut_anywhere_is_read_or_told(tmp_path: Path) -> None:
+    text, path = to_text(Kept(theme="dark", now=READY["Study"])), tmp_path / "window.toml"
+    for end in range(0, len(text), 97):
+        path.write_text(text[:end])
+        kept, told = KeptFile(path).read()
+        assert told == "" or (kept == Kept() and not path.exists())
+
+
+def test_docks_that_there_are_not_are_passed_over(bare, qapp) -> None:
+    window, docks, pages = bare
+    window.show()
+    text = to_text(Kept(now=READY["Study"])).replace("curvature = ", "holograms = ")
+    arrange(window, docks.by_name(), pages, from_text(text).now)
+    qapp.processEvents()
+    assert docks["curvature"].isHidden()
+    assert not docks["cost"].isHidden()
+    arrange(window, docks.by_name(), pages, READY["Live"])
+    window.hide()
 
 
 def test_the_text_is_read_by_a_person() -> None:

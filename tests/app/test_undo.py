@@ -117,9 +117,7 @@ def test_another_skin_is_seen_from_where_the_last_one_was(here: MainWindow, unti
     assert [a - f for a, f in zip(at, focus, strict=True)] == pytest.approx([0.0, -side, side])
 
 
-def test_a_dock_that_is_closed_and_a_tab_that_is_clicked_come_back(
-    here: MainWindow, qtbot
-) -> None:
+def test_a_dock_that_is_closed_and_a_tab_that_is_clicked_come_back(here: MainWindow, qtbot) -> None:
     for name in ("cost", "numbers"):
         here.actions_by_name[f"dock-{name}"].trigger()
         _settle()
