@@ -89,9 +89,9 @@ class Display(QObject):
         self.scale.lock.show_locked(locked_at(settings.colour_by, settings) > 0)
         self._allow_lock()
         s = settings
-        self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y))
+        self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y, s.from_z, s.to_z))
         self.membrane.show_options(settings.show_elements, settings.show_truth)
-        self.membrane.show_look(settings.look, settings.camera)
+        self.membrane.gaze.show(settings.look, settings.camera)
 
     def limit_shown(self) -> float:
         """How far the colours of the skin reach, in SI units."""

@@ -54,7 +54,7 @@ class Looking:
         for key, look in _LOOKS:
             words = f"Look {DIRECTIONS[look].words}"
             add(words.lower().replace(" ", "-"), _MENU, words, self._look(words, look), key)
-        self._display.membrane.turned.connect(guarded(self._turned))
+        self._display.membrane.gaze.turned.connect(guarded(self._turned))
 
         measuring = self._display.measuring
         self._measure = add("measure", _MENU, "&Measure", measuring.turn, "Ctrl+Alt+M", _TIP)

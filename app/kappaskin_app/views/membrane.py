@@ -18,20 +18,15 @@ from kappaskin import Estimate, Load, Sensor
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.box import WHOLE, Box, Shares
-from kappaskin_app.views.camera import (
-    DIRECTIONS,
-    FROM_THE_LEFT,
-    camera_of,
-    fit_camera,
-    place_camera,
-)
 from kappaskin_app.views.drag import LoadDrag
 from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
+from kappaskin_app.views.gaze import Gaze
 from kappaskin_app.views.loads import DrawnLoads, put_upright
 from kappaskin_app.views.marks import Marks
 from kappaskin_app.views.pointing import Pointing
+from kappaskin_app.views.sides import Sides
 from kappaskin_app.views.surface import Surface
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
@@ -39,14 +34,15 @@ _LIFT = 0.006  # of the skin's size above the surface, or half of a line drowns 
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
-class MembraneView(QWidget):
-    """Shows estimates, the skin pressed in along its normals; `drag` says when a load is moved.
+def _spare(length: int, ratio: float) -> int:
+    """How many px of a length to do without, to end between two pixels of the screen."""
+    return next((spare for spare in range(4) if (length - spare) * ratio % 1 == 0), 0)
 
-    `turned` brings how the camera stands after it was dragged, or else after a turn of the wheel.
-    """
+
+class MembraneView(QWidget):
+    """Shows estimates, the skin pressed in along its normals; `drag` says when a load is moved."""
 
     drawn = Signal()
-    turned = Signal(tuple, bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -56,15 +52,16 @@ class MembraneView(QWidget):
         self.plotter.setAttribute(Qt.WidgetAttribute.WA_DontCreateNativeAncestors)
         self.plotter.setAttribute(Qt.WidgetAttribute.WA_NativeWindow)
         self.plotter.setAcceptDrops(False)  # or it would take any file for a mesh to draw
-        around = QVBoxLayout(self)
-        around.setContentsMargins(0, 0, 0, 0)
-        around.addWidget(self.plotter)
+        self._around = QVBoxLayout(self)
+        self._around.setContentsMargins(0, 0, 0, 0)
+        self._around.addWidget(self.plotter)
         # Blending in any order adds 8 ms to each picture, as soon as anything is translucent.
         self.plotter.renderer.SetUseOIT(False)
         self._make_actors()
         self._make_lights()
         self.pointing = Pointing(self.plotter)  # after the drag: of filters the last goes first
         self.drag = LoadDrag(self.plotter)
+        self.gaze = Gaze(self.plotter, self.sides)
         self._box = Box()
         self.setMinimumSize(320, 240)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
@@ -82,15 +79,6 @@ class MembraneView(QWidget):
         self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
         self._positions, self._marked = np.empty((0, 2)), (b"", -1)
         self._arrays: dict[str, Any] = {}
-        self._look, self._camera = "left", ()
-        self._stood: tuple[float, ...] = ()  # how the camera stood when the mouse took hold of it
-        self._dragged = False
-        for event, note in (
-            ("StartInteractionEvent", self._note_taken),
-            ("InteractionEvent", self._note_turning),
-            ("EndInteractionEvent", self._note_turned),
-        ):
-            self.plotter.iren.interactor.AddObserver(event, note)
         self._theme: Theme | None = None
         self._ink = "#ffffff"
 
@@ -101,7 +89,7 @@ class MembraneView(QWidget):
         self._elements: Any = pv.PolyData(np.zeros((1, 3)))
         self._wire_actor: Any = None
         self._elements_actor = plotter.add_mesh(
-            self._elements, style="points", point_size=5, **UNLIT
+            self._elements, style="points", point_size=pixels(plotter, 5), **UNLIT
         )
         self.out, self.asked = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
         # Seen on every colour.
@@ -110,9 +98,7 @@ class MembraneView(QWidget):
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
-        self.labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
-        for label in self.labels:
-            plotter.add_actor(label, reset_camera=False, render=False)
+        self.sides = Sides(plotter)
         self.caption: Any = pv.Text("")
         self.caption.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
         self.caption.position = 0.015, 0.94  # of the picture, from its lower left corner
@@ -134,32 +120,14 @@ class MembraneView(QWidget):
         self.ages.append((now, now - self._taken))
         self.drawn.emit()
 
-    def _note_taken(self, *_: object) -> None:
-        self._stood, self._dragged = camera_of(self.plotter.renderer, self.skin), False
-
-    def _note_turning(self, *_: object) -> None:
-        self._dragged = True
-        self._show_labels(True, True)
-
-    def _note_turned(self, *_: object) -> None:
-        stands = camera_of(self.plotter.renderer, self.skin)
-        if stands != self._stood:
-            self._camera = stands
-            self._show_labels(True, True)
-            self.turned.emit(stands, self._dragged)
-
-    def _show_labels(self, x: bool, y: bool) -> None:
-        """Whether the sides' lengths are written: seen end-on, a text lies on the skin's rim."""
-        for label, shown in zip(self.labels[1:], (x, y), strict=True):
-            label.SetVisibility(shown)
-
     # What a skin looks like: rebuilt only when another one appears.
 
     def show_skin(self, sensor: Sensor, nx: int, ny: int) -> None:
         """Draw a surface of nx x ny points for the skin of `sensor`, at rest until an estimate."""
         patch = sensor.layout.patch
         another = self.surface.actor is None or self.skin.patch != patch
-        self.skin = self.drag.skin = self.pointing.skin = skin = DrawnSkin(patch, nx, ny)
+        skin = DrawnSkin(patch, nx, ny)
+        self.skin = self.drag.skin = self.pointing.skin = self.gaze.skin = skin
         self.surface.show_skin(skin, sensor.layout)
         self.lift = _LIFT * skin.size
         self._wire = self._wireframe(skin)
@@ -171,10 +139,10 @@ class MembraneView(QWidget):
         self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
         self._contact.scale = skin.size
         self._arrays = self._changing()
-        self._place_labels(skin)
+        self.sides.show_skin(skin)
         self.show_box(self._box.shares)
         if another:
-            self._place_camera()
+            self.gaze.place()
         if self._theme:
             self.show_theme(self._theme)
 
@@ -182,7 +150,7 @@ class MembraneView(QWidget):
         if self._wire_actor is not None:
             self.plotter.remove_actor(self._wire_actor, render=False)
         self._wire_actor = self.plotter.add_mesh(
-            self._wire, line_width=1, lighting=False, reset_camera=False, render=False
+            self._wire, line_width=pixels(self.plotter, 1), **UNLIT
         )
         self._wire_actor.prop.color = self._ink
 
@@ -230,39 +198,13 @@ class MembraneView(QWidget):
         for above, marks in enumerate(self.pointed, 2):
             marks.follow(self.skin, above * self.lift)  # the inner one is not to sink into the rim
 
-    def _place_labels(self, skin: DrawnSkin) -> None:
-        a, b = skin.patch.a, skin.patch.b
-        corners, _ = skin.at_rest(np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]))
-        beside = MM * np.array([(-0.04 * a, -0.04 * b, 0), (0, -0.06 * b, 0), (0, 0.05 * b, 0)])
-        texts = ("0", f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm")
-        for label, text, at in zip(self.labels, texts, corners + beside, strict=True):
-            label.input = text
-            label.position = tuple(at)
-        # Where the skin rises steeply beside it, a text in the middle would lie below it.
-        y_at = "right" if skin.patch.base_curvature else "center"
-        self.labels[2].prop.justification_horizontal = y_at
-
-    def show_look(self, look: str, camera: tuple[float, ...]) -> None:
-        """Look at the whole skin from a direction, or as the `camera` stood that was turned."""
-        if (look, camera) != (self._look, self._camera):
-            self._look, self._camera = look, camera
-            self._place_camera()
-
-    def _place_camera(self) -> None:
-        """Look as is asked for; a direction fits the skin in, and again whenever the size does."""
-        renderer, direction = self.plotter.renderer, DIRECTIONS.get(self._look, FROM_THE_LEFT)
-        if self._camera:
-            place_camera(renderer, self.skin, self._camera)
-        else:
-            fit_camera(renderer, self.skin, direction, self.plotter.width())
-        turned = bool(self._camera)
-        self._show_labels(turned or direction.sees(0), turned or direction.sees(1))
-        self.plotter.update()
-
     def resizeEvent(self, event: QResizeEvent) -> None:
+        # A picture that ends within a pixel of the screen would have a black edge there.
+        right, upper = (_spare(side, self.devicePixelRatioF()) for side in event.size().toTuple())
+        self._around.setContentsMargins(0, upper, right, 0)
         super().resizeEvent(event)
         # After VTK has its new size.
-        QTimer.singleShot(0, lambda: self._camera or self._place_camera())
+        QTimer.singleShot(0, self.gaze.fit)
 
     # What changes with every estimate.
 
@@ -327,7 +269,7 @@ class MembraneView(QWidget):
         self.plotter.update()
 
     def show_box(self, shares: Shares) -> None:
-        """Draw only what is within these shares of the skin: from and to, along x and along y."""
+        """Draw only what is these shares of the skin: from and to, along x, y and upwards."""
         self._box.shares = shares
         self._box.show(self.skin)
         self._box.cut(self.plotter.actors.values())
@@ -365,8 +307,8 @@ class MembraneView(QWidget):
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
         self.plotter.set_background(theme.scene, top=theme.scene_top)
-        for text in (*self.labels, self.caption):
-            text.prop.color = theme.text
+        self.sides.show_colour(theme.text)
+        self.caption.prop.color = theme.text
         self.alarm.show_theme(theme)
         self.surface.show_theme(theme)
         self.plotter.update()
