@@ -9,8 +9,11 @@ from PySide6.QtWidgets import QMainWindow, QMenu
 
 from kappaskin import Refusal
 from kappaskin_app.guard import guarded
+from kappaskin_app.keytips import retell
 from kappaskin_app.tips import tip_of
 
+WITHIN = " > "
+"""Between the title of a menu and that of one in it."""
 _TYPES_NOTHING = re.compile(r".*(Ctrl|Alt|Meta)\+.+|(Shift\+)?F\d+")
 
 
@@ -76,8 +79,11 @@ class Actions:
         return "" if self[name].isEnabled() else self._why_not.get(name) or "not now"
 
     def _menu(self, title: str) -> QMenu:
+        """The menu of this title, which may stand within another."""
         if title not in self._menus:
-            self._menus[title] = self._window.menuBar().addMenu(title)
+            around, _, own = title.rpartition(WITHIN)
+            bar = self._menu(around) if around else self._window.menuBar()
+            self._menus[title] = bar.addMenu(own)
         return self._menus[title]
 
     def __getitem__(self, name: str) -> QAction:
@@ -104,6 +110,12 @@ class Actions:
         if why_not := self.why_no_key(name, key):
             raise Refusal(why_not)
         self[name].setShortcut(QKeySequence(key))
+        self._retell()
+
+    def _retell(self) -> None:
+        """Let what names shortcuts name those of now."""
+        changed = self.changed_keys()
+        retell(self._window, {self.own_key(name): key for name, key in changed.items()})
 
     def why_no_key(self, name: str, key: str) -> str:
         """Why an action cannot have a shortcut; empty where it can."""
@@ -128,6 +140,7 @@ class Actions:
                 self.change_key(name, key)
             except Refusal as refusal:
                 refused.append(str(refusal))
+        self._retell()
         return refused
 
 

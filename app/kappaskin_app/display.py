@@ -91,6 +91,7 @@ class Display(QObject):
         s = settings
         self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y, s.from_z, s.to_z))
         self.membrane.show_options(settings.show_elements, settings.show_truth)
+        self.membrane.gaze.show(settings.look, settings.camera)
 
     def limit_shown(self) -> float:
         """How far the colours of the skin reach, in SI units."""

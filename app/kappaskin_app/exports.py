@@ -1,6 +1,7 @@
 """What leaves the window as a file: recordings, pictures of its views, films."""
 
 import time
+from collections.abc import Mapping
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -9,7 +10,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin import Refusal
-from kappaskin_app.actions import Actions
+from kappaskin_app.actions import WITHIN, Actions
 from kappaskin_app.exporting import ExportDialog
 from kappaskin_app.filming import Filming
 from kappaskin_app.guard import guarded
@@ -34,19 +35,23 @@ class Exports(QObject):
         self.filming.told.connect(guarded(self.told.emit))
 
     def register(
-        self, actions: Actions, solid: dict[str, QWidget], flat: dict[str, QWidget]
+        self,
+        actions: Actions,
+        solid: Mapping[str, QWidget],
+        flat: Mapping[str, Mapping[str, QWidget]],
     ) -> None:
         """Add actions for recordings, films, and for pictures of views by their names.
 
-        Those that are `solid` are in three dimensions, the others `flat`.
+        Those that are `solid` are in three dimensions, the others `flat`, a menu of its own each.
         """
         more = "\N{HORIZONTAL ELLIPSIS}"
         actions.add("export", _MENU, f"&Recording{more}", self.ask, "Ctrl+Shift+E")
         actions.add("film", _MENU, "&Film of the skin, begin or end", self.film, "Ctrl+Shift+F")
-        for is_flat, views in ((False, solid), (True, flat)):
+        menus = {_MENU: solid} | {f"{_MENU}{WITHIN}{title}": flat[title] for title in flat}
+        for menu, views in menus.items():
             for name, view in views.items():
-                act = partial(self.picture, view, name, is_flat)
-                actions.add(f"picture-of-{name.lower()}", _MENU, f"Picture of {name}{more}", act)
+                act = partial(self.picture, view, name, menu != _MENU)
+                actions.add(f"picture-of-{name.lower()}", menu, f"Picture of {name}{more}", act)
 
     def ask(self) -> None:
         """Ask what of a recording is to be written where."""

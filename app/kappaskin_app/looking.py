@@ -5,26 +5,19 @@ from functools import partial
 
 from PySide6.QtGui import QKeySequence, QShortcut
 
-from kappaskin_app.actions import Actions
+from kappaskin_app.actions import WITHIN, Actions
 from kappaskin_app.display import Display
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.settings import COLOURS
-from kappaskin_app.views.camera import (
-    ABOVE,
-    BELOW,
-    FROM_THE_LEFT,
-    FRONT,
-    ISOMETRIC,
-    SIDE,
-    Direction,
-)
+from kappaskin_app.views.camera import DIRECTIONS
 from kappaskin_app.wishes import Wishes
 
 _MENU = "Sk&in"
+_COLOURS = f"{_MENU}{WITHIN}&Colour"
 _LOOKS = (
-    *(("F6", ABOVE), ("F7", FRONT), ("F8", SIDE)),
-    *(("Shift+F6", BELOW), ("Shift+F7", ISOMETRIC)),
+    *(("F6", "above"), ("F7", "front"), ("F8", "side")),
+    *(("Shift+F6", "below"), ("Shift+F7", "corner")),
 )
 _TOGGLES = (
     ("elements", "&elements", "Ctrl+E"),
@@ -50,17 +43,18 @@ class Looking:
         for number, (value, words) in enumerate(COLOURS, 1):
             colour = partial(wishes.wish, "colour_by", value)
             key = f"Ctrl+{number}" if number <= _DIGITS else ""
-            add(f"colour-{value}", _MENU, f"Colour by {words.lower()}", colour, key)
+            add(f"colour-{value}", _COLOURS, f"Colour by {words.lower()}", colour, key)
         add("lock-ranges", _MENU, "&Lock or free all ranges", self.lock_all, "Ctrl+Alt+L")
         add("higher", _MENU, "Draw &higher", partial(wishes.exaggerate, 1), "Ctrl++")
         add("lower", _MENU, "Draw &lower", partial(wishes.exaggerate, -1), "Ctrl+-")
         for name, words, key in _TOGGLES:
             toggle = partial(wishes.toggle, f"show_{name}")
             add(name, _MENU, f"Show or hide {words}", toggle, key)
-        add("camera", _MENU, "Reset &camera", self._look(FROM_THE_LEFT), "Ctrl+R")
-        for key, direction in _LOOKS:
-            words = f"Look {direction.words}"
-            add(words.lower().replace(" ", "-"), _MENU, words, self._look(direction), key)
+        add("camera", _MENU, "Reset &camera", self._look("Reset camera", "left"), "Ctrl+R")
+        for key, look in _LOOKS:
+            words = f"Look {DIRECTIONS[look].words}"
+            add(words.lower().replace(" ", "-"), _MENU, words, self._look(words, look), key)
+        self._display.membrane.gaze.turned.connect(guarded(self._turned))
 
         measuring = self._display.measuring
         self._measure = add("measure", _MENU, "&Measure", measuring.turn, "Ctrl+Alt+M", _TIP)
@@ -79,8 +73,15 @@ class Looking:
         if self._display.measuring.on:
             self._display.measuring.take(x, y)
 
-    def _look(self, direction: Direction) -> Callable[[], None]:
-        return partial(self._display.membrane.look_from, direction)
+    def _look(self, words: str, look: str) -> Callable[[], None]:
+        return partial(self._history.change, words, -1, look=look, camera=())
+
+    def _turned(self, camera: tuple[float, ...], dragged: bool) -> None:
+        """Take note of how the camera was turned: a drag is one step, as are turns of the wheel."""
+        if dragged:
+            self._history.change("Turn the view", -1, camera=camera)
+        else:
+            self._history.wish("camera", camera=camera)
 
     def lock(self, locked: bool) -> None:
         """Keep the range of the skin's colours as it is, or let it follow what is shown."""

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject
+from PySide6.QtGui import QGuiApplication
 
-from kappaskin import FIGURES
+from kappaskin import FIGURES, Refusal, data_folder
 from kappaskin_app.actions import Actions
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.finder.finder import Finder
@@ -15,16 +16,19 @@ from kappaskin_app.finder.sheet import CheatSheet
 from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
+from kappaskin_app.scripting import script_of
 from kappaskin_app.settings import COLOURS
+from kappaskin_app.undoing import Undoing
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
 
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FILE, _EDIT, _SOURCE, _VIEW = "&File", "&Edit", "&Source", "&View"
-_FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, panels"
+_FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, files"
 _SHEET = "Every shortcut, to look up and to change"
 _BEGIN = "Offer above the skin what one may begin with: a scene, a sensor, a lesson, a recording"
+_PYTHON = "A script that does what the window does now: source, scene, setup; it prints the contact"
 _RECENT = "Scenes, recordings, calibrations and meshes opened last; each may also be dropped here"
 _FIGURES, _HELP = "Fi&gures", "&Help"
 
@@ -43,7 +47,7 @@ class Menus(QObject):
         for name in FIGURES:
             self.actions.add(name, _FIGURES, TITLES.get(name, name), partial(self._draw, name))
         self._add_export()
-        self.sheet = CheatSheet(self.actions, window)
+        self.sheet = CheatSheet(self.actions, window.history, window)
         self.actions.add("shortcuts", _HELP, "&Shortcuts", self.sheet.open_all, "F1", _SHEET)
         begin = window.beginning.offer
         self.actions.add("begin", _HELP, "&Ways to begin", begin, "", _BEGIN)
@@ -59,15 +63,13 @@ class Menus(QObject):
         add("quit", _FILE, "&Quit", window.quit, "Ctrl+Q")
 
     def _add_edit(self) -> None:
-        stack = self._window.history.stack
-        undo, redo = stack.createUndoAction(self._window), stack.createRedoAction(self._window)
-        undo.setShortcut("Ctrl+Z")
-        redo.setShortcut("Ctrl+Shift+Z")
-        self.actions.register("undo", _EDIT, undo)
-        self.actions.register("redo", _EDIT, redo)
+        window = self._window
+        self.undoing = Undoing(window.history.stack, window.layouts.note, self.actions, _EDIT)
         self.actions.add("reset", _EDIT, "&Reset settings", self._window.wishes.reset)
         find = self.finder.open_empty
-        self.actions.add("find", _EDIT, f"&Find a command{_DOTS}", find, "Ctrl+K", _FIND)
+        add = self.actions.add
+        add("copy-python", _EDIT, "Copy as P&ython", self._copy_python, "Ctrl+Shift+C", _PYTHON)
+        add("find", _EDIT, f"&Find a command{_DOTS}", find, "Ctrl+K", _FIND)
 
     def _add_source(self) -> None:
         add, window = self.actions.add, self._window
@@ -103,7 +105,8 @@ class Menus(QObject):
         words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
         maps = {f"the map of {words[name]}": view for name, view in window.heatmaps.items()}
         docks = {dock.windowTitle(): dock.widget() for dock in window.docks.below}
-        window.exports.register(self.actions, solid, maps | docks)
+        flat = {"Picture of a &map": maps, "Picture of a &panel": docks}
+        window.exports.register(self.actions, solid, flat)
 
     def _turn_sound(self) -> None:
         self._show_sound(self._window.presenting.sound.turn())
@@ -118,6 +121,20 @@ class Menus(QObject):
         self._window.tell(
             f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}"
         )
+
+    def _copy_python(self) -> None:
+        """Put a script on the clipboard, and what it reads into a folder."""
+        window, folder = self._window, data_folder().parent / "scripts"
+        try:
+            script = script_of(window.session, window.history.settings, folder)
+            for name, content in script.files.items():
+                folder.mkdir(parents=True, exist_ok=True)
+                (folder / name).write_bytes(content)
+        except (Refusal, OSError) as error:
+            window.tell(f"Nothing was copied: {error}")
+            return
+        QGuiApplication.clipboard().setText(script.text)
+        window.tell(f"Copied a script of {script.text.count(chr(10))} lines: paste it into a file")
 
     def _draw(self, name: str) -> None:
         """Draw a figure of the paper from a run of its own, in a window beside this one."""

@@ -54,7 +54,7 @@ class Opening(QObject):
     def __init__(self, window: "MainWindow") -> None:
         super().__init__(window)
         self._replaying, self._staging = window.replaying, window.staging
-        self._calibrating = window.calibrating
+        self._calibrating, self._history = window.calibrating, window.history
         self._session, self._wishes = window.session, window.wishes
         self.recent: list[Path] = []
         self.menu = QMenu(window)
@@ -115,13 +115,20 @@ class Opening(QObject):
 
     def clear(self) -> None:
         """Forget the last ones."""
-        self.recent = []
+        self._history.step("clear the files opened last", self._have, self.recent, [])
+
+    def _have(self, recent: list[Path]) -> None:
+        self.recent = recent
         self.changed.emit()
+
+    def last_ones(self) -> list[Path]:
+        """The files opened last, and the newest recordings besides."""
+        others = [file for file in newest(recordings_folder()) if file not in self.recent]
+        return [*self.recent, *others]
 
     def _list(self) -> None:
         self.menu.clear()
-        others = [file for file in newest(recordings_folder()) if file not in self.recent]
-        for file in [*self.recent, *others]:
+        for file in self.last_ones():
             self._list_one(file)
         if self.menu.isEmpty():
             self.menu.addAction("None yet").setEnabled(False)

@@ -13,7 +13,7 @@ from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
 from kappaskin_app.scene_text import forced, instead, pressed, shifted
 from kappaskin_app.session import Session
-from kappaskin_app.settings import Sending, Settings, Written, ask_of
+from kappaskin_app.settings import Sending, Settings, Written
 from kappaskin_app.simulation import (
     NO_ELEMENTS,
     OWN,
@@ -39,9 +39,8 @@ class Wishes:
 
     def wish(self, name: str, value: Any) -> None:
         """Make the setting `name` what is wished, and what follows from it."""
-        label = ask_of(name).label if not name.startswith("range_") else "colour range"
         changed = with_consequences(self._history.settings, self._session.scene, name, value)
-        self._history.wish(name, label, **changed)
+        self._history.wish(name, **changed)
 
     def choose(self, element: int) -> None:
         """Take an element into the region of those chosen, or out of it."""
@@ -114,7 +113,7 @@ class Wishes:
     def write(self, text: str) -> None:
         """Play what was written instead of the scene so far; a row of keys is one step to undo."""
         if (written := self._written_anew(text)) is not None:
-            self._history.wish("written", "the scene", written=written)
+            self._history.wish("written", written=written)
 
     def _written_anew(self, text: str) -> Written | None:
         """The scene with another text; None where it has this one."""

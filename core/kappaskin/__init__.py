@@ -135,6 +135,7 @@ from kappaskin.scene import read_scene_text as read_scene_text
 from kappaskin.scene import scene_file as scene_file
 from kappaskin.scene import write_scene as write_scene
 from kappaskin.sensor import Sensor as Sensor
+from kappaskin.setup_text import said_of_setup as said_of_setup
 from kappaskin.setup_text import setup_from as setup_from
 from kappaskin.setup_text import setups_of as setups_of
 from kappaskin.side import Computed as Computed

@@ -14,7 +14,7 @@ from kappaskin.recording.cdr import Layout, encode
 from kappaskin.recording.disk import Disk
 from kappaskin.recording.writing import RecordingFile, Written
 from kappaskin.scene import Scene, write_scene
-from kappaskin.setup_text import said_of
+from kappaskin.setup_text import said_of_setup
 from kappaskin.sources.clock import Known
 
 _CONTACTS = 1000.0  # a second at most
@@ -115,7 +115,7 @@ class Recorder:
 
     def set_up(self, pipeline: Pipeline) -> None:
         """Frames go through `pipeline` from now on."""
-        text, files = said_of(pipeline.setup)
+        text, files = said_of_setup(pipeline.setup)
         for name in files.keys() - self._attached:
             self._attached.add(name)
             self._file.attach(name, "application/toml", files[name])

@@ -22,7 +22,7 @@ _LONGEST = 2**16
 _SETUPS = 500  # of a recording, the first of more
 
 
-def said_of(setup: Setup) -> tuple[str, dict[str, bytes]]:
+def said_of_setup(setup: Setup) -> tuple[str, dict[str, bytes]]:
     """The text, and by name the files that it names."""
     said: dict[str, Any] = {name: getattr(setup, name) for name in (*_WHOLE, *_REAL, *_TEXT)}
     files: dict[str, bytes] = {}

@@ -19,9 +19,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin_app.layouts.arranging import layout_of, words_of
 from kappaskin_app.window import MainWindow
 
-_SPARED = ("quit",)
+_SPARED = ("quit", "undo", "redo")  # the window would be gone; and what the others are tried with
 
 
 @pytest.fixture
@@ -41,10 +42,44 @@ def _after(window: MainWindow, act: Callable[[], object]) -> None:
         dialog.reject()
 
 
-def test_every_action_can_be_taken(window: MainWindow, nothing_chosen, until) -> None:
-    for name in [name for name in window.actions_by_name.entries if name not in _SPARED]:
-        _after(window, window.actions_by_name[name].trigger)
+def _state(window: MainWindow) -> dict[str, object]:
+    """All that a person chose. What is read, written, computed or said is none of it."""
+    layout = layout_of(window, window.docks.by_name(), window.panels)
+    return {
+        "settings": window.history.settings,
+        "docks": words_of(layout),
+        "pages": (layout.page, window.scene.currentIndex()),
+        "keys": window.actions_by_name.changed_keys(),
+        "layouts": dict(window.layouts.own),
+        "files": list(window.opening.recent),
+    }
+
+
+def _sizes(window: MainWindow) -> list[float]:
+    layout = layout_of(window, window.docks.by_name(), window.panels)
+    return [size for _, place in layout.docks for size in (place.share, place.along)]
+
+
+def test_every_action_can_be_taken_undone_and_redone(
+    window: MainWindow, nothing_chosen, until
+) -> None:
+    actions, stack = window.actions_by_name, window.history.stack
+    window.opening.note(Path("own.toml"))  # something to undo and to clear
+    changed = set()
+    for name in [name for name in actions.entries if name not in _SPARED]:
+        before, sizes, index = _state(window), _sizes(window), stack.index()
+        _after(window, actions[name].trigger)
         window.presenting.leave()
+        after, steps = _state(window), stack.index() - index
+        assert steps or after == before, name
+        for way, wanted in (("undo", before), ("redo", after)):
+            for _ in range(steps):
+                _after(window, actions[way].trigger)
+            assert _state(window) == wanted, (name, way)
+            if way == "undo":
+                assert _sizes(window) == pytest.approx(sizes, abs=0.004), name
+        changed |= {name} if after != before else set()
+    assert {"theme", "look-from-above", "dock-cost", "calibrate", "layout-study"} < changed
     window.connect_to("sim:")
     until(lambda: window.badge.state == "SIM")
 

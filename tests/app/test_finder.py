@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -6,6 +7,7 @@ from hypothesis import strategies as st
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
+from kappaskin import scene_file
 from kappaskin_app.finder.finder import Finder
 from kappaskin_app.finder.matching import score
 from kappaskin_app.finder.things import Thing, things_in
@@ -107,7 +109,9 @@ def test_nothing_found_says_so(finder: Finder, qtbot) -> None:
     assert "fewer letters" in finder.hint.text()
 
 
-def test_ctrl_k_finds_every_kind_of_thing_in_the_window(window: MainWindow, until, qtbot) -> None:
+def test_ctrl_k_finds_every_kind_of_thing_in_the_window(
+    window: MainWindow, until, qtbot, tmp_path: Path
+) -> None:
     settings = window.history.settings
     box = window.panels.basis.editor("functions_x")
     box.setFocus()
@@ -130,6 +134,14 @@ def test_ctrl_k_finds_every_kind_of_thing_in_the_window(window: MainWindow, unti
     assert window.scene.effects.isVisible()
     do("disconnect")
     until(lambda: window.badge.state == "OFF")
+    file = tmp_path / "my own fingertip.toml"
+    file.write_text(scene_file("demo").read_text(encoding="utf-8"), encoding="utf-8")
+    window.opening.note(tmp_path / "gone.mcap")
+    window.opening.note(file)
+    (gone,) = [thing for thing in things_in(window) if thing.title == "Open gone.mcap"]
+    assert gone.why_not == "not there any more: moved or deleted"
+    do("own fing")
+    until(lambda: getattr(window.history.settings.written, "file", None) == file)
     do("play scene coin")
     until(lambda: window.session.source == "sim:" and window.badge.state == "SIM")
     assert window.history.settings.written.file.stem == "coin"

@@ -1,7 +1,10 @@
+from dataclasses import fields, replace
+
+import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.history import History
-from kappaskin_app.settings import Settings
+from kappaskin_app.settings import Settings, change_told
 
 
 def test_a_change_is_told_and_can_be_undone(qapp: QApplication) -> None:
@@ -51,3 +54,73 @@ def test_giving_up_a_gesture_that_changed_nothing_takes_nothing_back(qapp: QAppl
     history.cancel(history.new_gesture())
     history.cancel(-1)
     assert history.settings.x == 0.07
+
+
+def test_wishes_in_a_row_are_one_step_that_tells_the_first_and_the_last_value(
+    qapp: QApplication,
+) -> None:
+    history = History(Settings())
+    for creep in (0.02, 0.03, 0.05):
+        history.wish("creep", creep=creep)
+    assert history.stack.undoText() == "creep 0 \N{RIGHTWARDS ARROW} 5 %"
+    history.stack.undo()
+    assert history.settings == Settings()
+
+
+def test_a_wish_after_an_undo_is_no_part_of_what_was_before(qapp: QApplication) -> None:
+    history = History(Settings())
+    history.wish("creep", creep=0.02)
+    history.stack.undo()
+    history.stack.redo()
+    history.wish("creep", creep=0.03)
+    history.stack.undo()
+    assert history.settings.creep == 0.02
+
+
+def test_wishes_that_end_where_they_began_are_no_step(qapp: QApplication) -> None:
+    history = History(Settings())
+    history.wish("show_band", show_band=True)
+    history.wish("show_band", show_band=False)
+    assert (history.stack.count(), history.settings) == (0, Settings())
+
+
+def test_what_is_no_setting_is_a_step_too(qapp: QApplication) -> None:
+    history, seen = History(Settings()), []
+    history.step("turn the page", seen.append, 1, 2)
+    history.stack.undo()
+    history.stack.redo()
+    assert seen == [2, 1, 2]
+
+
+def test_ten_thousand_steps_are_bounded_and_the_last_ones_stay(qapp: QApplication) -> None:
+    history = History(Settings())
+    for n in range(10_000):
+        history.change("Seed", -1, noise_seed=n + 1)
+    assert history.stack.count() == 500
+    history.stack.setIndex(0)
+    assert history.settings.noise_seed == 9_500
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("noise_rms", 0.5, "noise RMS 0.231 > 0.500 1/m"),
+        ("noise_kind", "gaussian", "noise kind Uniform (Table 1) > Gaussian"),
+        ("x", 0.06, "load x 50.0 > 60.0 mm"),
+        ("region", "skin", "scan All elements > Around the contact"),
+        ("show_truth", False, "true surface off"),
+        ("udp_to", "", "publish to 127.0.0.1:9870 > nothing"),
+        ("range_xx", 3.0, "colour range"),
+        ("camera", (1.0,), "the view"),
+        ("functions_x", 5, "functions along x 8 > 5"),
+    ],
+)
+def test_a_change_is_told_in_its_own_words_and_unit(name: str, value: object, words: str) -> None:
+    after = replace(Settings(), **{name: value})
+    said = change_told(name, Settings(), after)
+    assert said == words.replace(">", "\N{RIGHTWARDS ARROW}")
+
+
+def test_every_setting_has_words() -> None:
+    for field in fields(Settings):
+        assert change_told(field.name, Settings(), Settings())

@@ -1,4 +1,5 @@
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from kappaskin_app.layouts.layout import (
 )
 from kappaskin_app.window import MainWindow
 
+SHARES = st.integers(50, 600).map(lambda share: share / 1000)
 RECTANGLES = st.tuples(*[st.integers(0, 400)] * 2, *[st.integers(120, 500)] * 2)
 
 
@@ -36,7 +38,9 @@ def _place(name: str) -> st.SearchStrategy[Place]:
         st.booleans(),
         st.booleans(),
         st.booleans(),
-        st.integers(50, 600).map(lambda share: share / 1000),
+        st.booleans(),
+        SHARES,
+        SHARES,
         RECTANGLES,
     )
     return made.map(lambda place: place if place.area == FLOATING else replace(place, at=None))
@@ -88,7 +92,7 @@ def bare() -> Iterator[tuple[QMainWindow, Docks, QTabWidget]]:
 
 def _words(layout: Layout) -> dict[str, tuple[object, ...]]:
     """What can be said of each dock without px."""
-    return {name: (p.area, p.shown, p.tabbed, p.front, p.at) for name, p in layout.docks}
+    return {name: (p.area, p.shown, p.tabbed, p.front, p.beside, p.at) for name, p in layout.docks}
 
 
 @settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -110,10 +114,11 @@ def test_any_layout_goes_through_text_and_window_and_back(bare, qapp, layout: La
     twice = layout_of(window, docks.by_name(), pages)
     arrange(window, docks.by_name(), pages, READY["Live"])  # or what floats would stay
     window.hide()
-    assert _words(twice) == _words(once)
+    assert list(_words(twice).items()) == list(_words(once).items())  # in their order too
     shares = dict(once.docks)
     for name, place in twice.docks:
         assert place.share == pytest.approx(shares[name].share, abs=0.004)
+        assert place.along == pytest.approx(shares[name].along, abs=0.004)
 
 
 HOSTILE = (
@@ -177,6 +182,39 @@ def test_an_earlier_one_put_aside_stays(tmp_path: Path) -> None:
     assert aside == ["first", "second"]
 
 
+def test_two_windows_that_write_at_once_leave_one_whole_file_and_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "window.toml"
+    kept = [Kept(theme="dark"), Kept(theme="light", files=("a",) * 50)]
+
+    def write(which: Kept) -> set[str]:
+        return {KeptFile(path).write(which) for _ in range(40)}
+
+    with ThreadPoolExecutor(2) as windows:
+        assert set().union(*windows.map(write, kept)) == {""}
+    assert KeptFile(path).read() in [(each, "") for each in kept]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_was_cut_anywhere_is_read_or_told(tmp_path: Path) -> None:
+    text, path = to_text(Kept(theme="dark", now=READY["Study"])), tmp_path / "window.toml"
+    for end in range(0, len(text), 97):
+        path.write_text(text[:end])
+        kept, told = KeptFile(path).read()
+        assert told == "" or (kept == Kept() and not path.exists())
+
+
+def test_docks_that_there_are_not_are_passed_over(bare, qapp) -> None:
+    window, docks, pages = bare
+    window.show()
+    text = to_text(Kept(now=READY["Study"])).replace("curvature = ", "holograms = ")
+    arrange(window, docks.by_name(), pages, from_text(text).now)
+    qapp.processEvents()
+    assert docks["curvature"].isHidden()
+    assert not docks["cost"].isHidden()
+    arrange(window, docks.by_name(), pages, READY["Live"])
+    window.hide()
+
+
 def test_the_text_is_read_by_a_person() -> None:
     text = to_text(Kept(theme="dark", keys={"picture": "F12"}))
     assert 'theme = "dark"' in text
@@ -211,8 +249,11 @@ def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) ->
     assert window.cost.isVisible()
     window.layouts.save("Mine")
     window.history.stack.undo()
+    assert window.layouts.own == {}
+    window.history.stack.undo()
     assert not window.cost.isVisible()
-    window.history.stack.redo()
+    for _ in range(2):
+        window.history.stack.redo()
     window.actions_by_name.change_key("theme", "Ctrl+J")
     window.opening.note(tmp_path / "a.toml")
     window.menus.finder.recent = ["action:tare"]

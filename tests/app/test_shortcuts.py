@@ -2,11 +2,14 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtWidgets import QLabel, QMainWindow
 
 from kappaskin import Refusal
-from kappaskin_app.actions import Actions
+from kappaskin_app.actions import WITHIN, Actions
 from kappaskin_app.finder.sheet import CheatSheet
+from kappaskin_app.history import History
+from kappaskin_app.keytips import in_words
+from kappaskin_app.settings import Settings
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 
@@ -24,7 +27,7 @@ def actions(qtbot) -> Actions:
 
 @pytest.fixture
 def sheet(actions: Actions) -> Iterator[CheatSheet]:
-    sheet = CheatSheet(actions, actions.window)
+    sheet = CheatSheet(actions, History(Settings(), actions.window), actions.window)
     sheet.open_all()
     yield sheet
     sheet.close()
@@ -88,3 +91,55 @@ def test_all_are_reset_at_once(sheet: CheatSheet, actions: Actions) -> None:
     sheet.reset_all.click()
     assert actions.changed_keys() == {}
     assert _shown(sheet) == ["Ctrl+S", "Ctrl+T", ""]
+
+
+def test_a_changed_shortcut_and_all_that_were_reset_come_back(
+    sheet: CheatSheet, actions: Actions, qtbot
+) -> None:
+    stack, told = sheet.history.stack, []
+    sheet.changed.connect(lambda: told.append(actions.changed_keys()))
+    qtbot.keyClicks(sheet.line, "theme")
+    sheet.edit.setKeySequence("Ctrl+J")
+    qtbot.waitUntil(lambda: actions.key("theme") == "Ctrl+J")
+    assert stack.undoText() == "shortcut of Theme"
+    sheet.reset_all.click()
+    stack.undo()
+    assert actions.changed_keys() == {"theme": "Ctrl+J"}
+    stack.undo()
+    assert actions.changed_keys() == {}
+    stack.redo()
+    assert told == [{"theme": "Ctrl+J"}, {}, {"theme": "Ctrl+J"}, {}, {"theme": "Ctrl+J"}]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("Save it (Ctrl+S).", "Save it (Ctrl+T)."),
+        ("Ctrl+T, or Ctrl+Shift+S", "Ctrl+S, or Ctrl+Shift+S"),
+        ("See F1; F11 and Ctrl+F1 are others", "See no shortcut; F11 and Ctrl+F1 are others"),
+        ("nothing", "nothing"),
+    ],
+)
+def test_a_text_names_the_keys_of_now(text: str, told: str) -> None:
+    assert in_words(text, {"Ctrl+S": "Ctrl+T", "Ctrl+T": "Ctrl+S", "F1": "", "": "Ctrl+J"}) == told
+
+
+def test_tooltips_follow_a_changed_shortcut_and_one_that_is_set_meanwhile(actions: Actions) -> None:
+    label, other = QLabel(actions.window), QLabel(actions.window)
+    label.setToolTip("Theme (Ctrl+T)")
+    other.setToolTip("Else")
+    actions.change_key("theme", "Ctrl+J")
+    assert (label.toolTip(), other.toolTip()) == ("Theme (Ctrl+J)", "Else")
+    other.setToolTip("Now Ctrl+T")
+    actions.change_key("theme", "Ctrl+L")
+    assert (label.toolTip(), other.toolTip()) == ("Theme (Ctrl+L)", "Now Ctrl+L")
+    actions.take_keys({})
+    assert (label.toolTip(), other.toolTip()) == ("Theme (Ctrl+T)", "Now Ctrl+T")
+
+
+def test_a_menu_may_stand_within_another(actions: Actions) -> None:
+    for name in ("map", "dock"):
+        actions.add(name, f"E&xport{WITHIN}&Picture", name, lambda: None)
+    (export,) = [a for a in actions.window.menuBar().actions() if a.text() == "E&xport"]
+    (picture,) = export.menu().actions()
+    assert [action.text() for action in picture.menu().actions()] == ["map", "dock"]

@@ -37,7 +37,7 @@ class Finder(QDialog):
         self.line, self.hint = QLineEdit(), QLabel(_HINT)
         self.list = Listing(self.line)
         self.line.setPlaceholderText(
-            "A command, a setting, a scene, a panel\N{HORIZONTAL ELLIPSIS}"
+            "A command, a setting, a scene, a panel, a file\N{HORIZONTAL ELLIPSIS}"
         )
         self.line.setAccessibleName("What to find")
         self.line.setToolTip(

@@ -18,6 +18,7 @@ from kappaskin_app.actions import Actions, plain
 from kappaskin_app.finder.listing import Listing, clearable, row
 from kappaskin_app.finder.matching import best, score
 from kappaskin_app.guard import guarded
+from kappaskin_app.history import History
 from kappaskin_app.panels.calibration.parts import button, in_a_row
 
 _MOUSE = "Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom."
@@ -30,12 +31,12 @@ class CheatSheet(QDialog):
 
     changed = Signal()
 
-    def __init__(self, actions: Actions, parent: QWidget) -> None:
+    def __init__(self, actions: Actions, history: History, parent: QWidget) -> None:
         super().__init__(parent)
         self.setObjectName("cheat-sheet")
         self.setWindowTitle("Shortcuts")
         self.resize(*_SIZE)
-        self._actions = actions
+        self._actions, self.history = actions, history
         self.line = QLineEdit(placeholderText="Look for a command, a menu or a key")  # pyright: ignore[reportCallIssue]
         clearable(self.line)
         self.line.setAccessibleName("Look for a shortcut")
@@ -132,20 +133,22 @@ class CheatSheet(QDialog):
         self._take(self._actions.own_key(self.chosen()))
 
     def _take(self, key: str) -> None:
-        name = self.chosen()
+        name, before = self.chosen(), self._actions.changed_keys()
         try:
             self._actions.change_key(name, key)
         except Refusal as refusal:
             self.message.setText(f"{refusal}.")
             self._show_key(self._actions.key(name))
             return
-        words = plain(self._actions[name].text())
+        words, after = plain(self._actions[name].text()), self._actions.changed_keys()
+        self.history.step(f"shortcut of {words}", self._have, before, after)
         self.message.setText(f"{words} is {key} now." if key else f"{words} has no shortcut now.")
-        self._list()
-        self.changed.emit()
 
     def _reset_all(self) -> None:
-        self._actions.take_keys({})
+        self.history.step("reset all shortcuts", self._have, self._actions.changed_keys(), {})
         self.message.setText("Every command has its own shortcut again.")
+
+    def _have(self, changed: dict[str, str]) -> None:
+        self._actions.take_keys(changed)
         self._list()
         self.changed.emit()

@@ -1,4 +1,4 @@
-"""What can be found in a window: its actions, settings and their values, scenes and panels."""
+"""What can be found in a window: actions, settings and their values, scenes, panels, files."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -42,6 +42,7 @@ def things_in(window: "MainWindow") -> list[Thing]:
         *_settings(window),
         *_scenes(window),
         *_layouts(window),
+        *_files(window),
     ]
 
 
@@ -149,6 +150,13 @@ def _scenes(window: "MainWindow") -> Iterator[Thing]:
     for name, card in window.scene.gallery.items.items():
         play = partial(window.staging.play, scene_file(name))
         yield Thing(f"scene:{name}", f"Play the scene {card.text()}", "Scene, Gallery", play)
+
+
+def _files(window: "MainWindow") -> Iterator[Thing]:
+    for file in window.opening.last_ones():
+        why_not = "" if file.is_file() else "not there any more: moved or deleted"
+        act = partial(window.opening.open, file)
+        yield Thing(f"file:{file}", f"Open {file.name}", f"{file.parent}", act, "", why_not)
 
 
 def _layouts(window: "MainWindow") -> Iterator[Thing]:

@@ -1,17 +1,17 @@
 """Layouts as a person chooses, saves, renames and deletes them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtGui import QUndoCommand
 from PySide6.QtWidgets import QInputDialog, QMenu
 
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.layouts.arranging import arrange, layout_of
 from kappaskin_app.layouts.layout import LIVE, PRESENTER, READY, Layout
+from kappaskin_app.layouts.noting import Noting
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
@@ -28,22 +28,6 @@ _TIPS = {
 }
 
 
-class _Choice(QUndoCommand):
-    """From one layout to another."""
-
-    def __init__(
-        self, apply: Callable[[Layout], None], before: Layout, after: Layout, name: str
-    ) -> None:
-        super().__init__(f"layout {name}")
-        self._apply, self._before, self._after = apply, before, after
-
-    def redo(self) -> None:
-        self._apply(self._after)
-
-    def undo(self) -> None:
-        self._apply(self._before)
-
-
 class Layouts(QObject):
     """Arranges the docks of a `window`; `own` are those saved, `changed` tells that they did."""
 
@@ -53,7 +37,8 @@ class Layouts(QObject):
     def __init__(self, window: "MainWindow") -> None:
         super().__init__(window)
         self._window, self._docks, self._panels = window, window.docks.by_name(), window.panels
-        self._presenting, self._stack = window.presenting, window.history.stack
+        self._presenting, self._history = window.presenting, window.history
+        self.note = Noting(window, self).note
         self.own: dict[str, Layout] = {}
         self._menu = QMenu(window)
         self._menu.aboutToShow.connect(guarded(self._list))
@@ -83,7 +68,7 @@ class Layouts(QObject):
         return layout_of(self._window, self._docks, self._panels)
 
     def apply(self, layout: Layout) -> None:
-        """Arrange the window so, at once and for good."""
+        """Arrange the window so."""
         self._presenting.leave()
         arrange(self._window, self._docks, self._panels, layout)
 
@@ -93,7 +78,7 @@ class Layouts(QObject):
         """Arrange the window as the layout of this name, as a step that can be undone."""
         layout = self.own[name] if name in self.own else READY[name]
         if (before := self.now) != layout:
-            self._stack.push(_Choice(self.apply, before, layout, name))
+            self._history.step(f"layout {name}", self.apply, before, layout)
         if name == PRESENTER:
             self._presenting.enter()
 
@@ -111,8 +96,7 @@ class Layouts(QObject):
                 f"{name!r:.80}: choose another"
             )
             return
-        self.own[name] = self.now
-        self.changed.emit()
+        self._step(f"save the layout {name}", self.own | {name: self.now})
         self.told.emit(f"Saved the layout {name}")
 
     def rename(self, old: str, new: str) -> None:
@@ -121,14 +105,21 @@ class Layouts(QObject):
         if new in self.own or new in READY or not 0 < len(new) <= _LONGEST:
             self.told.emit(f"{new!r:.80} cannot be its name or is another's: choose another")
             return
-        self.own = {new if name == old else name: each for name, each in self.own.items()}
-        self.changed.emit()
+        renamed = {new if name == old else name: each for name, each in self.own.items()}
+        self._step(f"call the layout {old} {new}", renamed)
 
     def delete(self, name: str) -> None:
         """Forget a layout."""
-        self.own.pop(name, None)
-        self.changed.emit()
+        kept = {other: each for other, each in self.own.items() if other != name}
+        self._step(f"delete the layout {name}", kept)
         self.told.emit(f"Deleted the layout {name}")
+
+    def _step(self, text: str, own: Mapping[str, Layout]) -> None:
+        self._history.step(text, self._have, self.own, own)
+
+    def _have(self, own: Mapping[str, Layout]) -> None:
+        self.own = dict(own)
+        self.changed.emit()
 
     # Asking.
 

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,11 +58,20 @@ class KeptFile:
 
     def write(self, kept: Kept) -> str:
         """Write the file whole or not at all; what went wrong."""
-        part = self.path.with_name(f".{self.path.name}.part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            part.write_text(to_text(kept), encoding="utf-8")
-            os.replace(part, self.path)
+            self._write(to_text(kept).encode())
         except (OSError, UnicodeEncodeError) as error:
             return f"{self.path}: cannot be written ({error}); the window will not be as it is now"
         return ""
+
+    def _write(self, data: bytes) -> None:
+        # Each under a name of its own: another window may be writing the same file.
+        opened, name = tempfile.mkstemp(".part", f".{self.path.name}.", self.path.parent)
+        try:
+            with os.fdopen(opened, "wb") as part:
+                part.write(data)
+            os.replace(name, self.path)
+        except OSError:
+            Path(name).unlink(missing_ok=True)
+            raise

@@ -1,6 +1,5 @@
 """What the window keeps for its next start, and how that is told in a text file."""
 
-import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ _LONGEST = 200  # characters of a name
 _MOST = 100  # of anything that is listed
 _PX = 100_000  # px, more than any screen has
 _HEAD = "What the window of Kappaskin was like. It may be edited while no window is open."
+_WAYS, _SHARES = ("tabbed", "front", "beside"), ("share", "along")
 _Some = TypeVar("_Some")
 
 
@@ -73,8 +73,8 @@ def _said(layout: Layout) -> Any:
 
 def _said_of(place: Place) -> dict[str, Any]:
     said: dict[str, Any] = {"area": place.area, "shown": place.shown}
-    said |= {name: True for name in ("tabbed", "front") if getattr(place, name)}
-    said |= {"share": place.share} if place.share else {}
+    said |= {name: True for name in _WAYS if getattr(place, name)}
+    said |= {name: share for name in _SHARES if (share := getattr(place, name))}
     return said | ({"at": list(place.at)} if place.at else {})
 
 
@@ -158,14 +158,14 @@ def _layout(table: Mapping[str, Any]) -> Layout:
 
 def _place(table: Mapping[str, Any]) -> Place:
     area = _one_of(_part(table, "area", str, ""), AREAS)
-    share = float(table["share"]) if type(table.get("share")) in (int, float) else 0.0
-    if not math.isfinite(share) or not 0 <= share <= 1:
+    tabbed, front, beside = (_part(table, name, bool, False) for name in _WAYS)
+    share, along = (_share(table, name) for name in _SHARES)
+    at = _rectangle(table, "at") if area == FLOATING else None
+    return Place(area, _part(table, "shown", bool, True), tabbed, front, beside, share, along, at)
+
+
+def _share(table: Mapping[str, Any], key: str) -> float:
+    share = float(table[key]) if type(table.get(key)) in (int, float) else 0.0
+    if not 0 <= share <= 1:
         raise Refusal(f"expected a share of the window from 0 to 1, got {share}")
-    return Place(
-        area,
-        _part(table, "shown", bool, True),
-        _part(table, "tabbed", bool, False),
-        _part(table, "front", bool, False),
-        share,
-        _rectangle(table, "at") if area == FLOATING else None,
-    )
+    return share

@@ -14,16 +14,19 @@ DOCKS = BESIDE + BELOW
 class Place:
     """Where a dock is.
 
-    In an area the docks follow one another, or are `tabbed` with the one before; of those the one
-    in `front` is seen. Its `share` is that of the window's width, or height above and below it;
-    one that floats is `at` (x, y, width, height) in px.
+    In an area the docks follow one another, are `tabbed` with the one before, or across the way
+    they follow: `beside` it in a column, below it in a row. Of tabs the one in `front` is seen.
+    Its `share` is that of the window's width, or height above and below the skin; `along` the
+    area its share of the other. One that floats is `at` (x, y, width, height) in px.
     """
 
     area: str
     shown: bool = True
     tabbed: bool = False
     front: bool = False
+    beside: bool = False
     share: float = 0.0
+    along: float = 0.0
     at: tuple[int, int, int, int] | None = None
 
 

@@ -19,6 +19,7 @@ from kappaskin_app.settings.load import SPREAD_CASES as SPREAD_CASES
 from kappaskin_app.settings.load import TABLE_1_CASES as TABLE_1_CASES
 from kappaskin_app.settings.load import TWO_ENDED as TWO_ENDED
 from kappaskin_app.settings.load import Load, Noise
+from kappaskin_app.settings.looked import Looked
 from kappaskin_app.settings.publishing import Sending as Sending
 from kappaskin_app.settings.reading import Reading
 from kappaskin_app.settings.scene import Own
@@ -32,6 +33,7 @@ from kappaskin_app.settings.shown import METHOD_SHORT as METHOD_SHORT
 from kappaskin_app.settings.shown import Fit as Fit
 from kappaskin_app.settings.shown import View
 from kappaskin_app.settings.skin import Skin
+from kappaskin_app.settings.telling import told
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class SceneSettings(Skin, Load, Noise, Electronics, Spoils, Own):
 
 
 @dataclass(frozen=True)
-class Settings(SceneSettings, Fit, View, Reading, Scanning, Sending, Compared):
+class Settings(SceneSettings, Fit, View, Looked, Reading, Scanning, Sending, Compared):
     """Everything a person may change, in SI units; a change is a new `Settings`.
 
     `calibration` and `tare` are in use whenever the sensor that they are of is connected.
@@ -50,6 +52,7 @@ class Settings(SceneSettings, Fit, View, Reading, Scanning, Sending, Compared):
     tare: Tare | None = None
 
 
+_WORDS = {"written": "the scene's text", "camera": "the view"}
 Kind = type[SceneSettings | Fit | View | Scanning | Sending]
 
 
@@ -61,3 +64,11 @@ def part(settings: Settings, kind: Kind) -> tuple[Any, ...]:
 def ask_of(name: str) -> Ask:
     """How the setting called `name` is asked for."""
     return next(f.metadata["ask"] for f in fields(Settings) if f.name == name)
+
+
+def change_told(name: str, before: Settings, after: Settings) -> str:
+    """What became of the setting called `name`, in words."""
+    if name in _WORDS:
+        return _WORDS[name]
+    field = next(f for f in fields(Settings) if f.name == name)
+    return told(name, field.metadata.get("ask"), getattr(before, name), getattr(after, name))

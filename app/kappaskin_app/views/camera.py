@@ -1,5 +1,6 @@
 """Where to look at a skin from, so that all of it and what is written beside it is seen."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,11 +30,15 @@ class Direction:
 
 
 FROM_THE_LEFT = Direction("from the front, a little from the left", (-0.45, -1.1, 1.1))
-ISOMETRIC = Direction("from a corner, all sides alike", (-1.0, -1.0, 1.0))
-ABOVE = Direction("from above", (0.0, 0.0, 1.6), (0.0, 1.0, 0.0))
-BELOW = Direction("from below", (0.0, 0.0, -1.6), (0.0, 1.0, 0.0))
-FRONT = Direction("along y", (0.0, -1.6, 0.0))
-SIDE = Direction("along x", (1.6, 0.0, 0.0))
+DIRECTIONS = {
+    "left": FROM_THE_LEFT,
+    "above": Direction("from above", (0.0, 0.0, 1.6), (0.0, 1.0, 0.0)),
+    "front": Direction("along y", (0.0, -1.6, 0.0)),
+    "side": Direction("along x", (1.6, 0.0, 0.0)),
+    "below": Direction("from below", (0.0, 0.0, -1.6), (0.0, 1.0, 0.0)),
+    "corner": Direction("from a corner, all sides alike", (-1.0, -1.0, 1.0)),
+}
+_NUMBERS = 12  # that say how a camera stands
 
 
 def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, wide: float) -> None:
@@ -59,6 +64,38 @@ def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, wide: float
     camera.Zoom(zoom)
     camera.SetWindowCenter(*(zoom * (least + most) / 2))
     renderer.ResetCameraClippingRange()
+
+
+def camera_of(renderer: Any, skin: DrawnSkin) -> tuple[float, ...]:
+    """How the camera stands: what it looks at and from where, what is up, its angle, its shift.
+
+    From the middle of `skin`, with its longer side for a unit, so that another is seen so too.
+    """
+    camera, middle = renderer.GetActiveCamera(), _middle(skin)
+    places = (camera.GetFocalPoint(), camera.GetPosition())
+    seen = [(np.array(place) - middle) / skin.side for place in places]
+    rest = (*camera.GetViewUp(), camera.GetViewAngle(), *camera.GetWindowCenter())
+    return tuple(float(value) for value in (*seen[0], *seen[1], *rest))
+
+
+def place_camera(renderer: Any, skin: DrawnSkin, numbers: Sequence[float]) -> None:
+    """Have the camera stand as `camera_of` told it; other numbers leave it as it is."""
+    if len(numbers) != _NUMBERS:
+        return
+    camera, middle = renderer.GetActiveCamera(), _middle(skin)
+    at, stands, up = (np.array(numbers[n : n + 3]) for n in (0, 3, 6))
+    camera.SetFocalPoint(*(middle + skin.side * at))
+    camera.SetPosition(*(middle + skin.side * stands))
+    camera.SetViewUp(*up)
+    camera.SetViewAngle(numbers[9])
+    camera.SetWindowCenter(*numbers[10:])
+    renderer.ResetCameraClippingRange()
+
+
+def _middle(skin: DrawnSkin) -> Array:
+    """The middle (3,) of what a skin reaches at rest, in mm."""
+    body = _around(skin, 0.0)
+    return (body.min(axis=0) + body.max(axis=0)) / 2
 
 
 def _around(skin: DrawnSkin, share: float) -> Array:

@@ -18,9 +18,9 @@ from kappaskin import Estimate, Load, Sensor
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.box import WHOLE, Box, Shares
-from kappaskin_app.views.camera import FROM_THE_LEFT, Direction, fit_camera
 from kappaskin_app.views.drag import LoadDrag
 from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
+from kappaskin_app.views.gaze import Gaze
 from kappaskin_app.views.loads import DrawnLoads, put_upright
 from kappaskin_app.views.marks import Marks
 from kappaskin_app.views.pointing import Pointing
@@ -61,6 +61,7 @@ class MembraneView(QWidget):
         self._make_lights()
         self.pointing = Pointing(self.plotter)  # after the drag: of filters the last goes first
         self.drag = LoadDrag(self.plotter)
+        self.gaze = Gaze(self.plotter, self.sides)
         self._box = Box()
         self.setMinimumSize(320, 240)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
@@ -78,9 +79,6 @@ class MembraneView(QWidget):
         self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
         self._positions, self._marked = np.empty((0, 2)), (b"", -1)
         self._arrays: dict[str, Any] = {}
-        self._fitted, self._from = True, FROM_THE_LEFT
-        for turning in ("InteractionEvent", "MouseWheelForwardEvent", "MouseWheelBackwardEvent"):
-            self.plotter.iren.interactor.AddObserver(turning, self._note_turning)
         self._theme: Theme | None = None
         self._ink = "#ffffff"
 
@@ -122,17 +120,14 @@ class MembraneView(QWidget):
         self.ages.append((now, now - self._taken))
         self.drawn.emit()
 
-    def _note_turning(self, *_: object) -> None:
-        self._fitted = False  # the person chose this view: a new size must not undo it
-        self.sides.show_from(None)
-
     # What a skin looks like: rebuilt only when another one appears.
 
     def show_skin(self, sensor: Sensor, nx: int, ny: int) -> None:
         """Draw a surface of nx x ny points for the skin of `sensor`, at rest until an estimate."""
         patch = sensor.layout.patch
         another = self.surface.actor is None or self.skin.patch != patch
-        self.skin = self.drag.skin = self.pointing.skin = skin = DrawnSkin(patch, nx, ny)
+        skin = DrawnSkin(patch, nx, ny)
+        self.skin = self.drag.skin = self.pointing.skin = self.gaze.skin = skin
         self.surface.show_skin(skin, sensor.layout)
         self.lift = _LIFT * skin.size
         self._wire = self._wireframe(skin)
@@ -147,7 +142,7 @@ class MembraneView(QWidget):
         self.sides.show_skin(skin)
         self.show_box(self._box.shares)
         if another:
-            self.look_from(self._from)
+            self.gaze.place()
         if self._theme:
             self.show_theme(self._theme)
 
@@ -203,26 +198,13 @@ class MembraneView(QWidget):
         for above, marks in enumerate(self.pointed, 2):
             marks.follow(self.skin, above * self.lift)  # the inner one is not to sink into the rim
 
-    def look_from(self, direction: Direction) -> None:
-        """Look at the whole skin, as large as it fits, and again whenever the size changes."""
-        self._from = direction
-        fit_camera(self.plotter.renderer, self.skin, direction, self.plotter.width())
-        self._fitted = True
-        self.sides.show_from(direction)
-        self.plotter.update()
-
     def resizeEvent(self, event: QResizeEvent) -> None:
         # A picture that ends within a pixel of the screen would have a black edge there.
         right, upper = (_spare(side, self.devicePixelRatioF()) for side in event.size().toTuple())
         self._around.setContentsMargins(0, upper, right, 0)
         super().resizeEvent(event)
-        if self._fitted:
-            # After VTK has its new size, and not when this view is gone by then.
-            QTimer.singleShot(0, self, self._fit_again)
-
-    def _fit_again(self) -> None:
-        if self._fitted:
-            self.look_from(self._from)
+        # After VTK has its new size, and not when this view is gone by then.
+        QTimer.singleShot(0, self, self.gaze.fit)
 
     # What changes with every estimate.
 

@@ -1,0 +1,234 @@
+"""The script that is copied, run in a process of its own beside the session that it is of."""
+
+import ast
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+import kappaskin
+from kappaskin import Engine, Estimate, Refusal, Tare, scene_file
+from kappaskin.calibration.calibration import fingerprint
+from kappaskin_app.history import History
+from kappaskin_app.scripting import script_of
+from kappaskin_app.session import Session
+from kappaskin_app.settings import Settings, Written
+from kappaskin_app.simulation import scene_of, with_consequences, written
+from kappaskin_app.window import MainWindow
+
+_RUN = """
+import sys
+import numpy as np
+sys.path.insert(0, sys.argv[1])
+if __name__ == "__main__":
+    from script import estimates
+    for e in estimates(40.0):
+        if np.isfinite(e.touch.force) and e.sequence >= int(sys.argv[2]):
+            np.savez(sys.argv[1] + "/out.npz", coefficients=e.coefficients, surface=e.surface,
+                     position=e.touch.position, force=e.touch.force, noise=e.noise,
+                     rms=e.error_rms, sequence=e.sequence)
+            break
+"""
+_STILL: dict[str, Any] = {"load_case": "off-centre", "noise_kind": "none"}
+
+
+@dataclass
+class Asked:
+    """A session without a window, and its history."""
+
+    history: History
+    session: Session
+    since: float = 0.0
+
+    def show(self, settings: Settings) -> None:
+        self.history.apply(settings)
+        self.since = time.monotonic()
+
+    def shown(self) -> bool:
+        """Whether what comes in is what was asked for last."""
+        session, estimate = self.session, self.session.estimate
+        return (
+            estimate is not None
+            and not session.making
+            and time.monotonic() > self.since + 0.5
+            and session.status.setup == session.asked
+            and estimate.generation == session.status.generation
+            and math.isfinite(estimate.touch.force)
+        )
+
+    def text(self, folder: Path) -> str:
+        script = script_of(self.session, self.history.settings, folder)
+        for name, content in script.files.items():
+            (folder / name).write_bytes(content)
+        return script.text
+
+
+@pytest.fixture
+def asked(qapp: QApplication) -> Iterator[Asked]:
+    history = History(Settings())
+    asked = Asked(history, Session(history, Engine()))
+    asked.session.connect_to("sim:")
+    yield asked
+    asked.session.close()
+
+
+def _numbers(text: str, folder: Path, sequence: int = 0) -> dict[str, Any]:
+    """What a script says of a frame from `sequence` on, run in a process of its own."""
+    (folder / "script.py").write_text(text, encoding="utf-8")
+    (folder / "run.py").write_text(_RUN)
+    order = [sys.executable, str(folder / "run.py"), str(folder), str(sequence)]
+    ran = subprocess.run(order, capture_output=True, text=True, timeout=60, check=False)
+    assert ran.returncode == 0, ran.stderr
+    with np.load(folder / "out.npz") as found:
+        return dict(found)
+
+
+def _same_bits(found: dict[str, Any], estimate: Estimate) -> bool:
+    touch = estimate.touch
+    parts = (estimate.coefficients, estimate.surface, touch.position, touch.force)
+    names = ("coefficients", "surface", "position", "force")
+    return all(
+        found[n].tobytes() == np.asarray(p).tobytes() for n, p in zip(names, parts, strict=True)
+    )
+
+
+def _pressed() -> Settings:
+    """A ball that stands pressed in, without noise: changed, so that its file does not say so."""
+    ready = written(scene_file("sphere"))
+    text = ready.text.partition("path =")[0]
+    text = text.replace("[effects.gaussian-noise]\nrms = 0.1  # 1/m\n", "")
+    return Settings(written=Written(text, ready.file))
+
+
+def _of_another_skin() -> Settings:
+    settings = Settings(**_STILL, method="bayes", functions_x=9, functions_y=7)
+    changed = with_consequences(settings, scene_of(settings), "shape", "cylinder")
+    return replace(settings, **changed, foam=20e3)
+
+
+@pytest.mark.parametrize("make", [lambda: Settings(**_STILL), _of_another_skin, _pressed])
+def test_of_what_stands_still_a_script_computes_the_same_bits(
+    asked: Asked, until, tmp_path: Path, make: Callable[[], Settings]
+) -> None:
+    asked.show(make())
+    until(asked.shown)
+    assert not asked.session.refusal
+    assert _same_bits(_numbers(asked.text(tmp_path), tmp_path), asked.session.estimate)
+
+
+def test_with_noise_a_script_computes_as_well(asked: Asked, until, tmp_path: Path) -> None:
+    asked.show(Settings())  # its noise is drawn from when a scene begins: not the same bits
+    until(asked.shown)
+    found, estimate = _numbers(asked.text(tmp_path), tmp_path), asked.session.estimate
+    assert found["noise"] == pytest.approx(estimate.noise, rel=0.3)
+    assert found["force"] == pytest.approx(0.150, rel=0.05)
+    assert found["rms"] < 30e-6
+
+
+def test_a_script_of_a_recording_computes_the_same_bits_of_the_same_frame(
+    asked: Asked, until, recording: Path, tmp_path: Path
+) -> None:
+    seen: dict[int, Estimate] = {}
+    asked.session.estimated.connect(lambda e: seen.update({e.sequence: e}))
+    asked.session.connect_to(f"replay:{recording}")
+    until(lambda: bool(seen))
+    text = asked.text(tmp_path)
+    assert f'engine.connect("replay:{recording}")' in text
+    found = _numbers(text, tmp_path, 20)
+    sequence = int(found["sequence"])
+    for at in range(max(sequence - 3, 0), sequence + 4):  # to that frame, of 100 in a second
+        asked.session.engine.seek(at / 100, 0.0)
+        until(lambda at=at: abs(asked.session.status.replay.at - at / 100) < 1e-6)
+        QTest.qWait(100)
+        if sequence in seen:
+            break
+    assert _same_bits(found, seen[sequence])
+
+
+def _names(text: str) -> set[str]:
+    """What a script imports from kappaskin."""
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
+    return {a.name for node in nodes if node.module == "kappaskin" for a in node.names}
+
+
+def _used(text: str) -> set[str]:
+    return {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+
+
+_QUOTED = "title = \"It's \\\\ '''\"\n"
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (Settings(written=written(scene_file("coin"))), ('load_scene("coin")', "planned(SCENE)")),
+        (
+            Settings(region="skin", region_radius=0.0123, send_udp=True),
+            (
+                'REGION = Region(around="skin", radius=0.0123)',
+                "engine.publish(['udp://127.0.0.1:9870'])",
+            ),
+        ),
+        (
+            Settings(functions_x=5, method="robust", fit_edge="clamped"),
+            ('SETUP = Setup(Ni=5, Nj=8, edge="clamped", method="robust")',),
+        ),
+        (Settings(written=Written(_QUOTED, Path("a.toml"))), (repr(_QUOTED),)),
+    ],
+)
+def test_a_script_is_short_and_says_what_is_asked_for(
+    asked: Asked, settings: Settings, said: tuple[str, ...]
+) -> None:
+    asked.history.apply(settings)
+    asked.session.refusal = ""  # of the text that is no scene
+    text = asked.text(Path("nowhere"))
+    assert _names(text) <= _used(text) & set(dir(kappaskin))
+    assert len(text.splitlines()) < 66
+    for words in said:
+        assert words in text
+
+
+def test_a_port_is_named_and_no_scene_with_it(asked: Asked) -> None:
+    asked.session.source = "/dev/ttyACM0"
+    text = asked.text(Path("nowhere"))
+    assert 'engine.connect("/dev/ttyACM0")' in text
+    assert "SCENE" not in text
+
+
+def test_without_a_source_there_is_nothing_to_copy(asked: Asked) -> None:
+    asked.session.source = ""
+    with pytest.raises(Refusal, match="expected a source that is read"):
+        asked.text(Path("nowhere"))
+
+
+def test_a_tare_in_use_is_in_a_file_that_the_script_reads(
+    asked: Asked, until, tmp_path: Path
+) -> None:
+    until(lambda: asked.session.status.sensor is not None)
+    sensor = asked.session.status.sensor
+    zero = np.full(sensor.channels, 0.25)
+    now = datetime(2026, 11, 22, tzinfo=UTC)
+    of = (sensor.name, sensor.serial_number, fingerprint(sensor.layout))
+    asked.history.change("Tare", -1, tare=Tare(*of, now, None, 100, 0.2, zero, 0.1 * zero))
+    assert asked.session.asked.tare is not None
+    made: dict[str, Any] = {}
+    exec(asked.text(tmp_path), made)
+    assert made["SETUP"] == asked.session.asked
+
+
+def test_the_action_puts_a_script_on_the_clipboard(window: MainWindow) -> None:
+    window.actions_by_name["copy-python"].trigger()
+    text = QGuiApplication.clipboard().text()
+    assert _names(text) == {"Engine", "Setup", "planned", "read_scene"}
+    assert window.statusBar().currentMessage().startswith("Copied a script of")
