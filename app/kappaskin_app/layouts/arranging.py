@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabBar
 
+from kappaskin_app.drawn_once import drawn_once
 from kappaskin_app.layouts.layout import BOTTOM, FLOATING, LEFT, RIGHT, TOP, Layout, Place
 from kappaskin_app.panels.panels import Panels
 
@@ -74,6 +75,12 @@ def _stacks(window: QMainWindow, here: list[QDockWidget]) -> list[list[QDockWidg
 def arrange(window: QMainWindow, docks: Docks, panels: Panels, layout: Layout) -> None:
     """Arrange the docks of a window so; one that the layout does not name is hidden."""
     placed = [(docks[name], place) for name, place in layout.docks if name in docks]
+    with drawn_once(window):
+        _place(window, docks, placed)
+        panels.setCurrentIndex(min(layout.page, panels.count() - 1))
+
+
+def _place(window: QMainWindow, docks: Docks, placed: list[tuple[QDockWidget, Place]]) -> None:
     for dock in docks.values():
         dock.hide()
     for dock, _ in placed:
@@ -97,7 +104,6 @@ def arrange(window: QMainWindow, docks: Docks, panels: Panels, layout: Layout) -
     for dock, place in placed:
         if place.front:
             dock.raise_()
-    panels.setCurrentIndex(min(layout.page, panels.count() - 1))
 
 
 def _taken(dock: QDockWidget, place: Place) -> str:
