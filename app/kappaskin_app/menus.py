@@ -110,11 +110,8 @@ class Menus(QObject):
         self.actions["sound"].setChecked(self._window.presenting.sound.on)
 
     def _save_picture(self) -> None:
-        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png"))
-        done = self._window.picture(path)
-        self._window.tell(
-            f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}"
-        )
+        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png")).resolve()
+        self._window.exports.save(self._window.grab().toImage(), path)
 
     def _draw(self, name: str) -> None:
         """Draw a figure of the paper from a run of its own, in a window beside this one."""
