@@ -3,17 +3,13 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kappaskin import load_scene, write_scene
-
 _DRAWING = Path(__file__).with_name("drawing.py")
 _TURNS = 3
-_CONVERSION = 2e-6  # s: 300 channels in less than a millisecond
 
 
 def _run(what: str, seconds: float, source: str = "device") -> dict[str, float]:
@@ -36,17 +32,6 @@ def test_the_window_draws_nearly_as_often_as_a_bare_interactor(figure, seconds: 
     assert app["reader_gap_p99_ms"] < 10
     assert app["drawn"] >= 0.85 * bare
     assert app["drawn"] >= 45
-
-
-@pytest.fixture
-def thousand(tmp_path: Path) -> str:
-    """A source of 1,000 frames/s that the engine simulates."""
-    scene = load_scene("circle")
-    chain = scene.transduction
-    fast = replace(chain, converter=replace(chain.converter, conversion_time=_CONVERSION))
-    path = tmp_path / "thousand.toml"
-    path.write_text(write_scene(replace(scene, rate=1000.0, transduction=fast)))
-    return f"sim:{path}"
 
 
 @pytest.mark.parametrize("shown", ["app", "everything"])
