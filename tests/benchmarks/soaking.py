@@ -7,7 +7,7 @@ import itertools
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -86,12 +86,12 @@ def soaked(
             seen.append([time.monotonic() - begun, *_held()])
             accepted.append(window.session.status.accounting.accepted)
 
-    steps = {1.0: look}
+    steps: list[tuple[float, Callable[[], object]]] = [(1.0, look)]
     for every, going in ((_EVERY, _changing(window)), (_FILE, _recording(window, folder))):
         next(going)
-        steps[every] = lambda going=going: next(going)
+        steps.append((every, lambda going=going: next(going)))
     timers = []
-    for every, step in steps.items():
+    for every, step in steps:
         timers.append(QTimer(interval=round(1e3 * every)))
         timers[-1].timeout.connect(step)
         timers[-1].start()
