@@ -159,9 +159,12 @@ class Plate:
         mixed = product("xx", "yy")
         bending = product("xx", "xx") + product("yy", "yy") + nu * (mixed + mixed.T)
         bending += 2 * (1 - nu) * product("xy", "xy")
-        squares = overlap((0, 0), (0, 0))
-        slopes = overlap((1, 0), (1, 0)) + overlap((0, 1), (0, 1))
-        whole = self.rigidity * bending + self.tension * (slopes - H**2 * squares)
+        whole = self.rigidity * bending
+        # Of modes, half the time it takes is theirs.
+        squares = overlap((0, 0), (0, 0)) if H or self.foundation else 0.0
+        if self.tension:
+            slopes = overlap((1, 0), (1, 0)) + overlap((0, 1), (0, 1))
+            whole += self.tension * (slopes - H**2 * squares)
         whole += self.foundation * squares
         if isinstance(basis, ElasticBasis):
             along, per_length = basis.rim()
