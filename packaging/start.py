@@ -44,7 +44,7 @@ CHECKS = (
     ("ruff", "format", "--check"),
     ("basedpyright",),
     ("lint-imports",),
-    # One process for the windows, one for the rest; -n0 among ARGUMENTS makes it one for all.
+    # Each process has a display of its own; -n0 among ARGUMENTS makes it one for all, on ours.
     ("pytest", "-n2"),
 )
 # Benchmark files are named so that plain pytest passes them by.
@@ -289,6 +289,13 @@ def display(variables: dict[str, str]) -> Iterator[dict[str, str]]:
     if not displayless():
         yield variables
         return
+    with virtual_display(variables) as shown:
+        yield shown
+
+
+@contextlib.contextmanager
+def virtual_display(variables: dict[str, str]) -> Iterator[dict[str, str]]:
+    """The environment `variables` with a virtual display of its own."""
     with tempfile.TemporaryFile("w+", errors="replace") as log:
         reader, writer = os.pipe()
         # Its default, a reset whenever the last client leaves, refuses whoever comes meanwhile.

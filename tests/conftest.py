@@ -2,13 +2,15 @@
 
 import multiprocessing
 import os
+import runpy
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.shared_memory import SharedMemory
@@ -39,6 +41,18 @@ if "forkserver" in multiprocessing.get_all_start_methods():
     forkserver.ensure_running()
 else:
     resource_tracker.ensure_running()
+
+# Windows that share a keyboard take it from each other: each of several processes has its own.
+_OWN_DISPLAYS = sys.platform.startswith("linux") and shutil.which("Xvfb") is not None
+_display = ExitStack()
+if _OWN_DISPLAYS and ("PYTEST_XDIST_WORKER" in os.environ or not os.environ.get("DISPLAY")):
+    _start = runpy.run_path(str(Path(__file__).parents[1] / "packaging" / "start.py"))
+    os.environ |= _display.enter_context(_start["virtual_display"](dict(os.environ)))
+
+
+def pytest_unconfigure() -> None:
+    _display.close()
+
 
 _PATIENCE = 2.0  # s that what was told to end may take
 
@@ -130,32 +144,16 @@ def _children_of(pid: int) -> set[int]:
     return {int(child) for child in found.split()}
 
 
-_NO_WINDOW = (
-    "ahead",
-    "drawn",
-    "footprint",
-    "history",
-    "lesson_files",
-    "scale",
-    "scene_picture",
-    "scene_text",
-    "settings_text",
-    "simulation",
-)
-"""Of the app's tests, files that open no window."""
-
-
-class ByFile(LoadFileScheduling):
+class OneForWindows(LoadFileScheduling):
     """Keeps a file's tests in one process, and all windows in one: they share a keyboard."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
-        bare = file in [f"tests/app/test_{name}.py" for name in _NO_WINDOW]
-        return "windows" if file.startswith("tests/app/") and not bare else file
+        return "windows" if file.startswith("tests/app/") else file
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFile:
-    return ByFile(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling:
+    return (LoadFileScheduling if _OWN_DISPLAYS else OneForWindows)(config, log)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,7 @@
 import ast
 import re
+import runpy
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -95,6 +97,18 @@ def test_start_needs_the_standard_library_alone():
 
     assert "subprocess" in imported
     assert imported <= sys.stdlib_module_names
+
+
+@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb: apt-get install -y xvfb")
+def test_virtual_displays_are_apart_and_gone_afterwards():
+    virtual_display = runpy.run_path(str(ROOT / "packaging" / "start.py"))["virtual_display"]
+
+    with virtual_display({}) as one, virtual_display({}) as other:
+        sockets = [Path("/tmp/.X11-unix", f"X{at['DISPLAY'][1:]}") for at in (one, other)]
+        assert one["DISPLAY"] != other["DISPLAY"]
+        assert all(socket.exists() for socket in sockets)
+
+    assert not any(socket.exists() for socket in sockets)
 
 
 @pytest.mark.parametrize(

@@ -2,19 +2,21 @@
 
 import time
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import datetime
 from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import Refusal
+from kappaskin import Refusal, Status
 from kappaskin_app.actions import WITHIN, Actions
 from kappaskin_app.exporting import ExportDialog
 from kappaskin_app.filming import Filming
 from kappaskin_app.guard import guarded
-from kappaskin_app.pictures import caption_of, chosen_file, save_view
+from kappaskin_app.pictures import caption_of, chosen_file, save_view, write_png
 from kappaskin_app.session import Session
 from kappaskin_app.views.membrane import MembraneView
 
@@ -33,6 +35,9 @@ class Exports(QObject):
         self.dialog = ExportDialog(window)
         self.filming = Filming(membrane, self)
         self.filming.told.connect(guarded(self.told.emit))
+        self._thread = ThreadPoolExecutor(1, "picture-writer")
+        self._written: list[tuple[Path, Future[None]]] = []
+        session.reported.connect(guarded(self._follow))
 
     def register(
         self,
@@ -74,10 +79,24 @@ class Exports(QObject):
         if path is None:
             return
         try:
-            save_view(view, path, title, caption, flat)
-            self.told.emit(f"Saved {path}")
+            save_view(view, path, title, caption, flat, self.save)
+            if path.suffix.lower() != ".png":  # which is told of once it is there
+                self.told.emit(f"Saved {path}")
         except Refusal as refusal:
             self.told.emit(str(refusal))
+
+    def save(self, image: QImage, path: Path) -> None:
+        """Write a picture beside the window: to pack it takes longer than to draw all anew."""
+        self._written.append((path, self._thread.submit(write_png, image, path)))
+
+    def _follow(self, _: Status) -> None:
+        while self._written and self._written[0][1].done():
+            path, done = self._written.pop(0)
+            try:
+                done.result()
+                self.told.emit(f"Saved {path}")
+            except Refusal as refusal:
+                self.told.emit(str(refusal))
 
     def film(self) -> None:
         """Ask for a file and film into it; or end the film that is made."""
@@ -93,6 +112,7 @@ class Exports(QObject):
                 self.told.emit(str(refusal))
 
     def close(self) -> None:
-        """End what is being written: a film is whole, an export is not there."""
+        """End what is being written: films and pictures are whole, an export is not there."""
         self.filming.end()
         self.dialog.close()
+        self._thread.shutdown(wait=True)

@@ -116,11 +116,8 @@ class Menus(QObject):
         self.actions["sound"].setChecked(self._window.presenting.sound.on)
 
     def _save_picture(self) -> None:
-        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png"))
-        done = self._window.picture(path)
-        self._window.tell(
-            f"Saved {path.resolve()}" if done else f"Could not write {path.resolve()}"
-        )
+        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png")).resolve()
+        self._window.exports.save(self._window.grab().toImage(), path)
 
     def _copy_python(self) -> None:
         """Put a script on the clipboard, and what it reads into a folder."""

@@ -17,7 +17,8 @@ from kappaskin_app.theme import Theme
 from kappaskin_app.views.element_card import ElementCard, Traces
 
 _PLOTS = 0.1  # s between two drawings of the plots
-_WORDS = 0.25  # s between two readings of the facts, and of the spectrum
+_WORDS = 0.25  # s between two readings of the facts
+_SPECTRA = 1.0  # s between two spectra of the last ten
 _ENOUGH = 32  # readings for a spectrum
 _LINES = 160  # of it at most
 
@@ -37,7 +38,7 @@ class Picking(QObject):
         self.element = -1
         self._past, self._met = Past(), 0
         self._of, self._after = (0, 0), 0
-        self._next_plots = self._next_words = 0.0
+        self._next_plots = self._next_words = self._next_spectrum = 0.0
         session.estimated.connect(guarded(self.receive))
         history.changed.connect(guarded(self._follow))
         display.membrane.pointing.moved.connect(guarded(self._point))
@@ -51,7 +52,7 @@ class Picking(QObject):
     def pick(self, element: int) -> None:
         """Tell all about an element."""
         self.element = element
-        self._next_plots = self._next_words = 0.0
+        self._next_plots = self._next_words = self._next_spectrum = 0.0
         self._show_tracing()
         self.picked.emit(element)
 
@@ -108,6 +109,8 @@ class Picking(QObject):
         if now >= self._next_words:
             self._next_words = now + _WORDS
             self._show_facts(estimate)
+        if now >= self._next_spectrum:
+            self._next_spectrum = now + _SPECTRA
             self._show_spectrum()
 
     def _show_facts(self, estimate: Estimate) -> None:

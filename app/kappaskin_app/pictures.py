@@ -1,5 +1,6 @@
 """A view to a picture in a file, PNG or SVG, with a line below it that says what it shows."""
 
+from collections.abc import Callable
 from datetime import datetime
 from importlib import metadata
 from pathlib import Path
@@ -29,13 +30,26 @@ def caption_of(status: Status, at: float, now: datetime) -> str:
     return "  \N{MIDDLE DOT}  ".join(parts)
 
 
-def save_view(view: QWidget, path: Path, title: str, caption: str, flat: bool = True) -> None:
+def write_png(image: QImage, path: Path) -> None:
+    """Write an `image`, in any thread; a `Refusal` where that cannot be."""
+    if not image.save(str(path)):
+        raise _unwritable(path)
+
+
+def save_view(
+    view: QWidget,
+    path: Path,
+    title: str,
+    caption: str,
+    flat: bool = True,
+    write: Callable[[QImage, Path], None] = write_png,
+) -> None:
     """Write `view` as a PNG, or if it is `flat` as an SVG; `title` and `caption` go into both.
 
     A `Refusal` where that cannot be.
     """
     if path.suffix.lower() == ".png":
-        _save_png(view, path, title, caption)
+        write(_png(view, title, caption), path)
     elif path.suffix.lower() == ".svg" and flat:
         _save_svg(view, path, title, caption)
     else:
@@ -43,7 +57,7 @@ def save_view(view: QWidget, path: Path, title: str, caption: str, flat: bool = 
         raise Refusal(f"{path.name}: expected a file that ends in {kinds}")
 
 
-def _save_png(view: QWidget, path: Path, title: str, caption: str) -> None:
+def _png(view: QWidget, title: str, caption: str) -> QImage:
     # What is drawn in three dimensions is in the window's picture alone.
     seen = view.window().grab(QRect(view.mapTo(view.window(), QPoint(0, 0)), view.size()))
     ratio = seen.devicePixelRatio()
@@ -55,8 +69,7 @@ def _save_png(view: QWidget, path: Path, title: str, caption: str) -> None:
         _write(painter, view, caption)
     for key, text in (("Title", title), ("Description", caption), ("Software", "kappaskin")):
         image.setText(key, text)
-    if not image.save(str(path)):
-        raise _unwritable(path)
+    return image
 
 
 def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:

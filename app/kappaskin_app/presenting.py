@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
 from kappaskin import ContactObject, Estimate, Status
 from kappaskin_app.cue import Cue, Found, cue_of
 from kappaskin_app.display import Display
+from kappaskin_app.drawn_once import drawn_once
 from kappaskin_app.guard import guarded
 from kappaskin_app.objects import THINGS, may_choose
 from kappaskin_app.session import Session
@@ -79,12 +80,13 @@ class Presenting(QObject):
             return
         window = self._window
         self._before = _Before(window.saveState(), window.geometry(), window.windowState())
-        for part in self._around():
-            part.hide()
-        self._display.alarming = False
-        self.stage.present(True)
-        self._show_hand()
-        window.showFullScreen()
+        with drawn_once(window):
+            for part in self._around():
+                part.hide()
+            self._display.alarming = False
+            self.stage.present(True)
+            self._show_hand()
+            window.showFullScreen()
         self.stage.operator.pad.setFocus()
 
     def leave(self) -> None:
@@ -96,13 +98,14 @@ class Presenting(QObject):
         self.stage.operator.pad.let_go()
         self._display.alarming = True
         self.sound.follow(math.nan)
-        self.stage.present(False)
-        window.setWindowState(before.state)
-        if before.state == Qt.WindowState.WindowNoState:
-            window.setGeometry(before.place)
-        window.menuBar().show()
-        window.statusBar().show()
-        window.restoreState(before.layout)
+        with drawn_once(window):
+            self.stage.present(False)
+            window.setWindowState(before.state)
+            if before.state == Qt.WindowState.WindowNoState:
+                window.setGeometry(before.place)
+            window.menuBar().show()
+            window.statusBar().show()
+            window.restoreState(before.layout)
 
     def close(self) -> None:
         """Before the window goes: let nothing be let go later, nor go on sounding."""

@@ -15,13 +15,10 @@ def amplitudes(times: Array, values: Array, frequencies: Array) -> Array:
     """
     centred = values - values.mean(axis=-1, keepdims=True)
     turn = 2 * np.pi * np.multiply.outer(frequencies, times)
+    waves = np.cos(turn) + 1j * np.sin(turn)
     # At this shift of time sine and cosine are orthogonal over the times there are.
-    shift = np.arctan2(np.sin(2 * turn).sum(axis=1), np.cos(2 * turn).sum(axis=1)) / 2
-    turn -= shift[:, None]
-    return np.hypot(*(_fitted(wave, centred) for wave in (np.cos(turn), np.sin(turn))))
-
-
-def _fitted(waves: Array, values: Array) -> Array:
-    """How much (..., F) of each of `waves` (F, T) is in `values` (..., T); none of a zero one."""
-    power = np.vecdot(waves, waves)
-    return values @ waves.T / np.where(power > _ROUNDING * waves.shape[1], power, np.inf)
+    twice = np.einsum("ft,ft->f", waves, waves)
+    shifted = centred @ waves.T * np.exp(-0.5j * np.angle(twice))
+    squares = (len(times) + np.abs(twice)) / 2, (len(times) - np.abs(twice)) / 2
+    cosine, sine = (np.where(s > _ROUNDING * len(times), s, np.inf) for s in squares)
+    return np.hypot(shifted.real / cosine, shifted.imag / sine)

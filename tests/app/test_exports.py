@@ -38,9 +38,10 @@ def recording(window: MainWindow, until, tmp_path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["the window", "the skin", "the map of curvature xx"])
-def test_a_png_is_what_was_seen_with_what_it_is(name: str, window, named, tmp_path) -> None:
+def test_a_png_is_what_was_seen_with_what_it_is(name: str, window, until, named, tmp_path) -> None:
     named(tmp_path / "out", "Picture (*.png)")
     window.actions_by_name[f"picture-of-{name}"].trigger()
+    until(lambda: window.statusBar().currentMessage() == f"Saved {tmp_path / 'out.png'}")
     with Image.open(tmp_path / "out.png") as image:
         assert image.info["Title"] == name
         assert "SIM-0001" in image.info["Description"]
@@ -51,6 +52,21 @@ def test_a_png_is_what_was_seen_with_what_it_is(name: str, window, named, tmp_pa
     assert pixels.shape[1] <= seen.width()
     assert len(np.unique(pixels[:-26].reshape(-1, 3), axis=0)) > 50
     assert len(np.unique(pixels[-26:].reshape(-1, 3), axis=0)) > 5  # the line below
+
+
+def test_a_png_that_cannot_be_written_is_told(window, until, named, tmp_path) -> None:
+    named(tmp_path / "nowhere" / "out.png")
+    window.actions_by_name["picture-of-the window"].trigger()
+    until(lambda: "cannot be written" in window.statusBar().currentMessage())
+
+
+def test_the_picture_is_whole_where_the_window_closes_at_once(window, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    window.actions_by_name["picture"].trigger()
+    window.close()
+    (path,) = tmp_path.iterdir()
+    with Image.open(path) as image:
+        assert len(np.unique(np.asarray(image.convert("RGB")).reshape(-1, 3), axis=0)) > 100
 
 
 def test_an_svg_of_a_heatmap_has_its_cells_and_a_title(window, named, tmp_path) -> None:

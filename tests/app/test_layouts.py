@@ -312,6 +312,17 @@ def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: Ma
     assert not window.presenting.on
 
 
+def test_the_skin_is_not_drawn_while_the_window_is_arranged(window: MainWindow) -> None:
+    drawn = []
+    window.membrane.drawn.connect(lambda: drawn.append(None))
+
+    for name in [*READY, "Live"]:
+        window.layouts.choose(name)
+
+    assert not drawn
+    assert window.membrane.updatesEnabled()
+
+
 def test_what_refuses_says_what_was_expected() -> None:
     with pytest.raises(Refusal, match="expected format 1, got 7: another version wrote it"):
         from_text("format = 7")

@@ -20,13 +20,6 @@ _MEMORY = 20.0  # MB that may be added
 
 
 @pytest.fixture
-def lasting(request: pytest.FixtureRequest) -> float:
-    """How long a load is held in s: ten minutes with --long, or as --soak says."""
-    soak = request.config.getoption("--soak")
-    return float(soak) if soak else 600.0 if request.config.getoption("--long") else 20.0
-
-
-@pytest.fixture
 def quickest() -> Callable[..., list[float]]:
     """Least seconds of several functions, called turn by turn: what else runs can only add."""
 

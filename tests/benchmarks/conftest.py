@@ -6,11 +6,15 @@ import statistics
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from kappaskin import load_scene, write_scene
+
 _FIRMWARE = Path(__file__).parents[2] / "resources" / "kappaskin_resources" / "firmware"
+_CONVERSION = 2e-6  # s: 300 channels in less than a millisecond
 
 Play = Callable[..., str]
 
@@ -40,6 +44,24 @@ def figure() -> Callable[[str], None]:
 def seconds(request: pytest.FixtureRequest) -> float:
     """How long a drawing is watched."""
     return 20.0 if request.config.getoption("--long") else 6.0
+
+
+@pytest.fixture
+def lasting(request: pytest.FixtureRequest) -> float:
+    """How long a load is held in s: ten minutes with --long, or as --soak says."""
+    soak = request.config.getoption("--soak")
+    return float(soak) if soak else 600.0 if request.config.getoption("--long") else 20.0
+
+
+@pytest.fixture
+def thousand(tmp_path: Path) -> str:
+    """A source of 1,000 frames/s that the engine simulates."""
+    scene = load_scene("circle")
+    chain = scene.transduction
+    fast = replace(chain, converter=replace(chain.converter, conversion_time=_CONVERSION))
+    path = tmp_path / "thousand.toml"
+    path.write_text(write_scene(replace(scene, rate=1000.0, transduction=fast)))
+    return f"sim:{path}"
 
 
 @pytest.fixture

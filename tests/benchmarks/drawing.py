@@ -1,12 +1,17 @@
-"""Draws for some seconds and prints what it managed as JSON: a `bare` QtInteractor, or the `app`.
+"""Draws for some seconds and prints what it managed as JSON.
 
-Both share the two cores with a device and an engine at 500 frames/s.
+`python drawing.py WHAT SECONDS SOURCE`: a `bare` QtInteractor, the `app` as it opens, or with
+`everything` shown that it can show at once. Each shares the two cores with an engine that reads
+SOURCE: `sim:FILE`, or the port of a `device` of its own at 500 frames/s.
 """
 
 import json
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 from bare_window import bare_window
@@ -14,15 +19,25 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Engine
+from kappaskin_app.layouts.layout import BOTTOM, LEFT, RIGHT, Layout, Place
+from kappaskin_app.settings import COLOURS
 from kappaskin_app.window import MainWindow
 
 SETTLE = 3.0
+_SHOWN = Layout(
+    0,
+    (
+        *(("settings", Place(LEFT, share=0.25)), ("curvature", Place(RIGHT, share=0.22))),
+        *((name, Place(BOTTOM, share=0.3)) for name in ("element", "traces", "numbers")),
+    ),
+)
+_DRAWN = ("directions", "band", "frame", "object", "elements", "truth")
 
 
-def bare(application: QApplication, port: str, seconds: float) -> dict[str, float]:
+def bare(application: QApplication, source: str, seconds: float) -> dict[str, float]:
     """The same mesh, written in place and drawn as fast as it goes."""
     engine = Engine()
-    engine.connect(port)
+    engine.connect(source)
     widget, mesh, shape = bare_window()
     widget.show()
     done: list[float] = []
@@ -45,10 +60,15 @@ def bare(application: QApplication, port: str, seconds: float) -> dict[str, floa
     return {"drawn": sum(t > done[-1] - seconds for t in done) / seconds}
 
 
-def app(application: QApplication, port: str, seconds: float) -> dict[str, float]:
-    """The whole window at 1280 x 800 on the device's port."""
-    window = MainWindow(port)
+def app(
+    application: QApplication, source: str, seconds: float, everything: bool = False
+) -> dict[str, float]:
+    """The whole window at 1280 x 800."""
+    window = MainWindow(source)
     window.show()
+    if everything:
+        # Once it has met the skin, of which it then tells an element.
+        QTimer.singleShot(round(SETTLE / 2 * 1e3), lambda: _show_everything(window))
     QTimer.singleShot(round((SETTLE + seconds) * 1e3), application.quit)
     application.exec()
     now = time.monotonic()
@@ -64,19 +84,31 @@ def app(application: QApplication, port: str, seconds: float) -> dict[str, float
     }
 
 
+def _show_everything(window: MainWindow) -> None:
+    shown = dict.fromkeys((f"show_{name}" for name in _DRAWN), True)
+    maps = tuple(name for name, _ in COLOURS)
+    window.history.change("Everything", -1, maps=maps, traced=(33, 44, 55), **shown)
+    window.picking.pick(44)
+    window.layouts.apply(_SHOWN)
+
+
+@contextmanager
+def read_from(source: str) -> Iterator[str]:
+    """The source to connect to, while it is there."""
+    if source != "device":
+        yield source
+        return
+    command = [sys.executable, "-m", "kappaskin", "device", "circle", "--rate", "500"]
+    quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, **quiet) as device:
+        yield json.loads(device.stdout.readline())["port"]
+        device.terminate()
+
+
 if __name__ == "__main__":
     what, seconds = sys.argv[1], float(sys.argv[2])
-    device = subprocess.Popen(
-        [sys.executable, "-m", "kappaskin", "device", "circle", "--rate", "500"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        port = json.loads(device.stdout.readline())["port"]
+    run = {"bare": bare, "app": app, "everything": partial(app, everything=True)}[what]
+    with read_from(sys.argv[3]) as source:
         application = QApplication([])
         application.setStyle("Fusion")
-        run = {"bare": bare, "app": app}[what]
-        print(json.dumps(run(application, port, seconds)))
-    finally:
-        device.terminate()
-        device.wait()
+        print(json.dumps(run(application, source, seconds)))

@@ -19,7 +19,14 @@ from kappaskin import (
     basis_for,
     edges_of,
 )
-from kappaskin.bases import ORDERS, ClampedBasis, DiskBasis, ElasticBasis, PolygonBasis
+from kappaskin.bases import (
+    ORDERS,
+    ClampedBasis,
+    DiskBasis,
+    ElasticBasis,
+    PolygonBasis,
+    overlaps,
+)
 from kappaskin.bases.basis import curvature_at
 
 MIXED = [(2, 1), (1, 2), (2, 2)]
@@ -568,3 +575,14 @@ def test_a_vertex_along_a_straight_edge_is_no_corner():
     plain, split = (basis_for(Polygon(v), "hinged", 8, 8).at(points) for v in (square, one_more))
 
     assert np.abs(split[:, 0]) == pytest.approx(np.abs(plain[:, 0]), abs=1e-5)
+
+
+def test_an_overlap_is_the_integral_of_a_product_by_quadrature(held_skin):
+    basis = held_skin.basis(4, 4)
+    points, weights = basis.quadrature()
+    overlap = overlaps(basis)
+
+    for one, other in (((0, 0), (0, 0)), ((2, 0), (0, 2)), ((1, 1), (1, 0))):
+        expected = (basis.at(points, *one).T * weights) @ basis.at(points, *other)
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(overlap(one, other), expected, atol=1e-12 * size, rtol=0)

@@ -17,6 +17,8 @@ from kappaskin import (
     Patch,
     Plate,
     PointLoad,
+    Region,
+    Scanner,
     Scene,
     SensorLayout,
     Simulator,
@@ -322,6 +324,39 @@ def test_frames_that_hold_a_tenth_of_the_channels_in_turn_are_enough() -> None:
     monitor, _ = watched([part_of(f, n) for n, f in enumerate(frames)])
 
     assert told(monitor) == {57: "stuck"}
+
+
+@cache
+def frames_around_the_contact(seconds):
+    """Frames of a region of interest that moves with the contact, the rest in turn."""
+    simulator, scanner = Simulator(ROUND), Scanner(ROUND.sensor(), Region("skin"))
+    frames = []
+    for n in range(round(seconds * RATE)):
+        time = n / RATE
+        scanner.follow(np.asarray(simulator.loads(time)[0].centre()))
+        frames.append(simulator.scanned(scanner(), n, time, lambda time=time: time))
+    return frames
+
+
+def test_under_a_region_that_moves_with_the_contact_no_sound_channel_is_found() -> None:
+    frames = frames_around_the_contact(20)
+
+    _, looks = watched(frames)
+
+    assert max(len(frame.channels) for frame in frames) < 150
+    assert not any(kinds.any() for _, kinds in looks)
+    assert len(looks) >= 40
+
+
+def test_under_a_region_that_moves_with_the_contact_a_noisy_channel_is_found_alone() -> None:
+    rng, frames = np.random.default_rng(0), []
+    for frame in frames_around_the_contact(20):
+        loud = np.where(frame.channels == 142, rng.normal(0, 1.5 * TO_COUNTS), 0).astype(int)
+        frames.append(replace(frame, counts=frame.counts + loud))
+
+    monitor, _ = watched(frames)
+
+    assert told(monitor) == {142: "noisy"}
 
 
 def test_a_clock_that_goes_back_begins_anew() -> None:

@@ -28,3 +28,22 @@ def test_noise_is_spread_over_all_frequencies() -> None:
     found = amplitudes(times, random.normal(0, 0.3, 2000), FREQUENCIES)
     # Of white noise the squared amplitudes are 4 sd^2 / T in the mean.
     assert np.mean(found**2) == pytest.approx(4 * 0.3**2 / 2000, rel=0.25)
+
+
+def test_each_amplitude_is_that_of_the_sine_that_least_squares_fits() -> None:
+    random = np.random.default_rng(5)
+    times, frequencies = np.sort(random.uniform(0, 10, 300)), np.array([0.07, 1.3, 9.0])
+    values = random.normal(0, 1.0, (2, 300))
+
+    found = amplitudes(times, values, frequencies)
+
+    for number, frequency in enumerate(frequencies):
+        turn = 2 * np.pi * frequency * times
+        waves = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        fitted, *_ = np.linalg.lstsq(waves, (values - values.mean(axis=1, keepdims=True)).T)
+        np.testing.assert_allclose(found[:, number], np.hypot(*fitted), rtol=1e-9)
+
+
+def test_a_sine_of_half_the_rate_that_is_zero_at_every_step_is_none() -> None:
+    times, values = np.arange(64.0), np.cos(np.pi * np.arange(64.0))
+    assert amplitudes(times, values, np.array([0.5])) == pytest.approx([1.0])

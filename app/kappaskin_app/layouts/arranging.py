@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabBar, QTabWidget
 
+from kappaskin_app.drawn_once import drawn_once
 from kappaskin_app.layouts.layout import BOTTOM, FLOATING, LEFT, RIGHT, TOP, Layout, Place
 
 _SIDES = {
@@ -113,14 +114,14 @@ def arrange(window: QMainWindow, docks: Docks, panels: QTabWidget, layout: Layou
     """Arrange the docks of a window so; one that the layout does not name is hidden."""
     placed = [(docks[name], place) for name, place in layout.docks if name in docks]
     if not _only_show(window, docks, panels, layout):
-        for dock in docks.values():
-            dock.hide()
-        _put(window, placed)
+        with drawn_once(window):
+            for dock in docks.values():
+                dock.hide()
+            _put(window, placed)
     _size(window, [(dock, place) for dock, place in placed if place.shown])
     for dock, place in placed:
         if place.front:
             dock.raise_()
-    panels.setCurrentIndex(min(layout.page, panels.count() - 1))
 
 
 def words_of(layout: Layout) -> list[tuple[object, ...]]:

@@ -62,6 +62,9 @@ class MembraneView(QWidget):
         self.pointing = Pointing(self.plotter)  # after the drag: of filters the last goes first
         self.drag = LoadDrag(self.plotter)
         self.gaze = Gaze(self.plotter, self.sides)
+        # After VTK has its new size.
+        self._fitting = QTimer(self, singleShot=True, interval=0)  # pyright: ignore[reportCallIssue]
+        self._fitting.timeout.connect(guarded(self.gaze.fit))
         self._box = Box()
         self.setMinimumSize(320, 240)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
@@ -203,8 +206,7 @@ class MembraneView(QWidget):
         right, upper = (_spare(side, self.devicePixelRatioF()) for side in event.size().toTuple())
         self._around.setContentsMargins(0, upper, right, 0)
         super().resizeEvent(event)
-        # After VTK has its new size, and not when this view is gone by then.
-        QTimer.singleShot(0, self, self.gaze.fit)
+        self._fitting.start()
 
     # What changes with every estimate.
 
@@ -315,5 +317,5 @@ class MembraneView(QWidget):
 
     def close_plotter(self) -> None:
         """Before the window goes: give VTK's resources back."""
-        self._fitted = False  # a size that it had last is not looked at any more
+        self._fitting.stop()
         self.plotter.close()

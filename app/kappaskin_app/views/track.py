@@ -40,24 +40,27 @@ class Track(Course):
         super().__init__("Time in the scene, in ms", _TIP, parent)
         self.frame = _FRAME
         self._profile, self._moments = np.zeros(_SAMPLES), [0.0]
+        self._shaped, self._shape = QRectF(), QPolygonF()
 
     def show_scene(self, scene: Scene) -> None:
+        self._shaped = QRectF()
         self.frame = min(max(1 / scene.rate, _FRAME), scene.duration)
         self._profile, self._moments = profile(scene), scene.moments
         self.show_duration(scene.duration, self.frame, scene.duration - self.frame)
 
     def paint_course(self, painter: QPainter, area: QRectF, handle: float) -> None:
-        shape = self._shape(area)
+        if area != self._shaped:  # it is drawn as often as the skin is
+            self._shaped, self._shape = area, self._shape_in(area)
         painter.setPen(Qt.PenStyle.NoPen)
         for part, ink in self.halves(area, handle):
             painter.save()
             painter.setClipRect(part)
             painter.setBrush(ink)
-            painter.drawPolygon(shape)
+            painter.drawPolygon(self._shape)
             painter.restore()
         self._paint_ticks(painter, area)
 
-    def _shape(self, area: QRectF) -> QPolygonF:
+    def _shape_in(self, area: QRectF) -> QPolygonF:
         """The profile, with a little of it where nothing presses."""
         x = np.linspace(area.left(), area.right(), _SAMPLES).tolist()
         heights = 1.5 + self._profile * (area.height() - 4)

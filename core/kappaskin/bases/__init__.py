@@ -10,6 +10,7 @@ from kappaskin.bases.basis import ValueMap as ValueMap
 from kappaskin.bases.beam import ClampedBasis as ClampedBasis
 from kappaskin.bases.disk import DiskBasis as DiskBasis
 from kappaskin.bases.elastic import ElasticBasis as ElasticBasis
+from kappaskin.bases.overlap import overlaps as overlaps
 from kappaskin.bases.polygon import PolygonBasis as PolygonBasis
 from kappaskin.bases.sine import SineBasis as SineBasis
 from kappaskin.errors import Refusal

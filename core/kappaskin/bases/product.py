@@ -2,10 +2,11 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from kappaskin.bases.basis import ORDERS
+from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.functions import FunctionBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -85,12 +86,27 @@ class ProductBasis(FunctionBasis):
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""
         return GridMap(self._along_x(x, dx), self._along_y(y, dy))
 
+    @cached_property
+    def _rules(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Points and weights along x and along y: Gauss, exact to rounding."""
+        along_y = 1 if self.patch.strip else 2 * self.Nj + 16
+        return gauss(self.patch.a, 2 * self.Ni + 16), gauss(self.patch.b, along_y)
+
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: Gauss, exact to rounding."""
-        x, wx = gauss(self.patch.a, 2 * self.Ni + 16)
-        y, wy = gauss(self.patch.b, 1 if self.patch.strip else 2 * self.Nj + 16)
+        (x, wx), (y, wy) = self._rules
         points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
         return points, np.multiply.outer(wx, wy).ravel()
+
+    def overlap(self, one: Order, other: Order) -> Array:
+        """The integrals (N, N) of one derivative of each function times another of each.
+
+        Of products they are products of an integral along x and one along y.
+        """
+        (x, wx), (y, wy) = self._rules
+        along_x: Array = (self._along_x(x, one[0]).T * wx) @ self._along_x(x, other[0])
+        along_y: Array = (self._along_y(y, one[1]).T * wy) @ self._along_y(y, other[1])
+        return np.kron(along_x, along_y).astype(float)
 
     def _without_mean(self, means: Array) -> Array:
         """The combinations (N, N - Nj) of products whose factor along x has no mean.

@@ -82,7 +82,7 @@ class Contradiction:
         """How much an element next to each changed at most, in 1/m."""
         self._alike = np.zeros(_KEPT)  # in 1/m, how far off channels are that have nothing wrong
         self.usual = 0.0
-        """Noise in 1/m that half of the channels have."""
+        """Noise in 1/m that half of the channels have, of those whose noise can be told."""
         self.distance, self.off, self.left_open = np.zeros(C), np.zeros(C), np.zeros(C)
         self.beyond = np.zeros(C)
         self.pressed = np.zeros(C, bool)
@@ -155,10 +155,11 @@ class Contradiction:
         self.base += step
 
     def _measure(self, look: Look) -> None:
-        known = np.nan_to_num(look.noise)
-        self.usual = float(np.median(known[~self.missing])) if not self.missing.all() else 0.0
+        heard = look.noise[~self.missing & ~np.isnan(look.noise)]
+        self.usual = float(np.median(heard)) if heard.size else self.usual
         around = (self.neighbours.weights**2).sum(axis=2).T.ravel()
-        white = (np.maximum(known, self.usual) ** 2 + self.usual**2 * around) / look.frames
+        white = np.fmax(look.noise, self.usual) ** 2 + self.usual**2 * around
+        white /= look.frames
         left = (self.changed - self.told)[self.recent]
         s2 = _SHAPE * self.open[self.recent] + (_GAIN * self.told[self.recent]) ** 2
         s2 += white + self._alike[self.recent, None] ** 2

@@ -121,8 +121,10 @@ class Monitor:
 
     def _listen(self, look: Look) -> None:
         """Find channels noisier than all others and than those around them, in several looks."""
-        P, noise = len(self.sensor.layout), np.nan_to_num(look.noise)
+        P = len(self.sensor.layout)
         usual = max(self._against.usual, self.sensor.transduction.resolution)
+        # A region of interest leaves most channels without a noise: they are as the others.
+        noise = np.where(np.isnan(look.noise), usual, look.noise)
         loud = np.flatnonzero((noise > _LOUD * usual) & ~self._dead)
         near = self._against.neighbours.near[loud % P]
         if near.shape[1]:

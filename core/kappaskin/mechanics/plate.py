@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
-from kappaskin.bases import Basis, ElasticBasis, SineBasis
-from kappaskin.bases.basis import curvature_at
+from kappaskin.bases import Basis, ElasticBasis, SineBasis, overlaps
+from kappaskin.bases.basis import terms
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
@@ -148,23 +149,21 @@ class Plate:
 
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
         """The energy's second derivative (N, N) in N/m, and what it is without cancellation."""
-        points, weights = basis.quadrature()
-        nu, H = self.poisson, self.patch.base_curvature
+        nu, H, overlap = self.poisson, self.patch.base_curvature, overlaps(basis)
 
-        def product(left: Array, right: Array) -> Array:
-            return (left.T * weights) @ right
+        def product(left: str, right: str) -> Array:
+            first, second = terms(self.patch, left), terms(self.patch, right)
+            pairs = [(g * h, one, other) for g, one in first for h, other in second]
+            return reduce(np.add, (gh * overlap(one, other) for gh, one, other in pairs))
 
-        xx, yy, xy = curvature_at(basis, points)
-        mixed = product(xx, yy)
-        bending = product(xx, xx) + product(yy, yy) + nu * (mixed + mixed.T)
-        bending += 2 * (1 - nu) * product(xy, xy)
+        mixed = product("xx", "yy")
+        bending = product("xx", "xx") + product("yy", "yy") + nu * (mixed + mixed.T)
+        bending += 2 * (1 - nu) * product("xy", "xy")
         whole = self.rigidity * bending
-        # Half the time it takes is theirs.
-        f = basis.at(points) if H or self.foundation else None
-        squares = 0.0 if f is None else product(f, f)
+        # Of modes, half the time it takes is theirs.
+        squares = overlap((0, 0), (0, 0)) if H or self.foundation else 0.0
         if self.tension:
-            fx, fy = basis.at(points, 1, 0), basis.at(points, 0, 1)
-            slopes = product(fx, fx) + product(fy, fy)
+            slopes = overlap((1, 0), (1, 0)) + overlap((0, 1), (0, 1))
             whole += self.tension * (slopes - H**2 * squares)
         whole += self.foundation * squares
         if isinstance(basis, ElasticBasis):
@@ -172,8 +171,7 @@ class Plate:
             rim = basis.at(along)
             whole += self.rim_stiffness * (rim.T * per_length) @ rim
         if H and self.stretching and not self.patch.strip:
-            strain = H * basis.at(points, -2, 2)
-            whole += self.stretching * product(strain, strain)
+            whole += self.stretching * H**2 * overlap((-2, 2), (-2, 2))
         return whole, whole + (self.rigidity * H**4 + self.tension * H**2) * squares
 
     def _by_ritz(self, basis: Basis) -> Array:

@@ -55,11 +55,15 @@ class Listener:
         self._kept.append((time, self._held))
         while time - self._kept[0][0] > _STILL:
             self._kept.popleft()
-        kept = np.array([reading for _, reading in self._kept])
         if self.phase is Phase.REST:
-            self._settle(kept)
+            self._settle()
         elif self.peak is None:
-            self._follow(kept)
+            self._follow()
+
+    def _last(self, count: int | None = None) -> Array:
+        """The readings (n, C) kept last, at most `count` of them."""
+        kept = list(self._kept) if count is None else list(self._kept)[-count:]
+        return np.array([reading for _, reading in kept])
 
     def _whole(self) -> bool:
         """Whether what is kept is long enough to tell a rest."""
@@ -71,20 +75,22 @@ class Listener:
         moved = np.nan_to_num(np.abs(kept[half:].mean(axis=0) - kept[:half].mean(axis=0)))
         return bool(moved.max() <= _MOVING * self._noise * 2 / math.sqrt(len(kept)))
 
-    def _settle(self, kept: Array) -> None:
+    def _settle(self) -> None:
         """Call it a rest once nothing has moved for a while."""
-        if len(kept) < _FEWEST_AT_REST or not self._whole():
+        if len(self._kept) < _FEWEST_AT_REST or not self._whole():
             return
+        kept = self._last()
         noise = np.sqrt(np.mean(np.diff(kept, axis=0) ** 2, axis=0) / 2)
         self._noise = max(float(np.median(noise[~np.isnan(noise)])), self._least)
         if self._still(kept):
             self._rest, self.phase = kept.mean(axis=0), Phase.PRESS
 
-    def _follow(self, kept: Array) -> None:
+    def _follow(self) -> None:
         now = self._kept[-1][0]
         count = sum(when >= now - _LATELY for when, _ in self._kept)
-        lately = kept[-max(count, _FEWEST) :]
-        change = np.nan_to_num(lately.mean(axis=0) - self._rest)
+        lately = self._last(max(count, _FEWEST))
+        change = lately.mean(axis=0) - self._rest
+        change[np.isnan(change)] = 0.0
         most = float(np.abs(change).max())
         clear = most > _CLEAR * self._noise / math.sqrt(len(lately))
         if clear and change.max() > _LET_GO * -change.min():
@@ -96,11 +102,11 @@ class Listener:
             self._hardest, self._most = change, most
         if self.phase is Phase.PRESS and clear:
             self.phase, self._pressed = Phase.RELEASE, now
-        elif self.phase is Phase.RELEASE and self._over(kept, most, now):
+        elif self.phase is Phase.RELEASE and self._over(most, now):
             self.peak = self._hardest
 
-    def _over(self, kept: Array, most: float, now: float) -> bool:
+    def _over(self, most: float, now: float) -> bool:
         """Whether it was let go, or lies still: then what comes next is the next press."""
         if most < _OVER * self._most:
             return True
-        return now - self._pressed > _STILL and self._whole() and self._still(kept)
+        return now - self._pressed > _STILL and self._whole() and self._still(self._last())
