@@ -1,0 +1,97 @@
+"""A design study's measures against the first thing that it varies, with their intervals."""
+
+import io
+import math
+from collections.abc import Sequence
+from itertools import cycle
+from typing import Any, cast
+
+from kappaskin.figures import style
+from kappaskin.figures.registry import KINDS
+from kappaskin.studies.design import MEASURES, Known, Study
+from kappaskin.studies.design.table import value_text
+
+_COLOURS = (style.BLUE, style.ORANGE, "#63a878", "#7a4b9a", "#c9a227", "#3f9aa5", "#c2487a",
+            style.FAINT, style.GREY)  # fmt: skip
+_PANEL = (18.0, 14.0, 92.0, 62.0)  # mm: left, bottom, width, height
+_WIDE = 20.0  # from the least to the largest by such a factor: shown by factors
+_LONGEST = 44  # characters of the name of a curve
+
+
+def draw_study(study: Study, known: Sequence[Known]) -> dict[str, str]:
+    """The SVG of a figure for every measure, by its name; none where nothing is varied."""
+    if not study.axes:
+        return {}
+    drawn = dict[str, str]()
+    for name in study.measures:
+        made = io.StringIO()
+        with style.sheet() as figure:
+            _draw(figure, study, known, name)
+            figure.savefig(made, format="svg", metadata=KINDS["svg"])
+        drawn[name] = made.getvalue()
+    return drawn
+
+
+def _draw(figure: style.Figure, study: Study, known: Sequence[Known], name: str) -> None:
+    style.resize(figure, style.DOUBLE, 80)
+    axes, measure = style.place(figure, _PANEL), MEASURES[name]
+    along = list(study.axes[0])
+    (place, *_) = study.axes[0].places
+    x = [_number(values[place], at) for at, values in enumerate(along)]
+    for (label, curve), colour in zip(_curves(study, known).items(), cycle(_COLOURS), strict=False):
+        means = [one.mean(name) for one in curve]
+        y = [measure.scale * mean.mean for mean in means]
+        half = [0.0 if math.isnan(m.half) else measure.scale * m.half for m in means]
+        axes.errorbar(x, y, half, color=colour, marker="o", capsize=2, elinewidth=0.8, label=label)
+    every = [y for line in axes.get_lines() for y in line.get_ydata() if math.isfinite(y)]
+    axes.set(xlabel=", ".join(study.axes[0].places), ylabel=f"{measure.title} [{measure.unit}]")
+    if _by_factors(every):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter("{x:g}")
+    elif every and min(every) >= 0:
+        axes.set_ylim(bottom=0)
+    _label(axes, x, [values[place] for values in along])
+    if len(study.axes) > 1:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0))
+
+
+def _label(axes: style.Axes, x: list[float], values: list[Any]) -> None:
+    """Ticks at the values themselves where these are no numbers."""
+    if all(isinstance(value, int | float) for value in values):
+        if _by_factors(x):
+            axes.set_xscale("log")
+            axes.xaxis.set_major_formatter("{x:g}")
+        return
+    axes.set_xticks(x, [value_text(value) for value in values])
+    texts = axes.get_xticklabels()
+    if sum(len(text.get_text()) for text in texts) > 60:
+        axes.tick_params(axis="x", rotation=40)
+
+
+def _by_factors(values: Sequence[float]) -> bool:
+    return bool(values) and min(values) > 0 and max(values) > _WIDE * min(values)
+
+
+def _number(value: Any, at: int) -> float:
+    """Where a value stands: numbers as they are, a grid by its number of cells, others in turn."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    if isinstance(value, list):
+        many = cast("list[Any]", value)
+        if len(many) == 2 and all(isinstance(one, int) for one in many):
+            return float(many[0] * many[1])
+    return float(at)
+
+
+def _curves(study: Study, known: Sequence[Known]) -> dict[str, list[Known]]:
+    """The points of each curve: those that are alike in all but the first axis."""
+    first = set(study.axes[0].places)
+    curves = dict[str, list[Known]]()
+    for one in known:
+        label = ", ".join(
+            f"{place.rpartition('.')[2]} {value_text(value)}"
+            for place, value in one.point.values.items()
+            if place not in first
+        )
+        curves.setdefault(label[:_LONGEST], []).append(one)
+    return curves
