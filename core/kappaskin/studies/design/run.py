@@ -11,7 +11,7 @@ from kappaskin.studies.design.folder import Folder
 from kappaskin.studies.design.known import Known
 from kappaskin.studies.design.study import Study
 from kappaskin.studies.design.task import Measured, Task, version
-from kappaskin.studies.design.workers import Workers
+from kappaskin.studies.design.workers import Workers, gone
 
 _AHEAD = 3  # tasks in hand for each worker: one at work, the others on their way
 _DEATHS = 3  # of workers at the same task: then it is what kills them
@@ -92,9 +92,7 @@ class _Run:
             deaths = self._deaths[task.key] = self._deaths.get(task.key, 0) + 1
             return None if deaths < _DEATHS else "the process that computed it died, three times"
         except CancelledError:
-            raise Refusal(
-                "the scheduler is gone; what was computed is kept, and the same study goes on there"
-            ) from None
+            raise gone() from None
         except Exception as error:  # whatever there is wrong with one task, the others go on
             return f"{type(error).__name__}: {error}"
 

@@ -1,10 +1,13 @@
 """Who computes tasks: processes of this machine, or the workers of a Dask cluster."""
 
+import socket
+import time
 from collections.abc import Generator
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import Any, Protocol
+from urllib.parse import urlsplit
 
 from kappaskin.errors import Refusal
 from kappaskin.processes import Context, beginning_processes
@@ -22,6 +25,13 @@ class Workers(Protocol):
     def count(self) -> int: ...
 
     def submit(self, task: Task) -> "Future[Measured]": ...
+
+
+def gone() -> Refusal:
+    """What to say once no scheduler answers any more."""
+    return Refusal(
+        "the scheduler is gone; what was computed is kept, and the same command goes on from there"
+    )
 
 
 class _Processes:
@@ -60,14 +70,21 @@ def processes(count: int) -> Generator[Workers]:
 
 
 class _Cluster:
-    """The workers of a Dask scheduler, as many as have come by now."""
+    """The workers of a Dask scheduler, which come and go."""
 
     def __init__(self, client: Any) -> None:
         self._client, self._executor = client, client.get_executor()
+        self._count, self._counted = 1, -_PATIENCE
 
     @property
     def count(self) -> int:
-        return max(sum(self._client.nthreads().values()), 1)
+        if time.monotonic() > self._counted + _PATIENCE:
+            try:
+                self._count = max(sum(self._client.nthreads().values()), 1)
+            except OSError as error:
+                raise gone() from error
+            self._counted = time.monotonic()
+        return self._count
 
     def submit(self, task: Task) -> "Future[Measured]":
         return self._executor.submit(run, task)
@@ -83,8 +100,9 @@ def cluster(address: str) -> Generator[Workers]:
             f"expected Dask to reach a scheduler with, got: {error}; pip install 'kappaskin[dask]'"
         ) from error
     try:
+        _knock(address)
         client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
+    except (OSError, ValueError) as error:
         raise Refusal(
             f"{address}: no Dask scheduler answers there ({error}); start one by dask scheduler, "
             "and give the address that it prints"
@@ -93,7 +111,16 @@ def cluster(address: str) -> Generator[Workers]:
         _check_workers(client, address)
         yield _Cluster(client)
     finally:
-        client.close()
+        with suppress(OSError):  # where the scheduler is gone
+            client.close(_PATIENCE)
+
+
+def _knock(address: str) -> None:
+    """Raise an error unless somebody is there: Dask itself would go on trying for 15 s."""
+    place = urlsplit(address if "//" in address else f"tcp://{address}")
+    if place.scheme not in ("tcp", "tls") or place.hostname is None or place.port is None:
+        raise ValueError("expected an address such as tcp://10.0.0.5:8786")
+    socket.create_connection((place.hostname, place.port), _PATIENCE).close()
 
 
 def _check_workers(client: Any, address: str) -> None:
