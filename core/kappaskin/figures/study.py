@@ -4,7 +4,7 @@ import io
 import math
 from collections.abc import Sequence
 from itertools import cycle
-from typing import Any, cast
+from typing import Any
 
 from kappaskin.figures import style
 from kappaskin.figures.registry import KINDS
@@ -35,14 +35,15 @@ def draw_study(study: Study, known: Sequence[Known]) -> dict[str, str]:
 def _draw(figure: style.Figure, study: Study, known: Sequence[Known], name: str) -> None:
     style.resize(figure, style.DOUBLE, 80)
     axes, measure = style.place(figure, _PANEL), MEASURES[name]
-    along = list(study.axes[0])
     (place, *_) = study.axes[0].places
-    x = [_number(values[place], at) for at, values in enumerate(along)]
+    values = [each[place] for each in study.axes[0]]
+    x = [float(value) if _is_number(value) else at for at, value in enumerate(values)]
     for (label, curve), colour in zip(_curves(study, known).items(), cycle(_COLOURS), strict=False):
         means = [one.mean(name) for one in curve]
         y = [measure.scale * mean.mean for mean in means]
         half = [0.0 if math.isnan(m.half) else measure.scale * m.half for m in means]
-        axes.errorbar(x, y, half, color=colour, marker="o", capsize=2, elinewidth=0.8, label=label)
+        look = {"color": colour, "marker": "o", "capsize": 2, "elinewidth": 0.8}
+        axes.errorbar(x, y, half, label=label[:_LONGEST], **look)
     every = [y for line in axes.get_lines() for y in line.get_ydata() if math.isfinite(y)]
     axes.set(xlabel=", ".join(study.axes[0].places), ylabel=f"{measure.title} [{measure.unit}]")
     if _by_factors(every):
@@ -50,14 +51,14 @@ def _draw(figure: style.Figure, study: Study, known: Sequence[Known], name: str)
         axes.yaxis.set_major_formatter("{x:g}")
     elif every and min(every) >= 0:
         axes.set_ylim(bottom=0)
-    _label(axes, x, [values[place] for values in along])
+    _label(axes, x, values)
     if len(study.axes) > 1:
         axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0))
 
 
 def _label(axes: style.Axes, x: list[float], values: list[Any]) -> None:
     """Ticks at the values themselves where these are no numbers."""
-    if all(isinstance(value, int | float) for value in values):
+    if all(map(_is_number, values)):
         if _by_factors(x):
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter("{x:g}")
@@ -72,15 +73,8 @@ def _by_factors(values: Sequence[float]) -> bool:
     return bool(values) and min(values) > 0 and max(values) > _WIDE * min(values)
 
 
-def _number(value: Any, at: int) -> float:
-    """Where a value stands: numbers as they are, a grid by its number of cells, others in turn."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return float(value)
-    if isinstance(value, list):
-        many = cast("list[Any]", value)
-        if len(many) == 2 and all(isinstance(one, int) for one in many):
-            return float(many[0] * many[1])
-    return float(at)
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _curves(study: Study, known: Sequence[Known]) -> dict[str, list[Known]]:
@@ -93,5 +87,5 @@ def _curves(study: Study, known: Sequence[Known]) -> dict[str, list[Known]]:
             for place, value in one.point.values.items()
             if place not in first
         )
-        curves.setdefault(label[:_LONGEST], []).append(one)
+        curves.setdefault(label, []).append(one)
     return curves

@@ -56,9 +56,9 @@ class Folder:
 
     def study(self) -> Study:
         """The study that was last computed here."""
-        file = self.path / _TEXT
+        name, file = self.name, self.path / _TEXT
         try:
-            return read_study(file.read_text("utf-8"), Path(f"{self.name}.toml"))
+            return read_study(file.read_text("utf-8"), Path(f"{name}.toml"))
         except OSError as error:
             raise Refusal(f"{file}: cannot be read ({error}); run the study again") from error
 
