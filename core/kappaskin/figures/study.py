@@ -14,6 +14,7 @@ from kappaskin.studies.design.table import value_text
 _COLOURS = (style.BLUE, style.ORANGE, "#63a878", "#7a4b9a", "#c9a227", "#3f9aa5", "#c2487a",
             style.FAINT, style.GREY)  # fmt: skip
 _PANEL = (18.0, 14.0, 92.0, 62.0)  # mm: left, bottom, width, height
+_ALONE = 150.0  # mm: the width of one without names of curves beside it
 _WIDE = 20.0  # from the least to the largest by such a factor: shown by factors
 _LONGEST = 44  # characters of the name of a curve
 
@@ -34,18 +35,22 @@ def draw_study(study: Study, known: Sequence[Known]) -> dict[str, str]:
 
 def _draw(figure: style.Figure, study: Study, known: Sequence[Known], name: str) -> None:
     style.resize(figure, style.DOUBLE, 80)
-    axes, measure = style.place(figure, _PANEL), MEASURES[name]
+    left, bottom, width, height = _PANEL
+    box = left, bottom, width if len(study.axes) > 1 else _ALONE, height
+    axes, measure = style.place(figure, box), MEASURES[name]
     (place, *_) = study.axes[0].places
     values = [each[place] for each in study.axes[0]]
     x = [float(value) if _is_number(value) else at for at, value in enumerate(values)]
+    line = "" if any(isinstance(value, str) for value in values) else "-"  # names have no order
     for (label, curve), colour in zip(_curves(study, known).items(), cycle(_COLOURS), strict=False):
         means = [one.mean(name) for one in curve]
         y = [measure.scale * mean.mean for mean in means]
         half = [0.0 if math.isnan(m.half) else measure.scale * m.half for m in means]
-        look = {"color": colour, "marker": "o", "capsize": 2, "elinewidth": 0.8}
+        look = {"color": colour, "marker": "o", "capsize": 2, "elinewidth": 0.8, "ls": line}
         axes.errorbar(x, y, half, label=label[:_LONGEST], **look)
     every = [y for line in axes.get_lines() for y in line.get_ydata() if math.isfinite(y)]
-    axes.set(xlabel=", ".join(study.axes[0].places), ylabel=f"{measure.title} [{measure.unit}]")
+    axes.set_xlabel(", ".join(map(study.called, study.axes[0].places)))
+    axes.set_ylabel(f"{measure.title} [{measure.unit}]")
     if _by_factors(every):
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter("{x:g}")
@@ -83,7 +88,7 @@ def _curves(study: Study, known: Sequence[Known]) -> dict[str, list[Known]]:
     curves = dict[str, list[Known]]()
     for one in known:
         label = ", ".join(
-            f"{place.rpartition('.')[2]} {value_text(value)}"
+            f"{study.called(place).rpartition('.')[2]} {value_text(value)}"
             for place, value in one.point.values.items()
             if place not in first
         )

@@ -1,13 +1,19 @@
 """A study's file to its points, and what is refused of it."""
 
 import json
+import re
+from dataclasses import fields
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kappaskin import Refusal
+from kappaskin import PLACEMENTS, Refusal
 from kappaskin.studies.design import MEASURES, STUDIES, load_study
-from kappaskin.studies.design.draws import LogUniform, Normal, Some, Uniform, Whole
+from kappaskin.studies.design.draws import KINDS, LogUniform, Normal, Some, Uniform, Whole
+from kappaskin.studies.design.setup import Measuring, Placing, Reconstruction
+from kappaskin.studies.design.study import Stop
 
 TWO = """
 [[vary]]
@@ -134,6 +140,18 @@ def test_a_skin_that_nothing_presses_is_refused(study_of):
     assert "expected a scene with a load" in refused(study_of, "", (touch, ""))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("[6, 6]", "[6, 6]\ndead = [3]", "expected live elements"),
+        ("size = [0.1, 0.1]", 'shape = "strip"\nsize = [0.1, 0.1]', "got a strip"),
+    ],
+)
+def test_what_cannot_be_placed_anew_is_refused(study_of, old, new, told):
+    with pytest.raises(Refusal, match=told):
+        study_of('[place]\nby = "D"', (old, new))
+
+
 def test_an_unknown_study_is_refused_with_those_there_are():
     with pytest.raises(Refusal, match=r"expected a study among .*placement.*; got 'placemnt'"):
         load_study("placemnt")
@@ -175,3 +193,13 @@ def test_some_are_different_ones_each_as_often_as_the_others():
     assert all(len(set(one)) == 4 for one in drawn)
     counts = np.bincount(np.concatenate(drawn), minlength=10)
     assert np.abs(counts - 800).max() < 4 * np.sqrt(2000 * 0.4 * 0.6)
+
+
+def test_the_guide_names_all_that_a_study_may_say():
+    guide = (Path(str(files("kappaskin_resources"))) / "studies" / "README.md").read_text("utf-8")
+
+    for name in (*MEASURES, *KINDS, *PLACEMENTS):
+        assert f"`{name}`" in guide or name == "scene"
+    for kind in (Reconstruction, Placing, Measuring, Stop):
+        for field in fields(kind):
+            assert re.search(rf"\n    {field.name} = ", guide)

@@ -5,9 +5,6 @@ from kappaskin.studies.design.known import Known as Known
 from kappaskin.studies.design.known import Mean as Mean
 from kappaskin.studies.design.measures import MEASURES as MEASURES
 from kappaskin.studies.design.measures import Measure as Measure
-from kappaskin.studies.design.placement import PLACEMENTS as PLACEMENTS
-from kappaskin.studies.design.placement import placement as placement
-from kappaskin.studies.design.placement import predicted_sd as predicted_sd
 from kappaskin.studies.design.run import known_of as known_of
 from kappaskin.studies.design.run import run_study as run_study
 from kappaskin.studies.design.study import STUDIES as STUDIES

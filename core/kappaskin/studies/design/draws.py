@@ -106,18 +106,19 @@ class Some:
         return sorted(rng.permutation(self.of)[: self.count].tolist())
 
 
-_KINDS = {
+KINDS = {
     "uniform": Uniform,
     "log-uniform": LogUniform,
     "normal": Normal,
     "whole": Whole,
     "some": Some,
 }
+"""What values can be drawn from, by name."""
 
 
 def read_draw(table: Table) -> tuple[str, Distribution]:
     """The place in the file `what`, and what its values are drawn from."""
     place = table.get("what", str)
-    made = table.make(table.choose("kind", _KINDS))
+    made = table.make(table.choose("kind", KINDS))
     table.done()
     return place, made

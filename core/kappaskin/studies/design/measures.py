@@ -13,10 +13,10 @@ from scipy import special
 from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator
 from kappaskin.frames import Array
+from kappaskin.placement import predicted_sd
 from kappaskin.scene import Indenter
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.block import Block
-from kappaskin.studies.design.placement import predicted_sd
 
 _CALLS = 21  # of a fit that is timed
 _SIDE = 21  # points along each side at which error bars are judged, less those on the edges

@@ -10,11 +10,11 @@ from typing import Any
 from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
 from kappaskin.fit import METHODS, Estimator, estimator_for
+from kappaskin.placement import PLACEMENTS, check_placement, elements_placed
 from kappaskin.scene import Scene, scene_of
 from kappaskin.scene.lines import Lines
 from kappaskin.scene.table import Table
 from kappaskin.studies.design.draws import Distribution, read_draw
-from kappaskin.studies.design.placement import PLACEMENTS, check_placement, placement
 
 _NAME = "the study"
 _MOST_FRAMES = 100_000
@@ -147,5 +147,5 @@ def _estimator(setup: Setup) -> Estimator:
     patch = scene.plate.patch
     Ni, Nj = fit.functions
     basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
-    layout = placement(scene.layout, basis, setup.place.by, setup.place.apart)
+    layout = elements_placed(scene.layout, basis, setup.place.by, setup.place.apart)
     return estimator_for(fit.method, basis, layout)

@@ -83,6 +83,13 @@ class Study:
         """The places in the file of all that is varied."""
         return [place for axis in self.axes for place in axis.places]
 
+    def called(self, place: str) -> str:
+        """What to call a place: that of a number of a [[draw]] by what is drawn."""
+        head, _, name = place.partition(".")
+        if not head.startswith("draw["):
+            return place
+        return f"{name} of {self.base.draws[int(head[5:-1]) - 1][0]}"
+
     def points(self) -> Iterator[Point]:
         """Every combination of what is varied."""
         for values in points_of(self.axes):

@@ -39,7 +39,7 @@ def mean_text(mean: Mean, measure: Measure) -> str:
 def heads_of(study: Study) -> list[str]:
     """What stands above the columns of `rows_of`."""
     units = [f"{MEASURES[name].title} [{MEASURES[name].unit}]" for name in study.measures]
-    return [*study.places, *units, "frames"]
+    return [*map(study.called, study.places), *units, "frames"]
 
 
 def rows_of(study: Study, known: Sequence[Known]) -> list[list[str]]:
@@ -56,7 +56,8 @@ def remarks_on(study: Study, known: Sequence[Known]) -> list[str]:
     """What a reader of the tables must know: what failed, what is missing, what is not exact."""
     remarks: list[str] = []
     for one in known:
-        told = ", ".join(f"{place} {value_text(v)}" for place, v in one.point.values.items())
+        values = one.point.values.items()
+        told = ", ".join(f"{study.called(place)} {value_text(value)}" for place, value in values)
         at = f"at {told}" if told else "everywhere"
         if failures := one.failures:
             failed = f"{len(failures)} of {len(one.results)} blocks failed"

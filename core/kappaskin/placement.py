@@ -72,7 +72,7 @@ def check_placement(layout: SensorLayout, by: str) -> None:
         raise Refusal("expected live elements where they are placed anew, got dead ones among them")
 
 
-def placement(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
+def elements_placed(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
     """As many elements as `layout` has, placed `by` one of `PLACEMENTS` to tell `basis`."""
     return PLACEMENTS[by](layout, basis, apart)
 
