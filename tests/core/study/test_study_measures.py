@@ -102,7 +102,9 @@ asymmetry = 1.5
 
 
 def test_loops_that_are_undone_cost_nothing(study_of):
-    def rms(*changes, path=POINT + path_of(1.0)):
+    path = POINT + path_of(1.0)
+
+    def rms(*changes):
         choice = 'choose = "linear"', 'choose = "all"\noff = ["finite-slope", "quantisation"]'
         study = study_of("", (POINT, path), choice, QUIET, measuring("rms", frames=20), *changes)
         return measured(study)["rms"].mean

@@ -21,7 +21,7 @@ def value_text(value: Any) -> str:
         many = cast("list[Any]", value)
         text = (" x " if len(many) == 2 else ", ").join(value_text(one) for one in many)
         return text if len(text) <= _LONGEST else f"{len(many)} values"
-    return str(value)
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def mean_text(mean: Mean, measure: Measure) -> str:
