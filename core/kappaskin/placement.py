@@ -7,6 +7,7 @@ variance of the displacement over the skin, trace (M'M)^-1 G with G the function
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -25,8 +26,8 @@ _CROWD = 1.6  # the power that draws clustered elements to the middle
 _MOST_CANDIDATES = 10_000
 _RIDGE = 1e-9  # of what a reading tells on average, so that too few elements are no error
 
-Score = Callable[[Array, Array], Array]
-"""M'M without an element, inverted (F, F), and places' rows (C, 3, F): the criterion with each."""
+Placement = Callable[[SensorLayout, Basis, float], SensorLayout]
+"""Elements, functions to tell and how far elements are apart in m at least, to as many elements."""
 
 
 def predicted_sd(estimator: Estimator, noise: float, positions: Array) -> Array:
@@ -40,7 +41,12 @@ def predicted_sd(estimator: Estimator, noise: float, positions: Array) -> Array:
     return np.hypot(noise * spread.sd_of(rows), undecided)
 
 
-def _regular(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout:
+def _at(places: Array, layout: SensorLayout) -> SensorLayout:
+    """Elements like those of `layout` at `places` (P, 2) in m."""
+    return replace(SensorLayout.scattered(layout.patch, places), gage_length=layout.gage_length)
+
+
+def _as_they_are(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout:
     return layout
 
 
@@ -48,18 +54,18 @@ def _clustered(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout
     """The same elements, drawn towards the middle of the skin."""
     half = np.array([layout.patch.a, layout.patch.b]) / 2
     u = layout.positions / half - 1
-    return SensorLayout.scattered(layout.patch, half * (1 + np.sign(u) * np.abs(u) ** _CROWD))
+    return _at(half * (1 + np.sign(u) * np.abs(u) ** _CROWD), layout)
 
 
-def _telling(det: bool) -> Callable[[SensorLayout, Basis, float], SensorLayout]:
+def _telling_most(det: bool) -> Placement:
     return lambda layout, basis, apart: _exchanged(layout, basis, apart, det)
 
 
-PLACEMENTS = {
-    "scene": _regular,
+PLACEMENTS: dict[str, Placement] = {
+    "scene": _as_they_are,
     "clustered": _clustered,
-    "D": _telling(det=True),
-    "A": _telling(det=False),
+    "D": _telling_most(det=True),
+    "A": _telling_most(det=False),
 }
 """Ways to place as many elements as a scene has: where the scene has them, and others."""
 
@@ -80,14 +86,17 @@ def elements_placed(layout: SensorLayout, basis: Basis, by: str, apart: float) -
 def _candidates(layout: SensorLayout, apart: float) -> Array:
     """Places (C, 2) on the skin at least `apart` in m from each other."""
     patch = layout.patch
-    counts = [math.floor(side / apart + 1e-9) for side in (patch.a, patch.b)]
-    if not len(layout) < counts[0] * counts[1] <= _MOST_CANDIDATES:
+    m, n = (math.floor(side / apart + 1e-9) for side in (patch.a, patch.b))
+    places = np.empty((0, 2))
+    if 0 < m * n <= _MOST_CANDIDATES:
+        places = SensorLayout.regular(patch, m, n).positions
+        places = places[patch.depth(places) >= layout.gage_length / 2]
+    if len(places) <= len(layout):
         raise Refusal(
-            f"expected a distance apart that leaves more than {len(layout)} and at most "
-            f"{_MOST_CANDIDATES} places, got {counts[0]} x {counts[1]} at {apart:g} m"
+            f"expected a distance apart that leaves more than {len(layout)} places on a tiling of "
+            f"at most {_MOST_CANDIDATES}, got {m} x {n} at {apart:g} m"
         )
-    places = SensorLayout.regular(patch, *counts).positions
-    return places[patch.depth(places) >= layout.gage_length / 2]
+    return places
 
 
 def _exchanged(layout: SensorLayout, basis: Basis, apart: float, det: bool) -> SensorLayout:
@@ -104,8 +113,7 @@ def _exchanged(layout: SensorLayout, basis: Basis, apart: float, det: bool) -> S
     for _ in range(_SWEEPS):
         if not sum([_exchange(rows, products, chosen, free, n, det) for n in range(len(chosen))]):
             break
-    made = SensorLayout.scattered(layout.patch, places[np.sort(chosen)])
-    return SensorLayout(layout.patch, made.positions, made.live, None, layout.gage_length)
+    return _at(places[np.sort(chosen)], layout)
 
 
 def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, Array]:
@@ -113,10 +121,8 @@ def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, A
 
     With their mean products over the skin (F, F), scaled alike.
     """
-    there = SensorLayout.scattered(layout.patch, places)
-    there = SensorLayout(layout.patch, there.positions, there.live, None, layout.gage_length)
     W = np.eye(basis.size) if basis.free is None else basis.free
-    M = there.curvature_operator(basis) @ W
+    M = _at(places, layout).curvature_operator(basis) @ W
     length = np.linalg.norm(M, axis=0) / math.sqrt(len(places))
     points, weights = basis.quadrature()
     shapes = basis.at(points) @ W / length

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import special
 
-from kappaskin.studies.design.study import Point, Stop, Study
+from kappaskin.frames import Array
+from kappaskin.studies.design.study import Point, Study
 from kappaskin.studies.design.task import Measured, Moments
 
 _MORE = 1.5  # times the blocks that were not enough
@@ -43,7 +44,7 @@ class Mean:
         return self.half <= share * abs(self.mean)
 
 
-def _half(means: np.ndarray, weights: np.ndarray, mean: float) -> float:
+def _half(means: Array, weights: Array, mean: float) -> float:
     B = len(means)
     if B < 2:
         return math.nan
@@ -58,7 +59,7 @@ class Known:
     point: Point
     study: Study
     results: dict[int, Measured | str] = field(default_factory=dict)
-    wanted: int = 0
+    wanted: int = field(init=False)
 
     def __post_init__(self) -> None:
         self.wanted = self.study.stop.least
@@ -88,7 +89,7 @@ class Known:
     @property
     def enough(self) -> bool:
         """Whether all that is to be known well is."""
-        stop: Stop = self.study.stop
+        stop = self.study.stop
         return all(self.mean(name).within(stop.within) for name in stop.of)
 
     def mean(self, measure: str) -> Mean:

@@ -120,7 +120,8 @@ def read_study(text: str, file: Path) -> Study:
         check_product(axes, stop.points)
     _check_places(tables, axes)
     for table, axis in zip(tables, axes, strict=True):
-        _check_axis(table, axis, own)
+        for values in axis:  # each with everything else as it is: not as many as there are points
+            _check(table, next(iter(values)), own, values)
     for table, (place, draw) in zip(top.tables("draw"), base.draws, strict=True):
         _check(table, "what", own, {place: draw(np.random.default_rng(0))})
     title, description = base.scene.title, base.scene.text
@@ -149,13 +150,8 @@ def _check_places(tables: list[Table], axes: tuple[Axis, ...]) -> None:
             seen.add(place)
 
 
-def _check_axis(table: Table, axis: Axis, said: dict[str, Any]) -> None:
-    """Refuse values of an axis that the scene cannot have, with everything else as it is."""
-    for values in axis:
-        _check(table, next(iter(values)), said, values)
-
-
 def _check(table: Table, key: str, said: dict[str, Any], values: dict[str, Any]) -> None:
+    """Refuse `values` by place, which are said at a `key`, that the scene cannot have."""
     try:
         setup_of(with_values(said, values), MEASURES)
     except Refusal as refusal:
