@@ -65,6 +65,7 @@ def test_the_page_is_whole_and_needs_no_network(folder):
 
     assert not structure.open
     assert structure.seen.count("svg") == 1
+    assert "<?xml" not in page
     assert structure.seen.count("tr") == 5
     assert all(link.startswith("#") for link in structure.links)
     assert not re.search(r"@import|url\((?!#)", page)

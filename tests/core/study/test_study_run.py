@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from kappaskin import LeastSquares, Patch, Refusal, Simulator, SineBasis
 from kappaskin.studies.design import Folder, Task, known_of, run, run_study
-from kappaskin.studies.design.known import Mean
+from kappaskin.studies.design.known import Known, Mean
 from kappaskin.studies.design.task import Moments, version
 
 NOISES = '[[vary]]\n"effects.uniform-noise.rms" = [0.1, 0.4]\n'
@@ -252,6 +253,28 @@ def test_means_of_blocks_are_those_of_all_their_frames():
     every = np.concatenate(values)
     np.testing.assert_allclose([found.mean, found.sd], [every.mean(), every.std(ddof=1)])
     assert found.count == 25
+
+
+def test_the_interval_of_equal_blocks_is_students_of_their_means():
+    blocks = np.random.default_rng(0).normal(3.0, 1.0, (6, 4))
+
+    found = Mean.of([Moments.of(block) for block in blocks])
+
+    interval = stats.ttest_1samp(blocks.mean(axis=1), 0.0).confidence_interval(0.95)
+    np.testing.assert_allclose([found.mean - found.half, found.mean + found.half], interval)
+
+
+def test_the_order_in_which_blocks_come_changes_no_bit(study_of):
+    study = study_of("", ("least = 2\nmost = 4", "least = 50\nmost = 50"))
+    means = np.random.default_rng(0).normal(3.0, 1.0, 50).tolist()
+    upward, downward = (Known(next(study.points()), study) for _ in range(2))
+
+    for block, mean in enumerate(means):
+        upward.take(block, {"rms": Moments(1, mean, 0.0)})
+    for block, mean in reversed(list(enumerate(means))):
+        downward.take(block, {"rms": Moments(1, mean, 0.0)})
+
+    assert upward.mean("rms") == downward.mean("rms")
 
 
 def test_frames_that_tell_nothing_are_left_out():
