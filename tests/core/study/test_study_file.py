@@ -108,7 +108,8 @@ def test_what_cannot_be_varied_or_drawn_is_refused_with_its_line_and_the_remedy(
     [
         ('"rms"', '"rsm"', "did you mean 'rms'?"),
         ('["rms"]', "[]", "expected at least one thing to measure"),
-        ("frames = 5", "frames = 0", "expected 1 to 100000 frames"),
+        ("frames = 5", "frames = 0", "expected at least one frame"),
+        ("frames = 5", "frames = 100000", "got 100000 frames of 108 = 10800000; take fewer frames"),
         ("[measure]", "[messure]", "did you mean measure?"),
         ("least = 2", "least = 9", "expected 2 <= least <= most"),
         ("least = 2", 'least = 2\nof = ["contact"]', "expected one of rms, got 'contact'"),

@@ -17,7 +17,7 @@ from kappaskin.scene.table import Table
 from kappaskin.studies.design.draws import Distribution, read_draw
 
 _NAME = "the study"
-_MOST_FRAMES = 100_000
+_MOST_READINGS = 2**23  # in a block: 64 MB for each array of them
 _ELSEWHERE = ("file", "recorded")  # keys of a touch that name files beside that of the scene
 
 
@@ -66,8 +66,8 @@ class Measuring:
             raise Refusal("expected at least one thing to measure, got none")
         if len(set(self.what)) < len(self.what):
             raise Refusal(f"expected to measure each thing once, got {', '.join(self.what)}")
-        if not 1 <= self.frames <= _MOST_FRAMES:
-            raise Refusal(f"expected 1 to {_MOST_FRAMES} frames in a block, got {self.frames}")
+        if self.frames < 1:
+            raise Refusal(f"expected at least one frame in a block, got {self.frames}")
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,12 @@ def read_setup(top: Table, file: Path, known: Iterable[str]) -> Setup:
         measure.stands_for(name, "what", among)
     with place.blamed():
         check_placement(scene.layout, made[1].by)
+    if (readings := made[2].frames * 3 * len(scene.layout)) > _MOST_READINGS:
+        raise measure.refusal(
+            f"expected at most {_MOST_READINGS} readings in a block, got {made[2].frames} frames "
+            f"of {3 * len(scene.layout)} = {readings}; take fewer frames and more blocks",
+            "frames",
+        )
     return Setup(scene, *made, tuple(read_draw(table) for table in drawing))
 
 
