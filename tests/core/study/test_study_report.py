@@ -8,9 +8,9 @@ from html.parser import HTMLParser
 import pytest
 
 from kappaskin.cli.common import FAILED
-from kappaskin.studies.design import Mean
+from kappaskin.studies.design import Folder, Mean, known_of
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.table import mean_text, value_text
+from kappaskin.studies.design.table import mean_text, table_text, value_text
 
 from .conftest import TEXT
 
@@ -100,6 +100,15 @@ def test_figures_stand_beside_the_page(folder):
 
     assert "RMS error of the shape [mm]" in svg
     assert "6 x 6" in svg
+
+
+def test_what_is_not_computed_yet_is_said_to_be_missing(study_of, tmp_path):
+    study = study_of(VARIED)
+
+    told = table_text(study, known_of(study, Folder.opened(tmp_path, study)))
+
+    assert told.count("0 of 2 blocks are computed") == 4
+    assert "6 x 6  0.1         -       0" in told
 
 
 def test_no_folder_of_a_study_is_refused(run, tmp_path):

@@ -5,6 +5,7 @@ import math
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from threading import Lock, Timer
 
 import numpy as np
 import pytest
@@ -204,16 +205,45 @@ def test_tasks_of_a_worker_that_died_are_given_to_another(study_of, tmp_path):
     assert results(found) == results(computed(study, tmp_path / "whole"))
 
 
-def test_a_task_that_kills_its_workers_fails_in_the_end(study_of, tmp_path):
-    def deadly(task):
-        if task.block == 1:
-            raise BrokenProcessPool("a process died")
-        return run(task)
+class Fragile:
+    """Takes its time, and breaks off all that is in hand at every task of block 1."""
 
-    (known,) = computed(study_of(), tmp_path / "out", Here(deadly))
+    count = 2
 
-    assert known.failures == ["the process that computed it died, three times"]
-    assert len(known.results) == 2
+    def __init__(self):
+        self._lock, self._pending = Lock(), []
+
+    def _finish(self, future, task):
+        with self._lock:
+            if not future.done():
+                future.set_result(run(task))
+
+    def submit(self, task):
+        future = Future()
+        with self._lock:
+            self._pending.append(future)
+            if task.block == 1:
+                for pending in self._pending:
+                    if not pending.done():
+                        pending.set_exception(BrokenProcessPool("a process died"))
+        Timer(0.02, self._finish, (future, task)).start()
+        return future
+
+
+def test_a_task_that_kills_workers_fails_alone(study_of, tmp_path):
+    study = study_of(NOISES, ("least = 2\nmost = 4", "least = 4\nmost = 4"))
+
+    found = computed(study, tmp_path / "out", Fragile())
+
+    for known in found:
+        assert known.failures == ["the process that computed it died, and so did a second one"]
+        assert [block for block, result in known.results.items() if isinstance(result, str)] == [1]
+        assert sorted(known.results) == [0, 1, 2, 3]
+
+
+def test_an_infinite_error_is_a_failure_not_a_number():
+    with pytest.raises(Refusal, match="the arithmetic overflowed"):
+        Moments.of(np.array([1.0, np.inf]))
 
 
 def test_a_folder_of_another_study_or_of_none_is_refused(study_of, tmp_path):

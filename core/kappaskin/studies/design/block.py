@@ -13,7 +13,7 @@ from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, Fit
 from kappaskin.frames import Array, Touch, Truth
 from kappaskin.mechanics import Plate
-from kappaskin.scene import Scene
+from kappaskin.scene import Scene, kept_of
 from kappaskin.simulate import Simulator
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.setup import Setup
@@ -124,7 +124,7 @@ def block_of(setup: Setup, estimator: Estimator, seed: int) -> Block:
 
 def _compensated(scene: Scene, read: Array) -> Array:
     """Readings (T, 3 P) in 1/m, one after the other, with the scene's loops undone."""
-    loops = [effect for effect in scene.effects if isinstance(effect, Hysteresis)]
+    loops = [effect for effect in kept_of(scene) if isinstance(effect, Hysteresis)]
     if not loops:
         raise Refusal("expected a scene with hysteresis to compensate, got none of it")
     undo = loops[0].operator(read.shape[1]).inverse.start()

@@ -14,7 +14,6 @@ from kappaskin.studies.design.task import Measured, Task, version
 from kappaskin.studies.design.workers import Workers, gone
 
 _AHEAD = 3  # tasks in hand for each worker: one at work, the others on their way
-_DEATHS = 3  # of workers at the same task: then it is what kills them
 _TELL = 0.5  # s between two words about the progress, at least
 
 
@@ -46,11 +45,18 @@ class _Run:
         self._first = ((known, block) for known in self.known for block in range(study.stop.least))
         self._next = deque[tuple[Known, int]]()
         self._running = dict["Future[Measured]", tuple[Known, Task]]()
-        self._deaths = dict[str, int]()
+        self._suspects, self._alone = set[str](), deque[tuple[Known, Task]]()
         self.progress = Progress(len(self.known) * study.stop.least, time.monotonic())
 
     def fill(self) -> bool:
-        """Hand out tasks until all workers have enough; whether any are at work."""
+        """Hand out tasks until all workers have enough; whether any are at work.
+
+        A task that was in hand when a worker died may be what kills them: it is handed out alone.
+        """
+        if self._alone:
+            if not self._running:
+                self._submit(*self._alone.popleft())
+            return True
         while len(self._running) < _AHEAD * self._workers.count:
             known, block = self._next.popleft() if self._next else next(self._first, (None, 0))
             if known is None:
@@ -60,8 +66,11 @@ class _Run:
                 self.progress.found += 1
                 self._take(known, block, result)
             else:
-                self._running[self._workers.submit(task)] = known, task
+                self._submit(known, task)
         return bool(self._running)
+
+    def _submit(self, known: Known, task: Task) -> None:
+        self._running[self._workers.submit(task)] = known, task
 
     def collect(self) -> None:
         """Take the results that are there within some time."""
@@ -69,10 +78,11 @@ class _Run:
             known, task = self._running.pop(future)
             result = self._result(future, task)
             if result is None:
-                self._next.append((known, task.block))
-                continue
-            self._folder.keep(task, result)
-            self._take(known, task.block, result)
+                self._suspects.add(task.key)
+                self._alone.append((known, task))
+            else:
+                self._folder.keep(task, result)
+                self._take(known, task.block, result)
 
     def _take(self, known: Known, block: int, result: Measured | str) -> None:
         following = known.take(block, result)
@@ -88,9 +98,8 @@ class _Run:
         except Refusal as refusal:
             return str(refusal)
         except BrokenExecutor:
-            # Every task in hand is told so, and one of them may be what kills workers.
-            deaths = self._deaths[task.key] = self._deaths.get(task.key, 0) + 1
-            return None if deaths < _DEATHS else "the process that computed it died, three times"
+            again = task.key in self._suspects
+            return "the process that computed it died, and so did a second one" if again else None
         except CancelledError:
             raise gone() from None
         except Exception as error:  # whatever there is wrong with one task, the others go on

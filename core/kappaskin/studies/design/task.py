@@ -42,6 +42,8 @@ class Moments:
 
     @classmethod
     def of(cls, values: Array) -> "Moments":
+        if np.isinf(values).any():
+            raise Refusal("expected finite errors, got infinity: the arithmetic overflowed")
         known = values[~np.isnan(values)]
         if not len(known):
             return cls(0, 0.0, 0.0)
