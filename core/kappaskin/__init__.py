@@ -95,6 +95,9 @@ from kappaskin.patch import Patch as Patch
 from kappaskin.patch import Polygon as Polygon
 from kappaskin.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline import Setup as Setup
+from kappaskin.placement import PLACEMENTS as PLACEMENTS
+from kappaskin.placement import elements_placed as elements_placed
+from kappaskin.placement import predicted_sd as predicted_sd
 from kappaskin.press import Phase as Phase
 from kappaskin.press import PressTest as PressTest
 from kappaskin.press import Verdict as Verdict

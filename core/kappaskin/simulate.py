@@ -85,7 +85,7 @@ class Simulator:
     def _start_effects(self) -> None:
         shape = (3 * len(self.scene.layout),)
         self._effects = [
-            effect.start(shape, _stream(self.scene.seed, effect.name))
+            (effect.start(shape, _stream(self.scene.seed, effect.name)), effect.at_once)
             for effect in _of_readings(self._kept)
         ]
         self._link = [
@@ -152,11 +152,30 @@ class Simulator:
     def reading(self, scan: Scan, time: float) -> tuple[Truth | None, Array]:
         """The truth, and the curvature (3 P,) in 1/m that is read; dead channels read nothing."""
         truth, curvature = self._true(scan, time)
-        for effect in self._effects:
+        for effect, _ in self._effects:
             curvature = effect(curvature, time)
         if self._dead is not None:
             curvature[self._dead] = 0.0
         return truth, curvature
+
+    def readings(self, scan: Scan, times: Array) -> tuple[list[Truth | None], Array]:
+        """The truths, and the curvature (T, 3 P) in 1/m that is read, of frames at `times` (T,).
+
+        As `reading` gives them one after the other, each effect on all frames before the next. Of
+        a skin that nothing moves on there is one truth.
+        """
+        moments = times.tolist() if self.scene.moves or self.scene.laid else times[:1].tolist()
+        truths, each = zip(*(self._true(scan, time) for time in moments), strict=True)
+        curvature = np.array(each) if len(each) == len(times) else np.tile(each, (len(times), 1))
+        for effect, at_once in self._effects:
+            if at_once:
+                curvature = effect(curvature, math.nan)
+            else:
+                frames = zip(curvature, times.tolist(), strict=True)
+                curvature = np.array([effect(frame, time) for frame, time in frames])
+        if self._dead is not None:
+            curvature[:, self._dead] = 0.0
+        return list(truths), curvature
 
     def temperature(self, time: float) -> float:
         """The skin's temperature in degrees Celsius at device `time`; NaN where none is simulated.

@@ -193,3 +193,22 @@ def test_every_frame_of_the_moving_scene_can_be_made():
     turn = 2 * np.pi * np.arange(50) / 50  # once round in 4 s, 2000 frames
     expected = 0.05 + 0.022 * np.column_stack([np.cos(turn), np.sin(turn)])
     np.testing.assert_allclose(contacts, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "name", ["centre", "circle", "tapping", "calibration", "failing-elements", "creep-hold"]
+)
+def test_frames_at_once_are_those_one_after_the_other(name):
+    scene = load_scene(name)
+    times = np.arange(12) / scene.rate
+    one_by_one, at_once = Simulator(scene), Simulator(scene)
+    scan = scene.sensor().scan()
+
+    truths, read = at_once.readings(scan, times)
+
+    each = [one_by_one.reading(scan, time) for time in times.tolist()]
+    np.testing.assert_array_equal(read, [curvature for _, curvature in each])
+    assert len(truths) == (12 if scene.moves or scene.laid else 1)
+    for truth, (expected, _) in zip(truths, each, strict=False):
+        if expected is not None:
+            np.testing.assert_array_equal(truth.coefficients, expected.coefficients)

@@ -15,6 +15,7 @@ class Quantisation(ReadingEffect):
     """Curvature is that of the count next to it, as `transduction` counts: no rails, only steps."""
 
     name: ClassVar = "quantisation"
+    at_once: ClassVar = True
     formula: ClassVar = "half a count over peak curvature"
 
     transduction: Transduction
@@ -34,6 +35,7 @@ class Saturation(ReadingEffect):
     """Curvature stays between the lowest and the highest count of `transduction`."""
 
     name: ClassVar = "saturation"
+    at_once: ClassVar = True
     formula: ClassVar = "largest curvature over that at the rail on its side"
 
     transduction: Transduction

@@ -55,6 +55,9 @@ class Effect(ABC):
 class ReadingEffect(Effect):
     """An effect that changes one reading after the other, from curvature to curvature."""
 
+    at_once: ClassVar[bool] = False
+    """Whether at work it takes many frames (T, C) in one call, as it would one after the other."""
+
     @abstractmethod
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
         """The effect at work on curvature of `shape`, at rest, with a state of its own.

@@ -21,6 +21,7 @@ class UniformNoise(ReadingEffect):
     """Noise even between -sqrt(3) rms and sqrt(3) rms, in 1/m (the paper's, section 4)."""
 
     name: ClassVar = "uniform-noise"
+    at_once: ClassVar = True
     formula: ClassVar = "RMS of the noise over peak curvature"
 
     rms: Annotated[float, _RMS]
@@ -32,7 +33,7 @@ class UniformNoise(ReadingEffect):
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
         from kappaskin.effects.at_work.noise import uniform
 
-        return uniform(self.rms, shape, rng)
+        return uniform(self.rms, rng)
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class GaussianNoise(ReadingEffect):
     """Normal noise of standard deviation `rms`, in 1/m."""
 
     name: ClassVar = "gaussian-noise"
+    at_once: ClassVar = True
     formula: ClassVar = "RMS of the noise over peak curvature"
 
     rms: Annotated[float, _RMS]
@@ -51,4 +53,4 @@ class GaussianNoise(ReadingEffect):
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
         from kappaskin.effects.at_work.noise import gaussian
 
-        return gaussian(self.rms, shape, rng)
+        return gaussian(self.rms, rng)

@@ -20,6 +20,7 @@ class Tolerance(ReadingEffect):
     """
 
     name: ClassVar = "tolerance"
+    at_once: ClassVar = True
     formula: ClassVar = "spread of the gains, plus that of the offsets over peak curvature"
 
     gain_sd: Annotated[float, Within(0, 10)]

@@ -14,8 +14,10 @@ from kappaskin.scene.playing import FROM_THE_BEGINNING as FROM_THE_BEGINNING
 from kappaskin.scene.playing import Playing as Playing
 from kappaskin.scene.pressing import Pressed as Pressed
 from kappaskin.scene.pressing import Pressing as Pressing
+from kappaskin.scene.read import parsed as parsed
 from kappaskin.scene.read import read_scene as read_scene
 from kappaskin.scene.read import read_scene_text as read_scene_text
+from kappaskin.scene.read import scene_of as scene_of
 from kappaskin.scene.ready import DEFAULT_SCENE as DEFAULT_SCENE
 from kappaskin.scene.ready import SCENES as SCENES
 from kappaskin.scene.ready import TABLE_1_NOISE as TABLE_1_NOISE

@@ -3,13 +3,15 @@
 import re
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([\w.\-\"' ]+?)\s*\]\]?\s*(#.*)?$")
-_KEY = re.compile(r"\s*([\w\-\"'.]+)\s*=")
+_KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w\-"'.]+)\s*=""")
 
 Place = tuple[str | int, ...]
 """The way to a value: keys, and numbers from 0 where tables come in arrays."""
 
 
 def _names(dotted: str) -> list[str]:
+    if dotted[0] == dotted[-1] and dotted.count(dotted[0]) == 2 and dotted[0] in "\"'":
+        return [dotted[1:-1]]
     return [name.strip().strip("\"'") for name in dotted.split(".")]
 
 

@@ -64,18 +64,26 @@ ELSEWHERE = {
 LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 
 
-def read_scene(text: str, file: FilePath) -> Scene:
-    """The scene that `text`, of `file`, describes; files that it names lie beside it."""
-    name, folder = file.stem, file.parent
+def parsed(text: str, file: FilePath) -> dict[str, Any]:
+    """What the TOML `text`, of `file`, says."""
     try:
         if _DEEP.search(text):
             raise RecursionError
-        said = tomllib.loads(text)
+        return tomllib.loads(text)
     except ValueError as error:  # a whole number of thousands of digits is one of these, too
         raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
     except RecursionError as error:
         raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
-    top = Table(said, Lines(text), str(file))
+
+
+def read_scene(text: str, file: FilePath) -> Scene:
+    """The scene that `text`, of `file`, describes; files that it names lie beside it."""
+    return scene_of(Table(parsed(text, file), Lines(text), str(file)), file)
+
+
+def scene_of(top: Table, file: FilePath) -> Scene:
+    """The scene that a file says at its `top`, besides what somebody else has asked for there."""
+    name, folder = file.stem, file.parent
     if (version := top.get("format", int)) != FORMAT:
         raise top.refusal(
             f"expected a scene of format {FORMAT}, got {version}; get a newer kappaskin"

@@ -1,7 +1,7 @@
 """A table of a TOML file to values of the kinds asked for; what nobody asks for is refused."""
 
 import difflib
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from types import UnionType
@@ -50,6 +50,20 @@ class Table:
 
     def __contains__(self, key: str) -> bool:
         return key in self._said
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._said)
+
+    def is_table(self, key: str) -> bool:
+        """Whether there is a table at `key`."""
+        return isinstance(self._said[key], dict)
+
+    def listed(self, key: str) -> list[Any]:
+        """The list at `key`, of values of any kind."""
+        self._asked.add(key)
+        if not isinstance(said := self._said[key], list):
+            raise self.refusal(f"expected a list, got {said!r:.60}", key)
+        return cast("list[Any]", said)
 
     def get(
         self, key: str, kind: Any, default: Any = _REQUIRED, within: Within | None = None
@@ -117,7 +131,10 @@ class Table:
 
     def choose(self, key: str, among: dict[str, _Made], default: Any = _REQUIRED) -> _Made:
         """What the name at `key` stands for."""
-        name = self.get(key, str, default)
+        return self.stands_for(self.get(key, str, default), key, among)
+
+    def stands_for(self, name: str, key: str, among: dict[str, _Made]) -> _Made:
+        """What a `name` that was said at `key` stands for."""
         if name not in among:
             near = "".join(f"; did you mean {one!r}?" for one in _nearest(name, list(among)))
             raise self.refusal(f"expected one of {', '.join(among)}, got {name!r}{near}", key)

@@ -17,8 +17,12 @@ _Item = TypeVar("_Item")
 _GRACE = 1.0  # s to clear up in once the one that asked is gone
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """End this process soon after the one that started it, whatever is being computed."""
+    threading.Thread(target=_watch_parent, name="parent-watcher", daemon=True).start()
+
+
+def _watch_parent() -> None:
     if parent := multiprocessing.parent_process():
         parent.join()
         time.sleep(_GRACE)
@@ -30,7 +34,7 @@ def _tell(
 ) -> None:
     """What the child process does: each item in a tuple, a refusal, and None at the end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
-    threading.Thread(target=_end_with_parent, name="parent-watcher", daemon=True).start()
+    end_with_parent()
     with suppress(OSError):  # who asked has gone
         try:
             for item in make(*about):

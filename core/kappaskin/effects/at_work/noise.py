@@ -7,10 +7,10 @@ import numpy as np
 from kappaskin.effects.effect import Running
 
 
-def uniform(rms: float, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
+def uniform(rms: float, rng: np.random.Generator) -> Running:
     limit = math.sqrt(3) * rms
-    return lambda curvature, _: curvature + rng.uniform(-limit, limit, shape)
+    return lambda curvature, _: curvature + rng.uniform(-limit, limit, curvature.shape)
 
 
-def gaussian(rms: float, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
-    return lambda curvature, _: curvature + rng.normal(0.0, rms, shape)
+def gaussian(rms: float, rng: np.random.Generator) -> Running:
+    return lambda curvature, _: curvature + rng.normal(0.0, rms, curvature.shape)

@@ -15,6 +15,7 @@ from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, estimator_for
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
+from kappaskin.patch import Patch
 from kappaskin.scan import Scan
 from kappaskin.scene import Pressed, Pressing, Scene, moments_of, planned
 from kappaskin.sensor import Sensor
@@ -82,9 +83,8 @@ class _Truth:
     at_load: Array
 
 
-def points_on(scene: Scene) -> Array:
+def points_on(patch: Patch) -> Array:
     """The points (G, 2) of the skin over which errors are averaged."""
-    patch = scene.plate.patch
     x, y = patch.grid(_POINTS, 2 if patch.strip else _POINTS)
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     return points[patch.contains(points)]
@@ -139,7 +139,7 @@ class Bench:
 
     @cached_property
     def _points(self) -> Array:
-        return points_on(self.scene)
+        return points_on(self.scene.plate.patch)
 
     @cached_property
     def _truth(self) -> _Truth:

@@ -121,7 +121,7 @@ class _Judge:
     def __init__(self, scene: Scene, setting: Setting, contact: Array) -> None:
         self._setting = setting
         self._basis = basis_for(scene.plate.patch, scene.edge, *setting.functions)
-        points = points_on(scene)
+        points = points_on(scene.plate.patch)
         self._at, self._true_at = self._basis.at(points), scene.basis.at(points)
         self._scanned = SCANS[setting.scanned](scene.layout, contact)
         frames = np.arange(SETTLING + _EACH) / scene.rate

@@ -1,0 +1,98 @@
+"""Blocks of a point to what is known of each measure there, and to how many more it takes."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import special
+
+from kappaskin.frames import Array
+from kappaskin.studies.design.study import Point, Study
+from kappaskin.studies.design.task import Measured, Moments
+
+_MORE = 1.5  # times the blocks that were not enough
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The `mean` of a measure with the `half` width of its 95 % interval, and the `sd` of a value.
+
+    Blocks are independent of each other, frames of one may not be: the interval is Student's of
+    the means of the blocks. NaN where nothing is known.
+    """
+
+    mean: float
+    half: float
+    sd: float
+    count: int
+
+    @classmethod
+    def of(cls, blocks: list[Moments]) -> "Mean":
+        some = [block for block in blocks if block.count]
+        count = sum(block.count for block in some)
+        if not some:
+            return cls(math.nan, math.nan, math.nan, 0)
+        means = np.array([block.mean for block in some])
+        weights = np.array([block.count for block in some]) / count
+        mean = float(weights @ means)
+        squares = sum(block.squares + block.count * (block.mean - mean) ** 2 for block in some)
+        sd = math.sqrt(squares / (count - 1)) if count > 1 else math.nan
+        return cls(mean, _half(means, weights, mean), sd, count)
+
+    def within(self, share: float) -> bool:
+        """Whether the interval reaches no further than this share of the mean."""
+        return self.half <= share * abs(self.mean)
+
+
+def _half(means: Array, weights: Array, mean: float) -> float:
+    B = len(means)
+    if B < 2:
+        return math.nan
+    variance = B / (B - 1) * float(np.sum((weights * (means - mean)) ** 2))
+    return float(special.stdtrit(B - 1, 0.975)) * math.sqrt(variance)
+
+
+@dataclass(eq=False)
+class Known:
+    """What is known of one `point`: the results of its blocks by number, or why they failed."""
+
+    point: Point
+    study: Study
+    results: dict[int, Measured | str] = field(default_factory=dict)
+    wanted: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.wanted = self.study.stop.least
+
+    def take(self, block: int, result: Measured | str) -> range:
+        """Numbers of the blocks to compute next, when `block` was the last of those wanted.
+
+        They follow from the results of all before alone, whoever computed them in whatever order.
+        """
+        self.results[block] = result
+        if len(self.results) < self.wanted or self.failures or self.enough:
+            return range(0)
+        before = self.wanted
+        self.wanted = min(math.ceil(_MORE * before), self.study.stop.most)
+        return range(before, self.wanted)
+
+    @property
+    def failures(self) -> list[str]:
+        """Why blocks failed."""
+        return [result for result in self.results.values() if isinstance(result, str)]
+
+    @property
+    def complete(self) -> bool:
+        """Whether all blocks that it takes were computed."""
+        return len(self.results) == self.wanted
+
+    @property
+    def enough(self) -> bool:
+        """Whether all that is to be known well is."""
+        stop = self.study.stop
+        return all(self.mean(name).within(stop.within) for name in stop.of)
+
+    def mean(self, measure: str) -> Mean:
+        """What is known of a measure, from its blocks in order."""
+        each = [self.results[block] for block in sorted(self.results)]
+        return Mean.of([result[measure] for result in each if not isinstance(result, str)])

@@ -1,0 +1,328 @@
+"""A study at work: the same numbers whoever computes them, each once, and what is left of it."""
+
+import json
+import math
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from threading import Lock, Timer
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from kappaskin import LeastSquares, Patch, Refusal, Simulator, SineBasis
+from kappaskin.studies.design import Folder, Task, known_of, run, run_study
+from kappaskin.studies.design.known import Known, Mean
+from kappaskin.studies.design.task import Moments, version
+
+NOISES = '[[vary]]\n"effects.uniform-noise.rms" = [0.1, 0.4]\n'
+DRAWN = NOISES + '[[draw]]\nwhat = "touch[1].x"\nkind = "uniform"\nlow = 0.03\nhigh = 0.07\n'
+GRID = Patch(0.1, 0.1).grid(101, 101)
+
+
+class Here:
+    """Computes in this process, as `done` says, at once."""
+
+    count = 2
+
+    def __init__(self, done=run):
+        self.done, self.tasks = done, list[Task]()
+
+    def submit(self, task):
+        self.tasks.append(task)
+        future = Future()
+        try:
+            future.set_result(self.done(task))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def quiet(line):
+    pass
+
+
+def computed(study, path, workers=None):
+    return run_study(study, Folder.opened(path, study), workers or Here(), quiet)
+
+
+def results(known):
+    return [one.results for one in known]
+
+
+def task_of(study, block=0):
+    return Task(next(study.points()).document, block, version())
+
+
+def test_a_block_is_what_a_loop_over_its_frames_gives(study_of):
+    study = study_of("", ("frames = 5", "frames = 40"))
+    task = task_of(study)
+    scene = replace(study.base.scene, seed=task.seed)
+    fit = LeastSquares(SineBasis(scene.plate.patch, 4, 4), scene.layout)
+    fitted, true = (basis.on_grid(*GRID) for basis in (fit.basis, scene.basis))
+    simulator, scan = Simulator(scene), scene.sensor().scan()
+    errors = []
+    for time in (np.arange(40) / scene.rate).tolist():
+        truth, read = simulator.reading(scan, time)
+        off = fitted(fit(read.reshape(3, -1)).coefficients) - true(truth.coefficients)
+        errors.append(np.sqrt(np.mean(off**2)))
+
+    found = run(task)["rms"]
+
+    assert found.count == 40
+    np.testing.assert_allclose(found.mean, np.mean(errors), rtol=1e-12)
+    np.testing.assert_allclose(found.squares, 40 * np.var(errors), rtol=1e-10)
+
+
+def test_a_task_gives_the_same_numbers_whatever_else_is_measured(study_of):
+    few, many = study_of(DRAWN), study_of(DRAWN, ('["rms"]', '["covered", "rms"]'))
+
+    assert run(task_of(few))["rms"] == run(task_of(many))["rms"]
+    assert run(task_of(few)) == run(task_of(few))
+
+
+def test_blocks_points_and_seeds_differ(study_of):
+    one, two = study_of(DRAWN).points()
+    other = study_of(DRAWN, ("rate", "seed = 7\nrate"))
+    documents = [one.document, two.document, next(other.points()).document]
+
+    tasks = [Task(document, block, version()) for document in documents for block in (0, 1)]
+
+    assert len({task.seed for task in tasks}) == len({task.key for task in tasks}) == 6
+    assert len({run(task)["rms"].mean for task in tasks}) == 6
+
+
+def test_title_and_text_change_no_result(study_of):
+    told = study_of("", ("rate", 'title = "Other"\ntext = "words"\nrate'))
+
+    assert task_of(told).key == task_of(study_of()).key
+
+
+def test_another_version_is_refused(study_of):
+    task = replace(task_of(study_of()), version="kappaskin 9, meaning 9")
+
+    with pytest.raises(Refusal, match="expected a worker with kappaskin 9"):
+        run(task)
+
+
+@pytest.mark.parametrize("workers", [1, 7])
+def test_numbers_and_blocks_do_not_depend_on_the_number_of_workers(study_of, tmp_path, workers):
+    study, one = study_of(DRAWN, ("least = 2", "within = 0.2\nleast = 2")), Here()
+    other = Here()
+    other.count = workers
+
+    first = computed(study, tmp_path / "first", one)
+
+    assert results(computed(study, tmp_path / "other", other)) == results(first)
+    assert {len(known.results) for known in first} <= {2, 3, 4}
+
+
+def test_what_is_computed_is_not_computed_again(study_of, tmp_path):
+    study, again = study_of(NOISES), Here()
+    first = computed(study, tmp_path / "out")
+
+    second = computed(study, tmp_path / "out", again)
+
+    assert not again.tasks
+    assert results(second) == results(first) == results(known_of(study, Folder(tmp_path / "out")))
+
+
+def test_a_stopped_study_goes_on_where_it_was(study_of, tmp_path):
+    study, rest = study_of(NOISES), Here()
+
+    def stopped(task):
+        if len(stopping.tasks) > 3:
+            raise KeyboardInterrupt
+        return run(task)
+
+    stopping = Here(stopped)
+    with pytest.raises(KeyboardInterrupt):
+        computed(study, tmp_path / "out", stopping)
+    known = sum(len(one.results) for one in known_of(study, Folder(tmp_path / "out")))
+    second = computed(study, tmp_path / "out", rest)
+
+    assert results(second) == results(computed(study, tmp_path / "whole"))
+    assert len(rest.tasks) == sum(len(one.results) for one in second) - known
+
+
+def test_a_changed_study_computes_only_what_changed(study_of, tmp_path):
+    computed(study_of(NOISES), tmp_path / "out")
+    more, again = study_of(NOISES.replace("[0.1, 0.4]", "[0.1, 0.2, 0.4]")), Here()
+
+    computed(more, tmp_path / "out", again)
+
+    noises = {json.loads(task.document)["effects"]["uniform-noise"]["rms"] for task in again.tasks}
+    assert noises == {0.2}
+
+
+def test_a_damaged_result_is_computed_again(study_of, tmp_path):
+    study, again = study_of(), Here()
+    first = computed(study, tmp_path / "out")
+    file = next((tmp_path / "out" / "results").rglob("*.json"))
+    file.write_text(file.read_text()[:-20])
+
+    assert results(computed(study, tmp_path / "out", again)) == results(first)
+    assert len(again.tasks) == 1
+
+
+def test_a_failing_point_does_not_stop_the_rest_and_is_tried_again(study_of, tmp_path):
+    study = study_of('[[vary]]\n"fit.functions" = [[4, 4], [9, 9]]\n')
+
+    good, bad = computed(study, tmp_path / "out")
+
+    assert not good.failures
+    assert "use at most 6 x 6 functions" in bad.failures[0]
+    assert len(bad.results) == study.stop.least
+    again = Here()
+    computed(study, tmp_path / "out", again)
+    assert len(again.tasks) == study.stop.least
+
+
+def test_any_error_of_a_task_is_told_with_its_kind(study_of, tmp_path):
+    def broken(task):
+        raise MemoryError("no room")
+
+    (known,) = computed(study_of(), tmp_path / "out", Here(broken))
+
+    assert known.failures == ["MemoryError: no room"] * 2
+
+
+def test_tasks_of_a_worker_that_died_are_given_to_another(study_of, tmp_path):
+    deaths = []
+
+    def dying(task):
+        if len(deaths) < 2:
+            deaths.append(task.key)
+            raise BrokenProcessPool("a process died")
+        return run(task)
+
+    study = study_of(NOISES)
+
+    found = computed(study, tmp_path / "out", Here(dying))
+
+    assert len(deaths) == 2
+    assert results(found) == results(computed(study, tmp_path / "whole"))
+
+
+class Fragile:
+    """Takes its time, and breaks off all that is in hand at every task of block 1."""
+
+    count = 2
+
+    def __init__(self):
+        self._lock, self._pending = Lock(), []
+
+    def _finish(self, future, task):
+        with self._lock:
+            if not future.done():
+                future.set_result(run(task))
+
+    def submit(self, task):
+        future = Future()
+        with self._lock:
+            self._pending.append(future)
+            if task.block == 1:
+                for pending in self._pending:
+                    if not pending.done():
+                        pending.set_exception(BrokenProcessPool("a process died"))
+        Timer(0.02, self._finish, (future, task)).start()
+        return future
+
+
+def test_a_task_that_kills_workers_fails_alone(study_of, tmp_path):
+    study = study_of(NOISES, ("least = 2\nmost = 4", "least = 4\nmost = 4"))
+
+    found = computed(study, tmp_path / "out", Fragile())
+
+    for known in found:
+        assert known.failures == ["the process that computed it died, and so did a second one"]
+        assert [block for block, result in known.results.items() if isinstance(result, str)] == [1]
+        assert sorted(known.results) == [0, 1, 2, 3]
+
+
+def test_an_infinite_error_is_a_failure_not_a_number():
+    with pytest.raises(Refusal, match="the arithmetic overflowed"):
+        Moments.of(np.array([1.0, np.inf]))
+
+
+def test_a_folder_of_another_study_or_of_none_is_refused(study_of, tmp_path):
+    study = study_of()
+    Folder.opened(tmp_path / "out", study)
+
+    with pytest.raises(Refusal, match="got that of small; choose another"):
+        Folder.opened(tmp_path / "out", replace(study, name="large"))
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "cat.png").touch()
+    with pytest.raises(Refusal, match="expected the folder of a study"):
+        Folder.opened(tmp_path / "photos", study)
+    (tmp_path / "file").touch()
+    with pytest.raises(Refusal, match="expected a folder that can be written to"):
+        Folder.opened(tmp_path / "file", study)
+
+
+def test_the_rule_stops_where_the_interval_is_narrow_enough(study_of, tmp_path):
+    stop = ("least = 2\nmost = 4", 'least = 3\nmost = 99\nwithin = 0.06\nof = ["rms"]')
+
+    (known,) = computed(study_of("", stop), tmp_path / "out")
+
+    mean = known.mean("rms")
+    assert mean.half <= 0.06 * mean.mean
+    assert 3 < len(known.results) < 99
+    # One round before, it was not.
+    before = Mean.of([known.results[n]["rms"] for n in range(math.ceil(len(known.results) / 1.6))])
+    assert before.half > 0.06 * before.mean
+
+
+def test_means_of_blocks_are_those_of_all_their_frames():
+    rng = np.random.default_rng(0)
+    values = [rng.normal(3.0, 1.0, count) for count in (5, 9, 9, 2)]
+
+    found = Mean.of([Moments.of(part) for part in values])
+
+    every = np.concatenate(values)
+    np.testing.assert_allclose([found.mean, found.sd], [every.mean(), every.std(ddof=1)])
+    assert found.count == 25
+
+
+def test_the_interval_of_equal_blocks_is_students_of_their_means():
+    blocks = np.random.default_rng(0).normal(3.0, 1.0, (6, 4))
+
+    found = Mean.of([Moments.of(block) for block in blocks])
+
+    interval = stats.ttest_1samp(blocks.mean(axis=1), 0.0).confidence_interval(0.95)
+    np.testing.assert_allclose([found.mean - found.half, found.mean + found.half], interval)
+
+
+def test_the_order_in_which_blocks_come_changes_no_bit(study_of):
+    study = study_of("", ("least = 2\nmost = 4", "least = 50\nmost = 50"))
+    means = np.random.default_rng(0).normal(3.0, 1.0, 50).tolist()
+    upward, downward = (Known(next(study.points()), study) for _ in range(2))
+
+    for block, mean in enumerate(means):
+        upward.take(block, {"rms": Moments(1, mean, 0.0)})
+    for block, mean in reversed(list(enumerate(means))):
+        downward.take(block, {"rms": Moments(1, mean, 0.0)})
+
+    assert upward.mean("rms") == downward.mean("rms")
+
+
+def test_frames_that_tell_nothing_are_left_out():
+    assert Moments.of(np.array([1.0, np.nan, 3.0])) == Moments(2, 2.0, 2.0)
+    nothing = Mean.of([Moments.of(np.full(3, np.nan))])
+    assert nothing.count == 0
+    assert math.isnan(nothing.mean)
+
+
+def test_intervals_hold_the_mean_as_often_as_they_promise():
+    rng = np.random.default_rng(0)
+
+    def holds():
+        # Blocks that differ from each other more than their frames do: another skin for each.
+        blocks = rng.normal(1.0, 1.0, (8, 1)) + rng.normal(0.0, 0.3, (8, 10))
+        mean = Mean.of([Moments.of(block) for block in blocks])
+        return abs(mean.mean - 1.0) < mean.half
+
+    held = np.mean([holds() for _ in range(800)])
+
+    assert abs(held - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 800)
