@@ -62,10 +62,11 @@ time.sleep(60)
 
 
 @pytest.fixture(scope="session", autouse=True)
-def no_real_orphans(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Lets no app that a test starts take over what a real one left."""
+def no_real_folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Lets no app that a test starts take over what a real one left, or use what it kept."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
 
 
@@ -130,6 +131,7 @@ def _children_of(pid: int) -> set[int]:
 
 
 _NO_WINDOW = (
+    "ahead",
     "drawn",
     "footprint",
     "history",

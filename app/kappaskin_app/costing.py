@@ -45,9 +45,8 @@ _NOISIER = 1.5  # times more or less noise is other noise
 def in_words(setting: Setting, elements: int = 0) -> str:
     """A setting in words; `elements` is how many there are, if known, where they are no grid."""
     name = METHOD_SHORT.get(setting.method, setting.method)
-    times = "\N{THIN SPACE}\N{MULTIPLICATION SIGN}\N{THIN SPACE}"
-    m_n = times.join(map(str, setting.elements)) if setting.elements else str(elements or "")
-    words = f"{name}, {times.join(map(str, setting.functions))} functions"
+    m_n = " x ".join(map(str, setting.elements)) if setting.elements else str(elements or "")
+    words = f"{name}, {' x '.join(map(str, setting.functions))} functions"
     return f"{words}, {m_n} elements" if m_n else words
 
 

@@ -7,7 +7,6 @@ from typing import Any
 from kappaskin_app.settings import Fit, SceneSettings, Settings
 from kappaskin_app.skins import SHAPES
 
-_M = "\N{THIN SPACE}\N{MULTIPLICATION SIGN}\N{THIN SPACE}"
 _PLAIN = {f.name: f.default for kind in (SceneSettings, Fit) for f in fields(kind)}
 
 
@@ -68,13 +67,13 @@ DEMONSTRATIONS = (
         {"dead_elements": _QUARTER, "load_case": "centre", "method": "bayes"},
     ),
     Demonstration(
-        f"Ask for 12{_M}12 from 10{_M}10",
+        "Ask for 12 x 12 from 10 x 10",
         "Functions 11 and 12 look like 9 and 8 at the elements: four mixtures of them, in red, "
         "change no reading. Least squares refuses, and goes on with functions that it can tell.",
         {"functions_x": 12, "functions_y": 12},
     ),
     Demonstration(
-        f"12{_M}12 with a prior",
+        "12 x 12 with a prior",
         "The same readings and functions, but Bayes expects what a plate does: the four mixtures "
         "stay near zero, and the error bars hold how far they may be off.",
         {"functions_x": 12, "functions_y": 12, "method": "bayes"},

@@ -89,7 +89,7 @@ class Display(QObject):
         self.scale.lock.show_locked(locked_at(settings.colour_by, settings) > 0)
         self._allow_lock()
         s = settings
-        self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y))
+        self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y, s.from_z, s.to_z))
         self.membrane.show_options(settings.show_elements, settings.show_truth)
 
     def limit_shown(self) -> float:

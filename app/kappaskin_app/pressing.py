@@ -26,6 +26,7 @@ from kappaskin import (
     basis_for,
     load_scene,
 )
+from kappaskin_app.memo import Memo
 from kappaskin_app.settings import FREE_CASES, LOAD_CASES, SPREAD_CASES, TWO_ENDED, Settings
 
 Array = NDArray[np.float64]
@@ -60,7 +61,6 @@ def reference_on(patch: Patch) -> tuple[int, int]:
     return (REFERENCE[0], 1) if patch.strip else REFERENCE
 
 
-@lru_cache(_REMEMBERED)
 def _tried(plate: Plate, edge: str) -> Compliance | Refusal:
     try:
         return plate.compliance(basis_for(plate.patch, edge, *reference_on(plate.patch)))
@@ -68,9 +68,13 @@ def _tried(plate: Plate, edge: str) -> Compliance | Refusal:
         return refusal
 
 
+tried = Memo(_tried, _REMEMBERED)
+"""How the true shape gives, or why it cannot be told."""
+
+
 def compliance_of(plate: Plate, edge: str) -> Compliance:
     """How the true shape gives, remembered; raises `Refusal` for a skin that nothing holds."""
-    found = _tried(plate, edge)
+    found = tried(plate, edge)
     if isinstance(found, Refusal):
         raise found
     return found

@@ -3,7 +3,6 @@
 import math
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +33,7 @@ from kappaskin import (
     scene_file,
     write_scene,
 )
+from kappaskin_app.memo import Memo
 from kappaskin_app.pressing import compliance_of, free_loads, ready, reference_on, whole_on
 from kappaskin_app.settings import FREE_CASES, READY_CASES, Settings, Written
 from kappaskin_app.skins import SHAPES
@@ -147,13 +147,12 @@ def scene_of(settings: Settings) -> Scene:
 
 def _read(written: Written) -> Scene:
     """The scene that is written, read and planned once."""
-    scene = _scene_or_why(written)
+    scene = scene_or_why(written)
     if isinstance(scene, str):
         raise Refusal(scene)
     return scene
 
 
-@lru_cache(_REMEMBERED)
 def _scene_or_why(written: Written) -> Scene | str:
     try:
         scene = read_scene(written.text, written.file)
@@ -163,10 +162,10 @@ def _scene_or_why(written: Written) -> Scene | str:
     return scene
 
 
-@lru_cache(_REMEMBERED)
-def played(scene: Scene) -> Scene:
-    """The scene as it is played: what its effects are is decided, here and not in the engine."""
-    return planned(scene)
+scene_or_why = Memo(_scene_or_why, _REMEMBERED)
+"""The scene that is written and can be planned, or why there is none."""
+played = Memo(planned, _REMEMBERED)
+"""The scene as it is played: what its effects are is decided, here and not in the engine."""
 
 
 def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:

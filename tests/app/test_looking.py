@@ -57,3 +57,13 @@ def test_what_is_beyond_the_box_is_cut_away_and_comes_back(
     drawn = len(window.membrane.ages)
     until(lambda: len(window.membrane.ages) > drawn + 2)
     assert colours_in(window, window.membrane) > 0.7 * whole
+
+
+def test_what_is_above_a_level_is_cut_away(window: MainWindow, until, colours_in) -> None:
+    whole = colours_in(window, window.membrane)
+
+    for cut, seen in (({"to_z": 0.02}, False), ({"to_z": 1.0}, True)):
+        window.history.change("Cut", -1, **cut)
+        drawn = len(window.membrane.ages)
+        until(lambda drawn=drawn: len(window.membrane.ages) > drawn + 2)
+        assert (colours_in(window, window.membrane) > 0.7 * whole) == seen

@@ -549,7 +549,7 @@ def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> No
             seen.append(renderer.GetViewPoint()[:2])
         assert np.abs(seen).max() < 1, name
         assert np.ptp(seen, axis=0).max() > 1, name  # and large
-        written = [bool(label.GetVisibility()) for label in window.membrane.labels]
+        written = [bool(label.GetVisibility()) for label in window.membrane.sides.labels]
         end_on = {"look-along-x": 1, "look-along-y": 2}.get(name)
         assert written == [number != end_on for number in range(3)], name
 

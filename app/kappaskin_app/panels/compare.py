@@ -34,7 +34,7 @@ _ASKS = (
 )
 _COLUMNS = ("", "A", "B", "B \N{MINUS SIGN} A")
 _ROW = 21  # px
-_DIGITS = 46  # of room for the figures
+_DIGITS = 51  # of room for the figures
 _MICROMETRES, _MILLIMETRES = 1e6, 1e3
 _SURFACE = "Displacement of the skin, on the scale of A and B together; the cross is the contact."
 _DIFFERENCE = "B less A, in \N{MICRO SIGN}m on a scale of its own."

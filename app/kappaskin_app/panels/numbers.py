@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -19,6 +20,8 @@ from kappaskin import Estimate, Sensor
 from kappaskin_app.guard import guarded
 from kappaskin_app.table import ELEMENTS, FACTS, Rows, csv_of, elements_of, facts_of
 
+_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _ROOM = 6  # px above and below a line together
 _EVERY = 0.5  # s between two readings: faster cannot be read
 
@@ -81,7 +84,9 @@ def _fill(table: QTableWidget, rows: Rows) -> None:
         for column, text in enumerate(texts):
             item = table.item(row, column)
             if item is None:
-                table.setItem(row, column, QTableWidgetItem(text))
-            elif item.text() != text:
+                item = QTableWidgetItem()
+                table.setItem(row, column, item)
+            if item.text() != text:
                 item.setText(text)
                 item.setToolTip(text)
+                item.setTextAlignment(_RIGHT if text[-1:].isdigit() else _LEFT)

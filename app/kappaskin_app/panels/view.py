@@ -13,6 +13,6 @@ class ViewPanel(Form):
             *("colour_by", "colour_from", "maps", "one_range"),
             *("exaggeration", "show_elements", "show_truth", "show_directions", "show_band"),
             *("show_frame", "show_object", "show_pressed", "from_x", "to_x", "from_y", "to_y"),
-            *("theme", "letters"),
+            *("from_z", "to_z", "theme", "letters"),
         )
         super().__init__("View", names, parent)

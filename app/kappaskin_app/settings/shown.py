@@ -77,6 +77,14 @@ def _cut(side: str, axis: str) -> Range:
     return Range(f"{side} {axis}", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
 
 
+def _cut_level(side: str, beyond: str) -> Range:
+    tip = (
+        f"Cut away what is drawn {beyond} this level, from as deep (0 %) to as high (100 %) as "
+        "the skin may be drawn."
+    )
+    return Range(f"{side} height", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
+
+
 @dataclass(frozen=True)
 class View:
     """How the skin is shown."""
@@ -184,6 +192,8 @@ class View:
     to_x: float = asked(1.0, _cut("To", "x"))
     from_y: float = asked(0.0, _cut("From", "y"))
     to_y: float = asked(1.0, _cut("To", "y"))
+    from_z: float = asked(0.0, _cut_level("From", "below"))
+    to_z: float = asked(1.0, _cut_level("To", "above"))
     theme: str = asked(
         "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
     )

@@ -2,40 +2,40 @@
 
 from typing import Any
 
+import numpy as np
 from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPlaneCollection
 
 from kappaskin_app.views.drawn import DrawnSkin
 
-Shares = tuple[float, float, float, float]
+Shares = tuple[float, float, float, float, float, float]
 
-WHOLE: Shares = (0.0, 1.0, 0.0, 1.0)
+WHOLE: Shares = (0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
 """Nothing is cut away."""
+_EDGE = 1e-3  # of the box: a skin that is drawn just as deep as it may be is not cut there
 
 
 class Box:
-    """Four planes across x and y; they hold for every actor that it was told to cut."""
+    """Six planes across x, y and the height; they hold for every actor that it was told to cut."""
 
     def __init__(self) -> None:
-        self._planes = [vtkPlane() for _ in range(4)]
+        self._planes = [vtkPlane() for _ in range(6)]
         self._all, self._none = vtkPlaneCollection(), vtkPlaneCollection()
-        for plane in self._planes:
+        for number, plane in enumerate(self._planes):
             self._all.AddItem(plane)
+            inward = [0.0, 0.0, 0.0]
+            inward[number // 2] = 1.0 if number % 2 == 0 else -1.0
+            plane.SetNormal(*inward)
         self.shares = WHOLE
 
     def show(self, skin: DrawnSkin) -> None:
-        """Stand where the skin is, from and to these shares of it along x and y."""
-        x0, x1, y0, y1 = skin.bounds
-        places = [
-            low + share * (high - low)
-            for share, (low, high) in zip(
-                self.shares, ((x0, x1), (x0, x1), (y0, y1), (y0, y1)), strict=True
-            )
-        ]
-        for number, (plane, place) in enumerate(zip(self._planes, places, strict=True)):
-            inward = 1.0 if number % 2 == 0 else -1.0
-            along_x = number < 2
-            plane.SetOrigin(place if along_x else 0.0, 0.0 if along_x else place, 0.0)
-            plane.SetNormal(inward if along_x else 0.0, 0.0 if along_x else inward, 0.0)
+        """Stand where the skin is, from and to these shares of it along x, y and the height."""
+        low, high = (np.repeat(side, 2) for side in skin.bounds)
+        places = low + np.array(self.shares) * (high - low)
+        outwards = np.tile([-_EDGE, _EDGE], 3) * (high - low)
+        for number, place in enumerate(places + outwards):
+            origin = [0.0, 0.0, 0.0]
+            origin[number // 2] = float(place)
+            self._planes[number].SetOrigin(*origin)
 
     def cut(self, actors: Any) -> None:
         """Cut all `actors` that have a mapper, or let them be whole again."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from kappaskin_app.theme import DIVERGING
 from kappaskin_app.views.drawn import MM, DrawnSkin
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,9 @@ class ContactFrame:
         rim = 1 + np.arange(_RIM)
         faces = np.column_stack([np.full(_RIM, 3), np.zeros(_RIM, int), rim, 1 + rim % _RIM])
         self._cone: Any = pv.PolyData(np.zeros((1 + _RIM, 3)), faces=faces.ravel())
-        self.actor = plotter.add_mesh(self._lines, scalars="rgb", rgb=True, line_width=5, **UNLIT)
+        self.actor = plotter.add_mesh(
+            self._lines, scalars="rgb", rgb=True, line_width=pixels(plotter, 5), **UNLIT
+        )
         self.cone = plotter.add_mesh(
             self._cone, color=np.array(_NORMAL) / 255, opacity=0.35, **UNLIT
         )

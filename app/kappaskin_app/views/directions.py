@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from kappaskin_app.theme import DIVERGING
 from kappaskin_app.views.drawn import MM, DrawnSkin
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
@@ -82,6 +82,6 @@ class Directions:
             self._lines,
             scalars="rgb",
             rgb=True,
-            line_width=3,
+            line_width=pixels(self._plotter, 3),
             **UNLIT,
         )

@@ -64,10 +64,10 @@ class DrawnSkin:
         return MM * min(_DEEPEST * min(patch.a, patch.b), _NEAREST * patch.radius)
 
     @property
-    def bounds(self) -> tuple[float, float, float, float]:
-        """From where to where in mm it reaches at rest, along x and along y in space."""
-        low, high = self._rest.min(axis=0), self._rest.max(axis=0)
-        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+    def bounds(self) -> tuple[Array, Array]:
+        """From where to where (3,) in mm it may be drawn, along x, y and upwards in space."""
+        upwards = np.array([0.0, 0.0, self.deepest])
+        return self._rest.min(axis=0) - upwards, self._rest.max(axis=0) + upwards
 
     # Its faces and lines, over the points of the grid.
 

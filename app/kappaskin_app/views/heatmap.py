@@ -330,7 +330,7 @@ class Heatmap(QWidget):
         elif self._element >= 0:
             self.value.show_text(self._of_one(self._element, values[self._element], self._layout))
         else:
-            self.value.show_text(self._of_all(values))
+            self.value.show_text(self._of_all(values), "peak ")
 
     def _of_one(self, element: int, value: float, layout: SensorLayout) -> str:
         x, y = layout.positions[element] * 1e3

@@ -8,12 +8,13 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 class Line(QWidget):
     """Draws its text where it stands; a QLabel would have the whole window laid out anew.
 
-    Where there is no room for all of it, the tooltip begins with it.
+    Where there is no room for all of it, it does without what it begins with, if that may be
+    left out; where there is none for that either, the tooltip begins with the text.
     """
 
     def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._text = text
+        self._text, self._head = text, ""
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def sizeHint(self) -> QSize:
@@ -25,15 +26,24 @@ class Line(QWidget):
     def text(self) -> str:
         return self._text
 
-    def show_text(self, text: str) -> None:
+    def show_text(self, text: str, head: str = "") -> None:
+        """Show `text`, which may do without its `head` where room is short."""
         if text != self._text:
-            self._text = text
+            self._text, self._head = text, head
             self.update()
+
+    def _fits(self, text: str) -> bool:
+        return self.fontMetrics().horizontalAdvance(text) <= self.width()
+
+    @property
+    def shown(self) -> str:
+        """What of the text there is room for, before what lacks room is cut off."""
+        return self._text if self._fits(self._text) else self._text.removeprefix(self._head)
 
     @property
     def whole(self) -> bool:
-        """Whether there is room for all of the text."""
-        return self.fontMetrics().horizontalAdvance(self._text) <= self.width()
+        """Whether there is room for all of the text that is needed."""
+        return self._fits(self.shown)
 
     def tip(self) -> str:
         """What the tooltip says."""
@@ -50,6 +60,6 @@ class Line(QWidget):
         painter.setPen(self.palette().windowText().color())
         flags = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         text = painter.fontMetrics().elidedText(
-            self._text, Qt.TextElideMode.ElideRight, self.width()
+            self.shown, Qt.TextElideMode.ElideRight, self.width()
         )
         painter.drawText(self.rect(), flags, text)

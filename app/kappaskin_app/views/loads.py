@@ -11,7 +11,7 @@ from kappaskin import Load
 from kappaskin_app.views.drag import ARROW
 from kappaskin_app.views.drawn import DrawnSkin
 from kappaskin_app.views.footprint import footprint
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class DrawnLoads:
         self._line: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
         self._line_actor = plotter.add_mesh(
             self._line,
-            line_width=5,
+            line_width=pixels(plotter, 5),
             color=_RED,
             **UNLIT,
         )

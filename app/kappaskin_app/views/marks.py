@@ -7,7 +7,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from kappaskin_app.views.drawn import DrawnSkin, Indices
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ class Marks:
         self.actor = plotter.add_mesh(
             self._points,
             style="points",
-            point_size=size,
+            point_size=pixels(plotter, size),
             color=colour,
             **UNLIT,
         )

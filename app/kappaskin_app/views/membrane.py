@@ -24,13 +24,19 @@ from kappaskin_app.views.drawn import MM, DrawnSkin, Indices
 from kappaskin_app.views.loads import DrawnLoads, put_upright
 from kappaskin_app.views.marks import Marks
 from kappaskin_app.views.pointing import Pointing
+from kappaskin_app.views.sides import Sides
 from kappaskin_app.views.surface import Surface
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
 _LIFT = 0.006  # of the skin's size above the surface, or half of a line drowns in it
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
+
+
+def _spare(length: int, ratio: float) -> int:
+    """How many px of a length to do without, to end between two pixels of the screen."""
+    return next((spare for spare in range(4) if (length - spare) * ratio % 1 == 0), 0)
 
 
 class MembraneView(QWidget):
@@ -46,9 +52,9 @@ class MembraneView(QWidget):
         self.plotter.setAttribute(Qt.WidgetAttribute.WA_DontCreateNativeAncestors)
         self.plotter.setAttribute(Qt.WidgetAttribute.WA_NativeWindow)
         self.plotter.setAcceptDrops(False)  # or it would take any file for a mesh to draw
-        around = QVBoxLayout(self)
-        around.setContentsMargins(0, 0, 0, 0)
-        around.addWidget(self.plotter)
+        self._around = QVBoxLayout(self)
+        self._around.setContentsMargins(0, 0, 0, 0)
+        self._around.addWidget(self.plotter)
         # Blending in any order adds 8 ms to each picture, as soon as anything is translucent.
         self.plotter.renderer.SetUseOIT(False)
         self._make_actors()
@@ -85,7 +91,7 @@ class MembraneView(QWidget):
         self._elements: Any = pv.PolyData(np.zeros((1, 3)))
         self._wire_actor: Any = None
         self._elements_actor = plotter.add_mesh(
-            self._elements, style="points", point_size=5, **UNLIT
+            self._elements, style="points", point_size=pixels(plotter, 5), **UNLIT
         )
         self.out, self.asked = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
         # Seen on every colour.
@@ -94,9 +100,7 @@ class MembraneView(QWidget):
         self._contact = plotter.add_mesh(
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
-        self.labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
-        for label in self.labels:
-            plotter.add_actor(label, reset_camera=False, render=False)
+        self.sides = Sides(plotter)
         self.caption: Any = pv.Text("")
         self.caption.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
         self.caption.position = 0.015, 0.94  # of the picture, from its lower left corner
@@ -120,12 +124,7 @@ class MembraneView(QWidget):
 
     def _note_turning(self, *_: object) -> None:
         self._fitted = False  # the person chose this view: a new size must not undo it
-        self._show_labels(True, True)
-
-    def _show_labels(self, x: bool, y: bool) -> None:
-        """Whether the sides' lengths are written: seen end-on, a text lies on the skin's rim."""
-        for label, shown in zip(self.labels[1:], (x, y), strict=True):
-            label.SetVisibility(shown)
+        self.sides.show_from(None)
 
     # What a skin looks like: rebuilt only when another one appears.
 
@@ -145,7 +144,7 @@ class MembraneView(QWidget):
         self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
         self._contact.scale = skin.size
         self._arrays = self._changing()
-        self._place_labels(skin)
+        self.sides.show_skin(skin)
         self.show_box(self._box.shares)
         if another:
             self.look_from(self._from)
@@ -156,7 +155,7 @@ class MembraneView(QWidget):
         if self._wire_actor is not None:
             self.plotter.remove_actor(self._wire_actor, render=False)
         self._wire_actor = self.plotter.add_mesh(
-            self._wire, line_width=1, lighting=False, reset_camera=False, render=False
+            self._wire, line_width=pixels(self.plotter, 1), **UNLIT
         )
         self._wire_actor.prop.color = self._ink
 
@@ -204,27 +203,18 @@ class MembraneView(QWidget):
         for above, marks in enumerate(self.pointed, 2):
             marks.follow(self.skin, above * self.lift)  # the inner one is not to sink into the rim
 
-    def _place_labels(self, skin: DrawnSkin) -> None:
-        a, b = skin.patch.a, skin.patch.b
-        corners, _ = skin.at_rest(np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]))
-        beside = MM * np.array([(-0.04 * a, -0.04 * b, 0), (0, -0.06 * b, 0), (0, 0.05 * b, 0)])
-        texts = ("0", f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm")
-        for label, text, at in zip(self.labels, texts, corners + beside, strict=True):
-            label.input = text
-            label.position = tuple(at)
-        # Where the skin rises steeply beside it, a text in the middle would lie below it.
-        y_at = "right" if skin.patch.base_curvature else "center"
-        self.labels[2].prop.justification_horizontal = y_at
-
     def look_from(self, direction: Direction) -> None:
         """Look at the whole skin, as large as it fits, and again whenever the size changes."""
         self._from = direction
         fit_camera(self.plotter.renderer, self.skin, direction, self.plotter.width())
         self._fitted = True
-        self._show_labels(direction.sees(0), direction.sees(1))
+        self.sides.show_from(direction)
         self.plotter.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
+        # A picture that ends within a pixel of the screen would have a black edge there.
+        right, upper = (_spare(side, self.devicePixelRatioF()) for side in event.size().toTuple())
+        self._around.setContentsMargins(0, upper, right, 0)
         super().resizeEvent(event)
         if self._fitted:
             # After VTK has its new size.
@@ -293,7 +283,7 @@ class MembraneView(QWidget):
         self.plotter.update()
 
     def show_box(self, shares: Shares) -> None:
-        """Draw only what is within these shares of the skin: from and to, along x and along y."""
+        """Draw only what is these shares of the skin: from and to, along x, y and upwards."""
         self._box.shares = shares
         self._box.show(self.skin)
         self._box.cut(self.plotter.actors.values())
@@ -331,8 +321,8 @@ class MembraneView(QWidget):
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
         self.plotter.set_background(theme.scene, top=theme.scene_top)
-        for text in (*self.labels, self.caption):
-            text.prop.color = theme.text
+        self.sides.show_colour(theme.text)
+        self.caption.prop.color = theme.text
         self.alarm.show_theme(theme)
         self.surface.show_theme(theme)
         self.plotter.update()

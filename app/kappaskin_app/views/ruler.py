@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from kappaskin import Distances
 from kappaskin_app.theme import WANTED, Theme
 from kappaskin_app.views.drawn import DrawnSkin
-from kappaskin_app.views.unlit import UNLIT
+from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
@@ -26,9 +26,11 @@ class Ruler:
             np.zeros((_STEPS, 3)), lines=np.concatenate([along, straight])
         )
         self._ends: Any = pv.PolyData(np.zeros((2, 3)))
-        self.actor = plotter.add_mesh(self._lines, color=WANTED, line_width=3, **UNLIT)
+        self.actor = plotter.add_mesh(
+            self._lines, color=WANTED, line_width=pixels(plotter, 3), **UNLIT
+        )
         self._ends_actor = plotter.add_mesh(
-            self._ends, style="points", point_size=11, color=WANTED, **UNLIT
+            self._ends, style="points", point_size=pixels(plotter, 11), color=WANTED, **UNLIT
         )
         self.text: Any = pv.Text("")
         self.text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()

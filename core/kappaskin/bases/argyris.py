@@ -10,6 +10,7 @@ from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_arra
 from scipy.sparse.linalg import eigsh
 
 from kappaskin.bases.basis import ORDERS
+from kappaskin.bases.kept import kept
 from kappaskin.bases.mesh import Mesh, meshed
 from kappaskin.bases.quintic import Quintics, chained, monomials, triangle_quadrature
 from kappaskin.frames import Array
@@ -43,16 +44,26 @@ def plate_modes(vertices: tuple[tuple[float, float], ...], count: int, clamped: 
     They make the bending energy, the integral of w_xx^2 + 2 w_xy^2 + w_yy^2, stationary for a
     given mean square; along straight edges that do not move Poisson's ratio adds nothing to it.
     """
+    made = kept(f"plate {vertices} {count} {clamped}", lambda: _made(vertices, count, clamped))
+    functions = Quintics(made["origins"], made["inverse"], made["coefficients"])
+    return PlateModes(functions, made["points"], made["weights"])
+
+
+def _made(vertices: tuple[tuple[float, float], ...], count: int, clamped: bool) -> dict[str, Array]:
     corners = np.array(vertices)
     size = np.sqrt(Outline(corners).area)
     spacing = _SPACING / np.sqrt(max(count, _FEWEST))
     blunt = _BLUNT_CLAMPED if clamped else _BLUNT_HINGED
     space = _Space(meshed(Outline(corners / size), spacing, blunt))
     modes = _lowest(*space.energies(), space.allowed(clamped), count) / 2
-    coefficients = space.shapes @ modes[space.unknowns]
     points, weights = space.quadrature()
-    functions = Quintics(size * space.origins, space.inverse / size, coefficients)
-    return PlateModes(functions, size * points.reshape(-1, 2), size**2 * weights.ravel())
+    return {
+        "origins": size * space.origins,
+        "inverse": space.inverse / size,
+        "coefficients": space.shapes @ modes[space.unknowns],
+        "points": size * points.reshape(-1, 2),
+        "weights": size**2 * weights.ravel(),
+    }
 
 
 class _Space:

@@ -158,10 +158,14 @@ class Plate:
         mixed = product(xx, yy)
         bending = product(xx, xx) + product(yy, yy) + nu * (mixed + mixed.T)
         bending += 2 * (1 - nu) * product(xy, xy)
-        f, fx, fy = (basis.at(points, *order) for order in ((0, 0), (1, 0), (0, 1)))
-        squares = product(f, f)
-        slopes = product(fx, fx) + product(fy, fy)
-        whole = self.rigidity * bending + self.tension * (slopes - H**2 * squares)
+        whole = self.rigidity * bending
+        # Half the time it takes is theirs.
+        f = basis.at(points) if H or self.foundation else None
+        squares = 0.0 if f is None else product(f, f)
+        if self.tension:
+            fx, fy = basis.at(points, 1, 0), basis.at(points, 0, 1)
+            slopes = product(fx, fx) + product(fy, fy)
+            whole += self.tension * (slopes - H**2 * squares)
         whole += self.foundation * squares
         if isinstance(basis, ElasticBasis):
             along, per_length = basis.rim()

@@ -1,0 +1,55 @@
+"""Arrays that take seconds to compute, kept in the user's folder of caches for the next process."""
+
+import hashlib
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+import platformdirs
+import scipy
+
+from kappaskin.frames import Array
+
+_MEANING = 1  # another number for whatever makes other arrays of the same question
+_MOST = 16  # files
+_LARGEST = 64_000_000  # bytes of one: more is read no faster than it is computed
+
+
+def kept(question: str, compute: Callable[[], dict[str, Array]]) -> dict[str, Array]:
+    """What `compute` answers to `question`, by name, the same bits whether kept or computed.
+
+    A file that is damaged or of other versions is not used; where none can be written, it is
+    computed every time.
+    """
+    asked = f"{_MEANING} {np.__version__} {scipy.__version__} {question}"
+    file = _folder() / f"{hashlib.sha256(asked.encode()).hexdigest()[:24]}.npz"
+    with suppress(OSError, ValueError, EOFError, BadZipFile), file.open("rb") as opened:
+        arrays = dict(np.load(opened))
+        file.touch()  # the oldest go first
+        return arrays
+    arrays = compute()
+    if sum(values.nbytes for values in arrays.values()) <= _LARGEST:
+        with suppress(OSError):
+            _write(file, arrays)
+    return arrays
+
+
+def _folder() -> Path:
+    return platformdirs.user_cache_path("kappaskin", appauthor=False) / "modes"
+
+
+def _write(file: Path, arrays: dict[str, Array]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(f".{os.getpid()}")  # whole when it has its name
+    try:
+        with part.open("wb") as to:
+            np.savez(to, **arrays)  # pyright: ignore[reportArgumentType]
+        part.replace(file)
+    finally:
+        part.unlink(missing_ok=True)
+    there = sorted(file.parent.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
+    for old in there[_MOST:]:
+        old.unlink(missing_ok=True)
