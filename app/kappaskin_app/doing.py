@@ -60,6 +60,10 @@ class Doing(QObject):
             self._words = words
             self.told.emit(words)
 
+    @property
+    def may_cancel(self) -> bool:
+        return self.task is not None and self.task.cancel is not None
+
     def cancel(self) -> None:
         """End what is told of."""
         if self.task is not None and self.task.cancel is not None:

@@ -7,6 +7,9 @@ from typing import Any
 
 log = logging.getLogger("kappaskin")
 
+# Not its docstring, which Qt would have to make for each of its own methods.
+_NAMES = ("__module__", "__name__", "__qualname__")
+
 _listeners: list[Callable[[str], None]] = []
 
 
@@ -30,7 +33,7 @@ def failed(error: Exception, where: object) -> None:
 def guarded(slot: Callable[..., Any]) -> Callable[..., Any]:
     """`slot`, with whatever it raises logged and told rather than lost in Qt or fatal."""
 
-    @functools.wraps(slot)
+    @functools.wraps(slot, assigned=_NAMES)
     def safe(*arguments: Any) -> Any:
         try:
             return slot(*arguments)

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,39 +16,77 @@ if TYPE_CHECKING:
 
     from kappaskin_app.logbook import Logbook
     from kappaskin_app.recovering import Recovering
+    from kappaskin_app.views.splash import Splash
     from kappaskin_app.window import MainWindow
 
 log = logging.getLogger("kappaskin")
 
+_LOADED = {
+    "pyvistaqt": "Loading the drawing in three dimensions (VTK)",
+    "kappaskin_app.window": "Loading panels and views",
+}
+"""What takes long to import, in this order, and what is said meanwhile."""
+
 _BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want a core
 
 
-def opened(source: str) -> "tuple[QApplication, MainWindow]":
-    """The application and its window, shown, on `source` or on what the last window left."""
+def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWindow]":
+    """The application and its window, shown, on `source` or on what the last window left.
+
+    Where the window is `kept` in a file it begins as it was, and until the skin is drawn a splash
+    says what is being loaded; a script that opens a window for some seconds needs neither.
+    """
     # Beside: the engine's process starts while this one loads Qt and VTK.
     with ThreadPoolExecutor(1) as beside:
         starting = beside.submit(_connected, source)
         try:
-            from PySide6.QtWidgets import QApplication
-
-            from kappaskin_app.window import MainWindow
+            application = _application()
+            splash = _splash(kept) if kept is not None else None
+            for module, words in _LOADED.items():
+                if splash is not None:
+                    splash.say(words)
+                import_module(module)
         except BaseException:
             starting.result().close()
             raise
     engine = starting.result()
     _stand_behind()
     try:
-        application = QApplication.instance() or QApplication(sys.argv[:1])
-        if not isinstance(application, QApplication):
-            raise Refusal("expected a Qt application with widgets, got one without")
-        application.setApplicationName("Kappaskin")
-        application.setStyle("Fusion")
+        from kappaskin_app.window import MainWindow
+
+        if splash is not None:
+            splash.say("Making the window")
         window = MainWindow(source, engine)
     except BaseException:
         engine.close()
         raise
     window.show()
+    if kept is not None:
+        window.keeping.begin(kept)
+    if splash is not None:
+        splash.finish(window)
     return application, window
+
+
+def _application() -> "QApplication":
+    from PySide6.QtWidgets import QApplication
+
+    application = QApplication.instance() or QApplication(sys.argv[:1])
+    if not isinstance(application, QApplication):
+        raise Refusal("expected a Qt application with widgets, got one without")
+    application.setApplicationName("Kappaskin")
+    application.setStyle("Fusion")
+    return application
+
+
+def _splash(kept: Path) -> "Splash":
+    from kappaskin_app.layouts.file import KeptFile
+    from kappaskin_app.theme import LIGHT, THEMES
+    from kappaskin_app.views.splash import Splash
+
+    splash = Splash(THEMES.get(KeptFile(kept).theme(), LIGHT))
+    splash.show()
+    return splash
 
 
 def _stand_behind() -> None:
@@ -80,11 +119,8 @@ def launch(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: asked.append(got))
     logbook = _logbook()
-    application, window = opened(source)
-    if seconds is None:  # what a script opens is the same whatever was before
-        from kappaskin_app.layouts.file import config_file
-
-        window.keeping.begin(config_file())
+    # What a script opens for some seconds is the same whatever was before.
+    application, window = opened(source, _kept_file() if seconds is None else None)
     recovering = _recovering(window)
     if presenting and not window.session.engine.adopted:
         window.presenting.enter()
@@ -108,6 +144,12 @@ def launch(
             kept.close()
     if saved == [False]:
         raise Refusal(f"{screenshot}: the picture cannot be written; choose another place")
+
+
+def _kept_file() -> Path:
+    from kappaskin_app.layouts.file import config_file
+
+    return config_file()
 
 
 def _logbook() -> "Logbook | None":

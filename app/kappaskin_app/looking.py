@@ -82,6 +82,11 @@ class Looking:
     def _look(self, direction: Direction) -> Callable[[], None]:
         return partial(self._display.membrane.look_from, direction)
 
+    def lock(self, locked: bool) -> None:
+        """Keep the range of the skin's colours as it is, or let it follow what is shown."""
+        limit = self._display.limit_shown() if locked else 0.0
+        self._wishes.wish(f"range_{self._history.settings.colour_by}", limit)
+
     def lock_all(self) -> None:
         """Keep all ranges of colours that are shown as they are, or let them go if all are kept."""
         settings, ranges = self._history.settings, self._display.limits_shown()

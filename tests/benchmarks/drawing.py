@@ -9,10 +9,9 @@ import sys
 import time
 
 import numpy as np
-import pyvista as pv
+from bare_window import bare_window
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
-from pyvistaqt import QtInteractor
 
 from kappaskin import Engine
 from kappaskin_app.window import MainWindow
@@ -22,22 +21,12 @@ SETTLE = 3.0
 
 def bare(application: QApplication, port: str, seconds: float) -> dict[str, float]:
     """The same mesh, written in place and drawn as fast as it goes."""
-    n = 65
     engine = Engine()
     engine.connect(port)
-    widget = QtInteractor(auto_update=False, multi_samples=0)
-    widget.resize(1280, 800)
-    x, y = np.meshgrid(np.linspace(0, 100, n), np.linspace(0, 100, n))
-    index = np.arange(n * n).reshape(n, n)
-    corners = [index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]]
-    faces = np.stack([np.full_like(corners[0], 4), *corners], axis=-1).ravel()
-    mesh = pv.PolyData(np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()]), faces=faces)
-    mesh.point_data["value"] = np.zeros(n * n)
-    widget.add_mesh(mesh, scalars="value", clim=(0, 1), show_scalar_bar=False)
+    widget, mesh, shape = bare_window()
     widget.show()
     done: list[float] = []
     widget.renderer.AddObserver("EndEvent", lambda *_: done.append(time.monotonic()))
-    shape = np.sin(np.pi * x / 100) * np.sin(np.pi * y / 100)
 
     def step() -> None:
         height = shape * np.sin(time.monotonic())

@@ -33,6 +33,13 @@ class KeptFile:
         except (OSError, UnicodeDecodeError, Refusal) as error:
             return Kept(), f"{self.path}: {error}; {self._put_aside()}, the window begins anew"
 
+    def theme(self) -> str:
+        """The name of the theme that is kept, none where none can be read."""
+        try:
+            return from_text(self._text()).theme
+        except (OSError, UnicodeDecodeError, Refusal):
+            return ""  # told by who reads all of it
+
     def _text(self) -> str:
         if self.path.stat().st_size > _LARGEST:
             raise Refusal(f"expected at most {_LARGEST} bytes")

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from kappaskin import Indenter, Pressed, Pressing, Scene, Stimulus, moments_of
 from kappaskin_app.views.drawn import DrawnSkin, Indices
@@ -91,6 +90,8 @@ def _drawn(skin: DrawnSkin, surface: Array) -> tuple[Array, Array]:
 
 
 def _marks(skin: DrawnSkin, positions: Array) -> Marks:
+    from scipy.ndimage import map_coordinates  # a tenth of a second that the first picture has not
+
     rest, out = skin.at_rest(positions)
     ny, nx = skin.height.shape
     x, y = (positions / (skin.patch.a, skin.patch.b) * (nx - 1, ny - 1)).T
