@@ -6,7 +6,17 @@ from dataclasses import dataclass
 LEFT, RIGHT, TOP, BOTTOM, FLOATING = "left", "right", "top", "bottom", "floating"
 AREAS = (LEFT, RIGHT, TOP, BOTTOM, FLOATING)
 BESIDE = ("lesson", "settings", "curvature")
-BELOW = ("cost", "stability", "scene", "health", "compare", "element", "traces", "numbers")
+BELOW = (
+    "cost",
+    "stability",
+    "scene",
+    "health",
+    "compare",
+    "design",
+    "element",
+    "traces",
+    "numbers",
+)
 DOCKS = BESIDE + BELOW
 
 
