@@ -76,6 +76,7 @@ def tasks_of(window: "MainWindow") -> list[Task]:
     export, repair = window.exports.dialog, window.taping.repairs
     planning, costing, seeing = window.planning, window.costing, window.seeing
     replaying, calibrating = window.replaying, window.calibrating
+    designing = window.designing
     return [
         Task("Making the scene; Ctrl+Z takes it back", lambda: session.making),
         Task(
@@ -92,6 +93,8 @@ def tasks_of(window: "MainWindow") -> list[Task]:
         Task("Sizing and timing effects", lambda: planning.waiting, planning.cancel),
         Task("Measuring what accuracy costs", lambda: costing.running, costing.cancel),
         Task("Computing how shapes are seen", lambda: seeing.computing, seeing.cancel),
+        Task("Placing the design's elements", lambda: designing.predicting, designing.cancel),
+        Task("Simulating the design", lambda: designing.checking, designing.cancel),
         Task("Painting the scenes", lambda: gallery.painting, gallery.rest),
         Task("Learning what objects read like", lambda: window.naming.learning),
     ]

@@ -27,13 +27,13 @@ class News(QObject):
         self._next_bargain = self._next_words = 0.0
         self._set = (
             *(window.panels, window.staging, window.display),
-            *(window.stability, window.compare),
+            *(window.stability, window.compare, window.design),
         )
         self._themed = (
             *(window.panels, window.cost, window.scene, window.timeline, window.transport),
             *(window.mark, window.offer, window.mishaps, window.compare, window.stability),
             *(window.log, window.health, window.lesson, window.pointing, window.display),
-            *(window.presenting, window.picking),
+            *(window.design, window.presenting, window.picking),
         )
 
     def follow_settings(self, settings: Settings) -> None:

@@ -242,6 +242,9 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
     changed: dict[str, Any] = {name: value}
     if name == "shape":
         changed |= {**SHAPES[value].asks, **SHAPES[value].begins}
+    if name == "design_shape":
+        changed |= {f"design_{length}": asked for length, asked in SHAPES[value].asks.items()}
+        changed |= {"design_place": "scene"} if value == "strip" else {}
     if name in ("shape", "rim_radius") and "side_x" not in changed:
         patch = patch_of(replace(settings, **changed))
         changed |= {"side_x": patch.a, "side_y": patch.b}  # of the rectangle around it

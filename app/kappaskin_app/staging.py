@@ -1,5 +1,6 @@
 """The scene between the session that plays it and where it is chosen, edited, planned, scrubbed."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -75,12 +76,17 @@ class Staging(QObject):
     def save(self) -> None:
         """Ask for a file, and write the scene as it is there."""
         settings = self._history.settings
-        name = settings.written.file.name if settings.written else OWN.name
+        self.save_as(
+            settings.written.file.name if settings.written else OWN.name, self._wishes.save
+        )
+
+    def save_as(self, name: str, write: Callable[[Path], object]) -> None:
+        """Ask for a file, `name` to begin with, and `write` a scene there."""
         file, _ = QFileDialog.getSaveFileName(self._window, "Save the scene", name, _FILES)
         if file:
             path = Path(file).with_suffix(".toml")
             try:
-                self._wishes.save(path)
+                write(path)
                 self.used.emit(path)
                 self.told.emit(f"Saved {path}")
             except (OSError, Refusal) as error:

@@ -18,6 +18,7 @@ from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.columns import widen
 from kappaskin_app.comparing import Comparing
 from kappaskin_app.costing import Costing
+from kappaskin_app.designing import Designing
 from kappaskin_app.display import Display
 from kappaskin_app.docks import Docks
 from kappaskin_app.doing import Doing, tasks_of
@@ -41,6 +42,7 @@ from kappaskin_app.news import News
 from kappaskin_app.opening import Opening
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
+from kappaskin_app.panels.design import DesignPanel
 from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.lesson import LessonPanel
@@ -103,6 +105,7 @@ class MainWindow(QMainWindow):
         self.log = LogPanel(self.logged)
         self.compare = ComparePanel()
         self.comparing = Comparing(self.history, self.session, self)
+        self.design, self.designing = DesignPanel(), Designing(self.history, self)
         self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
         self.offer = Offer()
         self.taping = Taping(self.session.engine, self)
@@ -179,6 +182,7 @@ class MainWindow(QMainWindow):
         docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
         docks.put_below("log", "Log", self.log, "Ctrl+Alt+G")
         docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
+        docks.put_below("design", "Design", self.design, "Ctrl+Alt+G")
         docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
         docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
         return docks
@@ -265,6 +269,7 @@ class MainWindow(QMainWindow):
             self.taping.close()
             self.costing.close()
             self.planning.close()
+            self.designing.close()
             self.scene.gallery.close()
             self.seeing.close()
             self.session.close()

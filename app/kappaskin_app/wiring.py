@@ -16,7 +16,7 @@ def wire(window: "MainWindow") -> None:
     """Join all rooms of a window; of one signal, in the order in which they hear it."""
     for join in (
         *(_connection, _settings, _views, _calibration, _tare, _measurements, _health),
-        *(_recordings, _lessons, _news, _refusals, _skin, _foot),
+        *(_recordings, _design, _lessons, _news, _refusals, _skin, _foot),
     ):
         join(window)
 
@@ -120,6 +120,17 @@ def _recordings(window: "MainWindow") -> None:
     session.reported.connect(guarded(window.comparing.follow))
     window.compare.form.wished.connect(guarded(window.wishes.wish))
     window.compare.attend(window.comparing)
+
+
+def _design(window: "MainWindow") -> None:
+    design, designing = window.design, window.designing
+    window.docks["design"].visibilityChanged.connect(guarded(designing.watch))
+    window.session.reported.connect(guarded(designing.follow))
+    design.form.wished.connect(guarded(window.wishes.wish))
+    design.save_wanted.connect(
+        guarded(lambda: window.staging.save_as("design.toml", designing.write))
+    )
+    design.attend(designing)
 
 
 def _lessons(window: "MainWindow") -> None:

@@ -161,6 +161,11 @@ from kappaskin.studies.cost import costs as costs
 from kappaskin.studies.cost import effect_costs as effect_costs
 from kappaskin.studies.cost import frontier as frontier
 from kappaskin.studies.cost import settings_to_try as settings_to_try
+from kappaskin.studies.design import Check as Check
+from kappaskin.studies.design import Design as Design
+from kappaskin.studies.design import Prospect as Prospect
+from kappaskin.studies.design import check as check
+from kappaskin.studies.design import prospect as prospect
 from kappaskin.studies.plan import plan_told as plan_told
 from kappaskin.taring import Drift as Drift
 from kappaskin.touch import NO_OBJECT as NO_OBJECT

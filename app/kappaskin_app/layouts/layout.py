@@ -6,7 +6,10 @@ from dataclasses import dataclass
 LEFT, RIGHT, TOP, BOTTOM, FLOATING = "left", "right", "top", "bottom", "floating"
 AREAS = (LEFT, RIGHT, TOP, BOTTOM, FLOATING)
 BESIDE = ("lesson", "settings", "curvature")
-BELOW = ("cost", "stability", "scene", "health", "compare", "element", "traces", "numbers", "log")
+BELOW = (
+    *("cost", "stability", "scene", "health", "compare", "design"),
+    *("element", "traces", "numbers", "log"),
+)
 DOCKS = BESIDE + BELOW
 
 

@@ -11,6 +11,7 @@ from kappaskin_app.settings.asks import Several as Several
 from kappaskin_app.settings.asks import Switch as Switch
 from kappaskin_app.settings.asks import Text as Text
 from kappaskin_app.settings.compared import Compared as Compared
+from kappaskin_app.settings.designed import Designed as Designed
 from kappaskin_app.settings.load import FREE_CASES as FREE_CASES
 from kappaskin_app.settings.load import LOAD_CASES as LOAD_CASES
 from kappaskin_app.settings.load import READY_CASES as READY_CASES
@@ -42,7 +43,7 @@ class SceneSettings(Skin, Load, Noise, Electronics, Spoils, Own):
 
 
 @dataclass(frozen=True)
-class Settings(SceneSettings, Fit, View, Looked, Reading, Scanning, Sending, Compared):
+class Settings(SceneSettings, Fit, View, Looked, Reading, Scanning, Sending, Compared, Designed):
     """Everything a person may change, in SI units; a change is a new `Settings`.
 
     `calibration` and `tare` are in use whenever the sensor that they are of is connected.
@@ -53,7 +54,7 @@ class Settings(SceneSettings, Fit, View, Looked, Reading, Scanning, Sending, Com
 
 
 _WORDS = {"written": "the scene's text", "camera": "the view"}
-Kind = type[SceneSettings | Fit | View | Scanning | Sending]
+Kind = type[SceneSettings | Fit | View | Scanning | Sending | Designed]
 
 
 def part(settings: Settings, kind: Kind) -> tuple[Any, ...]:

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, Load, Sensor
+from kappaskin_app.guard import guarded
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.box import WHOLE, Box, Shares

@@ -7,13 +7,14 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from kappaskin_app.shades import Tint
-from kappaskin_app.theme import LIGHT, SEQUENTIAL, Colours, Theme
+from kappaskin_app.theme import DARK_INK, LIGHT, LIGHT_INK, SEQUENTIAL, Colours, Theme
 from kappaskin_app.views.colour_bar import ColourBar
 from kappaskin_app.views.heatmap import coloured
 from kappaskin_app.views.line import Line
 
 Array = NDArray[np.float64]
 
+_DOT = 1.8  # px, the radius of a point
 _CROSS = 6.0  # px from the middle of a contact's cross to its ends
 
 
@@ -27,6 +28,7 @@ class _Map(QWidget):
         self._image: QImage | None = None
         self._contact, self._sides, self._faded = np.full(2, np.nan), (1.0, 1.0), False
         self.line = QColor("#888888")
+        self._points: Array | None = None
 
     def sizeHint(self) -> QSize:
         return QSize(180, 180)
@@ -40,6 +42,11 @@ class _Map(QWidget):
             data = np.ascontiguousarray(rgb[::-1]).tobytes()
             self._image = QImage(data, nx, ny, 3 * nx, QImage.Format.Format_RGB888).copy()
         self._contact, self._sides = contact, sides
+        self.update()
+
+    def show_points(self, positions: Array | None) -> None:
+        """Mark places (P, 2) in m on the skin, or none."""
+        self._points = positions
         self.update()
 
     def show_faded(self, faded: bool) -> None:
@@ -63,13 +70,21 @@ class _Map(QWidget):
             painter.setOpacity(1.0)
         painter.setPen(QPen(self.line, 1))
         painter.drawRect(area)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self._points is not None:
+            painter.setPen(QPen(QColor(DARK_INK), 1))
+            painter.setBrush(QColor(LIGHT_INK))
+            for x, y in self._points.tolist():
+                painter.drawEllipse(self._at(area, x, y), _DOT, _DOT)
         if self._image is not None and np.isfinite(self._contact).all():
             self._paint_cross(painter, area)
 
+    def _at(self, area: QRectF, x: float, y: float) -> QPointF:
+        a, b = self._sides
+        return QPointF(area.left() + x / a * area.width(), area.bottom() - y / b * area.height())
+
     def _paint_cross(self, painter: QPainter, area: QRectF) -> None:
-        (x, y), (a, b) = self._contact, self._sides
-        at = QPointF(area.left() + x / a * area.width(), area.bottom() - y / b * area.height())
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        at = self._at(area, *self._contact.tolist())
         for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # seen on every colour
             painter.setPen(QPen(QColor(colour), width))
             for d in (QPointF(_CROSS, _CROSS), QPointF(_CROSS, -_CROSS)):

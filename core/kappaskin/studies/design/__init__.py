@@ -5,6 +5,11 @@ from kappaskin.studies.design.known import Known as Known
 from kappaskin.studies.design.known import Mean as Mean
 from kappaskin.studies.design.measures import MEASURES as MEASURES
 from kappaskin.studies.design.measures import Measure as Measure
+from kappaskin.studies.design.prospect import Check as Check
+from kappaskin.studies.design.prospect import Design as Design
+from kappaskin.studies.design.prospect import Prospect as Prospect
+from kappaskin.studies.design.prospect import check as check
+from kappaskin.studies.design.prospect import prospect as prospect
 from kappaskin.studies.design.run import known_of as known_of
 from kappaskin.studies.design.run import run_study as run_study
 from kappaskin.studies.design.study import STUDIES as STUDIES

@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator
 from kappaskin.frames import Array
 from kappaskin.placement import predicted_sd
-from kappaskin.scene import Indenter
+from kappaskin.scene import Indenter, Scene
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.block import Block
 
@@ -82,9 +82,9 @@ def _covered(block: Block) -> Array:
     return np.mean(np.abs(block.off(points)) < bands, axis=1)
 
 
-def _noise_of(block: Block) -> float:
+def noise_of(scene: Scene) -> float:
     """The standard deviation in 1/m of all noise that differs from reading to reading."""
-    each = [getattr(effect, "rms", 0.0) for effect in block.scene.reading_effects]
+    each = [getattr(effect, "rms", 0.0) for effect in scene.reading_effects]
     return math.hypot(*each)
 
 
@@ -95,7 +95,7 @@ def _predicted_rms(estimator: Estimator, noise: float) -> float:
 
 
 def _predicted(block: Block) -> Array:
-    return np.array([_predicted_rms(block.estimator, _noise_of(block))])
+    return np.array([_predicted_rms(block.estimator, noise_of(block.scene))])
 
 
 def _rate(block: Block) -> Array:

@@ -1,0 +1,136 @@
+"""A design, not built yet, to how well it will tell the skin's shape, and to a check of that."""
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kappaskin.bases import basis_for
+from kappaskin.fit import Estimator, estimator_for
+from kappaskin.frames import Array, Mask
+from kappaskin.patch import Patch
+from kappaskin.placement import check_placement, placement, predicted_sd
+from kappaskin.scene import Scene
+from kappaskin.simulate import Simulator
+from kappaskin.studies.design.measures import noise_of
+from kappaskin.studies.design.setup import Placing
+
+_APART = 0.4  # of the mean distance between elements: places that are tried
+_SIDE = 41  # points along each side of the maps
+_BLOCK, _MOST = 250, 5_000  # frames at a time, and in all
+
+
+@dataclass(frozen=True)
+class Design:
+    """A `scene` with its elements placed `by` one of `PLACEMENTS`.
+
+    Shapes are told of Ni x Nj `functions` by least squares.
+    """
+
+    scene: Scene
+    functions: tuple[int, int] = (8, 8)
+    by: str = "scene"
+
+    def __post_init__(self) -> None:
+        Placing(self.by)  # for its refusal
+
+    def estimator(self) -> Estimator:
+        """Tells shapes from the elements where they are placed; `Refusal` where they cannot be."""
+        scene, patch = self.scene, self.scene.plate.patch
+        check_placement(scene.layout, self.by)
+        Ni, Nj = self.functions
+        basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
+        apart = _APART * math.sqrt(patch.a * patch.b / len(scene.layout))
+        return estimator_for("least-squares", basis, placement(scene.layout, basis, self.by, apart))
+
+
+@dataclass(frozen=True, eq=False)
+class Prospect:
+    """What is predicted of a design: `sd` (ny, nx) of the displacement in m, NaN off the skin.
+
+    `x` (nx,) and `y` (ny,) are in m, `positions` (P, 2) where the elements are, `rate` in 1/s what
+    the conversions allow.
+    """
+
+    x: Array
+    y: Array
+    sd: Array
+    positions: Array
+    rate: float
+
+    @property
+    def rms(self) -> float:
+        """The square root of the mean variance over the skin, in m."""
+        return float(np.sqrt(np.nanmean(self.sd**2)))
+
+    @property
+    def worst(self) -> float:
+        """The largest standard deviation on the skin, in m."""
+        return float(np.nanmax(self.sd))
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """What came of simulating a design for so many `frames`.
+
+    `sd` (ny, nx) in m is what the displacement varied by at the points of its prospect; `rms` in m
+    over the skin is what was told less what was true, what the functions cannot make included.
+    """
+
+    frames: int
+    sd: Array
+    rms: float
+
+
+def _points(patch: Patch) -> tuple[Array, Array, Mask, Array]:
+    """The map's x and y, which of its points (ny, nx) are on the skin, and those (G, 2)."""
+    x, y = patch.grid(_SIDE, 2 if patch.strip else _SIDE)
+    grid = np.stack(np.meshgrid(x, y), axis=-1)
+    on: Mask = patch.contains(grid.reshape(-1, 2)).reshape(grid.shape[:2])
+    return x, y, on, grid[on]
+
+
+def _on_map(on: Mask, values: Array) -> Array:
+    made = np.full(on.shape, np.nan)
+    made[on] = values
+    return made
+
+
+def prospect(design: Design) -> Prospect:
+    """What the covariance says of a design, without a simulation."""
+    estimator = design.estimator()
+    x, y, on, points = _points(design.scene.plate.patch)
+    sd = predicted_sd(estimator, noise_of(design.scene), points)
+    layout = estimator.layout
+    rate = 1 / design.scene.transduction.scan_time(int(layout.live.sum()))
+    return Prospect(x, y, _on_map(on, sd), layout.positions, rate)
+
+
+def check(design: Design, frames: int = _MOST, seed: int = 0) -> Generator[Check]:
+    """What simulating a design gives, after every few frames until there are so many.
+
+    The readings are made as all simulations make them, with every effect of the scene.
+    """
+    estimator = design.estimator()
+    _, _, on, points = _points(design.scene.plate.patch)
+    scene = replace(design.scene, layout=estimator.layout, seed=seed)
+    simulator, scan = Simulator(scene), scene.sensor().scan()
+    rows = estimator.basis.at(points)
+    true_rows = scene.basis.at(points)
+    count, mean, squares, off = 0, np.zeros(len(points)), np.zeros(len(points)), 0.0
+    while count < frames:
+        T = min(_BLOCK, frames - count)
+        truths, read = simulator.readings(scan, (count + np.arange(T)) / scene.rate)
+        known = np.array([truth.coefficients.ravel() for truth in truths if truth is not None])
+        told = estimator(read.reshape(T, 3, -1)).coefficients.reshape(T, -1) @ rows.T
+        apart = told - known @ true_rows.T
+        off += float(np.sum(apart**2))
+        # Chan's way to add what differs from one mean to what does from another.
+        here = apart.mean(axis=0)
+        share = T / (count + T)
+        squares += np.sum((apart - here) ** 2, axis=0) + count * share * (here - mean) ** 2
+        mean += share * (here - mean)
+        count += T
+        sd = np.sqrt(squares / max(count - 1, 1))
+        yield Check(count, _on_map(on, sd), float(np.sqrt(off / (count * len(points)))))

@@ -1,0 +1,114 @@
+"""The design panel: predicted at once, checked by a simulation, and saved as a scene."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog
+
+from kappaskin import load_scene, prospect
+from kappaskin_app.designing import design_of, scene_of
+from kappaskin_app.panels.design import DesignForm, _meant, _place
+from kappaskin_app.settings import Designed, Range, Settings, ask_of
+from kappaskin_app.simulation import with_consequences
+from kappaskin_app.skins import SHAPES
+from kappaskin_app.window import MainWindow
+
+RANGES = [n for n in Designed.__dataclass_fields__ if isinstance(ask_of(n), Range)]
+
+
+def shaped(name: str) -> Settings:
+    settings = Settings()
+    return replace(settings, **with_consequences(settings, None, "design_shape", name))
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_outline_is_designed_with_its_usual_lengths(name: str):
+    told = prospect(design_of(shaped(name)))
+
+    assert 0 < told.rms < told.worst < 1e-3
+    assert len(told.positions) == len(scene_of(shaped(name)).layout)
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_an_arrow_key_moves_every_slider_to_another_value_both_ways(name, qtbot):
+    form, how = DesignForm(), ask_of(name)
+    qtbot.addWidget(form)
+    form.wished.connect(lambda n, v: form.show_settings(replace(Settings(), **{n: v})))
+    form.show_settings(Settings())
+    slider, said = form.sliders[name], []
+    form.wished.connect(lambda _, value: said.append(value))
+
+    for key in (Qt.Key.Key_Right, Qt.Key.Key_Left, Qt.Key.Key_Left):
+        qtbot.keyClick(slider, key)
+
+    assert how.least <= said[2] < said[1] < said[0] <= how.most
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_a_slider_reaches_both_ends_and_stands_where_its_value_is(name):
+    how = ask_of(name)
+
+    assert _meant(0, how) == pytest.approx(how.least)
+    assert _meant(200, how) == pytest.approx(how.most)
+    for at in range(0, 201, 20):
+        assert abs(_place(_meant(at, how), how) - at) <= max(
+            200 * how.step / (how.most - how.least), 4
+        )
+
+
+def test_a_design_is_predicted_checked_undone_and_saved(
+    window: MainWindow, until, qtbot, tmp_path: Path, monkeypatch
+):
+    design, designing = window.design, window.designing
+    window.docks.reveal("design")
+    until(lambda: designing.prospect is not None and not designing.predicting)
+    first = designing.prospect.rms
+
+    window.wishes.wish("design_noise", 0.46)
+    until(lambda: designing.prospect.rms > 1.5 * first and not designing.predicting)
+    assert designing.prospect.rms == pytest.approx(2 * first)
+    assert "elements" in design.words.text()
+    window.history.stack.undo()
+    until(lambda: designing.prospect.rms == pytest.approx(first))
+
+    design.simulate.click()
+    assert design.simulate.text() == "End the check"
+    until(lambda: designing.check is not None and not designing.checking, 60)
+    assert [curve.name for curve in design.along.curves] == ["predicted", "simulated"]
+    assert "times as predicted" in design.words.text()
+
+    window.wishes.wish("design_place", "clustered")
+    until(lambda: designing.check is None and not designing.predicting)
+    file = tmp_path / "mine.toml"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    design.save.click()
+    np.testing.assert_allclose(
+        load_scene(str(file)).layout.positions, designing.prospect.positions, atol=1e-9
+    )
+
+
+def test_what_cannot_be_designed_is_told_and_mended(window: MainWindow, until):
+    designing = window.designing
+    window.docks.reveal("design")
+
+    window.history.change("more", -1, design_functions_x=24, design_functions_y=24)
+    until(lambda: bool(designing.refusal))
+    assert designing.prospect is None
+    assert not window.design.save.isEnabled()
+    assert window.design.words.text()
+    window.history.stack.undo()
+    until(lambda: designing.prospect is not None and not designing.refusal)
+
+
+def test_placing_takes_a_while_and_can_be_ended(window: MainWindow, until):
+    designing = window.designing
+    window.docks.reveal("design")
+
+    window.wishes.wish("design_place", "A")
+    until(lambda: designing.predicting)
+    designing.cancel()
+    assert not designing.predicting
+    assert "Cancelled" in designing.refusal
