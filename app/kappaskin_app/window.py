@@ -182,7 +182,7 @@ class MainWindow(QMainWindow):
         docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
         docks.put_below("log", "Log", self.log, "Ctrl+Alt+G")
         docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
-        docks.put_below("design", "Design", self.design, "Ctrl+Alt+G")
+        docks.put_below("design", "Design", self.design, "Ctrl+Alt+N")
         docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
         docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
         return docks

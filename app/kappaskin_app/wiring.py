@@ -127,6 +127,7 @@ def _design(window: "MainWindow") -> None:
     window.docks["design"].visibilityChanged.connect(guarded(designing.watch))
     window.session.reported.connect(guarded(designing.follow))
     design.form.wished.connect(guarded(window.wishes.wish))
+    design.form.reset_wanted.connect(guarded(window.wishes.reset_panel))
     design.save_wanted.connect(
         guarded(lambda: window.staging.save_as("design.toml", designing.write))
     )

@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLabel
 
 from kappaskin import EDGES, Status
 from kappaskin_app.panels.compare import OtherForm
+from kappaskin_app.panels.design import DesignForm
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.settings import Choice, Range, SceneSettings, Settings, ask_of, part
 
@@ -17,7 +18,8 @@ def panels(qapp: QApplication) -> Panels:
 
 
 def test_every_setting_asked_for_stands_in_one_panel(panels: Panels) -> None:
-    forms = [*panels.all(), OtherForm()]  # that of what is compared with stands beside its views
+    # Those of what is compared with and of what is designed stand beside their views.
+    forms = [*panels.all(), OtherForm(), DesignForm()]
     shown = [name for form in forms for name in ASKED if form.findChild(object, name)]
     assert sorted(shown) == sorted(ASKED)
 

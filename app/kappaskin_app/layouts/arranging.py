@@ -113,11 +113,12 @@ def _bars(window: QMainWindow) -> list[QTabBar]:
 def arrange(window: QMainWindow, docks: Docks, panels: QTabWidget, layout: Layout) -> None:
     """Arrange the docks of a window so; one that the layout does not name is hidden."""
     placed = [(docks[name], place) for name, place in layout.docks if name in docks]
-    if not _only_show(window, docks, panels, layout):
-        with drawn_once(window):
+    with drawn_once(window):
+        if not _only_show(window, docks, panels, layout):
             for dock in docks.values():
                 dock.hide()
             _put(window, placed)
+        panels.setCurrentIndex(min(layout.page, panels.count() - 1))
     _size(window, [(dock, place) for dock, place in placed if place.shown])
     for dock, place in placed:
         if place.front:

@@ -5,11 +5,8 @@ import math
 import numpy as np
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
-    QDoubleSpinBox,
-    QFormLayout,
     QHBoxLayout,
     QSlider,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
@@ -46,20 +43,17 @@ class DesignForm(Form):
     """Asks for what is designed, each number with a slider."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("To be built", _NAMES, parent)
         self.sliders: dict[str, QSlider] = {}
-        for name in _NAMES:
-            if isinstance(how := ask_of(name), Range):
-                self._add_slider(name, how)
+        super().__init__("To be built", _NAMES, parent)
 
-    def _add_slider(self, name: str, how: Range) -> None:
-        box = self.editor(name)
-        if not isinstance(box, QSpinBox | QDoubleSpinBox):
-            return
+    def field(self, name: str, editor: QWidget) -> QWidget:
+        how = ask_of(name)
+        if not isinstance(how, Range):
+            return editor
         slider = self.sliders[name] = QSlider(Qt.Orientation.Horizontal)
         slider.setObjectName(f"{name}-slider")
         slider.setAccessibleName(f"{how.label}, slider")
-        slider.setToolTip(box.toolTip())
+        slider.setToolTip(editor.toolTip())
         slider.setRange(0, _STEPS)
         # With an arrow key it must come to another value, or it would stand still.
         step = _FACTOR if _wide(how) else math.ceil(_STEPS * how.step / (how.most - how.least))
@@ -67,10 +61,8 @@ class DesignForm(Form):
         slider.setPageStep(4 * step)
         well_behaved(slider)
         slider.setMinimumWidth(70)
-        place, _ = self.form.getWidgetPosition(box)  # pyright: ignore[reportGeneralTypeIssues]
-        self.form.removeWidget(box)
-        self.form.setWidget(place, QFormLayout.ItemRole.FieldRole, row(slider, box))
         slider.valueChanged.connect(guarded(lambda at: self.wished.emit(name, _meant(at, how))))
+        return row(slider, editor)
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)

@@ -237,7 +237,11 @@ class Form(Panel):
         label = QLabel("" if isinstance(how, Switch) else how.label)
         label.setBuddy(editor.widget)
         label.setToolTip(how.tip)
-        self.form.addRow(label, editor.widget)
+        self.form.addRow(label, self.field(name, editor.widget))
+
+    def field(self, name: str, editor: QWidget) -> QWidget:
+        """What stands beside the label of a setting: its editor, and what else one may want."""
+        return editor
 
     @property
     def names(self) -> tuple[str, ...]:

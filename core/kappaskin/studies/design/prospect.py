@@ -10,7 +10,7 @@ from kappaskin.bases import basis_for
 from kappaskin.fit import Estimator, estimator_for
 from kappaskin.frames import Array, Mask
 from kappaskin.patch import Patch
-from kappaskin.placement import check_placement, placement, predicted_sd
+from kappaskin.placement import check_placement, elements_placed, predicted_sd
 from kappaskin.scene import Scene
 from kappaskin.simulate import Simulator
 from kappaskin.studies.design.measures import noise_of
@@ -42,7 +42,9 @@ class Design:
         Ni, Nj = self.functions
         basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
         apart = _APART * math.sqrt(patch.a * patch.b / len(scene.layout))
-        return estimator_for("least-squares", basis, placement(scene.layout, basis, self.by, apart))
+        return estimator_for(
+            "least-squares", basis, elements_placed(scene.layout, basis, self.by, apart)
+        )
 
 
 @dataclass(frozen=True, eq=False)
