@@ -30,10 +30,10 @@ class Beginning(QObject):
             signal.connect(guarded(lambda *_: self._end()))
 
     def begin(self) -> None:
-        """Offer them, where a person wants it and nothing else is offered or presented."""
-        window = self._window
-        wanted = window.history.settings.show_start and not window.presenting.on
-        if wanted and window.session.engine.adopted is None:
+        """Offer them where a person wants it, and has not begun with something already."""
+        window, session = self._window, self._window.session
+        begun = window.presenting.on or not session.inside or session.engine.adopted is not None
+        if window.history.settings.show_start and not begun:
             self.offer()
 
     def offer(self) -> None:

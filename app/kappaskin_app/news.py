@@ -31,7 +31,7 @@ class News(QObject):
         )
         self._themed = (
             *(window.panels, window.cost, window.scene, window.timeline, window.transport),
-            *(window.mark, window.offer, window.mishaps, window.compare, window.stability),
+            *(window.mark, window.mishaps, window.compare, window.stability),
             *(window.log, window.health, window.lesson, window.pointing, window.display),
             *(window.design, window.presenting, window.picking),
         )

@@ -90,7 +90,7 @@ def test_it_goes_by_itself_but_not_while_somebody_is_at_it(bench: Bench, until) 
 
 
 def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwanted(
-    window: MainWindow, tmp_path: Path, until
+    window: MainWindow, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window.beginning.begin()
     until(lambda: window.offer.height() > 20)
@@ -108,6 +108,10 @@ def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwant
     window.beginning.begin()
     assert not window.offer.isVisible()
     window.history.stack.undo()
+    with monkeypatch.context() as patch:
+        patch.setattr(window.session, "source", "/dev/ttyACM0")  # as the command may say
+        window.beginning.begin()
+    assert not window.offer.isVisible()
     window.beginning.begin()
     assert window.offer.isVisible()
     window.offer.buttons[2].click()

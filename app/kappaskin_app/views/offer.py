@@ -9,7 +9,6 @@ from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QToolButton, QWidget
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.views.flow import Flow
 
 
@@ -29,7 +28,6 @@ class Offer(QWidget):
         super().__init__(parent)
         self.setObjectName("offer")
         self.setAccessibleName("Offer")
-        self._theme = LIGHT
         self.words, self.away = QLabel(), QToolButton()
         self.buttons: list[QPushButton] = []
         self.away.setText("\N{MULTIPLICATION SIGN}")
@@ -82,8 +80,3 @@ class Offer(QWidget):
             self._ending.start()
         else:
             self.hide()
-
-    def show_theme(self, theme: Theme) -> None:
-        if theme != self._theme:
-            self._theme = theme
-            self.words.setStyleSheet(f"color: {theme.text};")
