@@ -261,8 +261,11 @@ def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) ->
     left = window.layouts.now
     window.close()
     other = opened("sim:")
-    other.keeping.begin(path)
     qapp.processEvents()
+    other.keeping.begin(path)
+    for _ in range(3):
+        qapp.processEvents()
+    assert other.history.stack.count() == 0  # nobody did what is as it was
     assert other.history.settings.theme == "light"
     assert _words(other.layouts.now) == _words(left)
     assert other.panels.currentIndex() == 2
