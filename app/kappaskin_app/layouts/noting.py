@@ -94,7 +94,7 @@ class Noting(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
         if kind == QEvent.Type.Resize:
-            self.settle()
+            self._later()
         elif kind == QEvent.Type.MouseButtonPress:  # of the window itself: on an edge of docks
             self._known = self._now()
         elif kind == QEvent.Type.MouseButtonRelease:
@@ -104,6 +104,8 @@ class Noting(QObject):
 
     def _told(self, before: Seen, after: Seen) -> str:
         """What became of the window, in words."""
+        if not after.differs(before):
+            return "size of the panels"
         was, now = dict(before.layout.docks), dict(after.layout.docks)
         for change in ("shown", "area", "front"):
             of = [n for n in now if getattr(was[n], change) != getattr(now[n], change)]
