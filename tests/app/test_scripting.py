@@ -193,7 +193,7 @@ def test_a_script_is_short_and_says_what_is_asked_for(
     asked.history.apply(settings)
     asked.session.refusal = ""  # of the text that is no scene
     text = asked.text(Path("nowhere"))
-    assert _names(text) <= _used(text) & set(dir(kappaskin))
+    assert _names(text) == _used(text) & set(dir(kappaskin))
     assert len(text.splitlines()) < 66
     for words in said:
         assert words in text
