@@ -121,6 +121,31 @@ def test_any_layout_goes_through_text_and_window_and_back(bare, qapp, layout: La
         assert place.along == pytest.approx(shares[name].along, abs=0.004)
 
 
+def test_tabs_keep_their_order_and_docks_that_share_a_column_their_sizes(bare, qapp) -> None:
+    window, docks, pages = bare
+    window.show()
+    tabs = [
+        (name, Place("bottom", tabbed=name != "traces")) for name in ("traces", "cost", "scene")
+    ]
+    beside = [
+        ("settings", Place("left", share=0.2, along=0.9)),
+        ("curvature", Place("left", beside=True, share=0.3, along=0.9)),
+    ]
+    wanted = Layout(0, (*beside, *tabs))
+    found = []
+    for _ in range(2):
+        arrange(window, docks.by_name(), pages, wanted)
+        qapp.processEvents()
+        wanted = layout_of(window, docks.by_name(), pages)
+        arrange(window, docks.by_name(), pages, READY["Live"])
+        qapp.processEvents()
+        found.append([(n, p.beside, round(p.share, 2)) for n, p in wanted.docks if p.shown])
+    window.hide()
+    assert [name for name, *_ in found[0]] == ["settings", "curvature", "traces", "cost", "scene"]
+    assert found[0][:2] == [("settings", False, 0.2), ("curvature", True, 0.3)]
+    assert found[1] == found[0]
+
+
 HOSTILE = (
     "",
     "format = 2",
@@ -261,8 +286,11 @@ def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) ->
     left = window.layouts.now
     window.close()
     other = opened("sim:")
-    other.keeping.begin(path)
     qapp.processEvents()
+    other.keeping.begin(path)
+    for _ in range(3):
+        qapp.processEvents()
+    assert other.history.stack.count() == 0  # nobody did what is as it was
     assert other.history.settings.theme == "light"
     assert _words(other.layouts.now) == _words(left)
     assert other.panels.currentIndex() == 2

@@ -154,6 +154,33 @@ def test_a_dock_that_is_moved_comes_back(here: MainWindow) -> None:
     assert here.actions_by_name["redo"].text() == "&Redo: move By element"
 
 
+def test_an_edge_that_is_dragged_is_one_step(here: MainWindow, qtbot) -> None:
+    dock = here.docks["settings"]
+    wide, edge = dock.width(), QPoint(dock.geometry().right() + 3, dock.geometry().center().y())
+    qtbot.mousePress(here, LEFT, pos=edge)
+    for step in (20, 40, 60):
+        qtbot.mouseMove(here, edge + QPoint(step, 0))
+        _settle()
+    qtbot.mouseRelease(here, LEFT, pos=edge + QPoint(60, 0))
+    _settle()
+    assert dock.width() > wide + 30
+    assert _texts(here) == ["size of the panels"]
+    here.actions_by_name["undo"].trigger()
+    _settle()
+    assert abs(dock.width() - wide) <= 2
+
+
+def test_a_window_that_grows_for_a_dock_has_that_as_a_step(here: MainWindow) -> None:
+    here.resize(here.minimumSizeHint())
+    _settle()
+    here.actions_by_name["dock-cost"].trigger()
+    _settle()
+    assert _texts(here) == ["show Cost of accuracy"]
+    here.resize(1280, 800)
+    _settle()
+    assert _texts(here) == ["show Cost of accuracy"]
+
+
 def test_what_is_undone_at_once_is_what_was_done_last(here: MainWindow) -> None:
     here.wishes.wish("letters", 110.0)
     _settle()

@@ -87,17 +87,15 @@ def _lines(
 
 def _stacks(window: QMainWindow, here: list[QDockWidget]) -> list[list[QDockWidget]]:
     """Docks that share a place, in the order of their tabs."""
-    seen = [bar for bar in _bars(window) if not bar.isHidden()]  # Qt keeps those of the past
-    order = [bar.tabText(n) for bar in seen for n in range(bar.count())]
+    orders = [[bar.tabText(n) for n in range(bar.count())] for bar in _bars(window)]
     stacks: list[list[QDockWidget]] = []
     for dock in here:
         if any(dock in stack for stack in stacks):
             continue
         stack = [dock, *(d for d in window.tabifiedDockWidgets(dock) if d in here)]
-        titles = {d.windowTitle() for d in stack}
-        if titles <= set(order):
-            stack.sort(key=lambda d: order.index(d.windowTitle()))
-        stacks.append(stack)
+        titled = {d.windowTitle(): d for d in stack}
+        order = next((each for each in orders if set(each) == set(titled)), list(titled))
+        stacks.append([titled[title] for title in order])
     return stacks
 
 

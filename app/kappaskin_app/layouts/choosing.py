@@ -38,7 +38,8 @@ class Layouts(QObject):
         super().__init__(window)
         self._window, self._docks, self._panels = window, window.docks.by_name(), window.panels
         self._presenting, self._history = window.presenting, window.history
-        self.note = Noting(window, self).note
+        self._noting = Noting(window, self)
+        self.note = self._noting.note
         self.own: dict[str, Layout] = {}
         self._menu = QMenu(window)
         self._menu.aboutToShow.connect(guarded(self._list))
@@ -68,7 +69,8 @@ class Layouts(QObject):
         return layout_of(self._window, self._docks, self._panels)
 
     def apply(self, layout: Layout) -> None:
-        """Arrange the window so."""
+        """Arrange the window so, which is no step by itself."""
+        self._noting.settle()
         self._presenting.leave()
         arrange(self._window, self._docks, self._panels, layout)
 

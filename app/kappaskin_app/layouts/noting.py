@@ -49,7 +49,7 @@ class Noting(QObject):
                 news.connect(guarded(self._later))
         for pages in (self._panels, self._pages):
             pages.currentChanged.connect(guarded(self._later))
-        window.history.stack.indexChanged.connect(guarded(self._settle))
+        window.history.stack.indexChanged.connect(guarded(self.settle))
         window.installEventFilter(self)
 
     def note(self) -> None:
@@ -86,7 +86,7 @@ class Noting(QObject):
     def _later(self, *_: object) -> None:
         self._timer.start(0)
 
-    def _settle(self, *_: object) -> None:
+    def settle(self, *_: object) -> None:
         """Take the next look for what is so, as nobody's step."""
         self._settles = True
         self._timer.start(0)
@@ -94,7 +94,7 @@ class Noting(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
         if kind == QEvent.Type.Resize:
-            self._settle()
+            self._later()
         elif kind == QEvent.Type.MouseButtonPress:  # of the window itself: on an edge of docks
             self._known = self._now()
         elif kind == QEvent.Type.MouseButtonRelease:
@@ -104,6 +104,8 @@ class Noting(QObject):
 
     def _told(self, before: Seen, after: Seen) -> str:
         """What became of the window, in words."""
+        if not after.differs(before):
+            return "size of the panels"
         was, now = dict(before.layout.docks), dict(after.layout.docks)
         for change in ("shown", "area", "front"):
             of = [n for n in now if getattr(was[n], change) != getattr(now[n], change)]
