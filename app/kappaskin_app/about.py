@@ -28,6 +28,11 @@ PANELS: Mapping[str, str] = {
         "The functions that the shape is made of, w(x, y) = \u03a3 c\u1d62\u2c7c "
         "\u03c6\u1d62\u2c7c(x, y), and how their coefficients c are found from the curvatures read."
     ),
+    "To be built": (
+        "A sensor that is not built yet. Its error bar follows from the covariance "
+        "s\N{SUPERSCRIPT TWO} (M\u1d40M)\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ONE} of noise s and the fit's matrix M, at once and "
+        "without a simulation."
+    ),
     "View": "How the skin is drawn: its colours, its height and what is drawn over it.",
     "Publish": (
         "Sends the contact with its error bars to other programs, as JSON by UDP or to Foxglove; "
@@ -79,6 +84,7 @@ DOCKS: Mapping[str, str] = {
     "health": "Which channels are dead, stuck, noisy, swapped or drifting, and what that costs",
     "numbers": "What the picture shows as tables: contact, object, every element; copied as CSV",
     "compare": "Two settings on the same readings: both surfaces, and B less A",
+    "design": "A sensor before it is built: how sure it would be, where its elements tell most",
     "element": "All about the element clicked: its last seconds, spectrum, calibration and health",
     "traces": "The last seconds of the elements chosen, in one plot each for xx, yy and xy",
     "log": "What was logged or said in passing since the window opened, newest first",

@@ -313,7 +313,8 @@ def test_both_themes_draw(window: MainWindow, until, colours_in, theme: str) -> 
     window.history.change("Theme", -1, theme=theme, colour_by="xy")
     drawn = len(window.membrane.ages)
     until(lambda: len(window.membrane.ages) > drawn + 3)
-    assert colours_in(window, window.membrane) > 500
+    # On a busy machine the skin may be grey for a moment, as nothing new came.
+    until(lambda: colours_in(window, window.membrane) > 500)
 
 
 def test_a_picture_is_saved(window: MainWindow, tmp_path: Path) -> None:
