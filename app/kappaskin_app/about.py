@@ -29,9 +29,8 @@ PANELS: Mapping[str, str] = {
         "\u03c6\u1d62\u2c7c(x, y), and how their coefficients c are found from the curvatures read."
     ),
     "To be built": (
-        "A sensor that is not built yet. Its error bar follows from the covariance "
-        "s\N{SUPERSCRIPT TWO} (M\u1d40M)\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ONE} of noise s and the fit's matrix M, at once and "
-        "without a simulation."
+        "A sensor that is not built yet. How sure it would be follows at once from the covariance "
+        "s\u00b2 (M\u1d40M)\u207b\u00b9 of noise s and the fit's matrix M; nothing is simulated."
     ),
     "View": "How the skin is drawn: its colours, its height and what is drawn over it.",
     "Publish": (

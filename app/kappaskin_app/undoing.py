@@ -7,6 +7,7 @@ from PySide6.QtGui import QUndoStack
 
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
+from kappaskin_app.tips import tip_of
 
 _LONGEST = 60  # characters of a step in a menu
 
@@ -39,5 +40,6 @@ class Undoing(QObject):
                 text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}\N{HORIZONTAL ELLIPSIS}"
             )
             action.setText(f"&{word}: {cut.replace('&', '&&')}" if text else f"&{word}")
-            action.setToolTip(f"{word}: {text}" if text else word)
+            what = tip_of(name, word)
+            action.setToolTip(f"{word}: {text}\n{what}" if text else what)
             self._actions.allow(name, "" if text else f"there is nothing to {name}")

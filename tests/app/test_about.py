@@ -10,6 +10,7 @@ from kappaskin_app.about import PANELS as ABOUT_PANELS
 from kappaskin_app.history import History
 from kappaskin_app.layouts.layout import DOCKS
 from kappaskin_app.panels.compare import OtherForm
+from kappaskin_app.panels.design import DesignForm
 from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.panels import Panels
 from kappaskin_app.settings import Settings
@@ -30,7 +31,7 @@ def panels(qapp: QApplication) -> Iterator[Panels]:
 
 
 def test_every_panel_and_every_dock_says_what_it_is_for(panels: Panels) -> None:
-    titles = {panel.title() for panel in panels.all()} | {OtherForm().title()}
+    titles = {panel.title() for panel in panels.all()} | {OtherForm().title(), DesignForm().title()}
     assert titles == set(ABOUT_PANELS)
     assert set(DOCKS) == set(ABOUT_DOCKS)
     assert all(len(text) > 40 for text in (*ABOUT_PANELS.values(), *ABOUT_DOCKS.values()))

@@ -18,13 +18,14 @@ from kappaskin_app.settings import (
     ask_of,
 )
 
+_OWN = ("theme", "show_start")  # matters of taste
 _LISTS = ("dead_elements", "region_elements")
 _KINDS = (SceneSettings, Fit, Scanning, View)
 SETTABLE = {
     field.name
     for kind in _KINDS
     for field in fields(kind)
-    if "ask" in field.metadata and field.name != "theme"
+    if "ask" in field.metadata and field.name not in _OWN
 }
 """What a lesson may set, besides lists of elements: nothing that leaves this machine."""
 
