@@ -40,6 +40,5 @@ class Undoing(QObject):
                 text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}\N{HORIZONTAL ELLIPSIS}"
             )
             action.setText(f"&{word}: {cut.replace('&', '&&')}" if text else f"&{word}")
-            what = tip_of(name, word)
-            action.setToolTip(f"{word}: {text}\n{what}" if text else what)
+            action.setToolTip(f"{word}: {text}" if text else tip_of(name, word))
             self._actions.allow(name, "" if text else f"there is nothing to {name}")
