@@ -87,8 +87,13 @@ def _measurements(window: "MainWindow") -> None:
     stability.demonstrated.connect(guarded(window.wishes.demonstrate))
     stability.back.connect(guarded(stack.undo))
     stability.shown.connect(guarded(window.news.show_shape))
-    stack.canUndoChanged.connect(guarded(stability.show_undo))
-    stability.show_undo(stack.canUndo())
+    show_back = partial(_show_back, window)
+    stack.indexChanged.connect(guarded(show_back))
+    show_back()
+
+
+def _show_back(window: "MainWindow", *_: object) -> None:
+    window.stability.show_undo(window.wishes.demonstrates)
 
 
 def _health(window: "MainWindow") -> None:

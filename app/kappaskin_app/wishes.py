@@ -36,6 +36,7 @@ class Wishes:
         self._place = (0.0, 0.0)
         self._grabbed_in: Written | None = None
         self._begun: tuple[Demonstration, int, Settings] | None = None
+        self._demonstrated = set[int]()  # gestures
 
     def wish(self, name: str, value: Any) -> None:
         """Make the setting `name` what is wished, and what follows from it."""
@@ -62,9 +63,17 @@ class Wishes:
     def demonstrate(self, demonstration: Demonstration) -> None:
         """Bring a hard case about, as one step."""
         gesture = self._history.new_gesture()
+        self._demonstrated.add(gesture)
         self._history.change(demonstration.title, gesture, **demonstration.changes())
         if demonstration.then:
             self._begun = demonstration, gesture, self._history.settings
+
+    @property
+    def demonstrates(self) -> bool:
+        """Whether the last step, which undoing takes back, brought a hard case about."""
+        stack = self._history.stack
+        last = stack.command(stack.index() - 1)
+        return last is not None and last.id() in self._demonstrated
 
     def follow(self, status: Status) -> None:
         """Go on with the hard case that was begun, once its skin is there."""

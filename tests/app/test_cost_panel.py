@@ -38,6 +38,7 @@ def shared(qapp: QApplication, few: None, until) -> Iterator[MainWindow]:
     until(lambda: window.session.estimate is not None)
     window.actions_by_name["dock-cost"].trigger()
     until(lambda: _all_measured(window), 60.0)
+    window.history.stack.clear()  # the dock stays, whatever is undone
     window.hide()
     yield window
     window.close()

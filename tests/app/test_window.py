@@ -580,8 +580,11 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     window.history.change("All", -1, load_case="two-points", side_x=0.03, x=0.02, region="skin")
     obeyed = set()
     window.actions_by_name["dock-compare"].trigger()
-    for page in range(window.panels.count()):
-        window.panels.setCurrentIndex(page)
+    for page in range(window.panels.count() + 1):
+        if page < window.panels.count():
+            window.panels.setCurrentIndex(page)
+        else:
+            window.actions_by_name["dock-design"].trigger()
         for form in window.findChildren(Form):
             for editor in form.editors():
                 if not editor.isVisible():
@@ -605,7 +608,8 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
                 window.history.stack.undo()
                 obeyed.add(editor.objectName())
     asked = {f.name for f in fields(Settings) if "ask" in f.metadata}
-    hidden = {"rim_radius", "size", "size_y"} | ({"base_radius"} if shape == "flat" else set())
+    hidden = {"rim_radius", "size", "size_y", "design_base_radius", "design_rim_radius"}
+    hidden |= {"base_radius"} if shape == "flat" else set()
     assert asked - obeyed == hidden
 
 

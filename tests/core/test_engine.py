@@ -239,10 +239,10 @@ def test_another_skin_is_met_as_another_device_is(engine) -> None:
 def test_between_two_skins_there_is_nothing_to_show(engine) -> None:
     engine.connect("sim:centre")
     next_estimate(engine)
-    engine.set_up(Setup(12, 12))
+    engine.set_up(Setup(18, 18))
     patch, waited = Patch(0.04, 0.03, 0.0129), 0
-    for m in (14, 15):  # so many that making the pipeline takes a while
-        layout = SensorLayout.regular(patch, m, 12)
+    for m in (20, 21):  # so many that making the pipeline takes a while
+        layout = SensorLayout.regular(patch, m, 20)
         engine.play(Scene("arc", Plate(patch), layout, rate=100.0))
         for _ in range(300):
             status = engine.status()
