@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int32]
@@ -102,7 +102,7 @@ class Touch:
 
     @property
     def _reach(self) -> float:
-        return float(special.stdtrit(max(self.spare, 1), 0.975))
+        return float(scipy.special.stdtrit(max(self.spare, 1), 0.975))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ive, jn_zeros, jv
 
 from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.modes import ModeBasis
@@ -114,8 +114,12 @@ class _Modes:
     def _radial(self, r: Array, p: int, q: int) -> Array:
         """The radial part of D-^p D+^q of the pairs of modes, (P, U), at `r` (P,)."""
         k, m, kr = self.k, self.m, np.multiply.outer(r, self.k)
-        growing: Array = ive(m - p + q, kr) / ive(m, k) * np.exp(kr - k)  # I_m-p+q(k r)/I_m(k)
-        return k ** (p + q) * ((-1.0) ** q * jv(m - p + q, kr) - jv(m, k) * growing)
+        growing: Array = (
+            scipy.special.ive(m - p + q, kr) / scipy.special.ive(m, k) * np.exp(kr - k)
+        )  # I_m-p+q(k r)/I_m(k)
+        return k ** (p + q) * (
+            (-1.0) ** q * scipy.special.jv(m - p + q, kr) - scipy.special.jv(m, k) * growing
+        )
 
     def derivative(self, z: Complex, order: Order) -> Array:
         """The derivatives (P, N) of one order at the points z = x + i y (P,) of the disk."""
@@ -160,9 +164,13 @@ def _frequencies(m: int, most: float, clamped: bool) -> list[float]:
 
     def edge(k: float) -> float:
         turning = 0.0 if clamped else 2 * k / (1 - _POISSON)
-        return float(jv(m + 1, k) + jv(m, k) * (ive(m + 1, k) / ive(m, k) - turning))
+        return float(
+            scipy.special.jv(m + 1, k)
+            + scipy.special.jv(m, k)
+            * (scipy.special.ive(m + 1, k) / scipy.special.ive(m, k) - turning)
+        )
 
-    zeros = jn_zeros(m, int(most / np.pi) + 2)
+    zeros = scipy.special.jn_zeros(m, int(most / np.pi) + 2)
     low = zeros[:-1] if clamped else [max(m, 1), *zeros[:-1]]
     high = zeros[1:] if clamped else zeros
     roots = [brentq(edge, a, b, xtol=1e-13) for a, b in zip(low, high, strict=True) if a < most]

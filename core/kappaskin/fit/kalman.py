@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
+import scipy
 from numpy.typing import DTypeLike
-from scipy import special
 from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
 from kappaskin.frames import Array
@@ -86,7 +86,7 @@ class MovingModes(Remembering):
         # The process's transition [[a, b], [c, d]] over that time, and the root of what it adds:
         # 1 - e^-2x (1 + 2x + 2x^2) is the incomplete gamma function, without its cancellation.
         a, b, c, d = (1 + x) * decay, seconds * decay, -rate * x * decay, (1 - x) * decay
-        first = np.sqrt(special.gammainc(3, 2 * x))
+        first = np.sqrt(scipy.special.gammainc(3, 2 * x))
         tiny = first == 0
         mixed = 2 * x**2 * decay**2 / np.where(tiny, 1.0, first)
         added = -np.expm1(-2 * x) + 2 * x * (1 - x) * decay**2

@@ -6,8 +6,8 @@ from itertools import combinations
 from typing import Any, cast
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient
@@ -94,7 +94,7 @@ class Robust(Estimator):
         self._judges = Remembered[_Judge]()
         P = len(layout)
         sensing = np.maximum(layout.live.sum(axis=0), 1)
-        self._limit: Array = special.chdtri(sensing, _ALARM / P)
+        self._limit: Array = scipy.special.chdtri(sensing, _ALARM / P)
         self._history = _History()
         self._judges(self.readable, self._judge)
 
@@ -112,7 +112,7 @@ class Robust(Estimator):
         """Per place (3 P, G, 4): of a force, of moving it along x, along y, of widening it."""
         self._presses /= np.linalg.norm(self._presses, axis=0)
         self._forces = np.ascontiguousarray(self._presses[..., 0])
-        self._press_limit = float(special.chdtri(1, _ALARM / len(points)))
+        self._press_limit = float(scipy.special.chdtri(1, _ALARM / len(points)))
 
     def _press(self, view: "_View", judge: _Judge) -> Array:
         """How much better the readings are explained (G,) with a load at each place."""

@@ -3,8 +3,8 @@
 from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from kappaskin.frames import Array, Mask
 from kappaskin.layout import SensorLayout
@@ -54,7 +54,7 @@ class Neighbours:
     def __init__(self, layout: SensorLayout) -> None:
         P = len(layout)
         k = min(_COUNT, P - 1)
-        apart, near = KDTree(layout.positions).query(layout.positions, k + 1)
+        apart, near = scipy.spatial.KDTree(layout.positions).query(layout.positions, k + 1)
         near = cast("Indices", near).reshape(P, k + 1)[:, 1:]
         pitch = float(np.median(np.reshape(apart, (P, k + 1))[:, 1:2])) if k else 1.0
         self._at = layout.positions.T / (pitch or 1.0)

@@ -6,7 +6,7 @@ from dataclasses import Field, dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from scipy.special import j1
+import scipy
 
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import Refusal
@@ -109,7 +109,7 @@ class DiscLoad(SpreadLoad):
 
     def _wave(self, k: Array, l: Array) -> Array:
         turn = np.hypot(k, l) * self.radius
-        return 2 * j1(turn) / turn
+        return 2 * scipy.special.j1(turn) / turn
 
     def _rim(self) -> Array:
         return self.radius * _circle(64)

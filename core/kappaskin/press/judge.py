@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
+import scipy
 
 from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
@@ -63,5 +63,5 @@ def _pitch(layout: SensorLayout) -> float:
     """The median distance in m of an element to the nearest other one."""
     if len(layout) < 2:
         return 1.0
-    apart, _ = KDTree(layout.positions).query(layout.positions, 2)
+    apart, _ = scipy.spatial.KDTree(layout.positions).query(layout.positions, 2)
     return float(np.median(np.asarray(apart)[:, 1]))

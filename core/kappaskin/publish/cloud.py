@@ -4,7 +4,7 @@ import base64
 import json
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from kappaskin.bases import CurvatureMap
 from kappaskin.frames import COMPONENTS, Array
@@ -71,7 +71,13 @@ def pose(message: Message) -> bytes:
     """The contact as a foxglove.PoseInFrame in JSON: z is the skin's normal, x along the skin."""
     geometry = message.estimate.geometry
     x, y, z = geometry.position.tolist()
-    turn = dict(zip("xyzw", Rotation.from_matrix(geometry.frame.T).as_quat().tolist(), strict=True))
+    turn = dict(
+        zip(
+            "xyzw",
+            scipy.spatial.transform.Rotation.from_matrix(geometry.frame.T).as_quat().tolist(),
+            strict=True,
+        )
+    )
     return (
         f'{{"timestamp":{moment(message.timestamp)},"frame_id":"{FRAME}","pose":{{"position":'
         f'{{"x":{x},"y":{y},"z":{z}}},"orientation":{json.dumps(turn)}}}}}'

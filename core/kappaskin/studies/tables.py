@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import special
+import scipy
 
 from kappaskin.bases import basis_for
 from kappaskin.effects import UniformNoise
@@ -92,7 +92,7 @@ class _Case:
         truth = self.scene.plate.deflection(self.scene.loads, self.scene.basis)
         off = fit.coefficients.reshape(len(fit.coefficients), -1) @ self.fit.basis.at(points).T
         off -= self.scene.basis.at(points) @ truth.ravel()
-        reach = special.stdtrit(np.maximum(fit.spare, 1), 0.975)
+        reach = scipy.special.stdtrit(np.maximum(fit.spare, 1), 0.975)
         return float(np.mean(np.abs(off) < np.reshape(reach, (-1, 1)) * fit.surface_sd(points)))
 
     def on_slopes(self) -> Array:

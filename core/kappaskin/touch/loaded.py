@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from kappaskin.bases import basis_for
 from kappaskin.fit.remembered import Remembered
@@ -104,4 +104,4 @@ def _by_chance(spare: int) -> float:
     """
     if spare < 2:
         return math.inf
-    return float(special.betaincinv(0.5, (spare - 1) / 2, 1 - _CHANCE / spare))
+    return float(scipy.special.betaincinv(0.5, (spare - 1) / 2, 1 - _CHANCE / spare))

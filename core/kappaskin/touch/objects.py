@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from scipy import special
+import scipy
 
 from kappaskin.frames import Array, Touch
 from kappaskin.layout import SensorLayout
@@ -159,7 +159,7 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
     probability = {kind: math.exp(weights[kind] - most) / total for kind in KINDS}
     kind = max(KINDS, key=probability.__getitem__)
     found = {"sphere": all_of.sphere, "edge": all_of.edge}.get(kind, all_of.cylinder)
-    reach = float(special.stdtrit(all_of.readings - len(found.best.parameters), 0.975))
+    reach = float(scipy.special.stdtrit(all_of.readings - len(found.best.parameters), 0.975))
     radius, radius_95 = _radius(cast("Width", found.width or all_of.cylinder.width), reach)
     known = probability[kind] >= _SURE and all_of.noise <= _WELL * noise
     known = known and not (kind == "plane" and math.isnan(radius))  # flattened, not just touched

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from scipy import special
+import scipy
 
 from kappaskin.errors import Refusal
 from kappaskin.scene.table import Table
@@ -70,9 +70,9 @@ class Normal:
 
     def __call__(self, rng: np.random.Generator) -> float:
         low, high = (
-            float(special.ndtr((end - self.mean) / self.sd)) for end in (self.low, self.high)
+            float(scipy.special.ndtr((end - self.mean) / self.sd)) for end in (self.low, self.high)
         )
-        drawn = self.mean + self.sd * float(special.ndtri(rng.uniform(low, high)))
+        drawn = self.mean + self.sd * float(scipy.special.ndtri(rng.uniform(low, high)))
         return min(max(drawn, self.low), self.high)
 
 

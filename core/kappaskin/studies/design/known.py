@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import special
+import scipy
 
 from kappaskin.frames import Array
 from kappaskin.studies.design.study import Point, Study
@@ -49,7 +49,7 @@ def _half(means: Array, weights: Array, mean: float) -> float:
     if B < 2:
         return math.nan
     variance = B / (B - 1) * float(np.sum((weights * (means - mean)) ** 2))
-    return float(special.stdtrit(B - 1, 0.975)) * math.sqrt(variance)
+    return float(scipy.special.stdtrit(B - 1, 0.975)) * math.sqrt(variance)
 
 
 @dataclass(eq=False)

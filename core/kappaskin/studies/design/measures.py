@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy import special
+import scipy
 
 from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator
@@ -77,7 +77,7 @@ def _covered(block: Block) -> Array:
     x, y = (along[1:-1] for along in patch.grid(_SIDE, 3 if patch.strip else _SIDE))
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     points = points[patch.contains(points)]
-    reach = special.stdtrit(np.maximum(block.fit.spare, 1), 0.975)
+    reach = scipy.special.stdtrit(np.maximum(block.fit.spare, 1), 0.975)
     bands = np.reshape(reach, (-1, 1)) * block.fit.surface_sd(points)
     return np.mean(np.abs(block.off(points)) < bands, axis=1)
 

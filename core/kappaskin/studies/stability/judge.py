@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, Fit
@@ -82,9 +82,9 @@ def _reach(fit: Fit) -> Array:
     """Half widths of 95 % in standard deviations, (T,): Student's t where noise is estimated."""
     frames = len(fit.curvature)
     if fit.estimator.sigma is not None:
-        return np.full(frames, special.ndtri(0.975))
+        return np.full(frames, scipy.special.ndtri(0.975))
     spare = np.broadcast_to(np.asarray(fit.spare, float), (frames,))
-    return np.asarray(special.stdtrit(np.where(spare > 0, spare, np.nan), 0.975), float)
+    return np.asarray(scipy.special.stdtrit(np.where(spare > 0, spare, np.nan), 0.975), float)
 
 
 @runtime_checkable
