@@ -58,9 +58,7 @@ class StabilityPanel(QWidget):
             button(demonstration.title, f"demonstration-{number}", demonstration.told)
             for number, demonstration in enumerate(DEMONSTRATIONS)
         ]
-        self.undo = button(
-            "Back", "back", "Undo the hard case that came last (Ctrl+Z)."
-        )
+        self.undo = button("Back", "back", "Undo the hard case that came last (Ctrl+Z).")
         self._seeing: Seeing | None = None
         self._told, self._simulating = _TRY, True
         self._lay_out()

@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtGui import QFont, QFontInfo
+from PySide6.QtCore import QEvent
+from PySide6.QtGui import QFont, QFontInfo, QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QWidget
 
 from kappaskin import Estimate, Touch
@@ -61,9 +62,10 @@ FIELDS = {
     "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
 }
 
+_DIGITS = 1.6  # that a unit of width takes at least
 _SMALL = 0.85  # of a number's letters are those of its name
 _WIDTHS = {
-    "contact": 13,
+    "contact": 14,
     "rate": 10,
     "lost": 12,
     "force": 10,
@@ -121,17 +123,20 @@ def _force(touch: Touch) -> str:
 
 
 class Readouts(QWidget):
-    """Names above numbers, each of a fixed width so that nothing jitters."""
+    """Names above numbers, each of a fixed width so that nothing jitters.
+
+    In two rows where the letters are too large for one.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        grid = QGridLayout(self)
-        grid.setContentsMargins(8, 2, 8, 2)
-        grid.setHorizontalSpacing(8)
-        grid.setVerticalSpacing(0)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(8, 2, 8, 2)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(0)
         self._names: list[QLabel] = []
         self._numbers: dict[str, Line] = {}
-        for column, (key, (name, tip)) in enumerate(FIELDS.items()):
+        for key, (name, tip) in FIELDS.items():
             above, below = QLabel(name), Line(NONE)
             bold = below.font()
             bold.setWeight(QFont.Weight.DemiBold)
@@ -140,9 +145,37 @@ class Readouts(QWidget):
                 widget.setToolTip(tip)
             self._names.append(above)
             self._numbers[key] = below
-            grid.addWidget(above, 0, column)
-            grid.addWidget(below, 1, column)
-            grid.setColumnStretch(column, _WIDTHS[key])
+        self._columns = 0
+        self._lay_out(len(FIELDS))
+
+    def _lay_out(self, columns: int) -> None:
+        """Put so many fields beside each other."""
+        if columns == self._columns:
+            return
+        self._columns = columns
+        for column in range(len(FIELDS)):
+            self._grid.setColumnStretch(column, 0)
+        fields = zip(self._names, self._numbers.items(), strict=True)
+        for number, (above, (key, below)) in enumerate(fields):
+            row, column = divmod(number, columns)
+            self._grid.addWidget(above, 2 * row, column)
+            self._grid.addWidget(below, 2 * row + 1, column)
+            stretch = max(self._grid.columnStretch(column), _WIDTHS[key])
+            self._grid.setColumnStretch(column, stretch)
+
+    def _fit(self) -> None:
+        digit = self._numbers["rate"].fontMetrics().horizontalAdvance("0")
+        room = self.width() >= _DIGITS * digit * sum(_WIDTHS.values())
+        self._lay_out(len(FIELDS) if room else len(FIELDS) // 2)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self._fit()
 
     def text(self, key: str) -> str:
         return self._numbers[key].text()

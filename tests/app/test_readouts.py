@@ -1,0 +1,44 @@
+"""The numbers of the header have room, whatever the letters."""
+
+import pytest
+
+from kappaskin_app.views.readouts import FIELDS, Health, Readouts
+
+
+@pytest.fixture
+def readouts(qtbot) -> Readouts:
+    made = Readouts()
+    qtbot.addWidget(made)
+    made.resize(1180, 60)
+    made.show()
+    made.show_health(Health(500.0, 42.0, 0.0123, 0.0004, 1234, 0, 5678))
+    return made
+
+
+def rows(readouts: Readouts) -> int:
+    return len({number.y() for number, _ in readouts.parts.values()})
+
+
+def test_numbers_too_wide_for_one_row_stand_in_two_and_come_back(readouts: Readouts, qtbot) -> None:
+    seen = []
+    for width in (1180, 560, 1180):
+        readouts.resize(width, 100)
+        qtbot.wait(1)
+        seen.append(rows(readouts))
+
+    assert seen == [1, 2, 1]
+    assert list(readouts.parts) == list(FIELDS)
+
+
+def test_larger_letters_stand_in_two_rows_and_are_read_whole(readouts: Readouts, qtbot) -> None:
+    font = readouts.font()
+    font.setPointSizeF(1.8 * font.pointSizeF())
+
+    for number, name in readouts.parts.values():
+        number.setFont(font)
+        name.setFont(font)
+    readouts.setFont(font)
+    qtbot.wait(1)
+
+    assert rows(readouts) == 2
+    assert all(number.whole for number, _ in readouts.parts.values())
