@@ -45,7 +45,8 @@ CHECKS = (
     ("basedpyright",),
     ("lint-imports",),
     # Each process has a display of its own; -n0 among ARGUMENTS makes it one for all, on ours.
-    ("pytest", "-n2"),
+    # One that crashes ends the run: what it had in hand would be waited for without end.
+    ("pytest", "-n2", "--max-worker-restart=0"),
 )
 # Benchmark files are named so that plain pytest passes them by.
 BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")
