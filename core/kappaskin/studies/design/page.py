@@ -20,7 +20,7 @@ figure svg { width: 100%; height: auto; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #9aa3ad55; }
-th { vertical-align: bottom; max-width: 11rem; }
+td { white-space: nowrap; } th { vertical-align: bottom; max-width: 11rem; }
 pre { overflow-x: auto; padding: .8rem; border: 1px solid #9aa3ad88; border-radius: 6px;
   font-size: .82rem; line-height: 1.4; }
 .faint { opacity: .75; }
