@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kappaskin import Load, Setting, Status
-from kappaskin_app.demonstrations import Demonstration
+from kappaskin_app.demonstrations import DEMONSTRATIONS, Demonstration
 from kappaskin_app.effects import called
 from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
@@ -24,6 +24,8 @@ from kappaskin_app.simulation import (
 )
 from kappaskin_app.touching import Held, most_times
 
+_TITLES = {name[:1].lower() + name[1:] for name in (d.title for d in DEMONSTRATIONS)}
+
 
 class Wishes:
     """Turns wishes of panels, menus and views into commands of the history."""
@@ -36,7 +38,6 @@ class Wishes:
         self._place = (0.0, 0.0)
         self._grabbed_in: Written | None = None
         self._begun: tuple[Demonstration, int, Settings] | None = None
-        self._demonstrated = set[int]()  # gestures
 
     def wish(self, name: str, value: Any) -> None:
         """Make the setting `name` what is wished, and what follows from it."""
@@ -63,7 +64,6 @@ class Wishes:
     def demonstrate(self, demonstration: Demonstration) -> None:
         """Bring a hard case about, as one step."""
         gesture = self._history.new_gesture()
-        self._demonstrated.add(gesture)
         self._history.change(demonstration.title, gesture, **demonstration.changes())
         if demonstration.then:
             self._begun = demonstration, gesture, self._history.settings
@@ -71,9 +71,8 @@ class Wishes:
     @property
     def demonstrates(self) -> bool:
         """Whether the last step, which undoing takes back, brought a hard case about."""
-        stack = self._history.stack
-        last = stack.command(stack.index() - 1)
-        return last is not None and last.id() in self._demonstrated
+        # By its words: Qt's own commands, asked for at every step, come and go with their wrappers.
+        return self._history.stack.undoText() in _TITLES
 
     def follow(self, status: Status) -> None:
         """Go on with the hard case that was begun, once its skin is there."""
