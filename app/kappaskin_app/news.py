@@ -45,7 +45,6 @@ class News(QObject):
             application.setPalette(palette(theme))
             if (font := letters(settings.letters)) != application.font():
                 application.setFont(font)
-                application.setFont(font, b"QDockWidgetTitle")  # which has one of its own
         for each in self._themed:
             each.show_theme(theme)
 
