@@ -5,6 +5,7 @@ import time
 import pytest
 
 from kappaskin import Pipeline, PointLoad, Setup, Simulator, load_scene
+from kappaskin_app import naming
 from kappaskin_app.naming import curved
 
 
@@ -37,8 +38,10 @@ def test_the_window_says_what_touches_the_skin(window, until):
     until(lambda: not window.object.text())
 
 
-def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until):
+def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until, monkeypatch):
     until(lambda: "curves" in window.object.text())
+    made = naming.ObjectFinder
+    monkeypatch.setattr(naming, "ObjectFinder", lambda *of: time.sleep(2.5) or made(*of))
     window.wishes.wish("shape", "cylinder")
     until(lambda: "computing what objects read like" in window.object.text())
     until(lambda: "curves" in window.object.text())
