@@ -1,9 +1,14 @@
-"""What importing the library does not do."""
+"""What importing the library does, and what it does not."""
 
+import ast
+import pkgutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+import kappaskin
 
 ROOMS = """
 import pkgutil, importlib, sys, kappaskin
@@ -13,15 +18,66 @@ for module in pkgutil.walk_packages(kappaskin.__path__, "kappaskin."):
 """
 
 
-@pytest.mark.parametrize("code", ["import kappaskin, sys", ROOMS], ids=["library", "every room"])
-def test_importing_the_library_loads_no_gui(code):
-    listing = "\nprint(*sorted({name.partition('.')[0] for name in sys.modules}))"
+def loaded_by(code: str) -> set[str]:
+    """The modules there are in a new process that ran `code`."""
+    listing = "\nimport sys\nprint(*sys.modules)"
+    return set(subprocess.check_output([sys.executable, "-c", code + listing], text=True).split())
 
-    loaded = subprocess.run(
-        [sys.executable, "-c", code + listing], capture_output=True, text=True, check=True
-    ).stdout.split()
+
+@pytest.mark.parametrize(
+    "code", ["from kappaskin import *", ROOMS], ids=["every name", "every room"]
+)
+def test_importing_the_library_loads_no_gui(code):
+    loaded = {name.partition(".")[0] for name in loaded_by(code)}
 
     assert "kappaskin" in loaded
     gui = {"PySide6", "shiboken6", "vtk", "vtkmodules", "pyvista", "pyvistaqt", "matplotlib"}
     asked_for = {"h5py", "imageio_ffmpeg"}
-    assert not (gui | asked_for) & set(loaded)
+    assert not (gui | asked_for) & loaded
+
+
+@pytest.mark.parametrize(
+    ("code", "rooms"),
+    [
+        ("import kappaskin", set()),
+        ("from kappaskin import Refusal", {"errors"}),
+        ("from kappaskin import Patch", {"errors", "frames", "outline", "patch"}),
+    ],
+)
+def test_a_name_of_the_library_loads_its_room_and_those_below_alone(code, rooms):
+    loaded = loaded_by(code)
+
+    ours = {name.split(".")[1] for name in loaded if name.startswith("kappaskin.")}
+    assert ours == rooms
+
+
+def test_every_exported_name_is_what_type_checkers_see():
+    [seen] = [
+        node
+        for node in ast.parse(Path(kappaskin.__file__).read_text("utf-8")).body
+        if isinstance(node, ast.If)
+    ]
+    typed = {
+        (alias.name, node.module)
+        for node in seen.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+    exported = {(name, f"kappaskin.{room}") for name, room in kappaskin._ROOM.items()}  # noqa: SLF001
+
+    assert exported == typed
+    assert set(kappaskin.__all__) == {name for name, _ in typed} <= set(dir(kappaskin))
+
+
+def test_every_exported_name_is_there_and_is_no_room():
+    rooms = {module.name for module in pkgutil.iter_modules(kappaskin.__path__)}
+
+    for name in kappaskin.__all__:
+        assert hasattr(kappaskin, name)  # or raises what its room does
+    assert not rooms & set(kappaskin.__all__)
+
+
+def test_a_misspelt_name_is_refused_as_of_any_module():
+    with pytest.raises(ImportError, match="cannot import name 'LeastSquare'"):
+        from kappaskin import LeastSquare  # noqa: F401
