@@ -21,7 +21,6 @@ from kappaskin_app.theme import DIVERGING, LIGHT, Theme
 from kappaskin_app.touching import touches_at
 from kappaskin_app.views.badge import GAP, LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.views.colour_bar import SkinScale
-from kappaskin_app.views.heatmap import coloured, legend
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.notice import Notice, warnings
 from kappaskin_app.views.readouts import Health, Readouts
@@ -231,8 +230,8 @@ class Display(QObject):
         else:
             of_elements = self._of_elements(name, estimate, kinds)
             tint, on_rail = self._tint(name, estimate, of_elements, now), _of_row(name, railed)
-            values = coloured(of_elements, tint, self._missing, on_rail)
-            beside = legend(of_elements, tint, self._missing, on_rail)
+            values = tint.rgb(of_elements, self._missing, on_rail)
+            beside = tint.legend(of_elements, self._missing, on_rail)
         self._show_colours(tint)
         self._say_unknown(name, values)
         self.membrane.show_estimate(estimate, values, tint.limits, times)

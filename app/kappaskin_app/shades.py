@@ -6,9 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin import QUANTITIES, WHY
-from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, PULLED, SEQUENTIAL, Colours
+from kappaskin_app.theme import (
+    DARK_INK,
+    DIVERGING,
+    LIGHT_INK,
+    PULLED,
+    SATURATED,
+    SEQUENTIAL,
+    Colours,
+)
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 _UNITS = {"m": (1e3, "mm"), "1/m": (1.0, "1/m"), "1/m^2": (1.0, "1/m\u00b2"), "": (1.0, "")}
 _DIGITS = {"mm": ".3f", "1/m": ".2f", "1/m\u00b2": ".3g"}
@@ -51,8 +60,8 @@ class Tint:
         """What is seen against every one of the colours."""
         return DARK_INK if self.colours is DIVERGING else LIGHT_INK
 
-    def rgb(self, values: Array, missing: str) -> Colours:
-        """Colours (..., 3) of `values` (...); NaN in the colour `missing`."""
+    def rgb(self, values: Array, missing: str, railed: Mask | None = None) -> Colours:
+        """Colours (..., 3) of `values` (...); NaN is `missing`, what is `railed` has its own."""
         gone = ~np.isfinite(values)
         known = np.where(gone, 0.0, values)
         low, high = self.limits
@@ -63,7 +72,21 @@ class Tint:
             index = (np.clip(share, 0, 1) * 255).astype(np.intp)
         rgb = self.colours[index]
         rgb[gone] = _rgb(missing)[0]
+        if railed is not None and railed.any():
+            rgb[railed] = _rgb(SATURATED)[0]
         return rgb
+
+    def legend(
+        self, values: Array, missing: str, railed: Mask | None = None
+    ) -> tuple[tuple[str, str], ...]:
+        """What is seen beside the scale's own colours, or without a scale: colours and words."""
+        if self.kinds:
+            seen = np.unique(values[np.isfinite(values)].astype(int))
+            return tuple((f"#{self.colours[k].tobytes().hex()}", self.kinds[k]) for k in seen)
+        gone = ~np.isfinite(values)
+        on_rail = np.zeros(len(values), bool) if railed is None else railed
+        beside = (on_rail.any(), SATURATED, "on rail"), ((gone & ~on_rail).any(), missing, "none")
+        return tuple((colour, words) for there, colour, words in beside if there)
 
 
 HEALTH = Tint(HEALTH_COLOURS, (0.0, len(WHY) - 1.0), "", kinds=HEALTH_WORDS)

@@ -15,7 +15,7 @@ from kappaskin_app.settings import COLOURS, Settings
 from kappaskin_app.shades import HEALTH, HEALTH_COLOURS, SHADES
 from kappaskin_app.theme import SATURATED
 from kappaskin_app.views.element_cells import ElementCells
-from kappaskin_app.views.heatmap import Heatmap, coloured, legend
+from kappaskin_app.views.heatmap import Heatmap
 from kappaskin_app.window import MainWindow
 
 ALL = tuple(name for name, _ in COLOURS)
@@ -47,11 +47,11 @@ def test_each_kind_of_fault_has_one_colour_of_its_own() -> None:
 def test_a_reading_on_a_rail_has_its_own_colour_and_an_entry_in_the_legend() -> None:
     values, railed = np.array([1.0, np.nan, np.nan]), np.array([False, True, False])
     tint = SHADES["xx"].tint(1.0)
-    rgb = coloured(values, tint, "#59626d", railed)
+    rgb = tint.rgb(values, "#59626d", railed)
     assert [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in rgb[1:].tolist()] == [SATURATED, "#59626d"]
-    told = legend(values, tint, "#59626d", railed)
+    told = tint.legend(values, "#59626d", railed)
     assert told == ((SATURATED, "on rail"), ("#59626d", "none"))
-    assert legend(values[:1], tint, "#59626d", railed[:1]) == ()
+    assert tint.legend(values[:1], "#59626d", railed[:1]) == ()
 
 
 def test_one_range_for_all_is_that_of_the_largest_shown() -> None:

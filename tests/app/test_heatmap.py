@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Patch, SensorLayout
 from kappaskin_app.shades import SHADES
 from kappaskin_app.theme import DARK, DIVERGING
-from kappaskin_app.views.heatmap import Heatmap, coloured
+from kappaskin_app.views.heatmap import Heatmap
 
 TINT = SHADES["xx"].tint(1.0)
 
@@ -24,12 +24,12 @@ def _picture(heatmap: Heatmap) -> QImage:
 
 
 def test_colours_are_symmetric_about_zero() -> None:
-    rgb = coloured(np.array([-2.0, 0.0, 2.0]), TINT, "#888888")
+    rgb = TINT.rgb(np.array([-2.0, 0.0, 2.0]), "#888888")
     assert rgb.tolist() == [DIVERGING[0].tolist(), DIVERGING[127].tolist(), DIVERGING[255].tolist()]
 
 
 def test_a_missing_reading_has_its_own_colour() -> None:
-    rgb = coloured(np.array([np.nan, np.inf]), TINT, "#59626d")
+    rgb = TINT.rgb(np.array([np.nan, np.inf]), "#59626d")
     assert rgb.tolist() == [[0x59, 0x62, 0x6D]] * 2
 
 
@@ -46,7 +46,7 @@ def test_each_element_is_one_cell_of_one_colour(qapp: QApplication) -> None:
             for dx in (-9, 0, 9)
             for dy in (-9, 9)
         ]
-        wanted = tuple(coloured(np.array([value]), TINT, "#000000")[0].tolist())
+        wanted = tuple(TINT.rgb(np.array([value]), "#000000")[0].tolist())
         assert set(here) == {wanted}
 
 

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from kappaskin import SensorLayout
 from kappaskin_app.shades import Tint
 from kappaskin_app.theme import DIVERGING, LIGHT, Theme
-from kappaskin_app.views.heatmap import coloured
 
 Array = NDArray[np.float64]
 
@@ -50,7 +49,7 @@ class ModeMap(QWidget):
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         area = self._area(self._layout)
         # y points up on the skin, down in an image.
-        rgb = coloured(self._surface[::-1], Tint(DIVERGING, (-1.0, 1.0), ""), self._theme.window)
+        rgb = Tint(DIVERGING, (-1.0, 1.0), "").rgb(self._surface[::-1], self._theme.window)
         ny, nx = self._surface.shape
         image = QImage(
             np.ascontiguousarray(rgb).tobytes(), nx, ny, 3 * nx, QImage.Format.Format_RGB888

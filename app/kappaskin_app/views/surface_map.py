@@ -9,7 +9,6 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWi
 from kappaskin_app.shades import Tint
 from kappaskin_app.theme import DARK_INK, LIGHT, LIGHT_INK, SEQUENTIAL, Colours, Theme
 from kappaskin_app.views.colour_bar import ColourBar
-from kappaskin_app.views.heatmap import coloured
 from kappaskin_app.views.line import Line
 
 Array = NDArray[np.float64]
@@ -126,7 +125,7 @@ class SurfaceMap(QWidget):
         """Show `values` (ny, nx) in the unit of the scale, NaN off the skin; None for nothing."""
         rgb = None
         if values is not None:
-            rgb = coloured(values, Tint(colours, limits, self._unit), self._theme.window)
+            rgb = Tint(colours, limits, self._unit).rgb(values, self._theme.window)
         self.map.show_map(rgb, contact, sides)
         self.bar.show_scale(colours, limits, self._unit)
 
