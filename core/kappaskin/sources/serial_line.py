@@ -1,6 +1,5 @@
 """Bytes on a serial line, or any URL that pyserial opens, to frames; a line that may vanish."""
 
-import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -11,13 +10,15 @@ from kappaskin.region import Scanner
 from kappaskin.sensor import Sensor
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.asking import Asking
-from kappaskin.sources.clock import ClockMap, Known
+from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.interpreter import Interpreter
 from kappaskin.sources.line import Line
 from kappaskin.sources.ports import holders, port_called, serial_ports
 from kappaskin.sources.scanning import Scanning
 from kappaskin.sources.tape import Tape
+from kappaskin.sources.taping import Taping
+from kappaskin.sources.telling import Telling
 from kappaskin.sources.tuning import Tuning
 from kappaskin.sources.wire import (
     VERSION,
@@ -26,7 +27,6 @@ from kappaskin.sources.wire import (
     Information,
     Reply,
     Samples,
-    encode_samples,
 )
 
 _PATIENCE = 3.0  # s that a device may say nothing, or not what it is
@@ -34,7 +34,6 @@ _DWELL = 0.8  # s of bytes that mean nothing, after which another baud rate is t
 _RETRY = 0.25  # s between two tries to open a port that is gone
 _UNREAD = 2**22  # counts kept until the device says what they are of
 _EACH = 64  # counts that take as much memory as a message beside its own
-_SUMMED = 1.0  # s of which lost messages are told together
 _APART, _DRIFT = 0.5, 0.01  # s, and share, by which two clocks that both went on may differ
 
 
@@ -52,16 +51,12 @@ class SerialSource:
         self._means = Interpreter(url)
         self._absent = ""
         self._pending: deque[tuple[float, FromDevice]] = deque()
-        self._events: list[Event] = []
-        self._overrun = self._lost_told = self._restarts_told = 0
-        self._summed_at = self._next_try = 0.0
+        self._tell = Telling(self._decoder.sequence, clock)
+        self._overrun, self._next_try = 0, 0.0
         self._gone_at: float | None = None  # when the line was lost, until the device is back
         self._last: tuple[float, float] | None = None  # device and host time of the last message
         self._scanning = Scanning()
-        self._tape: Tape | None = None
-        self._told: Known | None = None  # to the tape
-        self._mapped: list[tuple[float, Known]] = []
-        self._met = ""  # what the tape was told of the device
+        self._taping = Taping(self._means)
         self._line: Line | None = None
         self._begin(Line(url, clock))
 
@@ -91,42 +86,14 @@ class SerialSource:
         self._scanning.begin()
 
     def _send(self, data: bytes) -> None:
-        if self._line is not None and self._line.write(data) and self._tape is not None:
-            self._tape.sent(self._clock(), data)
+        if self._line is not None and self._line.write(data):
+            self._taping.sent(self._clock(), data)
 
     def record(self, tape: Tape | None) -> None:
         """Tell `tape` from now on all that frames come from; nobody without one."""
-        self._tape, self._told, self._mapped = tape, None, []
-        if tape is None or self._line is None:
-            return
-        self._met = self._means.text if self._means.known else ""
-        if self._met:
-            tape.met(self._met)
-        for now, message in self._pending:
-            if isinstance(message, Samples):
-                sequence, began, channels, counts = message
-                tape.came(now, encode_samples(sequence, began, channels, counts, 4))
-        tape.mapped(math.nan, self._means.times.known)
-        self._told = self._means.times.known
-        if held := self._decoder.held:
-            tape.came(self._clock(), held)
-
-    def _map(self, since: float) -> None:
-        """Take note of what is known of the clock from the scan at device time `since` on."""
-        known = self._means.times.known
-        if self._told is None or known.map != self._told.map:
-            self._mapped.append((since, known))
-            self._told = known
-
-    def _record(self, tape: Tape, came: list[tuple[float, bytes]]) -> None:
-        for since, known in self._mapped:
-            tape.mapped(since, known)
-        self._mapped = []
-        for now, data in came:
-            tape.came(now, data)
-        if self._means.known and self._means.text != self._met:
-            self._met = self._means.text  # told in those bytes: here for whoever begins after them
-            tape.met(self._met)
+        self._taping.to(tape)
+        if self._line is not None:
+            self._taping.begin(self._clock(), self._pending, self._decoder.held)
 
     def scan(self, scanner: Scanner | None) -> None:
         """Let the device scan what `scanner` chooses, a few times a second; all without one."""
@@ -151,8 +118,7 @@ class SerialSource:
         self._decoder.sequence.interrupt()
         self._pending.clear()
         self._gone_at = self._clock()
-        if self._tape is not None:
-            self._tape.ended(self._gone_at)
+        self._taping.ended(self._gone_at)
         self._absent = (
             f"{self.url}: the line is gone: unplugged, or the device stopped; plug it in, and it "
             "goes on"
@@ -197,8 +163,7 @@ class SerialSource:
         if not self._means.known:
             self._look_for_information()
         frames = self._frames()
-        if self._tape is not None:
-            self._record(self._tape, came)
+        self._taping.came(came)
         self._tell_losses()
         if gone and not self._usable():
             self._end(line)
@@ -244,30 +209,14 @@ class SerialSource:
             self._compare(was, self._means.sensor)
 
     def _compare(self, was: Sensor | None, now: Sensor) -> None:
-        name = f"{now.name} {now.serial_number}"
-        same = was is not None and was.serial_number == now.serial_number
         if self._gone_at is not None:
-            self._resume(name, same, self._clock() - self._gone_at)
-            self._gone_at = None
-        if was is None:
-            self._tell("met", f"{name}, firmware {now.firmware}")
-        elif not same:
-            self._tell("other", f"another device: {name} instead of {was.serial_number}")
-        elif now.firmware != was.firmware:
-            self._tell("firmware", f"firmware {now.firmware} instead of {was.firmware}")
-        elif now is not was:
-            self._tell("changed", f"{name} says something else of itself than before")
-
-    def _resume(self, name: str, same: bool, away: float) -> None:
-        """Go on counting after `away` s: with the device as it was, or from its beginning."""
-        sequence = self._decoder.sequence
-        before = sequence.lost
-        sequence.resume(same and self._went_on())
-        again = "" if sequence.restarts == self._restarts_told else ", from its beginning"
-        lost = sequence.lost - before
-        self._lost_told, self._restarts_told = self._lost_told + lost, sequence.restarts
-        if same:
-            self._tell("back", f"{name} is back after {away:.1f} s{again}: {lost} messages lost")
+            same = was is not None and was.serial_number == now.serial_number
+            away, self._gone_at = self._clock() - self._gone_at, None
+            sequence = self._decoder.sequence
+            before = sequence.lost
+            sequence.resume(same and self._went_on())
+            self._tell.resumed(now, away, same, sequence.lost - before)
+        self._tell.met(was, now)
 
     def _went_on(self) -> bool:
         """Whether the device's clock went on while nobody listened.
@@ -292,8 +241,7 @@ class SerialSource:
                 self._meet(message.text)
             elif frame := self._means.frame(message, now):
                 frames.append(frame)
-                if self._tape is not None:
-                    self._map(frame.device_time)
+                self._taping.map(frame.device_time)
         return frames
 
     def _take(self, reply: Reply, now: float) -> None:
@@ -305,24 +253,14 @@ class SerialSource:
 
     # What is said, and what is in the way.
 
-    def _tell(self, kind: str, text: str) -> None:
-        self._events.append(Event(self._clock(), kind, text))
-
     def events(self) -> list[Event]:
         """What happened since the last time that this was asked."""
-        told, self._events = self._events, []
-        return told
+        return self._tell.taken()
 
     def _tell_losses(self) -> None:
-        sequence, now = self._decoder.sequence, self._clock()
-        if self._means.known and sequence.restarts > self._restarts_told:
-            self._restarts_told = sequence.restarts
+        if self._means.known and self._tell.restarted():
             self._scanning.begin()
-            self._tell("restarted", "the device started anew while it was connected")
-        if sequence.lost != self._lost_told and now - self._summed_at >= _SUMMED:
-            if sequence.lost > self._lost_told:
-                self._tell("gap", f"{sequence.lost - self._lost_told} messages lost")
-            self._lost_told, self._summed_at = sequence.lost, now
+        self._tell.losses()
 
     def _attend(self, line: Line) -> None:
         """Ping, and say what to scan; try other baud rates on bytes that mean nothing."""
