@@ -1,11 +1,6 @@
 """The live process, away from whatever draws: started, asked, watched and ended from here."""
 
-import gc
 import multiprocessing
-import os
-import signal
-import sys
-import threading
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -18,10 +13,8 @@ from typing import Any, cast
 import numpy as np
 
 from kappaskin.adoption import Left, Orphan, adopted
-from kappaskin.asker import Asker
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Event
-from kappaskin.live import Loop
 from kappaskin.pipeline import Setup
 from kappaskin.processes import beginning_processes
 from kappaskin.publish import targets_of
@@ -44,14 +37,13 @@ from kappaskin.requests import (
 )
 from kappaskin.ring import Ring
 from kappaskin.scene import Playing, Scene
+from kappaskin.serving import serve
 from kappaskin.status import LOST, Status
 
 LONGEST_NOTE = 500
 """Characters of a note."""
 
-_SWITCH = 2e-4  # s that one thread may keep the interpreter from another
 _ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
-_GRACE = 0.5  # s for an orderly end once the parent is gone
 _PATIENCE = 600.0  # s that a recording goes on without one, where another may come
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
 
@@ -62,50 +54,6 @@ _GIVEN_UP = (
     "itself; choose a simpler scene or fewer functions, then connect again; why it ended is on "
     "the terminal that the program was started from"
 )
-
-
-def _end_with_parent(loop: Loop) -> None:
-    """End this process soon after the one that started it, whatever is being computed.
-
-    What was recorded is ended first. What is being recorded, and may be adopted, goes on.
-    """
-    if parent := multiprocessing.parent_process():
-        parent.join()
-        time.sleep(_GRACE)
-        if not loop.may_be_adopted:
-            loop.end_recording()
-            os._exit(1)
-
-
-def _serve(
-    requests: "Connection[Request, Request]",
-    names: tuple[str, str],
-    orphans: Path | None,
-    patience: float,
-) -> None:
-    """What the child process does."""
-    # The thread that reads the line needs the interpreter three times for 4 KiB: with Python's 5 ms
-    # for each, a loop that always computes would starve it below the rate of the line.
-    sys.setswitchinterval(_SWITCH)
-    gc.freeze()  # what was imported is no garbage: to look through it takes 27 ms each time
-    # Ctrl+C and a terminal that closes are the parent's: it says goodbye, or is gone.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(signal, "SIGHUP"):
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    rings = Ring.attach(names[0]), Ring.attach(names[1])
-    try:
-        loop = Loop(Asker(requests, names, orphans, patience), *rings)
-        watcher = threading.Thread(target=_end_with_parent, args=(loop,), name="parent-watcher")
-        watcher.daemon = True
-        watcher.start()
-        loop.run()
-    finally:
-        parent = multiprocessing.parent_process()
-        for ring in rings:
-            if parent and parent.is_alive():
-                ring.close()
-            else:
-                ring.destroy()
 
 
 class Engine:
@@ -149,7 +97,7 @@ class Engine:
         self._requests = cast("Connection[Request, Request]", ours)
         with beginning_processes() as context:
             self._process = context.Process(
-                target=_serve,
+                target=serve,
                 args=(theirs, names, self._orphans, self._patience),
                 name="kappaskin-engine",
                 daemon=True,

@@ -10,14 +10,14 @@ import numpy as np
 
 from kappaskin.arrivals import Arrivals
 from kappaskin.asker import Asker
+from kappaskin.compared import Compared
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Event, Frame
-from kappaskin.health import Health
 from kappaskin.keeping import Keeping
 from kappaskin.pace import Pace
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.processes import Haste
-from kappaskin.publish import Publishing, State
+from kappaskin.publish import Publishing
 from kappaskin.region import Region
 from kappaskin.requests import (
     Compare,
@@ -36,8 +36,7 @@ from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.side import Computed, Side
 from kappaskin.sources import ReplayedSource, SimulatedSource, Source, open_source
-from kappaskin.sources.accounting import Accounting
-from kappaskin.status import LOST, OFF, STREAMING, WAITING, Status
+from kappaskin.status import LOST, STREAMING, WAITING, Status
 from kappaskin.steer import Following, Steering, steered
 from kappaskin.tare_taking import TareTaking
 from kappaskin.watching import Watching
@@ -46,7 +45,6 @@ _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
 _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
-_LOOKED_AT = 1 / 60  # s between two frames that are computed with the setup compared with
 
 
 class Loop:
@@ -64,10 +62,8 @@ class Loop:
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
         status = self._status
         self._side = Side(ring, self._builder, Computed(status.setup, status.generation))
-        # What is computed beside it, while that is asked for.
-        self._other = Side(beside, self._builder, status.beside or Computed())
-        self._compares = self._changing = False
-        self._seen_beside = -math.inf
+        self._compared = Compared(beside, self._builder, status.beside or Computed())
+        self._changing = False
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
         self._haste = Haste()
@@ -111,7 +107,7 @@ class Loop:
         if isinstance(request, Setup):
             self._side.ask(request)
         elif isinstance(request, Compare):
-            self._compare(request.setup)
+            self._compared.ask(request.setup, self._status.sensor)
         elif isinstance(request, Scene):
             self._play(request)
         elif isinstance(request, Seek | Step):
@@ -130,22 +126,7 @@ class Loop:
             self._haste(self._publishing.active)
         elif isinstance(request, Connect | Disconnect):
             self._close()
-            self._status = replace(
-                self._status,
-                state=OFF,
-                source="",
-                message="",
-                sensor=None,
-                region_refusal="",
-                skipped=0,
-                accounting=Accounting(),
-                rate=0.0,
-                last_frame=-math.inf,
-                temperature=math.nan,
-                drift=None,
-                health=Health(),
-                replay=None,
-            )
+            self._status = self._status.without_source()
             if isinstance(request, Connect):
                 self._open(request.source)
         self._report()
@@ -207,22 +188,12 @@ class Loop:
             self._source.close()
             self._keeping.ended()
         self._source = None
-        for side in (self._side, self._other):
+        for side in (self._side, self._compared.side):
             side.forget()
         self._steering = None
         self._watching.meet(None)
         self._arrivals.clear()
         self._again = math.inf
-
-    def _compare(self, setup: Setup | None) -> None:
-        """Compute with another setup beside, or no more."""
-        self._compares = setup is not None
-        if setup is None:
-            self._other.meet(None)
-            return
-        self._other.ask(setup)
-        if self._other.pipeline is None:
-            self._other.meet(self._status.sensor)
 
     def _swap(self) -> None:
         """Go over to what has been built."""
@@ -233,8 +204,8 @@ class Loop:
                 self._leave_out(self._side)
             self._show_again()
             self._report()
-        if self._other.swap():
-            self._leave_out(self._other)
+        if self._compared.side.swap():
+            self._leave_out(self._compared.side)
             self._show_again()
             self._report()
 
@@ -271,12 +242,12 @@ class Loop:
         late = len(frames) - self._pace.affordable(len(frames), *within)
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
-        beside = self._other.pipeline
         for frame in frames[:late]:
             pipeline.pass_over(frame)
-            if beside is not None:
-                beside.pass_over(frame)
+            self._compared.pass_over(frame)
             self._arrivals.used(frame)
+        source = self._source
+        stands = isinstance(source, ReplayedSource) and source.stands
         began = time.monotonic()
         for frame in frames[late:]:
             begun = time.monotonic()
@@ -289,19 +260,8 @@ class Loop:
             if self._steering is not None:
                 self._steering(estimate.touch, pipeline.fit)
             self._keeping.take(frame, estimate)
-            if beside is not None:
-                self._compute_beside(frame, beside)
+            self._compared.take(frame, stands)
         self._pace.spend(len(frames) - late, time.monotonic() - began)
-
-    def _compute_beside(self, frame: Frame, pipeline: Pipeline) -> None:
-        """Work out a frame with the other setup too, as often as it is looked at."""
-        source = self._source
-        stands = isinstance(source, ReplayedSource) and source.stands
-        if stands or frame.host_time - self._seen_beside >= _LOOKED_AT:
-            self._seen_beside = frame.host_time
-            self._other.compute(frame, pipeline)
-        else:
-            pipeline.pass_over(frame)
 
     def _follow(self, source: Source) -> None:
         """Say how the source is doing, and who is on it."""
@@ -324,7 +284,7 @@ class Loop:
         """Look after the health of the channels, and leave out of the fit which are not well."""
         if self._watching(frame):
             self._leave_out(self._side)
-            self._leave_out(self._other)
+            self._leave_out(self._compared.side)
 
     def _leave_out(self, side: Side) -> None:
         if self._watching.leave_out(side) and side is self._side:
@@ -355,7 +315,7 @@ class Loop:
             meetings=self._status.meetings + (sensor is not None),
         )
         self._side.meet(sensor)
-        self._other.meet(sensor if self._compares else None)
+        self._compared.meet(sensor)
         if sensor is not None:
             self._steer()
 
@@ -379,7 +339,8 @@ class Loop:
                 health=self._watching.health(self._side.pipeline, self._place),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
             )
-        self._publish(status)
+        self._publishing.tell(status.told_since(self._told))
+        self._told = status.happened
         told = self._side.told
         self._status = replace(
             status,
@@ -392,23 +353,6 @@ class Loop:
             computing=told.computing or self._changing,
             publishing=self._publishing.news,
             recording=self._keeping.written,
-            beside=self._other.told if self._compares else None,
+            beside=self._compared.told,
         )
         self._ring.write_status(self._status)
-
-    def _publish(self, status: Status) -> None:
-        """Tell the receivers how the source is doing, and what happened since that was told."""
-        fresh = min(status.happened - self._told, len(status.events))
-        events = status.events[len(status.events) - fresh :]
-        self._told = status.happened
-        told = status.message, status.sensor, status.rate, status.last_frame
-        self._publishing.tell(State(status.state, _kind(status), *told, events))
-
-
-def _kind(status: Status) -> str:
-    """Where readings come from, as receivers are told; nothing without a sensor."""
-    if status.sensor is None:
-        return ""
-    if status.replay is not None:
-        return "replay"
-    return "sim" if status.sensor.simulated else "live"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Estimate, Frame
+from kappaskin.frames import Array
 from kappaskin.health import Monitor
 from kappaskin.health.leaving_out import Kinds
 from kappaskin.pipeline import Pipeline, Setup
@@ -109,12 +109,6 @@ class Side:
             return False
         self.left = monitor.kinds.copy(), monitor.badness.copy()
         return True
-
-    def compute(self, frame: Frame, pipeline: Pipeline) -> Estimate:
-        """The estimate that the `pipeline` in use makes of a frame, also in the ring."""
-        estimate = pipeline(frame)
-        self.ring.write(estimate)
-        return estimate
 
 
 @dataclass(frozen=True, eq=False)

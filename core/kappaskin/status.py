@@ -9,7 +9,7 @@ import numpy as np
 from kappaskin.frames import Event
 from kappaskin.health import Health
 from kappaskin.pipeline import Setup
-from kappaskin.publish import PublishNews
+from kappaskin.publish import PublishNews, State
 from kappaskin.recording.writing import Written
 from kappaskin.region import Region
 from kappaskin.scene import FROM_THE_BEGINNING, Playing
@@ -77,3 +77,38 @@ class Status:
         """The same status once `events` happened."""
         last = (*self.events, *events)[-_EVENTS:]
         return replace(self, events=last, happened=self.happened + len(events))
+
+    def without_source(self) -> "Status":
+        """The same where nothing is read."""
+        return replace(
+            self,
+            state=OFF,
+            source="",
+            message="",
+            sensor=None,
+            region_refusal="",
+            skipped=0,
+            accounting=Accounting(),
+            rate=0.0,
+            last_frame=-math.inf,
+            temperature=math.nan,
+            drift=None,
+            health=Health(),
+            replay=None,
+        )
+
+    @property
+    def kind(self) -> str:
+        """Where readings come from, as receivers are told; nothing without a sensor."""
+        if self.sensor is None:
+            return ""
+        if self.replay is not None:
+            return "replay"
+        return "sim" if self.sensor.simulated else "live"
+
+    def told_since(self, happened: int) -> State:
+        """What receivers are told, with what came after so many had `happened`."""
+        fresh = min(self.happened - happened, len(self.events))
+        events = self.events[len(self.events) - fresh :]
+        told = self.message, self.sensor, self.rate, self.last_frame
+        return State(self.state, self.kind, *told, events)
