@@ -1,11 +1,10 @@
 """Recordings as a person opens, plays and scrubs them, with the settings recorded in them."""
 
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin import Damaged, Event, Refusal, Replay, Setup, Status
@@ -13,15 +12,14 @@ from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.newest import Newest
+from kappaskin_app.peeking import Peeking
+from kappaskin_app.recorded import Recorded, told_of
 from kappaskin_app.recordings import recordings_folder
-from kappaskin_app.seen import Seen, seen, told_of
 from kappaskin_app.session import RECORDED, Session
-from kappaskin_app.views.landmarks import day
 from kappaskin_app.views.transport import SPEEDS, Transport
 
 FILES = "Recording (*.mcap *.mcap.part)"
 _MENU = "&Recording"
-_LOOK = 20  # ms between two looks whether a file has been read
 _ARRIVES = 0.4  # s after which what was asked of the engine shows in its status
 _HERE = 1e-4  # s: an event so near is where the replay is
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
@@ -46,7 +44,7 @@ class Replaying(QObject):
         super().__init__(window)
         self._history, self._session, self._transport = history, session, transport
         self._window = window
-        self.seen: Seen | None = None
+        self.seen: Recorded | None = None
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
         self.speed, self._looped, self._goes = 1.0, False, True
@@ -56,8 +54,7 @@ class Replaying(QObject):
         self._begins = False  # once the settings are in use, from the beginning on
         self._before: dict[str, object] = {}
         self._changes: list[Event] = []
-        self._thread = ThreadPoolExecutor(1, "recording-reader")
-        self._looking: tuple[Future[Seen], Path, bool] | None = None
+        self._peeking = Peeking(self)
         self._send, self._folder = Newest(self), recordings_folder()
         self._actions: Actions | None = None
         self._wire()
@@ -71,6 +68,8 @@ class Replaying(QObject):
         transport.play_wanted.connect(guarded(self.go))
         transport.speed_wanted.connect(guarded(self.play_at))
         transport.loop_wanted.connect(guarded(self.loop))
+        self._peeking.found.connect(guarded(self._play))
+        self._peeking.refused.connect(guarded(self._refuse))
         session.turning.connect(guarded(self._leave))
         session.reported.connect(guarded(self.follow))
 
@@ -119,37 +118,24 @@ class Replaying(QObject):
 
     def _look(self, path: Path, connects: bool) -> None:
         self.told.emit(f"Reading {path.name}{_DOTS}")
-        self._looking = self._thread.submit(seen, path), path, connects
-        QTimer.singleShot(_LOOK, self, guarded(self._take))
+        self._peeking.look(path, connects)
 
     @property
     def reading(self) -> bool:
         """Whether a file is looked into."""
-        return self._looking is not None
+        return self._peeking.busy
 
     def stop_reading(self) -> None:
         """Play what was played before instead."""
-        self._looking = None
+        self._peeking.stop()
         self.told.emit("Cancelled; it is not opened")
 
-    def _take(self) -> None:
-        if self._looking is None:
-            return
-        future, path, connects = self._looking
-        if not future.done():
-            QTimer.singleShot(_LOOK, self, guarded(self._take))
-            return
-        self._looking = None
-        try:
-            found = future.result()
-        except Refusal as refusal:
-            damaged = path if isinstance(refusal, Damaged) else None
-            self._say(str(refusal), alarming=True, damaged=damaged)
-            self.told.emit(str(refusal))
-            return
-        self._play(found, connects)
+    def _refuse(self, path: Path, refusal: Refusal) -> None:
+        damaged = path if isinstance(refusal, Damaged) else None
+        self._say(str(refusal), alarming=True, damaged=damaged)
+        self.told.emit(str(refusal))
 
-    def _play(self, found: Seen, connects: bool) -> None:
+    def _play(self, found: Recorded, connects: bool) -> None:
         source = f"{RECORDED}{found.path}"
         if connects:
             self._session.connect_to(source)
@@ -347,9 +333,7 @@ class Replaying(QObject):
                     self._actions.allow(name, why_not)
 
     def _show_title(self, replay: Replay | None) -> None:
-        title = "Kappaskin"
-        if replay is not None and self.seen is not None:
-            title = f"{self.seen.path.name}, recorded {day(replay)} \N{EN DASH} Kappaskin"
+        title = "Kappaskin" if replay is None or self.seen is None else self.seen.title(replay)
         if title != self._window.windowTitle():
             self._window.setWindowTitle(title)
 
@@ -360,6 +344,5 @@ class Replaying(QObject):
             self.offered.emit()
 
     def close(self) -> None:
-        self._looking = None
         self._send.forget()
-        self._thread.shutdown(wait=True, cancel_futures=True)
+        self._peeking.close()

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from kappaskin import Event, Recording, Refusal, Setup, setups_of
+from kappaskin import Event, Recording, Refusal, Replay, Setup, setups_of
 from kappaskin_app.recordings import repairing
-from kappaskin_app.views.landmarks import minutes
+from kappaskin_app.views.landmarks import day, minutes
 
 
 @dataclass(frozen=True)
-class Seen:
+class Recorded:
     """What there is to know of the recording at `path` before it is played.
 
     `setups` it was made with, each from a time in s on, and why they cannot be told.
@@ -28,6 +28,10 @@ class Seen:
         ]
         return used[-1] if used else None
 
+    def title(self, replay: Replay) -> str:
+        """What the window is called while it is played."""
+        return f"{self.path.name}, recorded {day(replay)} \N{EN DASH} Kappaskin"
+
     def changes(self) -> list[Event]:
         """Where another setup came into use, in words."""
         return [
@@ -37,18 +41,18 @@ class Seen:
         ]
 
 
-def seen(path: Path) -> Seen:
+def recorded(path: Path) -> Recorded:
     """Look into the file at `path`; a `Refusal` where it is no recording."""
     with Recording(path) as recording:
         length = (recording.last - recording.first) * 1e-9
         try:
             setups = tuple(setups_of(recording))
         except Refusal as refusal:
-            return Seen(path, length, recording.whole, (), str(refusal))
-        return Seen(path, length, recording.whole, setups)
+            return Recorded(path, length, recording.whole, (), str(refusal))
+        return Recorded(path, length, recording.whole, setups)
 
 
-def told_of(found: Seen) -> str:
+def told_of(found: Recorded) -> str:
     """What a person should know of a recording that is opened, or nothing."""
     told: list[str] = []
     if not found.whole:
