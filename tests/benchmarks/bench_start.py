@@ -6,6 +6,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 _FIRST = Path(__file__).with_name("first_picture.py")
 _BARE = Path(__file__).with_name("bare_window.py")
 
@@ -16,14 +18,21 @@ def _import(statement: str) -> float:
     return time.perf_counter() - start
 
 
-def test_importing_the_library_costs_little_more_than_numpy_and_scipy(figure) -> None:
-    ours, theirs = [], []
-    for _ in range(9):
-        theirs.append(_import("import numpy, scipy.linalg, scipy.fft"))
-        ours.append(_import("import kappaskin"))
-    ratio = statistics.median(ours) / statistics.median(theirs)
-    figure(f"import kappaskin: {ratio:.2f} times import numpy, scipy.linalg, scipy.fft")
-    assert ratio <= 1.5
+# Nothing else is loaded by the first; the second are the names of the README's example.
+@pytest.mark.parametrize(
+    "ours",
+    [
+        "import kappaskin",
+        "from kappaskin import LeastSquares, Patch, Plate, PointLoad, SensorLayout, SineBasis",
+        "from kappaskin import Engine",
+    ],
+)
+def test_importing_the_library_costs_little_more_than_numpy_and_scipy(figure, ours) -> None:
+    theirs = "import numpy, scipy.linalg, scipy.fft"
+    taken = [(_import(ours), _import(theirs)) for _ in range(9)]
+    ratio = statistics.median(own for own, _ in taken) / statistics.median(it for _, it in taken)
+    figure(f"{ours}: {ratio:.2f} times {theirs}")
+    assert ratio <= (1.5 if "Engine" not in ours else 2.0)
 
 
 def _drawn(script: Path) -> tuple[float, float]:
