@@ -29,8 +29,10 @@ def mean_text(mean: Mean, measure: Measure) -> str:
     if not mean.count:
         return "-"
     value, half = measure.scale * mean.mean, measure.scale * mean.half
+    if math.isnan(half):
+        return f"{value:.4g} ± ?"
     # What rounding has left of an interval of nothing is none.
-    if math.isnan(half) or half <= 1e-9 * abs(value):
+    if half <= 1e-9 * abs(value):
         return f"{value:.4g}"
     digits = max(1 - math.floor(math.log10(half)), 0)
     return f"{value:.{digits}f} ± {half:.{digits}f}"
@@ -47,7 +49,7 @@ def rows_of(study: Study, known: Sequence[Known]) -> list[list[str]]:
     rows: list[list[str]] = []
     for one in known:
         means = [mean_text(one.mean(name), MEASURES[name]) for name in study.measures]
-        frames = str(len(one.results) * study.base.measure.frames)
+        frames = str((len(one.results) - len(one.failures)) * study.base.measure.frames)
         rows.append([*map(value_text, one.point.values.values()), *means, frames])
     return rows
 
