@@ -314,6 +314,17 @@ def test_frames_that_tell_nothing_are_left_out():
     assert math.isnan(nothing.mean)
 
 
+def test_all_of_eight_blocks_are_not_all_there_are():
+    alike = [Moments.of(np.ones(10))] * 8
+
+    found = Mean.of(alike, share=True)
+
+    # With the share at its end, eight blocks are all alike once in twenty times.
+    lowest = stats.binomtest(8, 8, alternative="greater").proportion_ci(0.95).low
+    assert found.half == pytest.approx(1 - lowest)
+    assert Mean.of(alike).half == 0.0
+
+
 def test_intervals_hold_the_mean_as_often_as_they_promise():
     rng = np.random.default_rng(0)
 

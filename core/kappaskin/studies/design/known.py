@@ -7,10 +7,12 @@ import numpy as np
 import scipy
 
 from kappaskin.frames import Array
+from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.study import Point, Study
 from kappaskin.studies.design.task import Measured, Moments
 
 _MORE = 1.5  # times the blocks that were not enough
+_DOUBT = 0.05  # what an interval of 95 % leaves
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,8 @@ class Mean:
     """The `mean` of a measure with the `half` width of its 95 % interval, and the `sd` of a value.
 
     Blocks are independent of each other, frames of one may not be: the interval is Student's of
-    the means of the blocks. NaN where nothing is known.
+    the means of the blocks. Where all of them are all or nothing of something, it reaches to the
+    share for which so many blocks are alike once in twenty times. NaN where nothing is known.
     """
 
     mean: float
@@ -27,7 +30,8 @@ class Mean:
     count: int
 
     @classmethod
-    def of(cls, blocks: list[Moments]) -> "Mean":
+    def of(cls, blocks: list[Moments], share: bool = False) -> "Mean":
+        """The mean of some blocks, which may be a `share` of something."""
         some = [block for block in blocks if block.count]
         count = sum(block.count for block in some)
         if not some:
@@ -37,7 +41,9 @@ class Mean:
         mean = float(weights @ means)
         squares = sum(block.squares + block.count * (block.mean - mean) ** 2 for block in some)
         sd = math.sqrt(squares / (count - 1)) if count > 1 else math.nan
-        return cls(mean, _half(means, weights, mean), sd, count)
+        alike = share and set(means.tolist()) in ({0.0}, {1.0})
+        half = 1 - _DOUBT ** (1 / len(some)) if alike else _half(means, weights, mean)
+        return cls(mean, half, sd, count)
 
     def within(self, share: float) -> bool:
         """Whether the interval reaches no further than this share of the mean."""
@@ -49,7 +55,7 @@ def _half(means: Array, weights: Array, mean: float) -> float:
     if B < 2:
         return math.nan
     variance = B / (B - 1) * float(np.sum((weights * (means - mean)) ** 2))
-    return float(scipy.special.stdtrit(B - 1, 0.975)) * math.sqrt(variance)
+    return float(scipy.special.stdtrit(B - 1, 1 - _DOUBT / 2)) * math.sqrt(variance)
 
 
 @dataclass(eq=False)
@@ -95,4 +101,5 @@ class Known:
     def mean(self, measure: str) -> Mean:
         """What is known of a measure, from its blocks in order."""
         each = [self.results[block] for block in sorted(self.results)]
-        return Mean.of([result[measure] for result in each if not isinstance(result, str)])
+        blocks = [result[measure] for result in each if not isinstance(result, str)]
+        return Mean.of(blocks, MEASURES[measure].share)

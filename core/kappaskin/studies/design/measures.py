@@ -27,13 +27,15 @@ class Measure:
     """Something to measure: values (T,) of a block's frames, NaN where a frame tells none.
 
     `title` is what it is called, `unit` what it is shown in, `scale` how many of those the value's
-    own unit has. Where there are no frames to average over, it is one value.
+    own unit has. Where there are no frames to average over, it is one value. A `share` is one of
+    something, from nothing to all.
     """
 
     title: str
     unit: str
     scale: float
     of: Callable[[Block], Array]
+    share: bool = False
 
 
 def _at_load(block: Block) -> Array:
@@ -116,9 +118,9 @@ MEASURES = {
     "at-load": Measure("error at the load, signed", "mm", 1e3, _at_load),
     "contact": Measure("distance of the contact found", "mm", 1e3, _contact),
     "force": Measure("error of the force, of the largest", "%", 1e2, _force),
-    "found": Measure("frames with a contact found", "%", 1e2, _found),
+    "found": Measure("frames with a contact found", "%", 1e2, _found, share=True),
     "radius": Measure("error of the object's radius", "%", 1e2, _radius),
-    "covered": Measure("skin within the 95 % bands", "%", 1e2, _covered),
+    "covered": Measure("skin within the 95 % bands", "%", 1e2, _covered, share=True),
     "predicted": Measure("RMS error by noise alone, predicted", "mm", 1e3, _predicted),
     "rate": Measure("frame rate that the conversions allow", "frames/s", 1.0, _rate),
     "time": Measure("time to fit a frame", "us", 1e6, _time),
