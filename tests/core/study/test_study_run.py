@@ -9,6 +9,7 @@ from threading import Lock, Timer
 
 import numpy as np
 import pytest
+import scipy
 from scipy import stats
 
 from kappaskin import LeastSquares, Patch, Refusal, Simulator, SineBasis
@@ -104,6 +105,10 @@ def test_another_version_is_refused(study_of):
 
     with pytest.raises(Refusal, match="expected a worker with kappaskin 9"):
         run(task)
+
+
+def test_a_version_says_all_that_the_last_bits_depend_on():
+    assert f"NumPy {np.__version__}, SciPy {scipy.__version__}" in version()
 
 
 @pytest.mark.parametrize("workers", [1, 7])

@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator
 from kappaskin.frames import Array
 from kappaskin.placement import predicted_sd
-from kappaskin.scene import Indenter, Scene
+from kappaskin.scene import Indenter, Scene, kept_of
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.block import Block
 
@@ -52,7 +52,8 @@ def _contact(block: Block) -> Array:
 def _force(block: Block) -> Array:
     """As a share of the largest force in the block."""
     found, true = np.array([touch.force for touch in block.touches]), block.forces()
-    return np.abs(found - true) / np.abs(true).max()
+    largest = np.abs(true).max()
+    return np.abs(found - true) / (largest if largest else np.nan)
 
 
 def _found(block: Block) -> Array:
@@ -81,12 +82,13 @@ def _covered(block: Block) -> Array:
     points = points[patch.contains(points)]
     reach = scipy.special.stdtrit(np.maximum(block.fit.spare, 1), 0.975)
     bands = np.reshape(reach, (-1, 1)) * block.fit.surface_sd(points)
-    return np.mean(np.abs(block.off(points)) < bands, axis=1)
+    held = np.mean(np.abs(block.off(points)) <= bands, axis=1)
+    return np.where(np.isnan(block.fit.noise), np.nan, held)  # which makes no bands
 
 
 def noise_of(scene: Scene) -> float:
-    """The standard deviation in 1/m of all noise that differs from reading to reading."""
-    each = [getattr(effect, "rms", 0.0) for effect in scene.reading_effects]
+    """The standard deviation in 1/m of all noise there is that differs from reading to reading."""
+    each = [getattr(effect, "rms", 0.0) for effect in kept_of(scene)]
     return math.hypot(*each)
 
 
@@ -97,6 +99,8 @@ def _predicted_rms(estimator: Estimator, noise: float) -> float:
 
 
 def _predicted(block: Block) -> Array:
+    if block.estimator.has_prior:  # which counts on other skins than one at rest
+        return np.array([np.nan])
     return np.array([_predicted_rms(block.estimator, noise_of(block.scene))])
 
 
@@ -105,7 +109,7 @@ def _rate(block: Block) -> Array:
 
 
 def _time(block: Block) -> Array:
-    taken = list[float]()
+    taken, _ = list[float](), block.fit  # what remembers takes the frames in before
     for K in block.curvature[np.arange(_CALLS) % len(block.curvature)]:
         begun = time.perf_counter()
         block.estimator(K)

@@ -9,6 +9,7 @@ from importlib import metadata
 from typing import Any
 
 import numpy as np
+import scipy
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -17,7 +18,7 @@ from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.places import with_values
 from kappaskin.studies.design.setup import Setup, estimator_of, setup_of
 
-MEANING = 1
+MEANING = 2
 """Goes up with every change that makes the same study give other numbers."""
 
 _ONE_BY_ONE = threading.Lock()  # what blocks share is not made for several threads
@@ -26,7 +27,8 @@ _ONE_BY_ONE = threading.Lock()  # what blocks share is not made for several thre
 @cache
 def version() -> str:
     """What a worker must have to give the same numbers."""
-    return f"kappaskin {metadata.version('kappaskin')}, meaning {MEANING}, NumPy {np.__version__}"
+    ours = f"kappaskin {metadata.version('kappaskin')}, meaning {MEANING}"
+    return f"{ours}, NumPy {np.__version__}, SciPy {scipy.__version__}"
 
 
 @dataclass(frozen=True)
