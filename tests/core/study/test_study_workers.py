@@ -14,8 +14,10 @@ import pytest
 from kappaskin import Refusal
 from kappaskin.studies.design import Folder, cluster, processes, run, run_study
 from kappaskin.studies.design.task import Task, version
+from kappaskin.studies.design.workers import kind
 
 NEEDS_DASK = pytest.mark.skipif(find_spec("distributed") is None, reason="Dask is not installed")
+ALIKE = f"{version()}, threads of BLAS 1"
 LONGER = "least = 2\nmost = 4", "least = 30\nmost = 30"
 
 
@@ -132,6 +134,13 @@ def test_a_scheduler_that_is_not_there_is_refused_at_once(address):
     assert time.monotonic() - began < 5
 
 
+def test_a_worker_tells_the_threads_that_its_bits_depend_on(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+
+    assert kind() == ALIKE.replace("BLAS 1", "BLAS 4")
+
+
 class Told:
     """A client whose workers have these versions."""
 
@@ -156,7 +165,8 @@ class Told:
     ("versions", "told"),
     [
         ({}, "expected workers, got none in 5 s; start some by dask worker"),
-        ({"a": version(), "b": "kappaskin 9"}, "got 1 of 2 with another, b with kappaskin 9"),
+        ({"a": ALIKE, "b": "kappaskin 9"}, "got 1 of 2 with another, b with kappaskin 9"),
+        ({"a": ALIKE.replace("BLAS 1", "BLAS 2")}, "start them with OPENBLAS_NUM_THREADS=1"),
     ],
 )
 def test_workers_that_would_give_other_numbers_are_refused(monkeypatch, versions, told):
