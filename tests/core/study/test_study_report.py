@@ -114,7 +114,7 @@ def test_what_is_not_computed_yet_is_said_to_be_missing(study_of, tmp_path):
 
     told = table_text(study, known_of(study, Folder.opened(tmp_path, study)))
 
-    assert told.count("0 of 2 blocks are computed") == 4
+    assert told.count("0 of 2 blocks are computed by this version") == 4
     assert "6 x 6  0.1         -       0" in told
 
 

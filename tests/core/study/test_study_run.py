@@ -246,9 +246,10 @@ def test_a_task_that_kills_workers_fails_alone(study_of, tmp_path):
         assert sorted(known.results) == [0, 1, 2, 3]
 
 
-def test_an_infinite_error_is_a_failure_not_a_number():
+@pytest.mark.parametrize("large", [np.inf, 1e200])
+def test_an_infinite_error_is_a_failure_not_a_number(large):
     with pytest.raises(Refusal, match="the arithmetic overflowed"):
-        Moments.of(np.array([1.0, np.inf]))
+        Moments.of(np.array([1.0, large]))
 
 
 def test_a_folder_of_another_study_or_of_none_is_refused(study_of, tmp_path):

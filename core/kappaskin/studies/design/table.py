@@ -65,7 +65,9 @@ def remarks_on(study: Study, known: Sequence[Known]) -> list[str]:
             failed = f"{len(failures)} of {len(one.results)} blocks failed"
             remarks.append(f"{at}: {failed}: {failures[0]}")
         elif not one.complete:
-            remarks.append(f"{at}: {len(one.results)} of {one.wanted} blocks are computed")
+            remarks.append(
+                f"{at}: {len(one.results)} of {one.wanted} blocks are computed by this version"
+            )
         elif not one.enough:
             what = ", ".join(study.stop.of)
             remarks.append(

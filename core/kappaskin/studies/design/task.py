@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import threading
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
@@ -44,13 +45,15 @@ class Moments:
 
     @classmethod
     def of(cls, values: Array) -> "Moments":
-        if np.isinf(values).any():
-            raise Refusal("expected finite errors, got infinity: the arithmetic overflowed")
         known = values[~np.isnan(values)]
         if not len(known):
             return cls(0, 0.0, 0.0)
-        mean = float(known.mean())
-        return cls(len(known), mean, float(np.sum((known - mean) ** 2)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            mean = float(known.mean())
+            squares = float(np.sum((known - mean) ** 2))
+        if not math.isfinite(squares):
+            raise Refusal("expected finite errors, got infinity: the arithmetic overflowed")
+        return cls(len(known), mean, squares)
 
 
 Measured = dict[str, Moments]
