@@ -14,7 +14,7 @@ from kappaskin.studies.compare.way import Way
 from kappaskin.studies.compare.works import Work, works
 from kappaskin.studies.cost.bench import seconds, traced
 
-_TURNS, _BUDGET = (7, 201), 0.2  # least and most that are timed of a work, and about how long in s
+_TURNS, _BUDGET = (7, 201), 0.1  # least and most that are timed of a work, and about how long in s
 
 
 @dataclass(frozen=True)
