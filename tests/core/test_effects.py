@@ -28,6 +28,7 @@ from kappaskin.effects import (
     IntermittentElements,
     MainsHum,
     Quantisation,
+    ReadingEffect,
     Saturation,
     StrainLimit,
     StuckElements,
@@ -56,6 +57,12 @@ EFFECTS_AT_WORK = [
 ]
 ALIKE = (Tolerance, Temperature, MainsHum, Quantisation, Saturation)  # whatever came before
 SOMETIMES = (StuckElements, IntermittentElements, Saturation)
+
+
+def test_what_is_listed_here_is_every_effect_on_readings() -> None:
+    every = {effect for effect in EFFECTS.values() if issubclass(effect, ReadingEffect)}
+
+    assert {type(effect) for effect in EFFECTS_AT_WORK} == every
 
 
 def played(running, frames=30):

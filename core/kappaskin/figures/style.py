@@ -15,8 +15,8 @@ Figure = Any
 Axes = Any
 """matplotlib.axes.Axes, flat or 3-D."""
 
-SINGLE, DOUBLE = 85.0, 174.0
-"""Widths in mm of one column and of two."""
+DOUBLE = 174.0
+"""Width in mm of two columns."""
 
 INK, FAINT, GREY, LINE, FILL = "#16191d", "#5b6470", "#9aa3ad", "#c6ccd4", "#e9edf2"
 BLUE, ORANGE = "#2166ac", "#bd5a14"

@@ -29,6 +29,5 @@ class Choice:
             raise Refusal(f"expected an effect to be on or off, got {', '.join(both)} as both")
 
 
-EVERYTHING = Choice()
 LINEAR = Choice(off=frozenset({"finite-slope"}))
 """All there is of the electronics, on a skin of which the gages sense what Eqs. 3-5 say."""

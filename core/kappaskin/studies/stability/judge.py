@@ -19,7 +19,7 @@ their own answer in float64 is the reference.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy
@@ -31,8 +31,6 @@ from kappaskin.fit.fit import gathered
 from kappaskin.frames import Array
 from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.reference import Reference
-
-Precision = np.dtype[np.floating[Any]]
 
 COVERED = 0.85
 """How much of the truth must lie in bars of 95 %: three standard errors less, over 40 frames."""
