@@ -1,0 +1,144 @@
+"""The laws that every source of frames keeps, one suite over all of them."""
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from kappaskin import Frame, load_scene
+from kappaskin.sources import ReplayedSource, SerialSource, SimulatedSource, Source
+from kappaskin.sources.decoder import Decoder
+from kappaskin.sources.information import to_json
+from kappaskin.sources.wire import Information, Samples, encode_information, encode_samples
+
+SCENE = replace(load_scene("circle"), rate=100.0)
+SENSOR = SCENE.sensor()
+FRAMES = 20
+
+
+class Clock:
+    """A clock that stands still but for those who sleep by it."""
+
+    def __init__(self) -> None:
+        self.now = time.monotonic()
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += max(seconds, 1e-4)
+
+
+class Tape:
+    """Takes down what it is told, in order."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[str, tuple[object, ...]]] = []
+
+    def __getattr__(self, what: str) -> Callable[..., None]:
+        return lambda *told: self.told.append((what, told))
+
+    def bytes_that(self, what: str) -> bytes:
+        return b"".join(told[1] for name, told in self.told if name == what)
+
+
+def simulated(request: pytest.FixtureRequest) -> Iterator[SimulatedSource]:
+    clock = Clock()
+    yield SimulatedSource(SCENE, clock, clock.sleep)
+
+
+def replayed(request: pytest.FixtureRequest) -> Iterator[ReplayedSource]:
+    clock = Clock()
+    yield ReplayedSource(request.getfixturevalue("recording"), clock, clock.sleep)
+
+
+def on_a_line(request: pytest.FixtureRequest) -> Iterator[SerialSource]:
+    tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    source = SerialSource(os.ttyname(slave))
+    os.close(slave)
+    os.write(master, encode_information(0, 0.0, to_json(SENSOR)))
+    for n in range(1, FRAMES + 1):
+        counts = np.full(SENSOR.channels, n, np.int32)
+        os.write(master, encode_samples(n, n / 100, np.arange(SENSOR.channels), counts, 2))
+    yield source
+    os.close(master)
+
+
+@pytest.fixture(params=[simulated, replayed, on_a_line], ids=lambda made: made.__name__)
+def source(request: pytest.FixtureRequest) -> Iterator[Source]:
+    for made in request.param(request):
+        yield made
+        made.close()
+
+
+def frames_of(source: Source) -> list[Frame]:
+    """The first frames that come, few."""
+    frames, patience = list[Frame](), time.monotonic() + 10.0
+    while len(frames) < FRAMES:
+        assert time.monotonic() < patience, "nothing comes"
+        frames += source.read(0.02)
+    return frames
+
+
+def test_it_says_what_the_device_is_before_its_first_frame_and_nothing_is_wrong(source) -> None:
+    frames_of(source)
+
+    assert source.sensor is not None
+    assert source.sensor.serial_number == SENSOR.serial_number
+    assert not source.trouble
+
+
+def test_frames_come_in_order_each_with_a_count_for_each_of_its_channels(source) -> None:
+    frames = frames_of(source)
+
+    for a, b in pairwise(frames):
+        assert b.sequence > a.sequence
+        assert b.device_time > a.device_time
+        assert b.host_time >= a.host_time
+    for frame in frames:
+        assert frame.counts.shape == frame.channels.shape
+        assert 0 <= frame.channels.min() <= frame.channels.max() < SENSOR.channels
+
+
+def test_every_byte_and_every_number_is_accounted_for(source) -> None:
+    frames = frames_of(source)
+
+    seen = source.accounting()
+    assert seen.balanced
+    assert seen.accepted >= len(frames)
+
+
+def test_what_happened_is_told_once(source) -> None:
+    frames_of(source)
+    source.events()
+
+    assert source.events() == []
+
+
+def test_a_tape_gets_what_the_same_frames_are_made_of(source) -> None:
+    if isinstance(source, ReplayedSource):
+        pytest.skip("what a recording brings is in its file")
+    tape = Tape()
+    source.record(tape)
+
+    frames = frames_of(source)
+
+    came = Decoder().feed(tape.bytes_that("came"))
+    scans = {message.sequence: message for message in came if isinstance(message, Samples)}
+    met = [told[0] for name, told in tape.told if name == "met"]
+    met += [message.text for message in came if isinstance(message, Information)]
+    assert to_json(SENSOR) in met
+    for frame in frames:
+        np.testing.assert_array_equal(scans[frame.sequence].counts, frame.counts)
+    assert "mapped" in [name for name, _ in tape.told]
+
+
+def test_it_can_be_closed_twice(source) -> None:
+    source.close()
+    source.close()
