@@ -1,0 +1,81 @@
+"""A calibration taken and used on the window."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from kappaskin import Calibration
+from kappaskin.calibration.calibration import fingerprint
+from kappaskin_app.window import MainWindow
+
+
+def test_a_refused_file_is_told_where_files_are_loaded(window, tmp_path: Path) -> None:
+    panels = window.panels
+    window.calibrating.load(tmp_path / "none.toml")
+    assert "none.toml" in panels.in_use.message.text()
+    assert not panels.calibrate.message.text()
+
+
+def _error(window: MainWindow, until: Callable[..., None]) -> float:
+    """RMS error of the shape in m, over the next estimates."""
+    found: list[float] = []
+    window.session.estimated.connect(lambda estimate: found.append(estimate.error_rms))
+    until(lambda: len(found) > 40)
+    return float(np.median(found))
+
+
+def test_a_calibration_taken_in_the_window_mends_the_shape(
+    opened: Callable[[str], MainWindow],
+    until: Callable[..., None],
+    colours_in: Callable[..., int],
+) -> None:
+    window = opened("sim:centre")
+    until(lambda: len(window.membrane.ages) > 3 and window.session.estimate is not None)
+    window.history.change("Spoil", loops="second", tolerance=0.1)
+    until(lambda: window.session.status.meetings > 0 and not window.session.status.computing)
+    nominal = _error(window, until)
+    panels, panel = window.panels, window.panels.calibrate
+    panels.show_calibration()
+    panel.start.radii.setText("150, 80, 45")
+    panel.start.seconds.setValue(0.1)
+    panel.start.begin.click()
+    assert panel.steps.take.isVisible()
+    panel.steps.all.click()
+    until(lambda: panel.outcome.use.isVisible(), 240.0)
+    assert "of 300 channels pass" in panel.outcome.passed.text()
+    for view in (panel.outcome.map, panel.outcome.plot):
+        assert colours_in(window, view) > 3
+    panel.outcome.use.click()
+    until(lambda: window.session.status.setup.calibration is not None)
+    calibrated = _error(window, until)
+    assert calibrated < 0.2 * nominal
+    assert "channels" in panels.connection.device.text()
+    window.history.stack.undo()
+    until(lambda: window.session.status.setup.calibration is None)
+    assert _error(window, until) > 0.8 * nominal
+
+
+def test_a_calibration_rests_while_another_skin_is_connected(
+    window: MainWindow, until: Callable[..., None]
+) -> None:
+    sensor, ones = window.session.scene.sensor(), np.ones(300)
+    window.history.change(
+        "Use",
+        calibration=Calibration(
+            sensor.name,
+            sensor.serial_number,
+            "",
+            fingerprint(sensor.layout),
+            datetime.now(UTC),
+            *(ones, 0 * ones, ones, ones),
+        ),
+    )
+    until(lambda: window.session.status.setup.calibration is not None)
+    window.history.change("Fewer", elements_x=8)
+    until(lambda: window.session.status.setup.calibration is None)
+    until(lambda: window.session.estimate is not None)
+    until(lambda: "Not in use" in window.panels.in_use.message.text())
+    window.history.stack.undo()
+    until(lambda: window.session.status.setup.calibration is not None)

@@ -1,0 +1,100 @@
+"""What a window keeps in a file between two starts, and files that cannot be used."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin_app.layouts.file import KeptFile
+from kappaskin_app.layouts.kept import Kept, to_text
+from kappaskin_app.layouts.layout import READY
+
+HOSTILE = (
+    "",
+    "format = 2",
+    "format = '1'",
+    "format = 1\nwindow = 3",
+    "format = 1\n[window]\ntheme = 'neon'",
+    "format = 1\n[window]\nplace = [0, 0, 0, 5]",
+    "format = 1\n[window]\nplace = [0, 0, 9999999999, 5]",
+    "format = 1\n[window]\nplace = [0, 0, 'a', true]",
+    "format = 1\n[window]\nfiles = [1]",
+    "format = 1\n[layout]\npage = -1",
+    "format = 1\n[layout]\ncost = 'left'",
+    "format = 1\n[layout]\ncost = { area = 'inside' }",
+    "format = 1\n[layout]\ncost = { area = 'left', share = nan }",
+    "format = 1\n[layout]\ncost = { area = 'left', shown = 1 }",
+    "format = 1\n[layouts]\nA = 3",
+    "format = 1\n[shortcuts]\npicture = ['Ctrl+S']",
+    "a = " + 5000 * "[" + 5000 * "]",
+    "\x00",
+    "format = 1\n" + "\n".join(f"[layouts.a{n}]" for n in range(200)),
+)
+
+
+@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
+def test_a_file_that_cannot_be_used_is_told_and_put_aside(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "window.toml"
+    path.write_text(text)
+    kept, told = KeptFile(path).read()
+    assert kept == Kept()
+    assert "window.toml.1.aside" in told
+    assert (tmp_path / "window.toml.1.aside").read_text() == text
+    assert not path.exists()
+
+
+@given(st.text() | st.binary())
+def test_no_text_at_all_ends_the_start(tmp_path_factory, text: str | bytes) -> None:
+    path = tmp_path_factory.mktemp("kept") / "window.toml"
+    data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
+    path.write_bytes(data)
+    kept, told = KeptFile(path).read()
+    assert kept == Kept()
+    assert told
+
+
+def test_a_file_that_is_not_there_is_no_news_and_one_that_cannot_be_written_is(
+    tmp_path: Path,
+) -> None:
+    assert KeptFile(tmp_path / "none.toml").read() == (Kept(), "")
+    (tmp_path / "file").touch()
+    assert "cannot be written" in KeptFile(tmp_path / "file" / "window.toml").write(Kept())
+
+
+def test_an_earlier_one_put_aside_stays(tmp_path: Path) -> None:
+    path = tmp_path / "window.toml"
+    for text in ("first", "second"):
+        path.write_text(text)
+        KeptFile(path).read()
+    aside = [(tmp_path / f"window.toml.{number}.aside").read_text() for number in (1, 2)]
+    assert aside == ["first", "second"]
+
+
+def test_two_windows_that_write_at_once_leave_one_whole_file_and_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "window.toml"
+    kept = [Kept(theme="dark"), Kept(theme="light", files=("a",) * 50)]
+
+    def write(which: Kept) -> set[str]:
+        return {KeptFile(path).write(which) for _ in range(40)}
+
+    with ThreadPoolExecutor(2) as windows:
+        assert set().union(*windows.map(write, kept)) == {""}
+    assert KeptFile(path).read() in [(each, "") for each in kept]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_was_cut_anywhere_is_read_or_told(tmp_path: Path) -> None:
+    text, path = to_text(Kept(theme="dark", now=READY["Study"])), tmp_path / "window.toml"
+    for end in range(0, len(text), 97):
+        path.write_text(text[:end])
+        kept, told = KeptFile(path).read()
+        assert told == "" or (kept == Kept() and not path.exists())
+
+
+def test_the_text_is_read_by_a_person() -> None:
+    text = to_text(Kept(theme="dark", keys={"picture": "F12"}))
+    assert 'theme = "dark"' in text
+    assert 'picture = "F12"' in text
+    assert 'settings = {area = "left", shown = true, share = 0.25}' in text
