@@ -27,9 +27,11 @@ class Keeping:
     def active(self) -> bool:
         return self._recorder is not None
 
-    def begin(self, path: Path, source: Source | None, side: Side) -> None:
-        """Record to `path` from now on, instead of to where it was."""
+    def begin(self, path: Path | None, source: Source | None, side: Side) -> None:
+        """Record to `path` from now on, instead of to where it was; nowhere if None."""
         self.end(source)
+        if path is None:
+            return
         try:
             if isinstance(source, ReplayedSource):
                 raise Refusal("expected a live source to record, got a recording; copy its file")

@@ -4,7 +4,6 @@ import math
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -63,12 +62,11 @@ class Loop:
         status = self._status
         self._side = Side(ring, self._builder, Computed(status.setup, status.generation))
         self._compared = Compared(beside, self._builder, status.beside or Computed())
-        self._changing = False
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
         self._haste = Haste()
         self._arrivals, self._pace = Arrivals(), Pace()
-        self._again = math.inf
+        self._changing, self._again = False, math.inf
 
     def run(self) -> None:
         """Serve until whoever asks says goodbye, or is gone and nobody comes in its place."""
@@ -118,7 +116,7 @@ class Loop:
         elif isinstance(request, TakeTare):
             self._taking.begin(self._status.sensor if self._status.state == STREAMING else None)
         elif isinstance(request, Record):
-            self._record(request.path)
+            self._keeping.begin(request.path, self._source, self._side)
         elif isinstance(request, Note):
             self._happen(Event(time.monotonic(), "note", request.text))
         elif isinstance(request, Publish):
@@ -294,12 +292,6 @@ class Loop:
         """Tell of something that happened."""
         self._status = self._status.after([event])
         self._keeping.happened(event)
-
-    def _record(self, path: Path | None) -> None:
-        if path is None:
-            self._keeping.end(self._source)
-        else:
-            self._keeping.begin(path, self._source, self._side)
 
     def end_recording(self) -> None:
         """End the file, if one is recorded to, and wait until it is on the disk."""
