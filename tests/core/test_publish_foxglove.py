@@ -84,7 +84,7 @@ def clients(server: Foxglove) -> Sequence[Client]:
     return server._clients  # noqa: SLF001
 
 
-def until(holds: Callable[[], object], within: float = 5.0) -> None:
+def until(holds: Callable[[], object], within: float = 30.0) -> None:
     end = time.monotonic() + within
     while not holds():
         assert time.monotonic() < end, "it never came to hold"

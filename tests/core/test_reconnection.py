@@ -120,7 +120,7 @@ class Reader:
     def __init__(self, source):
         self.source, self.frames, self.events = source, [], []
 
-    def until(self, holds, within=5.0):
+    def until(self, holds, within=30.0):
         end = time.monotonic() + within
         while not holds():
             assert time.monotonic() < end, (self.source.trouble, self.events)

@@ -36,7 +36,7 @@ from kappaskin.verify import Verdict, verifying
 CIRCLE = load_scene("circle")
 
 
-def wait_for(ask: Callable[[], Any], within: float = 10.0) -> Any:
+def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
     """The first answer that is true, or the last one."""
     end = time.monotonic() + within
     while not (answer := ask()) and time.monotonic() < end:

@@ -187,7 +187,7 @@ def few(engine):
     return 0 < scanned(engine) < 90
 
 
-def wait_for(holds, within=10.0):
+def wait_for(holds, within=30.0):
     end = time.monotonic() + within
     while not holds():
         assert time.monotonic() < end, "it never came to hold"
