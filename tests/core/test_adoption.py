@@ -37,6 +37,8 @@ from kappaskin.requests import (
 )
 from kappaskin.sources.reenact import Reenactment
 
+pytestmark = pytest.mark.slow
+
 LEFT = Left(Asked(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
 
 

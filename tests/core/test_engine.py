@@ -32,6 +32,8 @@ from kappaskin.engine import Engine
 from kappaskin.status import LOST, OFF, STREAMING, Status
 from kappaskin.tare_taking import TareNews
 
+pytestmark = pytest.mark.slow
+
 Answer = TypeVar("Answer")
 
 

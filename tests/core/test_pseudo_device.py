@@ -37,6 +37,8 @@ from kappaskin.status import LOST, STREAMING
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice
 
+pytestmark = pytest.mark.slow
+
 SCENE = load_scene("circle")
 MOTION = Orbit(0.022, 4.0)
 

@@ -21,6 +21,8 @@ from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.tuning import BAUD_RATES
 from kappaskin.sources.wire import Operation, encode_information, encode_reply, encode_samples
 
+pytestmark = pytest.mark.slow
+
 pty = pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 termios, tty = map(pytest.importorskip, ("termios", "tty"))
 SPEEDS = {getattr(termios, f"B{rate}", None): rate for rate in BAUD_RATES}

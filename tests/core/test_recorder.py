@@ -33,6 +33,8 @@ from kappaskin.status import STREAMING, Status
 from kappaskin.studies.beside import Beside
 from kappaskin.verify import Verdict, verifying
 
+pytestmark = pytest.mark.slow
+
 CIRCLE = load_scene("circle")
 
 

@@ -12,6 +12,8 @@ from kappaskin import LONGEST_NOTE, Engine, Recording, Refusal, Setup, Status, s
 from kappaskin.sources import ReplayedSource
 from kappaskin.verify import Verdict, verifying
 
+pytestmark = pytest.mark.slow
+
 Clock = list[float]
 
 

@@ -17,6 +17,8 @@ pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.engine import Engine
 from kappaskin.sources.device import PseudoDevice
 
+pytestmark = pytest.mark.slow
+
 SCENE = replace(load_scene("off-centre"), rate=200.0)
 ELEMENTS = (3, 4)
 

@@ -15,6 +15,8 @@ from kappaskin import Refusal
 from kappaskin.studies.design import Folder, cluster, processes, run, run_study
 from kappaskin.studies.design.task import Task, version
 
+pytestmark = pytest.mark.slow
+
 NEEDS_DASK = pytest.mark.skipif(find_spec("distributed") is None, reason="Dask is not installed")
 LONGER = "least = 2\nmost = 4", "least = 30\nmost = 30"
 
