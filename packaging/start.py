@@ -1,9 +1,11 @@
-"""A fresh machine, set up, and one task run on it: the app, every check, benchmarks or fuzzing.
+"""A fresh machine, set up, and one task run on it: the app, every check or some, or benchmarks.
 
     python3 packaging/start.py                     opens the app on the simulated fingertip
     python3 packaging/start.py app [ARGUMENTS]     opens the app, e.g. app --source sim:
     python3 packaging/start.py test [ARGUMENTS]    runs every check; ARGUMENTS go to pytest
-    python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; ARGUMENTS go to pytest
+    python3 packaging/start.py fast [ARGUMENTS]    runs what of the library's tests takes a minute
+    python3 packaging/start.py cover [ARGUMENTS]   tells which lines of the library no test runs
+    python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history tells how it went
     python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
 
 Standard library only. A second start with nothing changed installs nothing.
@@ -46,8 +48,10 @@ CHECKS = (
     ("lint-imports",),
     # Each process has a display of its own; -n0 among ARGUMENTS makes it one for all, on ours.
     # One that crashes ends the run: what it had in hand would be waited for without end.
-    ("pytest", "-n2", "--max-worker-restart=0"),
+    # Three of them, for windows and lines wait for half of their time.
+    ("pytest", "-n3", "--max-worker-restart=0"),
 )
+LIBRARY = "tests/core"
 # Benchmark files are named so that plain pytest passes them by.
 BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")
 
@@ -111,6 +115,24 @@ def test(arguments: list[str], shown: dict[str, str]) -> int:
     return 0
 
 
+def fast(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run the library's tests but those that are slow or start a process."""
+    command = [tool("pytest"), "-n2", "-q", "-m", "not slow", LIBRARY, *arguments]
+    return run(command, shown, cwd=ROOT)
+
+
+def cover(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run the library's tests, and fail where they leave too much of it out."""
+    coverage = [tool("python"), "-m", "coverage"]
+    with tempfile.TemporaryDirectory() as folder:
+        variables = shown | {"COVERAGE_FILE": str(Path(folder, "coverage"))}
+        tests = ["run", "-m", "pytest", "-n3", "-q", LIBRARY, *arguments]
+        for words in (tests, ["combine", "-q"], ["report"]):
+            if code := run([*coverage, *words], variables, cwd=ROOT):
+                return code
+    return 0
+
+
 def bench(arguments: list[str], shown: dict[str, str]) -> int:
     """Run the benchmarks."""
     return run([tool("pytest"), *BENCHMARKS, *arguments], shown, cwd=ROOT)
@@ -121,7 +143,7 @@ def fuzz(arguments: list[str], shown: dict[str, str]) -> int:
     return run([tool("python"), str(ROOT / "tests" / "fuzz" / "fuzz.py"), *arguments], shown)
 
 
-TASKS = {"app": app, "test": test, "bench": bench, "fuzz": fuzz}
+TASKS = {"app": app, "test": test, "fast": fast, "cover": cover, "bench": bench, "fuzz": fuzz}
 
 
 # --- the setup

@@ -153,7 +153,16 @@ class OneForWindows(LoadFileScheduling):
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling:
+    config.option.loadscopereorder = False  # the order below, not the files of most tests first
     return (LoadFileScheduling if _OWN_DISPLAYS else OneForWindows)(config, log)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Begin with the files that take long: at the end one process would be alone with them."""
+    if hasattr(config, "workerinput"):
+        long = {item.path for item in items if item.get_closest_marker("slow")}
+        long |= {item.path for item in items if item.nodeid.startswith("tests/app/")}
+        items.sort(key=lambda item: item.path not in long)
 
 
 @pytest.fixture(scope="session")

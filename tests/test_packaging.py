@@ -99,6 +99,16 @@ def test_start_needs_the_standard_library_alone():
     assert imported <= sys.stdlib_module_names
 
 
+def test_every_task_is_told_in_its_help_and_to_those_who_contribute():
+    start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
+    contributing = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+
+    assert {"fast", "cover"} < set(start["TASKS"])
+    for task in start["TASKS"]:
+        assert f"start.py {task} [" in start["__doc__"]
+        assert task == "app" or f"start.py {task} " in contributing
+
+
 @pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb: apt-get install -y xvfb")
 def test_virtual_displays_are_apart_and_gone_afterwards():
     virtual_display = runpy.run_path(str(ROOT / "packaging" / "start.py"))["virtual_display"]

@@ -47,7 +47,7 @@ Wait = Callable[[Callable[[], bool]], None]
 def until(qapp: QApplication) -> Wait:
     """Let the window live until something holds; fail after a while."""
 
-    def wait(holds: Callable[[], bool], patience: float = 15.0) -> None:
+    def wait(holds: Callable[[], bool], patience: float = 60.0) -> None:
         end = time.monotonic() + patience
         while not holds():
             assert time.monotonic() < end, "it never came to hold"

@@ -62,7 +62,7 @@ def ticking(running):
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
-def test_an_effect_takes_a_few_microseconds_a_frame(effect, medians, figure) -> None:
+def test_an_effect_takes_a_few_microseconds_a_frame(effect, medians, figure, ratio) -> None:
     work = ticking(effect.start((CHANNELS,), np.random.default_rng(0)))
 
     ours, baseline = medians(work, bare, turns=60, calls=100)
@@ -71,10 +71,10 @@ def test_an_effect_takes_a_few_microseconds_a_frame(effect, medians, figure) -> 
         f"{effect.name} on {CHANNELS} channels: {ours * 1e6:.1f} us, {ours / baseline:.1f} times a "
         f"bare copy and sum ({baseline * 1e6:.2f} us)"
     )
-    assert ours < 60 * baseline
+    ratio(f"{effect.name}, against a copy and sum", ours / baseline, at_most=60)
 
 
-def test_finite_slopes_take_a_few_times_the_operator(medians, figure) -> None:
+def test_finite_slopes_take_a_few_times_the_operator(medians, figure, ratio) -> None:
     patch = Patch(0.1, 0.1)
     basis, layout = SineBasis(patch, 15, 15), SensorLayout.regular(patch, 10, 10)
     c = np.random.default_rng(0).normal(0, 1e-4, (15, 15))
@@ -86,10 +86,10 @@ def test_finite_slopes_take_a_few_times_the_operator(medians, figure) -> None:
         f"finite-slope, 15 x 15 functions to 300 channels: {ours * 1e6:.1f} us, "
         f"{ours / baseline:.1f} times the bare operator ({baseline * 1e6:.1f} us)"
     )
-    assert ours < 10 * baseline
+    ratio("finite-slope, against the bare operator", ours / baseline, at_most=10)
 
 
-def test_a_link_tells_of_a_frame_in_a_few_microseconds(medians, figure) -> None:
+def test_a_link_tells_of_a_frame_in_a_few_microseconds(medians, figure, ratio) -> None:
     hit, frames = DroppedFrames(0.1).start(np.random.default_rng(0)), iter(range(10**9))
 
     ours, baseline = medians(lambda: hit(next(frames)), bare, turns=60, calls=100)
@@ -98,4 +98,4 @@ def test_a_link_tells_of_a_frame_in_a_few_microseconds(medians, figure) -> None:
         f"dropped-frames: {ours * 1e6:.1f} us a frame, {ours / baseline:.1f} times a bare copy and "
         f"sum of {CHANNELS} numbers"
     )
-    assert ours < 60 * baseline
+    ratio("dropped-frames, against a copy and sum", ours / baseline, at_most=60)

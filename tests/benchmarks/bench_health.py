@@ -7,7 +7,7 @@ import numpy as np
 from kappaskin import Monitor, Pipeline, Setup, Simulator, load_scene
 
 
-def test_watching_costs_a_small_part_of_an_estimate(figure) -> None:
+def test_watching_costs_a_small_part_of_an_estimate(figure, ratio) -> None:
     scene = load_scene("circle")
     simulator = Simulator(scene)
     frames = [simulator.frame(n, time.monotonic) for n in range(2000)]
@@ -29,5 +29,5 @@ def test_watching_costs_a_small_part_of_an_estimate(figure) -> None:
         f"{watching / whole:.3f} of an estimate ({whole * 1e6:.0f} us); a look, four times a "
         f"second, {look * 1e3:.1f} ms"
     )
-    assert watching / whole < 0.25
+    ratio("health of a frame, against its estimate", watching / whole, at_most=0.25)
     assert look < 10e-3

@@ -33,7 +33,7 @@ class Bench:
         return w
 
 
-def test_a_frame_is_fifty_times_faster_than_lstsq_and_summation(medians, figure) -> None:
+def test_a_frame_is_fifty_times_faster_than_lstsq_and_summation(medians, figure, ratio) -> None:
     bench = Bench()
     frame, pipeline = bench.frames[0], bench.pipeline
     surface_of = pipeline.basis.on_grid(*bench.scene.plate.patch.grid(65, 65))
@@ -47,12 +47,12 @@ def test_a_frame_is_fifty_times_faster_than_lstsq_and_summation(medians, figure)
         f"counts to 65 x 65 surface: {fast * 1e6:.1f} us, {slow / fast:.0f} times faster than "
         f"lstsq and summation ({slow * 1e6:.0f} us)"
     )
-    assert slow / fast >= 50
+    ratio("lstsq and summation, against counts to a surface", slow / fast, at_least=50)
     assert fast < 60e-6
 
 
 def test_a_whole_estimate_is_four_times_faster_than_lstsq_and_summation(
-    medians, spaced, figure
+    medians, spaced, figure, ratio
 ) -> None:
     bench = Bench()
     of_sim = itertools.cycle(bench.frames)
@@ -71,5 +71,7 @@ def test_a_whole_estimate_is_four_times_faster_than_lstsq_and_summation(
         f"are 1 ms apart {cold[0] * 1e6:.0f} us, {cold[1] * 1e6:.0f} us, "
         f"{cold[2] / cold[1]:.1f} times"
     )
-    assert warm[1] < warm[2] / 4
-    assert cold[1] < cold[2] / 4
+    ratio("lstsq and summation, against a whole estimate", warm[2] / warm[1], at_least=4)
+    ratio(
+        "lstsq and summation, against a whole estimate, 1 ms apart", cold[2] / cold[1], at_least=4
+    )

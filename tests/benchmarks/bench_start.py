@@ -27,12 +27,13 @@ def _import(statement: str) -> float:
         "from kappaskin import Engine",
     ],
 )
-def test_importing_the_library_costs_little_more_than_numpy_and_scipy(figure, ours) -> None:
+def test_importing_the_library_costs_little_more_than_numpy_and_scipy(figure, ratio, ours) -> None:
     theirs = "import numpy, scipy.linalg, scipy.fft"
     taken = [(_import(ours), _import(theirs)) for _ in range(9)]
-    ratio = statistics.median(own for own, _ in taken) / statistics.median(it for _, it in taken)
-    figure(f"{ours}: {ratio:.2f} times {theirs}")
-    assert ratio <= (1.5 if "Engine" not in ours else 2.0)
+    times = statistics.median(own for own, _ in taken) / statistics.median(it for _, it in taken)
+    figure(f"{ours}: {times:.2f} times {theirs}")
+    asked = 2.0 if "Engine" in ours else 1.5
+    ratio(f"{ours}, against NumPy and SciPy", times, at_most=asked)
 
 
 def _drawn(script: Path) -> tuple[float, float]:
@@ -49,7 +50,7 @@ def test_the_first_picture_is_there_within_three_seconds(figure) -> None:
     assert min(taken[1:]) < 3.0
 
 
-def test_the_first_picture_takes_little_more_than_a_bare_window_does(figure) -> None:
+def test_the_first_picture_takes_little_more_than_a_bare_window_does(figure, ratio) -> None:
     ours, bare = [], []
     for _ in range(5):
         bare.append(_drawn(_BARE))
@@ -62,4 +63,5 @@ def test_the_first_picture_takes_little_more_than_a_bare_window_does(figure) -> 
         f"first picture of the skin: {passed:.2f} times as late as that of a bare QtInteractor, "
         f"{spent:.2f} times its processor time"
     )
-    assert spent <= 2.5  # other processes on the same cores do not change it much
+    # Other processes on the same cores do not change it much.
+    ratio("processor time until a picture, against a bare QtInteractor", spent, at_most=2.5)

@@ -42,7 +42,7 @@ def task_of(study, block):
     return Task(next(study.points()).document, block, version())
 
 
-def test_draws_against_a_loop_over_reconstruct(figure, medians, tmp_path):
+def test_draws_against_a_loop_over_reconstruct(figure, ratio, medians, tmp_path):
     study, scene, file = study_of(1000, 2), load_scene("centre"), tmp_path / "frame.npz"
     simulator, scan, patch = Simulator(scene), scene.sensor().scan(), scene.plate.patch
     truth, _ = simulator.reading(scan, 0.0)
@@ -69,7 +69,7 @@ def test_draws_against_a_loop_over_reconstruct(figure, medians, tmp_path):
         f"study: {1000 / block:.0f} draws/s in one process, {1000 * whole / block:.0f} times a "
         f"loop over reconstruct, {1000 * bare / block:.1f} times one over the estimator alone"
     )
-    assert 1000 * whole / block >= 20
+    ratio("a loop over reconstruct, against a study", 1000 * whole / block, at_least=20)
 
 
 def computed(study, folder, workers):
@@ -88,7 +88,7 @@ def computed(study, folder, workers):
     return time.perf_counter() - began, most
 
 
-def test_a_million_frames_in_bounded_memory(figure, tmp_path):
+def test_a_million_frames_in_bounded_memory(figure, ratio, tmp_path):
     with processes(2) as two:
         _, few = computed(study_of(1000, 100), tmp_path / "few", two)
         seconds, many = computed(study_of(1000, 1000), tmp_path / "many", two)
@@ -98,14 +98,14 @@ def test_a_million_frames_in_bounded_memory(figure, tmp_path):
         f"{seconds:.1f} s; {many / 1e6:.0f} MB at most, {many / few:.2f} times those of 1e5 frames"
     )
     assert seconds < 30
-    assert many < 1.1 * few
+    ratio("memory of 1e6 frames, against 1e5", many / few, at_most=1.1)
 
 
-def test_a_second_worker(figure, tmp_path):
+def test_a_second_worker(figure, ratio, tmp_path):
     study, folders = study_of(1000, 80), (tmp_path / str(n) for n in range(100))
     with processes(1) as one, processes(2) as two:
         turns = [[computed(study, next(folders), w)[0] for w in (one, two)] for _ in range(10)]
 
     alone, both = np.median(turns[1:], axis=0)  # the first turn begins the processes
     figure(f"study: {alone / both:.2f} times the blocks per second with two workers as with one")
-    assert alone / both >= 1.7
+    ratio("blocks of two workers, against one", alone / both, at_least=1.7)

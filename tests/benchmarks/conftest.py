@@ -1,18 +1,26 @@
-"""Benchmarks: each figure is a ratio to a named baseline of the same run, printed at the end."""
+"""Benchmarks: each figure is a ratio to a named baseline of the same run, printed at the end.
+
+The ratios are kept in history.jsonl, a line each; `start.py bench --history` tells how they went.
+"""
 
 import json
+import os
+import platform
 import shutil
 import statistics
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from kappaskin import load_scene, write_scene
 
+HISTORY = Path(__file__).with_name("history.jsonl")
+_TOLD = 8  # of a figure's values, the newest
 _FIRMWARE = Path(__file__).parents[2] / "resources" / "kappaskin_resources" / "firmware"
 _CONVERSION = 2e-6  # s: 300 channels in less than a millisecond
 
@@ -20,11 +28,48 @@ Play = Callable[..., str]
 
 Figures = list[str]
 _figures: Figures = []
+_ratios: list[dict[str, object]] = []
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="measure for as long as the figures ask")
     parser.addoption("--soak", type=float, help="hold a load for so many s, such as 1800")
+    parser.addoption("--history", action="store_true", help="measure nothing, tell how it went")
+
+
+def pytest_cmdline_main(config: pytest.Config) -> int | None:
+    if not config.getoption("--history"):
+        return None
+    print(told(map(json.loads, HISTORY.read_text("utf-8").splitlines())))
+    return 0
+
+
+def told(lines: Iterable[dict[str, object]]) -> str:
+    """Each figure of the history with its newest values, from the oldest of them on."""
+    figures: dict[object, list[dict[str, object]]] = {}
+    for line in lines:
+        figures.setdefault(line["figure"], []).append(line)
+    return "\n".join(
+        f"{name}: "
+        + ", ".join(f"{line['value']} ({line['commit']})" for line in kept[-_TOLD:])
+        + f"; {kept[-1]['asked']}"
+        for name, kept in figures.items()
+    )
+
+
+def pytest_sessionfinish() -> None:
+    if not _ratios:
+        return
+    say = ["git", "describe", "--always", "--dirty=+", "--exclude=*"]
+    commit = subprocess.run(say, cwd=HISTORY.parent, capture_output=True, text=True, check=False)
+    run = {
+        "date": f"{datetime.now(UTC):%Y-%m-%d %H:%M}",
+        "commit": commit.stdout.strip() or "unknown",
+        "machine": f"{os.cpu_count()} cores, {platform.machine()}, {platform.system()}, Python "
+        f"{platform.python_version()}",
+    }
+    with HISTORY.open("a", encoding="utf-8") as file:
+        file.writelines(json.dumps(run | ratio) + "\n" for ratio in _ratios)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -38,6 +83,23 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 def figure() -> Callable[[str], None]:
     """Print a line in the summary."""
     return _figures.append
+
+
+@pytest.fixture
+def ratio() -> Callable[..., None]:
+    """Keep a figure in the history, and fail where it is not what is asked."""
+
+    def keep(
+        figure: str, value: float, *, at_least: float | None = None, at_most: float | None = None
+    ) -> None:
+        bounds = {"at least": at_least, "at most": at_most}
+        asked = [f"{words} {bound:g}" for words, bound in bounds.items() if bound is not None]
+        kept = {"figure": figure, "value": float(f"{value:.3g}"), "asked": " ".join(asked)}
+        _ratios.append(kept)
+        assert at_least is None or value >= at_least, kept
+        assert at_most is None or value <= at_most, kept
+
+    return keep
 
 
 @pytest.fixture

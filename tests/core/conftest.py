@@ -1,10 +1,13 @@
 """What several tests of the core use: commands, and skins held in every way that they can be."""
 
 import math
+import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from multiprocessing.process import BaseProcess
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -85,6 +88,20 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         which = metafunc.definition.get_closest_marker("where")
         chosen = [held for held in ALL if which is None or which.kwargs["which"](held)]
         metafunc.parametrize("held_skin", chosen, ids=str)
+
+
+@pytest.fixture(autouse=True)
+def slow_if_it_starts_a_process(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Keeps processes out of `start.py fast`, which leaves out what is marked as slow."""
+
+    def refuse(*_: object, **__: object) -> NoReturn:
+        pytest.fail("it starts a process: mark it with pytest.mark.slow")
+
+    if not request.node.get_closest_marker("slow"):
+        monkeypatch.setattr(subprocess.Popen, "__init__", refuse)
+        monkeypatch.setattr(BaseProcess, "start", refuse)
 
 
 @pytest.fixture

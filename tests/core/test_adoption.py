@@ -37,10 +37,12 @@ from kappaskin.requests import (
 )
 from kappaskin.sources.reenact import Reenactment
 
+pytestmark = pytest.mark.slow
+
 LEFT = Left(Asked(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
 
 
-def wait_for(ask: Callable[[], Any], within: float = 10.0) -> Any:
+def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
     """The first answer that is true, or the last one."""
     end = time.monotonic() + within
     while not (answer := ask()) and time.monotonic() < end:

@@ -15,6 +15,8 @@ from kappaskin import (
 )
 from kappaskin.fit.prior import prior_root
 
+pytestmark = pytest.mark.slow
+
 SQUARE = Patch(0.1, 0.1)
 TENS = SensorLayout.regular(SQUARE, 10, 10)
 FIFTEEN = SineBasis(SQUARE, 15, 15)

@@ -40,6 +40,8 @@ from kappaskin.guide import summary, take_sweep
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice
 
+pytestmark = pytest.mark.slow
+
 RADII = (0.1, 0.05, 0.025, 0.015)
 STEPS = schedule(RADII)
 SCENE = load_scene("calibration")

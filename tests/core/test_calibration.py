@@ -41,6 +41,8 @@ from kappaskin.calibration.loops import identify, thresholds
 from kappaskin.effects import ReadingEffect, Size
 from kappaskin.ring import Ring
 
+pytestmark = pytest.mark.slow
+
 DATE = datetime(2026, 3, 1, 12, tzinfo=UTC)
 TOLERANCE = Tolerance(0.05, 3.0, seed=8)
 NOISE = GaussianNoise(0.23)

@@ -15,6 +15,8 @@ import pytest
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
 from kappaskin.cli import REFUSED, app
 
+pytestmark = pytest.mark.slow
+
 SIZE, BASIS = np.array([0.1, 0.1]), SineBasis(Patch(0.1, 0.1), 8, 8)
 LAYOUT = SensorLayout.regular(BASIS.patch, 10, 10)
 TRUTH = Plate(BASIS.patch).deflection([PointLoad(0.03, 0.06)], BASIS)

@@ -20,6 +20,8 @@ from kappaskin.sources import information
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.wire import LONGEST, Kind, encode, encode_information, encode_samples
 
+pytestmark = pytest.mark.slow
+
 SENSOR = load_scene("centre").sensor()
 SOURCES = [
     file

@@ -29,6 +29,8 @@ from kappaskin import (
     local_geometry,
 )
 
+pytestmark = pytest.mark.slow
+
 NOISE = 0.231
 SIDE = 0.1
 D = 3.7e-3

@@ -39,6 +39,8 @@ from kappaskin.studies.cost import Bench, costs_text, length_of, rows, verdict
 from kappaskin.studies.cost.choice import ALIKE
 from kappaskin.studies.tables import fingertip_scene, table_1
 
+pytestmark = pytest.mark.slow
+
 EIGHT = Setting("least-squares", (8, 8), (10, 10))
 CENTRE = load_scene("centre")
 # A third of the gain: at Table 2's loads the default electronics stand on the rails.

@@ -27,6 +27,8 @@ from kappaskin.studies.drills.spoil import Cut, Flips, Garbage
 from kappaskin.studies.drills.stand import Device, Stand, opened
 from kappaskin.studies.drills.uart import heard
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def device() -> Iterator[Device]:

@@ -28,6 +28,8 @@ from kappaskin.effects import CorruptedFrames, Creep, DroppedFrames, GaussianNoi
 from kappaskin.scene import Choice, plan
 from kappaskin.studies.cost import effect_rows, effects_text, usual_setting
 
+pytestmark = pytest.mark.slow
+
 EIGHT = Setting("least-squares", (8, 8))
 CENTRE = load_scene("centre")
 EVERYTHING = Choice()

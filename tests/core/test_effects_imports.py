@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 # A plate, a load on it, and what a scene does with every known effect before it starts any.
 SIZED = """
 import sys

@@ -32,10 +32,12 @@ from kappaskin.engine import Engine
 from kappaskin.status import LOST, OFF, STREAMING, Status
 from kappaskin.tare_taking import TareNews
 
+pytestmark = pytest.mark.slow
+
 Answer = TypeVar("Answer")
 
 
-def wait_for(ask: Callable[[], Answer], within: float = 10.0) -> Answer:
+def wait_for(ask: Callable[[], Answer], within: float = 30.0) -> Answer:
     """The first answer that is true, or the last one."""
     end = time.monotonic() + within
     while not (answer := ask()) and time.monotonic() < end:
@@ -43,7 +45,7 @@ def wait_for(ask: Callable[[], Answer], within: float = 10.0) -> Answer:
     return answer
 
 
-def state(engine: Engine, expected: str, within: float = 10.0) -> Status:
+def state(engine: Engine, expected: str, within: float = 30.0) -> Status:
     wait_for(lambda: engine.status().state == expected, within)
     status = engine.status()
     assert status.state == expected, status.message

@@ -357,6 +357,7 @@ def waves(patch, m, n, modes):
     return K.reshape(3, -1)
 
 
+@pytest.mark.slow
 def test_a_grid_of_1024_by_1024_returns_its_waves():
     modes = [(1, 1, 1e-3), (3, 700, 1e-6), (1023, 2, 2e-6), (1022, 1023, -3e-6)]
     fit = Fast(*of(1024, 1024, 1023, 1023))

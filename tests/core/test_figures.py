@@ -25,6 +25,8 @@ from kappaskin.figures import fig2, fig9, style
 from kappaskin.studies.initial_curvature import initial_curvature
 from kappaskin_app import theme
 
+pytestmark = pytest.mark.slow
+
 DOUBLE_COLUMN = 174 / 25.4
 SVG = "{http://www.w3.org/2000/svg}"
 R0 = 12.9e-3

@@ -27,6 +27,8 @@ from kappaskin import (
 )
 from kappaskin.health.window import Window
 
+pytestmark = pytest.mark.slow
+
 ROUND = load_scene("circle")
 TO_COUNTS = 1 / ROUND.transduction.resolution
 RATE = 128.0  # frames/s: as many as are looked at twice over

@@ -312,6 +312,7 @@ JSON = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.sampled_from([*said(), "positions"]), JSON)
 def test_any_value_of_any_key_is_understood_or_refused(key: str, value: Any) -> None:
     found = scattered([[0.01, 0.02]]) if key == "positions" else said()

@@ -16,6 +16,8 @@ from skfem.helpers import dd, ddot, dot, grad
 
 from kappaskin import Disk, Patch, Plate, Polygon, basis_for
 
+pytestmark = pytest.mark.slow
+
 SIDE = 0.1
 SQUARE = Polygon([(0, 0), (SIDE, 0), (SIDE, SIDE), (0, SIDE)])
 TRIANGLE = Polygon([(0, 0), (SIDE, 0), (SIDE / 2, SIDE * math.sqrt(3) / 2)])

@@ -13,6 +13,8 @@ from kappaskin.effects import EFFECTS
 from kappaskin.scene import Choice, effects_of, kept_of, plan
 from kappaskin.scene.survey import survey
 
+pytestmark = pytest.mark.slow
+
 RANDOM = {"gaussian-noise", "uniform-noise", "flicker-noise", "mains-hum", "tolerance"}
 READY = pytest.mark.parametrize("name", SCENES)
 

@@ -19,6 +19,8 @@ from kappaskin import (
 from kappaskin.press import Phase
 from kappaskin.sources import SimulatedSource
 
+pytestmark = pytest.mark.slow
+
 SCENE = load_scene("centre")
 SENSOR = SCENE.sensor()
 M = SCENE.layout.curvature_operator(SCENE.basis)

@@ -10,7 +10,10 @@ import pytest
 from kappaskin.processes import beginning_processes
 from kappaskin.studies import beside
 
-pytestmark = pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no signal masks")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="no signal masks"),
+]
 
 
 def _blocked() -> set[signal.Signals]:

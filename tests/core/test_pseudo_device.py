@@ -37,11 +37,13 @@ from kappaskin.status import LOST, STREAMING
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice
 
+pytestmark = pytest.mark.slow
+
 SCENE = load_scene("circle")
 MOTION = Orbit(0.022, 4.0)
 
 
-def wait_for(ask: Callable[[], Any], within: float = 5.0) -> Any:
+def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
     """The first answer that is true, or the last one."""
     end = time.monotonic() + within
     while not (answer := ask()) and time.monotonic() < end:
@@ -63,7 +65,7 @@ def serving(device: PseudoDevice) -> Iterator[None]:
         device.close()
 
 
-def listened(port: str, count: int, within: float = 5.0) -> tuple[SerialSource, list[Frame]]:
+def listened(port: str, count: int, within: float = 30.0) -> tuple[SerialSource, list[Frame]]:
     """`count` frames or more of a source that is closed by now, and the source."""
     source, frames = SerialSource(port), list[Frame]()
     end = time.monotonic() + within
@@ -80,7 +82,7 @@ class Listener:
         self._line = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         self.decoder, self._asked = Decoder(), 0
 
-    def reads(self, spent: int, within: float = 5.0) -> list[Message]:
+    def reads(self, spent: int, within: float = 30.0) -> list[Message]:
         """What comes until `spent` numbers are accounted for."""
         messages: list[Message] = []
         end = time.monotonic() + within
@@ -96,7 +98,7 @@ class Listener:
         self._asked += 1
         os.write(self._line, encode_command(self._asked, 0.0, operation, arguments))
         messages: list[Message] = []
-        end = time.monotonic() + 5.0
+        end = time.monotonic() + 30.0
         while time.monotonic() < end:
             with suppress(BlockingIOError):
                 messages += self.decoder.feed(os.read(self._line, 65536))
@@ -109,7 +111,7 @@ class Listener:
     def takes(self, count: int) -> list[Samples]:
         """The next `count` scans."""
         scans: list[Samples] = []
-        end = time.monotonic() + 5.0
+        end = time.monotonic() + 30.0
         while len(scans) < count and time.monotonic() < end:
             with suppress(BlockingIOError):
                 came = self.decoder.feed(os.read(self._line, 65536))

@@ -19,6 +19,8 @@ import pytest
 from kappaskin import Engine, Refusal, Setup
 from kappaskin.publish import Published
 
+pytestmark = pytest.mark.slow
+
 RECEIVERS = files("kappaskin_resources") / "publishing"
 
 

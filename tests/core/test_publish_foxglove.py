@@ -24,6 +24,8 @@ from kappaskin.publish.cloud import NAMES, POINTS
 from kappaskin.publish.foxglove import MOST_CLIENTS, Foxglove
 from kappaskin.publish.target import opened, target_of
 
+pytestmark = pytest.mark.slow
+
 PRESSED = load_scene("off-centre")
 EVENT = Event(0.0, "gap", "3 messages lost")
 STATE = State("streaming", "sim", "", PRESSED.sensor(), 500.0, 0.0, (EVENT,))
@@ -84,7 +86,7 @@ def clients(server: Foxglove) -> Sequence[Client]:
     return server._clients  # noqa: SLF001
 
 
-def until(holds: Callable[[], object], within: float = 5.0) -> None:
+def until(holds: Callable[[], object], within: float = 30.0) -> None:
     end = time.monotonic() + within
     while not holds():
         assert time.monotonic() < end, "it never came to hold"

@@ -21,6 +21,8 @@ from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.tuning import BAUD_RATES
 from kappaskin.sources.wire import Operation, encode_information, encode_reply, encode_samples
 
+pytestmark = pytest.mark.slow
+
 pty = pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 termios, tty = map(pytest.importorskip, ("termios", "tty"))
 SPEEDS = {getattr(termios, f"B{rate}", None): rate for rate in BAUD_RATES}
@@ -120,7 +122,7 @@ class Reader:
     def __init__(self, source):
         self.source, self.frames, self.events = source, [], []
 
-    def until(self, holds, within=5.0):
+    def until(self, holds, within=30.0):
         end = time.monotonic() + within
         while not holds():
             assert time.monotonic() < end, (self.source.trouble, self.events)

@@ -33,10 +33,12 @@ from kappaskin.status import STREAMING, Status
 from kappaskin.studies.beside import Beside
 from kappaskin.verify import Verdict, verifying
 
+pytestmark = pytest.mark.slow
+
 CIRCLE = load_scene("circle")
 
 
-def wait_for(ask: Callable[[], Any], within: float = 10.0) -> Any:
+def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
     """The first answer that is true, or the last one."""
     end = time.monotonic() + within
     while not (answer := ask()) and time.monotonic() < end:

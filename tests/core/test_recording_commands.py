@@ -14,6 +14,8 @@ from kappaskin.cli import main
 from kappaskin.recording.reading import Recording
 from kappaskin.recording.writing import part_of
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory) -> Path:

@@ -56,6 +56,7 @@ def test_every_frame_scans_all_elements_within_the_radius(centre, radius, share)
         assert set(near.tolist()) <= scanned(scanner)
 
 
+@pytest.mark.slow
 @given(ANYWHERE, st.floats(1e-6, 0.09), st.floats(0.01, 1))
 def test_the_others_come_up_within_one_over_the_share_frames(centre, radius, share):
     scanner = Scanner(SENSOR, Region("skin", radius=radius, share=share))

@@ -7,6 +7,8 @@ import pytest
 from kappaskin import Refusal, Region
 from kappaskin.studies.regions import PERIODS, ROWS, TRACKED, measured
 
+pytestmark = pytest.mark.slow
+
 FAST = 0.25  # s per turn: 553 mm/s
 FULL, PART = Region(), Region("skin", radius=0.025, rate=1e6)
 

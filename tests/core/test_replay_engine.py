@@ -12,6 +12,8 @@ from kappaskin import LONGEST_NOTE, Engine, Recording, Refusal, Setup, Status, s
 from kappaskin.sources import ReplayedSource
 from kappaskin.verify import Verdict, verifying
 
+pytestmark = pytest.mark.slow
+
 Clock = list[float]
 
 
@@ -100,7 +102,7 @@ def test_a_file_that_cannot_be_read_any_more_is_a_refusal(
 # As the live process plays them.
 
 
-def until(holds: Callable[[], bool], patience: float = 15.0) -> None:
+def until(holds: Callable[[], bool], patience: float = 60.0) -> None:
     end = time.monotonic() + patience
     while not holds():
         assert time.monotonic() < end, "it never came to hold"

@@ -13,6 +13,8 @@ from scipy.optimize import brentq, lsq_linear, nnls
 from kappaskin import Disk, Patch, Plate, PointLoad, Polygon, Refusal, basis_for
 from kappaskin.mechanics import Block, Cylinder, HeightMap, Press, Punch, Sphere, Wedge
 
+pytestmark = pytest.mark.slow
+
 SQUARE, D = Patch(0.1, 0.1), 3.7e-3
 ROUGH = HeightMap(np.random.default_rng(0).uniform(0, 2e-4, (23, 31)), 0.04, 0.03)
 # What presses a skin whose shorter side is 1; scaled to it.

@@ -19,6 +19,8 @@ from kappaskin import (
     load_scene,
 )
 
+pytestmark = pytest.mark.slow
+
 SQUARE = Patch(0.1, 0.1)
 TENS = SensorLayout.regular(SQUARE, 10, 10)
 EIGHT, TRUE = SineBasis(SQUARE, 8, 8), SineBasis(SQUARE, 15, 15)

@@ -314,6 +314,7 @@ def scenes(draw) -> Scene:
     return replace(scene, choice=draw(choices(scene)))
 
 
+@pytest.mark.slow
 @settings(max_examples=80)
 @given(scenes())
 def test_any_scene_is_the_same_once_written_and_read(scene):

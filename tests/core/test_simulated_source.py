@@ -26,6 +26,8 @@ from kappaskin import (
 from kappaskin.effects import CorruptedFrames, DroppedFrames
 from kappaskin.sources import SimulatedSource, open_source
 
+pytestmark = pytest.mark.slow
+
 
 class Clock:
     """A clock that stands still but for those who sleep by it."""

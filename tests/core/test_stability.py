@@ -32,6 +32,8 @@ from kappaskin.studies.stability.precise import least_squares
 from kappaskin.studies.stability.reference import reference_of
 from kappaskin.studies.stability.run import rows_of
 
+pytestmark = pytest.mark.slow
+
 CASES = {case.name: case for case in gallery()}
 
 SEEK_LEAST_SQUARES = ("least-squares", "direct")

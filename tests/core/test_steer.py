@@ -19,6 +19,8 @@ from kappaskin import (
 from kappaskin.sources import SimulatedSource
 from kappaskin.steer import steered
 
+pytestmark = pytest.mark.slow
+
 RATE = 1e6  # frames/s asked for: as many as the scan allows
 _ROUND = load_scene("circle")
 CIRCLE = replace(

@@ -17,6 +17,8 @@ pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.engine import Engine
 from kappaskin.sources.device import PseudoDevice
 
+pytestmark = pytest.mark.slow
+
 SCENE = replace(load_scene("off-centre"), rate=200.0)
 ELEMENTS = (3, 4)
 
@@ -187,7 +189,7 @@ def few(engine):
     return 0 < scanned(engine) < 90
 
 
-def wait_for(holds, within=10.0):
+def wait_for(holds, within=30.0):
     end = time.monotonic() + within
     while not holds():
         assert time.monotonic() < end, "it never came to hold"

@@ -29,6 +29,8 @@ from kappaskin.effects import FlickerNoise, Temperature
 from kappaskin.taring import Rest, Taring
 from kappaskin.touch import LoadSeeker
 
+pytestmark = pytest.mark.slow
+
 SCENE = replace(load_scene("centre"), stimuli=(), rate=100.0)
 SENSOR = SCENE.sensor()
 SEEKER = LoadSeeker(SENSOR)

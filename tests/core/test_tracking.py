@@ -27,6 +27,8 @@ from kappaskin.fit.kalman import MovingModes
 from kappaskin.fit.prior import prior_root
 from kappaskin.studies.long_run import long_run
 
+pytestmark = pytest.mark.slow
+
 SQUARE = Patch(0.1, 0.1)
 SIXES = SensorLayout.regular(SQUARE, 6, 6)
 FOURS = SineBasis(SQUARE, 4, 4)

@@ -57,7 +57,7 @@ class Said:
         return self.payload[5]
 
 
-def wait_for(ask: Callable[[], Any], within: float = 5.0) -> Any:
+def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
     """The first answer that is true, or the last one."""
     end = time.monotonic() + within
     while not (answer := ask()) and time.monotonic() < end:
@@ -88,7 +88,7 @@ class Line:
         self.said += new
         return new
 
-    def until(self, right: Callable[[Said], bool], within: float = 5.0) -> Said:
+    def until(self, right: Callable[[Said], bool], within: float = 30.0) -> Said:
         """The first message from now on that is right."""
         found = wait_for(lambda: [said for said in self.listen() if right(said)], within)
         assert found, "it never came"

@@ -16,6 +16,8 @@ from kappaskin.studies.design import Folder, cluster, processes, run, run_study
 from kappaskin.studies.design.task import Task, version
 from kappaskin.studies.design.workers import kind
 
+pytestmark = pytest.mark.slow
+
 NEEDS_DASK = pytest.mark.skipif(find_spec("distributed") is None, reason="Dask is not installed")
 ALIKE = f"{version()}, threads of BLAS 1"
 LONGER = "least = 2\nmost = 4", "least = 30\nmost = 30"
