@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin import Recording, Refusal
+from kappaskin import Recording, Refusal, lacking
 
 app = App(name="app", help_format="markdown")
 demo = App(name="demo", help_format="markdown")
@@ -91,9 +91,7 @@ def _open(
     try:
         launch(source, seconds, screenshot, presenting, file)
     except ImportError as error:
-        raise Refusal(
-            f"the desktop app needs {error.name}; install it with: pip install 'kappaskin[app]'"
-        ) from error
+        raise lacking("app", "the desktop app", error) from error
 
 
 def replay(file: Path) -> None:

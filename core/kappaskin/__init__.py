@@ -45,6 +45,7 @@ from kappaskin.errors import Damaged as Damaged
 from kappaskin.errors import RankDeficient as RankDeficient
 from kappaskin.errors import Refusal as Refusal
 from kappaskin.errors import SourceError as SourceError
+from kappaskin.errors import lacking as lacking
 from kappaskin.export import Exported as Exported
 from kappaskin.export import Exporting as Exporting
 from kappaskin.export import Repairing as Repairing

@@ -23,7 +23,6 @@ from kappaskin import (
 from kappaskin.cli import main
 from kappaskin.figures import fig2, fig9, style
 from kappaskin.studies.initial_curvature import initial_curvature
-from kappaskin_app import theme
 
 DOUBLE_COLUMN = 174 / 25.4
 SVG = "{http://www.w3.org/2000/svg}"
@@ -168,6 +167,9 @@ def test_no_text_is_small_leaves_the_sheet_or_touches_another(drawn, name) -> No
 
 
 def test_the_colours_are_the_apps() -> None:
+    pytest.importorskip("PySide6")
+    from kappaskin_app import theme
+
     for mine, theirs in ((style.DIVERGING, theme.DIVERGING), (style.SEQUENTIAL, theme.SEQUENTIAL)):
         colours = style.colour_map(mine)(np.arange(256), bytes=True)[:, :3].astype(int)
 
