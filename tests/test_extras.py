@@ -6,7 +6,6 @@ import sys
 import tomllib
 from pathlib import Path
 
-import pytest
 from packaging.requirements import Requirement
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
@@ -25,7 +24,7 @@ ASKS = {
     "hdf5": ["export", "{recording}", "--to", "out.h5"],
     "foxglove": ["publish", "sim:", "--seconds", "30", "--foxglove", "127.0.0.1:8765"],
 }
-"""What asks for each extra on the command line; `film` only the window does (tests/app/test_exports.py)."""
+"""What asks for each extra; `film` the window alone does, see tests/app/test_exports.py."""
 
 BARRED = """
 import sys
