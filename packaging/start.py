@@ -38,8 +38,7 @@ PICTURE = ROOT / "kappaskin-window.png"
 VENV, CORE_VENV = ROOT / ".venv", ROOT / ".venv-core"
 STAMP = VENV / "kappaskin-stamp"
 REFUSED = 2
-PATIENCE = 10.0
-"""Seconds a process is given to start or to end."""
+PATIENCE = 10.0  # s that a process is given to start or to end
 
 CHECKS = (
     ("ruff", "check"),
@@ -146,9 +145,8 @@ TASKS = {"app": app, "test": test, "bench": bench, "fuzz": fuzz, "core": core, "
 def set_up() -> None:
     """Make .venv and have the system libraries, or stop with what to do."""
     if sys.version_info[:2] < OLDEST:
-        expected = ".".join(str(part) for part in OLDEST)
         raise Stop(
-            f"expected Python {expected} or newer, this is {platform.python_version()}; "
+            f"expected Python {OLDEST[0]}.{OLDEST[1]} or newer, this is {platform.python_version()}; "
             "start with a newer one, e.g. python3.12 packaging/start.py"
         )
     wanted, found = stamp(), STAMP.read_text("utf-8") if STAMP.exists() else ""
@@ -170,12 +168,18 @@ def install(venv: Path, *asked: str, keep: bool) -> None:
     if not keep:
         if not importlib.util.find_spec("ensurepip"):
             apt("Python's venv module is incomplete", "apt-get install -y python3-venv")
+        if venv.is_symlink():  # which venv would follow, to clear what others use
+            raise Stop(f"expected {venv} to be a folder of its own, it is a link; remove the link")
         say(f"Making {venv}")
         # Started with .venv's own Python, we would clear it away under our feet.
         base = getattr(sys, "_base_executable", sys.executable)
         command = [base, "-m", "venv", "--clear", str(venv)]
         quietly(command, environment(pip=True), "repair this Python, or start with another")
-    say("Updating the packages" if keep else "Installing the packages (some minutes)")
+    say(
+        "Updating the packages"
+        if keep
+        else "Installing the packages (some minutes, 1.5 GB at most)"
+    )
     command = [tool("python", venv), "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS)]
     command += ["-e", *asked]
     quietly(command, environment(pip=True), "check the network and pip's settings, start again")
@@ -300,14 +304,9 @@ def displayless() -> bool:
     return sys.platform.startswith("linux") and not shown
 
 
-@contextlib.contextmanager
-def display(variables: dict[str, str]) -> Iterator[dict[str, str]]:
+def display(variables: dict[str, str]) -> contextlib.AbstractContextManager[dict[str, str]]:
     """The environment `variables` with a display, a virtual one where there is none."""
-    if not displayless():
-        yield variables
-        return
-    with virtual_display(variables) as shown:
-        yield shown
+    return virtual_display(variables) if displayless() else contextlib.nullcontext(variables)
 
 
 @contextlib.contextmanager
