@@ -146,8 +146,8 @@ def set_up() -> None:
     """Make .venv and have the system libraries, or stop with what to do."""
     if sys.version_info[:2] < OLDEST:
         raise Stop(
-            f"expected Python {OLDEST[0]}.{OLDEST[1]} or newer, this is {platform.python_version()}; "
-            "start with a newer one, e.g. python3.12 packaging/start.py"
+            "expected Python {}.{} or newer, this is {}; start with a newer one, e.g. python3.12 "
+            "packaging/start.py".format(*OLDEST, platform.python_version())
         )
     wanted, found = stamp(), STAMP.read_text("utf-8") if STAMP.exists() else ""
     if found != wanted:
@@ -175,11 +175,7 @@ def install(venv: Path, *asked: str, keep: bool) -> None:
         base = getattr(sys, "_base_executable", sys.executable)
         command = [base, "-m", "venv", "--clear", str(venv)]
         quietly(command, environment(pip=True), "repair this Python, or start with another")
-    say(
-        "Updating the packages"
-        if keep
-        else "Installing the packages (some minutes, 1.5 GB at most)"
-    )
+    say("Updating the packages" if keep else "Installing the packages (minutes, up to 1.5 GB)")
     command = [tool("python", venv), "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS)]
     command += ["-e", *asked]
     quietly(command, environment(pip=True), "check the network and pip's settings, start again")

@@ -48,7 +48,7 @@ def build() -> None:
             if file.is_file() and not file.is_symlink():
                 strip(file)
         print(f"stripped: {before / 1e6:.0f} to {size(BUNDLE) / 1e6:.0f} MB")
-        add_desktop(BUNDLE)
+        add_desktop(BUNDLE, DRAWN)
 
 
 def draw(svg: Path, png: Path) -> None:
@@ -90,12 +90,12 @@ def loads(elf: bytes) -> bool:
     return True
 
 
-def add_desktop(bundle: Path) -> None:
+def add_desktop(bundle: Path, drawn: Path) -> None:
     """Put icon, desktop entry and kinds of files into `share`, and what installs them beside it."""
     icons = bundle / "share" / "icons" / "hicolor"
     for source, place in (
         (ICON, icons / "scalable" / "apps" / "kappaskin.svg"),
-        (DRAWN, icons / f"{_SIDE}x{_SIDE}" / "apps" / "kappaskin.png"),
+        (drawn, icons / f"{_SIDE}x{_SIDE}" / "apps" / "kappaskin.png"),
         *((HERE / name, bundle / "share" / place) for name, place in SHARE.items()),
         (HERE / "install.sh", bundle / "install.sh"),
         (ROOT / "LICENSE", bundle / "LICENSE"),
