@@ -61,7 +61,8 @@ HIDDEN = (
 """Modules that are imported by a name in a string."""
 
 EXCLUDED = (
-    *("dask", "distributed", "imageio_ffmpeg"),  # of extras: a cluster has its own, ffmpeg is large
+    # Of extras: a cluster has its own, ffmpeg is large, and comparing is for who works on this.
+    *("dask", "distributed", "imageio_ffmpeg", "skfem"),
     *("hypothesis", "psutil", "pytest", "pydoc_data", "tkinter", "IPython"),
     *("PySide6.QtDBus", "PySide6.QtNetwork"),
     "PIL.AvifImagePlugin",
