@@ -22,6 +22,7 @@ ASKS = {
     "plots": ["figures", "--out", "figures"],
     "dask": ["study", "paper-elements", "--scheduler", "tcp://127.0.0.1:1", "--out", "study"],
     "hdf5": ["export", "{recording}", "--to", "out.h5"],
+    "compare": ["compare"],
     "foxglove": ["publish", "sim:", "--seconds", "30", "--foxglove", "127.0.0.1:8765"],
 }
 """What asks for each extra; `film` the window alone does, see tests/app/test_exports.py."""
