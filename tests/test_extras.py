@@ -73,7 +73,7 @@ def without(barred: set[str], code: str, folder: Path, *arguments: str) -> str:
     script.write_text(BARRED.format(barred=barred) + code)
     command = [sys.executable, str(script), *arguments]
     return subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, timeout=60, check=True
+        command, cwd=folder, capture_output=True, text=True, timeout=180, check=True
     ).stdout
 
 
@@ -84,14 +84,14 @@ def test_every_extra_is_tried_here():
 def test_without_any_extra_the_library_works_and_says_what_installs_what_is_asked_for(
     recording, tmp_path
 ):
-    plain = [["tables"], ["doctor"], ["plan", "circle"], ["info", str(recording)]]
+    plain = [["tables"], ["doctor"], ["info", str(recording)]]
     asked = {extra: [word.format(recording=recording) for word in ASKS[extra]] for extra in ASKS}
 
     printed = without(modules(*ASKS, "film"), TOLD, tmp_path, json.dumps([plain, asked]))
 
     told = json.loads(printed)
     assert told["missing"] == ["kappaskin.publish.client", "kappaskin.publish.foxglove"]
-    assert told["plain"] == [0, 0, 0, 0]
+    assert told["plain"] == [0, 0, 0]
     for extra, (code, said) in told["asked"].items():
         assert code == 2
         assert f"pip install 'kappaskin[{extra}]'" in said
