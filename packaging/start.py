@@ -7,6 +7,8 @@
     python3 packaging/start.py cover [ARGUMENTS]   tells which lines of the library no test runs
     python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history tells how it went
     python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
+    python3 packaging/start.py core [ARGUMENTS]    tests the library where no GUI is installed
+    python3 packaging/start.py bundle [--try]      makes a folder that needs no Python, tries it
 
 Standard library only. A second start with nothing changed installs nothing.
 """
@@ -35,11 +37,10 @@ OLDEST = (3, 11)
 ROOT = Path(__file__).resolve().parent.parent
 CONSTRAINTS = ROOT / "packaging" / "constraints.txt"
 PICTURE = ROOT / "kappaskin-window.png"
-VENV = ROOT / ".venv"
+VENV, CORE_VENV = ROOT / ".venv", ROOT / ".venv-core"
 STAMP = VENV / "kappaskin-stamp"
 REFUSED = 2
-PATIENCE = 10.0
-"""Seconds a process is given to start or to end."""
+PATIENCE = 10.0  # s that a process is given to start or to end
 
 CHECKS = (
     ("ruff", "check"),
@@ -54,6 +55,8 @@ CHECKS = (
 LIBRARY = "tests/core"
 # Benchmark files are named so that plain pytest passes them by.
 BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")
+CORE = (f"{ROOT}[plots,foxglove,hdf5]", "hypothesis", "mcap-ros2-support", "mpmath", "psutil")
+CORE += ("pytest", "pytest-xdist", "scikit-fem")
 
 
 class Stop(Exception):
@@ -143,7 +146,21 @@ def fuzz(arguments: list[str], shown: dict[str, str]) -> int:
     return run([tool("python"), str(ROOT / "tests" / "fuzz" / "fuzz.py"), *arguments], shown)
 
 
-TASKS = {"app": app, "test": test, "fast": fast, "cover": cover, "bench": bench, "fuzz": fuzz}
+def core(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run the library's tests in a venv of its own, without any GUI library."""
+    install(CORE_VENV, *CORE, keep=Path(tool("python", CORE_VENV)).exists())
+    return run([tool("pytest", CORE_VENV), "-n2", "tests/core", *arguments], shown, cwd=ROOT)
+
+
+def bundle(arguments: list[str], shown: dict[str, str]) -> int:
+    """Make the app a folder that needs no Python, and try it."""
+    install(VENV, f"{ROOT}[bundle]", keep=True)
+    return run([tool("python"), str(ROOT / "packaging/bundle/build.py"), *arguments], shown)
+
+
+TASKS = {
+    task.__name__: task for task in (app, test, fast, cover, bench, fuzz, core, bundle)
+}
 
 
 # --- the setup
@@ -152,14 +169,14 @@ TASKS = {"app": app, "test": test, "fast": fast, "cover": cover, "bench": bench,
 def set_up() -> None:
     """Make .venv and have the system libraries, or stop with what to do."""
     if sys.version_info[:2] < OLDEST:
-        expected = ".".join(str(part) for part in OLDEST)
         raise Stop(
-            f"expected Python {expected} or newer, this is {platform.python_version()}; "
-            "start with a newer one, e.g. python3.12 packaging/start.py"
+            "expected Python {}.{} or newer, this is {}; start with a newer one, e.g. python3.12 "
+            "packaging/start.py".format(*OLDEST, platform.python_version())
         )
     wanted, found = stamp(), STAMP.read_text("utf-8") if STAMP.exists() else ""
     if found != wanted:
-        install(keep=found.split("\n")[0] == wanted.split("\n")[0])
+        STAMP.unlink(missing_ok=True)  # Killed from here on, the next start begins anew.
+        install(VENV, f"{ROOT}[app,dev]", keep=found.split("\n")[0] == wanted.split("\n")[0])
         STAMP.write_text(wanted, "utf-8")
     have_libraries()
 
@@ -170,20 +187,21 @@ def stamp() -> str:
     return f"{platform.python_version()} {sys.base_prefix} {ROOT}\n{asked.hexdigest()}\n"
 
 
-def install(*, keep: bool) -> None:
-    """Fill .venv, made anew unless the one found was complete, to `keep`, and only out of date."""
-    STAMP.unlink(missing_ok=True)  # Killed from here on, the next start begins anew.
+def install(venv: Path, *asked: str, keep: bool) -> None:
+    """Fill a venv, made anew unless the one found was complete, to `keep`, and only out of date."""
     if not keep:
         if not importlib.util.find_spec("ensurepip"):
             apt("Python's venv module is incomplete", "apt-get install -y python3-venv")
-        say(f"Making {VENV}")
+        if venv.is_symlink():  # which venv would follow, to clear what others use
+            raise Stop(f"expected {venv} to be a folder of its own, it is a link; remove the link")
+        say(f"Making {venv}")
         # Started with .venv's own Python, we would clear it away under our feet.
         base = getattr(sys, "_base_executable", sys.executable)
-        command = [base, "-m", "venv", "--clear", str(VENV)]
+        command = [base, "-m", "venv", "--clear", str(venv)]
         quietly(command, environment(pip=True), "repair this Python, or start with another")
-    say("Updating the packages" if keep else "Installing the packages (some minutes, 1.5 GB)")
-    command = [tool("python"), "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS)]
-    command += ["-e", f"{ROOT}[app,dev]"]
+    say("Updating the packages" if keep else "Installing the packages (minutes, up to 1.5 GB)")
+    command = [tool("python", venv), "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS)]
+    command += ["-e", *asked]
     quietly(command, environment(pip=True), "check the network and pip's settings, start again")
 
 
@@ -230,9 +248,9 @@ def apt(why: str, line: str) -> None:
 # --- processes
 
 
-def tool(name: str) -> str:
-    """The path of a program of .venv."""
-    return str(VENV / ("Scripts" if sys.platform == "win32" else "bin") / name)
+def tool(name: str, venv: Path = VENV) -> str:
+    """The path of a program of a venv."""
+    return str(venv / ("Scripts" if sys.platform == "win32" else "bin") / name)
 
 
 def environment(*, pip: bool = False) -> dict[str, str]:
@@ -306,14 +324,9 @@ def displayless() -> bool:
     return sys.platform.startswith("linux") and not shown
 
 
-@contextlib.contextmanager
-def display(variables: dict[str, str]) -> Iterator[dict[str, str]]:
+def display(variables: dict[str, str]) -> contextlib.AbstractContextManager[dict[str, str]]:
     """The environment `variables` with a display, a virtual one where there is none."""
-    if not displayless():
-        yield variables
-        return
-    with virtual_display(variables) as shown:
-        yield shown
+    return virtual_display(variables) if displayless() else contextlib.nullcontext(variables)
 
 
 @contextlib.contextmanager

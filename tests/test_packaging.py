@@ -63,15 +63,23 @@ def test_the_wheel_holds_the_three_packages_and_nothing_else(tmp_path):
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
 
-    information = f"kappaskin-{PROJECT['project']['version']}.dist-info"
-    tops = {name.split("/")[0] for name in names}
-    assert tops == {"kappaskin", "kappaskin_app", "kappaskin_resources", information}
-    resources = ROOT / "resources"
-    assert {
-        file.relative_to(resources).as_posix()
-        for file in (resources / "kappaskin_resources").rglob("*")
+    information = f"kappaskin-{PROJECT['project']['version']}.dist-info/"
+    ours = {
+        file.relative_to(ROOT / root).as_posix()
+        for root in ("core", "app", "resources")
+        for file in (ROOT / root).rglob("*")
         if file.is_file() and "__pycache__" not in file.parts
-    } <= names
+    }
+    assert {name.split("/")[0] for name in ours} == {
+        "kappaskin",
+        "kappaskin_app",
+        "kappaskin_resources",
+    }
+    assert names - ours == {
+        information + name
+        for name in ("METADATA", "RECORD", "WHEEL", "entry_points.txt", "licenses/LICENSE")
+    }
+    assert ours <= names
 
 
 def test_constraints_are_pins_without_an_address():
@@ -107,6 +115,19 @@ def test_every_task_is_told_in_its_help_and_to_those_who_contribute():
     for task in start["TASKS"]:
         assert f"start.py {task} [" in start["__doc__"]
         assert task == "app" or f"start.py {task} " in contributing
+
+
+def test_a_venv_that_is_a_link_is_never_cleared(tmp_path):
+    start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
+    (tmp_path / "others").mkdir()
+    (tmp_path / "others" / "pyvenv.cfg").touch()
+    link = tmp_path / ".venv"
+    link.symlink_to(tmp_path / "others")
+
+    with pytest.raises(start["Stop"], match="it is a link"):
+        start["install"](link, "nothing", keep=False)
+
+    assert (tmp_path / "others" / "pyvenv.cfg").exists()
 
 
 @pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb: apt-get install -y xvfb")

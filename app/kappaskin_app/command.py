@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin import Recording, Refusal
+from kappaskin import Recording, Refusal, lacking
 
 app = App(name="app", help_format="markdown")
 demo = App(name="demo", help_format="markdown")
@@ -26,14 +26,21 @@ def _require_display() -> None:
 
 @app.default
 def run(
-    *, source: str = "sim:", seconds: float | None = None, screenshot: Path | None = None
+    file: Path | None = None,
+    /,
+    *,
+    source: str = "sim:",
+    seconds: float | None = None,
+    screenshot: Path | None = None,
 ) -> None:
-    """Open the desktop app on a source of readings.
+    """Open the desktop app on a source of readings, or on a file.
 
     Example: `kappaskin app --source /dev/ttyACM0`
 
     Parameters
     ----------
+    file
+        A recording or a scene to play, a calibration of the source's sensor, or a mesh to touch it.
     source
         `sim:`, `sim:SCENE`, `replay:FILE`, or a port or URL for pyserial.
     seconds
@@ -41,7 +48,9 @@ def run(
     screenshot
         Save a picture of the window just before it closes by itself.
     """
-    _open(source, seconds, screenshot)
+    if file is not None and not file.is_file():
+        raise Refusal(f"{file}: is not there; check its name")
+    _open(source, seconds, screenshot, file=file)
 
 
 @demo.default
@@ -66,7 +75,11 @@ def present(*, seconds: float | None = None, screenshot: Path | None = None) -> 
 
 
 def _open(
-    source: str, seconds: float | None, screenshot: Path | None, presenting: bool = False
+    source: str,
+    seconds: float | None,
+    screenshot: Path | None,
+    presenting: bool = False,
+    file: Path | None = None,
 ) -> None:
     if seconds is not None and not 0 < seconds <= _LONGEST:
         raise Refusal(f"expected seconds above zero, {_LONGEST:g} at most, got {seconds}")
@@ -76,11 +89,9 @@ def _open(
     from kappaskin_app.launch import launch
 
     try:
-        launch(source, seconds, screenshot, presenting)
+        launch(source, seconds, screenshot, presenting, file)
     except ImportError as error:
-        raise Refusal(
-            f"the desktop app needs {error.name}; install it with: pip install 'kappaskin[app]'"
-        ) from error
+        raise lacking("app", "the desktop app", error) from error
 
 
 def replay(file: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from kappaskin import Refusal
+from kappaskin import Refusal, lacking
 from kappaskin_app.guard import guarded
 from kappaskin_app.views.membrane import MembraneView
 
@@ -43,9 +43,7 @@ class Filming(QObject):
         try:
             from imageio_ffmpeg import write_frames
         except ImportError as error:
-            raise Refusal(
-                'expected ffmpeg for a film; `pip install "kappaskin[film]"` installs it'
-            ) from error
+            raise lacking("film", "a film", error) from error
         if path.suffix.lower() != ".mp4":
             raise Refusal(f"{path.name}: expected a file that ends in .mp4")
         if path.exists():

@@ -6,6 +6,7 @@ import signal
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,6 +70,7 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
 
 
 def _application() -> "QApplication":
+    from PySide6.QtGui import QIcon
     from PySide6.QtWidgets import QApplication
 
     application = QApplication.instance() or QApplication(sys.argv[:1])
@@ -76,6 +78,9 @@ def _application() -> "QApplication":
         raise Refusal("expected a Qt application with widgets, got one without")
     application.setApplicationName("Kappaskin")
     application.setStyle("Fusion")
+    # A desktop that shows windows by their program finds icon and name in its desktop entry.
+    application.setDesktopFileName("kappaskin")
+    application.setWindowIcon(QIcon(str(files("kappaskin_resources") / "icons" / "kappaskin.svg")))
     return application
 
 
@@ -109,10 +114,11 @@ def launch(
     seconds: float | None = None,
     screenshot: Path | None = None,
     presenting: bool = False,
+    file: Path | None = None,
 ) -> None:
     """Show the window on `source`; after `seconds` save `screenshot`, if any, and close.
 
-    While it is `presenting`, what is felt fills the screen.
+    While it is `presenting`, what is felt fills the screen. A `file` is opened as one dropped is.
     """
     # A signal may come in the middle of loading or of a drawing, where closing or raising would
     # leave things behind: it is only noted, and the loop closes the window.
@@ -127,6 +133,8 @@ def launch(
         window.presenting.enter()
     if seconds is None:
         window.beginning.begin()
+    if file is not None:
+        window.opening.begin_with(file)
     from PySide6.QtCore import QTimer
 
     watch = QTimer(window, interval=50)  # pyright: ignore[reportCallIssue]

@@ -1,13 +1,14 @@
 """Files that a person opens, whatever is in them, and the last of them in a menu."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QMenu
 
-from kappaskin import Refusal
+from kappaskin import Refusal, Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.objects import may_choose
 from kappaskin_app.recordings import newest, recordings_folder
@@ -45,6 +46,13 @@ def is_calibration(file: Path) -> bool:
         ) from error
 
 
+def _waits(file: Path) -> bool:
+    """Whether a file is of use only where there is a sensor."""
+    with suppress(Refusal):
+        return file.suffix.lower() == ".toml" and is_calibration(file)
+    return False
+
+
 class Opening(QObject):
     """Opens files by what they are; `told` says what came of it, `changed` that `recent` did."""
 
@@ -57,6 +65,7 @@ class Opening(QObject):
         self._calibrating, self._history = window.calibrating, window.history
         self._session, self._wishes = window.session, window.wishes
         self.recent: list[Path] = []
+        self._first: Path | None = None
         self.menu = QMenu(window)
         self.menu.setToolTipsVisible(True)
         self.menu.aboutToShow.connect(guarded(self._list))
@@ -70,6 +79,21 @@ class Opening(QObject):
             self._way(file)(file)
         except Refusal as refusal:
             self.told.emit(str(refusal))
+
+    def begin_with(self, file: Path) -> None:
+        """Open `file` in a new window; a calibration once it is known which sensor there is."""
+        if self._session.engine.adopted:
+            self.told.emit(f"{file.name} is not opened: the recording that was left goes on")
+        elif self._session.status.sensor is None and _waits(file):
+            self._first = file
+        else:
+            self.open(file)
+
+    def follow(self, status: Status) -> None:
+        """Open what waited for a sensor."""
+        if self._first is not None and status.sensor is not None:
+            file, self._first = self._first, None
+            self.open(file)
 
     def _way(self, file: Path) -> Callable[[Path], None]:
         suffix = file.suffix.lower()

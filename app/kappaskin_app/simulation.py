@@ -54,7 +54,7 @@ _LEAST_SCANNED = 0.05  # of the channels, where they are scanned as they tell mo
 _CREEPING = 5.0  # s, the time constant of the creep
 _OFFSET = 10.0  # 1/m of offset for a gain that is off by 1
 
-OWN = Path("own.toml")
+OWN = Path("own.scene.toml")
 """What a scene is called that was begun from the panels' own."""
 _LARGEST = 1_000_000  # bytes of a scene: a longer text would hold up the editor
 _REMEMBERED = 64  # scenes, so that undoing is quick

@@ -57,6 +57,7 @@ def _calibration(window: "MainWindow") -> None:
     session, calibrating = window.session, window.calibrating
     calibrating.laid.connect(guarded(session.lay))
     session.reported.connect(guarded(calibrating.follow))
+    session.reported.connect(guarded(window.opening.follow))  # who may load a calibration then
     session.estimated.connect(guarded(calibrating.receive))
     window.panels.calibrate.attend(calibrating)
     window.panels.in_use.attend(calibrating)
@@ -134,7 +135,7 @@ def _design(window: "MainWindow") -> None:
     design.form.wished.connect(guarded(window.wishes.wish))
     design.form.reset_wanted.connect(guarded(window.wishes.reset_panel))
     design.save_wanted.connect(
-        guarded(lambda: window.staging.save_as("design.toml", designing.write))
+        guarded(lambda: window.staging.save_as("design.scene.toml", designing.write))
     )
     design.attend(designing)
 

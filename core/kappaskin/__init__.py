@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from kappaskin.errors import RankDeficient as RankDeficient
     from kappaskin.errors import Refusal as Refusal
     from kappaskin.errors import SourceError as SourceError
+    from kappaskin.errors import lacking as lacking
     from kappaskin.export import Exported as Exported
     from kappaskin.export import Exporting as Exporting
     from kappaskin.export import Repairing as Repairing
@@ -203,7 +204,7 @@ else:
             "Tolerance UniformNoise parameters"
         ),
         "engine": "LONGEST_NOTE Engine",
-        "errors": "Damaged RankDeficient Refusal SourceError",
+        "errors": "Damaged RankDeficient Refusal SourceError lacking",
         "export": "Exported Exporting Repairing Wanted",
         "figures": "FIGURES write_figures",
         "fit": (

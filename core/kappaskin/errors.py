@@ -1,5 +1,7 @@
 """What the library raises when it cannot do what was asked."""
 
+import sys
+
 
 class Refusal(ValueError):
     """A question that cannot be answered as put.
@@ -19,3 +21,10 @@ class SourceError(Refusal):
 
 class Damaged(Refusal):
     """A file is not whole, and a repair may save what is."""
+
+
+def lacking(extra: str, purpose: str, error: ImportError) -> Refusal:
+    """What to say where a package of an optional `extra` is missing, which a `purpose` needs."""
+    where = ", which this bundle has not; in a Python of your own" if hasattr(sys, "frozen") else ""
+    what = error.name or error
+    return Refusal(f"{purpose} needs {what}{where}: pip install 'kappaskin[{extra}]'")

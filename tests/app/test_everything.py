@@ -1,5 +1,7 @@
 """Every action and every control, used once: nothing fails, and nothing is left behind."""
 
+import runpy
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,6 +25,17 @@ from kappaskin_app.layouts.arranging import layout_of, words_of
 from kappaskin_app.window import MainWindow
 
 _SPARED = ("quit", "undo", "redo")  # the window would be gone; and what the others are tried with
+
+
+def _vtk() -> set[str]:
+    """The parts of VTK that are loaded, for whatever."""
+    return {name.split(".")[1] for name in sys.modules if name.startswith("vtkmodules.vtk")}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def others_vtk() -> set[str]:
+    """Those that other tests had loaded before, which may read what the app only writes."""
+    return _vtk()
 
 
 @pytest.fixture
@@ -121,3 +134,11 @@ def test_every_control_can_be_used(window: MainWindow, nothing_chosen, until) ->
     window.history.stack.setIndex(0)
     window.connect_to("sim:")
     until(lambda: window.badge.state == "SIM")
+
+
+def test_all_of_vtk_that_was_loaded_meanwhile_is_in_the_bundle(others_vtk: set[str]) -> None:
+    contents = Path(__file__).parents[2] / "packaging" / "bundle" / "contents.py"
+    bundled = {f"vtk{part}" for part in runpy.run_path(str(contents))["VTK"]}
+
+    assert "vtkRenderingCore" in bundled
+    assert _vtk() - others_vtk <= bundled

@@ -118,7 +118,7 @@ def test_without_ffmpeg_the_line_that_installs_it_is_told(window, named, monkeyp
     named(tmp_path / "out.mp4")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     window.actions_by_name["film"].trigger()
-    assert 'pip install "kappaskin[film]"' in window.statusBar().currentMessage()
+    assert "pip install 'kappaskin[film]'" in window.statusBar().currentMessage()
     assert not list(tmp_path.iterdir())
 
 

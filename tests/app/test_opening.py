@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -87,3 +88,26 @@ def test_what_cannot_be_opened_says_why_and_is_not_listed(
         assert why in window.statusBar().currentMessage()
     window.actions_by_name["disconnect"].trigger()
     assert window.opening.recent == []
+
+
+def test_a_calibration_given_at_the_start_waits_for_the_sensor_it_is_of(
+    opened: Callable[..., MainWindow], tmp_path: Path, until
+) -> None:
+    calibration = tmp_path / "skin.toml"
+    calibration.write_text('format = 1\nsha256 = "0"\n')
+    window = opened("sim:")
+    assert window.session.status.sensor is None
+    window.opening.begin_with(calibration)
+    assert "skin.toml" not in window.statusBar().currentMessage()
+    until(lambda: "skin.toml" in window.statusBar().currentMessage())
+    assert "no sensor" not in window.statusBar().currentMessage()
+
+
+def test_a_scene_given_at_the_start_is_played_at_once(
+    opened: Callable[..., MainWindow], tmp_path: Path
+) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(scene_file("demo").read_text())
+    window = opened("sim:")
+    window.opening.begin_with(own)
+    assert window.history.settings.written.file == own

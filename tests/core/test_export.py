@@ -16,7 +16,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-import pyvista as pv
 import trimesh
 from mcap.writer import Writer
 from scipy.spatial import KDTree
@@ -358,6 +357,7 @@ def test_the_curvature_of_a_flat_skin_is_that_of_equations_3_to_5() -> None:
 
 @pytest.mark.parametrize("name", ["tapping", "fingertip"])
 def test_a_vtp_opens_in_pyvista_with_all_that_is_known_of_it(name: str, tmp_path) -> None:
+    pv = pytest.importorskip("pyvista")
     setup = replace(SMALL, nx=33, ny=21)
     told = recorded(tmp_path / "rec.mcap", load_scene(name), (setup,), 0.2)
     export(tmp_path / "rec.mcap", tmp_path / "skin.vtp", at=0.1)
@@ -376,6 +376,7 @@ def test_a_vtp_opens_in_pyvista_with_all_that_is_known_of_it(name: str, tmp_path
 
 
 def test_an_stl_is_the_same_surface_as_the_vtp(taps, tmp_path) -> None:
+    pv = pytest.importorskip("pyvista")
     export(taps[0], tmp_path / "skin.vtp", at=0.2)
     export(taps[0], tmp_path / "skin.stl", at=0.2)
     one, other = pv.read(tmp_path / "skin.vtp"), trimesh.load(tmp_path / "skin.stl")
@@ -393,6 +394,7 @@ def test_an_stl_is_the_same_surface_as_the_vtp(taps, tmp_path) -> None:
 
 
 def test_a_series_is_one_surface_each_so_many_seconds(taps, tmp_path) -> None:
+    pv = pytest.importorskip("pyvista")
     export(taps[0], tmp_path / "skin.pvd", every=0.1)
     reader = pv.get_reader(tmp_path / "skin.pvd")
     times = reader.time_values
@@ -558,7 +560,7 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
 
 def test_without_h5py_the_line_that_installs_it_is_told(taps, tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(Refusal, match=r'pip install "kappaskin\[hdf5\]"'):
+    with pytest.raises(Refusal, match=r"pip install 'kappaskin\[hdf5\]'"):
         export(taps[0], tmp_path / "out.h5")
 
 

@@ -23,7 +23,6 @@ from kappaskin import (
 from kappaskin.cli import main
 from kappaskin.figures import fig2, fig9, style
 from kappaskin.studies.initial_curvature import initial_curvature
-from kappaskin_app import theme
 
 pytestmark = pytest.mark.slow
 
@@ -170,6 +169,9 @@ def test_no_text_is_small_leaves_the_sheet_or_touches_another(drawn, name) -> No
 
 
 def test_the_colours_are_the_apps() -> None:
+    pytest.importorskip("PySide6")
+    from kappaskin_app import theme
+
     for mine, theirs in ((style.DIVERGING, theme.DIVERGING), (style.SEQUENTIAL, theme.SEQUENTIAL)):
         colours = style.colour_map(mine)(np.arange(256), bytes=True)[:, :3].astype(int)
 

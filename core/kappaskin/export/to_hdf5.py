@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from kappaskin.errors import Refusal
+from kappaskin.errors import lacking
 from kappaskin.export.tables import Block, Table
 
 
@@ -45,10 +45,7 @@ class Hdf5Table(Table):
         try:
             h5py: Any = importlib.import_module("h5py")
         except ImportError as error:
-            raise Refusal(
-                'expected h5py for a .h5 file; `pip install "kappaskin[hdf5]"` installs it, and an '
-                ".npz needs nothing more"
-            ) from error
+            raise lacking("hdf5", "a .h5 file, unlike an .npz,", error) from error
         self._disk = _File(self.path)
         # Attributes of older versions end at 64 KiB.
         self._file: Any = h5py.File(self._disk, "w", libver=("v108", "v108"))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kappaskin.errors import Refusal
+from kappaskin.errors import lacking
 from kappaskin.frames import Array
 
 Figure = Any
@@ -69,10 +69,7 @@ def loaded() -> Any:
     try:
         import matplotlib.figure  # pyright: ignore[reportUnusedImport]
     except ImportError as error:
-        raise Refusal(
-            f"expected Matplotlib to draw figures with, got: {error}; "
-            "pip install 'kappaskin[plots]'"
-        ) from error
+        raise lacking("plots", "a figure", error) from error
     return matplotlib
 
 

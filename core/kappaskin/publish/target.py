@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
 
-from kappaskin.errors import Refusal
+from kappaskin.errors import Refusal, lacking
 from kappaskin.publish.publisher import Publisher
 
 MOST_TARGETS = 8
@@ -78,8 +78,5 @@ def opened(target: Target) -> Publisher:
     try:  # by name: a transport is imported when somebody asks for it
         module = importlib.import_module(f"kappaskin.publish.{target.scheme}")
     except ImportError as error:
-        raise Refusal(
-            f"{target} needs {error.name}; install it with: pip install "
-            f"'kappaskin[{target.scheme}]'"
-        ) from error
+        raise lacking(target.scheme, str(target), error) from error
     return cast("Publisher", module.opened(target))

@@ -83,7 +83,7 @@ def read_scene(text: str, file: FilePath) -> Scene:
 
 def scene_of(top: Table, file: FilePath) -> Scene:
     """The scene that a file says at its `top`, besides what somebody else has asked for there."""
-    name, folder = file.stem, file.parent
+    name, folder = file.stem.removesuffix(".scene"), file.parent
     if (version := top.get("format", int)) != FORMAT:
         raise top.refusal(
             f"expected a scene of format {FORMAT}, got {version}; get a newer kappaskin"

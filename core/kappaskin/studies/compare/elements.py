@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
-from kappaskin.errors import Refusal
+from kappaskin.errors import lacking
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import GaussianLoad, Plate
 from kappaskin.studies.compare.way import Way
@@ -18,9 +18,7 @@ def library() -> Any:
     try:
         return importlib.import_module("skfem")
     except ImportError as error:
-        raise Refusal(
-            'expected scikit-fem to compare with; `pip install "kappaskin[compare]"` installs it'
-        ) from error
+        raise lacking("compare", "a comparison", error) from error
 
 
 def axes(sides: tuple[float, float], cells: int) -> list[Array]:

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
-from kappaskin.errors import Refusal
+from kappaskin.errors import Refusal, lacking
 from kappaskin.processes import Context, beginning_processes
 from kappaskin.studies.beside import end_with_parent
 from kappaskin.studies.design.task import Measured, Task, run, version
@@ -97,9 +97,7 @@ def cluster(address: str) -> Generator[Workers]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
-        raise Refusal(
-            f"expected Dask to reach a scheduler with, got: {error}; pip install 'kappaskin[dask]'"
-        ) from error
+        raise lacking("dask", "a scheduler", error) from error
     try:
         _knock(address)
         client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)

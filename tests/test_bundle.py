@@ -1,0 +1,123 @@
+"""What the bundle's recipe says is there, and is what a desktop understands."""
+
+import configparser
+import importlib.util
+import os
+import re
+import runpy
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from kappaskin_resources import __file__ as resources
+
+ROOT = Path(__file__).parents[1]
+RECIPE = ROOT / "packaging" / "bundle"
+CONTENTS = runpy.run_path(str(RECIPE / "contents.py"))
+BUILD = runpy.run_path(str(RECIPE / "build.py"))
+MIME = "{http://www.freedesktop.org/standards/shared-mime-info}"
+NEEDS_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="binaries as Linux has them")
+
+
+def entry():
+    read = configparser.ConfigParser(interpolation=None)
+    read.optionxform = str
+    read.read(RECIPE / "kappaskin.desktop", "utf-8")
+    return read["Desktop Entry"]
+
+
+def kinds():
+    return ElementTree.parse(RECIPE / "kappaskin.xml").getroot().findall(f"{MIME}mime-type")
+
+
+@pytest.mark.parametrize("name", CONTENTS["HIDDEN"])
+def test_what_is_imported_by_name_is_there(name):
+    pytest.importorskip(name.partition(".")[0])
+
+    assert importlib.util.find_spec(name)
+
+
+def test_nothing_goes_in_that_is_left_out():
+    hidden = {*CONTENTS["HIDDEN"], *CONTENTS["PACKAGES"]}
+
+    assert not hidden & set(CONTENTS["EXCLUDED"])
+
+
+def test_the_desktop_entry_opens_the_kinds_of_files_that_are_told_of():
+    said = entry()
+
+    assert said["Exec"] == "kappaskin app %f"
+    assert set(said["MimeType"].strip(";").split(";")) == {kind.get("type") for kind in kinds()}
+    assert (ROOT / "resources/kappaskin_resources/icons" / f"{said['Icon']}.svg").is_file()
+
+
+@pytest.mark.skipif(shutil.which("desktop-file-validate") is None, reason="not installed")
+def test_the_desktop_entry_is_valid():
+    subprocess.run(["desktop-file-validate", str(RECIPE / "kappaskin.desktop")], check=True)
+
+
+def test_files_are_told_by_the_endings_that_the_app_gives_them():
+    from kappaskin_app.simulation import OWN
+
+    patterns = [glob.get("pattern") for kind in kinds() for glob in kind.findall(f"{MIME}glob")]
+
+    names = ("press.mcap", "press.mcap.part", OWN.name, "calibration-SIM-0001-20261122.toml")
+    for name in names:
+        assert sum(Path(name).match(pattern) for pattern in patterns) == 1, name
+    assert not any(Path("pyproject.toml").match(pattern) for pattern in patterns)
+
+
+@pytest.mark.skipif(shutil.which("update-mime-database") is None, reason="not installed")
+def test_it_installs_for_one_user_from_a_folder_of_any_name(tmp_path):
+    bundle, home = tmp_path / "my bundle", tmp_path / "home"
+    pytest.importorskip("PySide6")
+    drawn = tmp_path / "kappaskin.png"
+    BUILD["draw"](BUILD["ICON"], drawn)
+    BUILD["add_desktop"](bundle, drawn)
+
+    surroundings = {"HOME": str(home), "PATH": os.environ["PATH"]}
+    subprocess.run([bundle / "install.sh"], env=surroundings, check=True, capture_output=True)
+
+    share = home / ".local" / "share"
+    desktop = (share / "applications" / "kappaskin.desktop").read_text()
+    assert f'Exec="{bundle}/kappaskin" app %f' in desktop
+    assert "*.scene.toml" in (share / "mime" / "globs").read_text()
+    assert (share / "icons/hicolor/256x256/apps/kappaskin.png").read_bytes() == drawn.read_bytes()
+
+
+@NEEDS_LINUX
+def test_a_stripped_file_that_no_longer_loads_is_told():
+    elf = bytearray(Path(importlib.util.find_spec("_ctypes").origin).read_bytes())
+    assert BUILD["loads"](bytes(elf))
+    at = int.from_bytes(elf[32:40], "little")
+    size, count = (int.from_bytes(elf[i : i + 2], "little") for i in (54, 56))
+    first = next(at + i * size for i in range(count) if elf[at + i * size] == 1)
+
+    elf[first + 8] ^= 1  # where the segment lies in the file
+
+    assert not BUILD["loads"](bytes(elf))
+
+
+def test_the_icon_is_drawn_from_what_the_window_shows(tmp_path):
+    qtgui = pytest.importorskip("PySide6.QtGui")
+    assert Path(resources).parent / "icons" / "kappaskin.svg" == BUILD["ICON"]
+
+    BUILD["draw"](BUILD["ICON"], tmp_path / "icon.png")
+
+    icon = qtgui.QImage(str(tmp_path / "icon.png"))
+    assert icon.size().toTuple() == (256, 256)
+    assert icon.pixelColor(0, 0).alpha() == 0  # its corners are round
+    assert icon.pixelColor(128, 80).name() == "#ffb347"  # the ball
+
+
+def test_what_is_left_out_is_imported_by_no_line_of_ours():
+    left_out = "|".join(re.escape(name) for name in CONTENTS["EXCLUDED"])
+    code = re.compile(rf"^(?:import|from) (?:{left_out})\b", re.MULTILINE)
+
+    for root in ("core", "app"):
+        for file in (ROOT / root).rglob("*.py"):
+            assert not code.search(file.read_text("utf-8")), file
