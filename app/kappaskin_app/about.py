@@ -86,5 +86,6 @@ DOCKS: Mapping[str, str] = {
     "design": "A sensor before it is built: how sure it would be, where its elements tell most",
     "element": "All about the element clicked: its last seconds, spectrum, calibration and health",
     "traces": "The last seconds of the elements chosen, in one plot each for xx, yy and xy",
+    "guide": "How to begin, connect, calibrate and record, what every number means, what to mend",
     "log": "What was logged or said in passing since the window opened, newest first",
 }
