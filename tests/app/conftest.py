@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPoint
-from PySide6.QtGui import QImage
+from PySide6.QtGui import QImage, QSurface
 from PySide6.QtWidgets import QApplication, QWidget
+from shiboken6 import getAllValidWrappers
 
 from kappaskin import Engine
 from kappaskin_app import guard
@@ -34,6 +35,8 @@ def no_window_and_no_failure_left(
     # Outside of an event loop nothing else does, and each palette would be told to all there were.
     qapp.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     assert not left
+    # No QObject, it would outlive what Qt has deleted, and be taken for what comes to lie there.
+    assert not [each for each in getAllValidWrappers() if type(each) is QSurface]
     assert not failures or request.node.get_closest_marker("fails_inside")
 
 

@@ -319,4 +319,7 @@ class MembraneView(QWidget):
     def close_plotter(self) -> None:
         """Before the window goes: give VTK's resources back."""
         self._fitting.stop()
+        # Its wrapper of a QSurface, which is no QObject, outlives what Qt deletes with the window;
+        # whatever comes to lie there next is then taken for it: a wrong type, or a crash.
+        self.plotter._cleanup_context()  # noqa: SLF001
         self.plotter.close()
