@@ -274,5 +274,5 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 def test_every_page_is_in_the_contents_and_in_one_order() -> None:
     contents = (GUIDE / "README.md").read_text("utf-8")
-    listed = re.findall(r"^\d+\. \[[^\]]+\]\((\w+\.md)\)", contents, re.MULTILINE)
+    listed = re.findall(r"^\d+\. \[[^\]]+\]\(([\w-]+\.md)\)", contents, re.MULTILINE)
     assert sorted(listed) == sorted(page.name for page in PAGES[1:] if page.name != "README.md")

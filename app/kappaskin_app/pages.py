@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 FOLDER = Path(str(files("kappaskin_resources"))) / "guide"
-_LISTED = re.compile(r"^\d+\. \[([^\]]+)\]\((\w+\.md)\)", re.MULTILINE)
+_LISTED = re.compile(r"^\d+\. \[([^\]]+)\]\(([\w-]+\.md)\)", re.MULTILINE)
 _HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 
 
