@@ -1,4 +1,4 @@
-"""What each panel and each dock is for, with the equation where there is one."""
+"""What each panel and each dock is for, with the equation where there is one, and where more is."""
 
 from collections.abc import Mapping
 
@@ -72,6 +72,18 @@ PANELS: Mapping[str, str] = {
     ),
     "B": "Other settings for the same readings, to hold against those in use (A).",
 }
+
+PAGES: Mapping[str, str] = {
+    **dict.fromkeys(("Connection", "Tare"), "connect"),
+    **dict.fromkeys(("Recording", "Publish"), "record"),
+    **dict.fromkeys(("Load", "Noise", "Shape", "Elements", "Below and around"), "scenes"),
+    **dict.fromkeys(("Electronics", "Gages"), "scenes"),
+    **dict.fromkeys(("Basis", "Region of interest", "B"), "accuracy"),
+    **dict.fromkeys(("In use", "Cylinders of known radius"), "calibrate"),
+    "View": "numbers",
+    "To be built": "build",
+}
+"""The page of the guide that tells more than a panel does."""
 
 DOCKS: Mapping[str, str] = {
     "settings": "What a person chooses: connection, load, basis, view, skin, sensor, calibration",

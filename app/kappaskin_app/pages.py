@@ -20,6 +20,11 @@ class Page:
     headings: tuple[str, ...]
 
 
+def page_called(name: str) -> Page:
+    """The page in the file of this name, without its suffix."""
+    return next(page for page in pages() if page.file.stem == name)
+
+
 @cache
 def pages() -> tuple[Page, ...]:
     """The contents, and each page that they list."""

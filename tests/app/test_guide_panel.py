@@ -7,7 +7,7 @@ from PySide6.QtCore import QUrl
 from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.pages import FOLDER, Page, pages
+from kappaskin_app.pages import FOLDER, page_called, pages
 from kappaskin_app.panels.guide import GuidePanel
 from kappaskin_app.theme import DARK, LIGHT, palette
 from kappaskin_app.window import MainWindow
@@ -28,10 +28,6 @@ def shown(panel: GuidePanel) -> Iterator[GuidePanel]:
     panel.read(pages()[0])
     yield panel
     panel.hide()
-
-
-def page_called(name: str) -> Page:
-    return next(page for page in pages() if page.file.stem == name)
 
 
 def test_every_page_is_listed_under_its_own_title() -> None:
