@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import QUrl
-from PySide6.QtGui import QColor, QImage
+from PySide6.QtGui import QColor, QFont, QImage
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.pages import FOLDER, page_called, pages
@@ -70,6 +70,19 @@ def test_pages_fit_into_the_window_and_pictures_into_their_lines(shown: GuidePan
     kind = shown.text.document().ResourceType.ImageResource
     assert 0 < shown.text.loadResource(kind, url).width() < 500
     shown.resize(1270, 400)
+
+
+def test_code_is_as_large_as_the_letters_around_it(shown: GuidePanel, qapp: QApplication) -> None:
+    shown.read(page_called("connect"))
+    before, larger = shown.font(), QFont(shown.font())
+    larger.setPointSizeF(1.5 * before.pointSizeF())
+    shown.setFont(larger)
+    qapp.processEvents()
+    for words in ("kappaskin doctor", "Ctrl+0"):
+        code = shown.text.document().find(words)
+        assert code.charFormat().fontPointSize() == larger.pointSizeF()
+    assert shown.contents.width() >= shown.contents.sizeHintForColumn(0)
+    shown.setFont(before)
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])

@@ -1,6 +1,6 @@
 """The guide to read: its pages listed, the text of one, and the way back."""
 
-from PySide6.QtCore import QEvent, QSignalBlocker, Qt, QUrl
+from PySide6.QtCore import QEvent, QSignalBlocker, Qt, QTimer, QUrl
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -34,7 +34,6 @@ class GuidePanel(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._theme = LIGHT
         self.contents, self.text = QListWidget(), _Text()
         self.contents.setAccessibleName("Pages of the guide")
         self.contents.setToolTip("The pages of the guide; Ctrl+K finds every heading in them.")
@@ -77,22 +76,25 @@ class GuidePanel(QWidget):
         row = listed.index(url.toLocalFile()) if url.toLocalFile() in listed else -1
         with QSignalBlocker(self.contents):
             self.contents.setCurrentRow(row)
-        self.text.dress(self._theme)
+        self.text.dress()
         self.text.scroll_to(url.fragment())
+
+    def _fit(self) -> None:
+        self.contents.setFixedWidth(self.contents.sizeHintForColumn(0) + 4 * _CELL)
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            QTimer.singleShot(0, self, guarded(self._fit))  # once the list has its letters
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self.contents.setFixedWidth(self.contents.sizeHintForColumn(0) + 4 * _CELL)
+        self._fit()
         if self.text.source().isEmpty():
             self.read(pages()[0])
 
     def show_theme(self, theme: Theme) -> None:
-        if theme != self._theme:
-            self._theme = theme
-            at = self.text.verticalScrollBar().value()
-            self.text.reload()  # links have the colour of the palette with which they were read
-            self.text.dress(theme)
-            self.text.verticalScrollBar().setValue(at)
+        self.text.show_theme(theme)
 
 
 class _Text(QTextBrowser):
@@ -100,6 +102,7 @@ class _Text(QTextBrowser):
 
     def __init__(self) -> None:
         super().__init__()
+        self._theme = LIGHT
         self.setAccessibleName("The page of the guide")
         self.setOpenExternalLinks(True)
         self.setLineWrapMode(QTextBrowser.LineWrapMode.FixedPixelWidth)
@@ -121,9 +124,17 @@ class _Text(QTextBrowser):
                 top = self.document().documentLayout().blockBoundingRect(block).top()
                 self.verticalScrollBar().setValue(round(top))
 
-    def dress(self, theme: Theme) -> None:
-        """Give code a ground and tables thin lines, in the colours of `theme`."""
-        document = self.document()
+    def show_theme(self, theme: Theme) -> None:
+        if theme != self._theme:
+            self._theme = theme
+            at = self.verticalScrollBar().value()
+            self.reload()  # links have the colour of the palette with which they were read
+            self.dress()
+            self.verticalScrollBar().setValue(at)
+
+    def dress(self) -> None:
+        """Give code a ground and letters as large as others, and tables thin lines."""
+        document, theme = self.document(), self._theme
         document.setDocumentMargin(_MARGIN)
         for frame in document.rootFrame().childFrames():
             if isinstance(frame, QTextTable):
@@ -133,6 +144,7 @@ class _Text(QTextBrowser):
                 _ground(block, theme)
             elif block.blockFormat().headingLevel():
                 _space(block)
+            _enlarge(block, self.font().pointSizeF())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -142,6 +154,7 @@ class _Text(QTextBrowser):
         super().changeEvent(event)
         if event.type() == QEvent.Type.FontChange:
             self._fit()
+            self.dress()
 
     def _fit(self) -> None:
         widest = _WIDEST * self.fontMetrics().horizontalAdvance("M")
@@ -190,6 +203,19 @@ def _ground(block: QTextBlock, theme: Theme) -> None:
     cursor.mergeBlockFormat(ground)
     cursor.select(QTextCursor.SelectionType.LineUnderCursor)
     cursor.mergeCharFormat(letters)
+
+
+def _enlarge(block: QTextBlock, size: float) -> None:
+    """Let words of code be so many points large: they follow no change of the letters."""
+    larger, cursor, at = QTextCharFormat(), QTextCursor(block), block.begin()
+    larger.setFontPointSize(size)
+    while not at.atEnd():
+        words = at.fragment()
+        if _is_code(block) or words.charFormat().fontFixedPitch():
+            cursor.setPosition(words.position())
+            cursor.setPosition(words.position() + words.length(), QTextCursor.MoveMode.KeepAnchor)
+            cursor.mergeCharFormat(larger)
+        at += 1
 
 
 def _space(block: QTextBlock) -> None:
