@@ -1,4 +1,4 @@
-"""What each panel and each dock is for, with the equation where there is one."""
+"""What each panel and each dock is for, with the equation where there is one, and where more is."""
 
 from collections.abc import Mapping
 
@@ -73,6 +73,18 @@ PANELS: Mapping[str, str] = {
     "B": "Other settings for the same readings, to hold against those in use (A).",
 }
 
+PAGES: Mapping[str, str] = {
+    **dict.fromkeys(("Connection", "Tare"), "connect"),
+    **dict.fromkeys(("Recording", "Publish"), "record"),
+    **dict.fromkeys(("Load", "Noise", "Shape", "Elements", "Below and around"), "scenes"),
+    **dict.fromkeys(("Electronics", "Gages"), "scenes"),
+    **dict.fromkeys(("Basis", "Region of interest", "B"), "accuracy"),
+    **dict.fromkeys(("In use", "Cylinders of known radius"), "calibrate"),
+    "View": "numbers",
+    "To be built": "build",
+}
+"""The page of the guide that tells more than a panel does."""
+
 DOCKS: Mapping[str, str] = {
     "settings": "What a person chooses: connection, load, basis, view, skin, sensor, calibration",
     "lesson": "Lessons of a quarter of an hour, from what a gage feels to mending a sensor",
@@ -86,5 +98,6 @@ DOCKS: Mapping[str, str] = {
     "design": "A sensor before it is built: how sure it would be, where its elements tell most",
     "element": "All about the element clicked: its last seconds, spectrum, calibration and health",
     "traces": "The last seconds of the elements chosen, in one plot each for xx, yy and xy",
+    "guide": "How to begin, connect, calibrate and record, what every number means, what to mend",
     "log": "What was logged or said in passing since the window opened, newest first",
 }

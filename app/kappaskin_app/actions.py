@@ -67,6 +67,10 @@ class Actions:
         self._menu(menu).addAction(action)
         self._window.addAction(action)
 
+    def repeat(self, name: str, menu: str) -> None:
+        """Have an action in another menu too."""
+        self._menu(menu).addAction(self[name])
+
     def allow(self, name: str, why_not: str) -> None:
         """Let an action be taken, or say why it cannot be now."""
         action = self[name]

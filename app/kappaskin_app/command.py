@@ -94,7 +94,7 @@ def _open(
         raise lacking("app", "the desktop app", error) from error
 
 
-def replay(file: Path) -> None:
+def replay(file: Path, *, seconds: float | None = None, screenshot: Path | None = None) -> None:
     """Open the desktop app on a recording.
 
     Example: `kappaskin replay press.mcap`
@@ -103,6 +103,10 @@ def replay(file: Path) -> None:
     ----------
     file
         The recording.
+    seconds
+        Close by itself after so long.
+    screenshot
+        Save a picture of the window just before it closes by itself.
     """
     with Recording(file):  # or refused here
-        run(source=f"replay:{file.absolute()}")
+        _open(f"replay:{file.absolute()}", seconds, screenshot)

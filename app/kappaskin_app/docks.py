@@ -11,7 +11,7 @@ from kappaskin_app.actions import Actions
 from kappaskin_app.columns import heighten
 
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
-_HEIGHTS = {"scene": 0.38, "compare": 0.36, "design": 0.4}
+_HEIGHTS = {"scene": 0.38, "compare": 0.36, "design": 0.4, "guide": 0.5}
 _UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that one
 _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 

@@ -47,6 +47,7 @@ class Menus(QObject):
         for name in FIGURES:
             self.actions.add(name, _FIGURES, TITLES.get(name, name), partial(self._draw, name))
         self._add_export()
+        self.actions.repeat("dock-guide", _HELP)
         self.sheet = CheatSheet(self.actions, window.history, window)
         self.actions.add("shortcuts", _HELP, "&Shortcuts", self.sheet.open_all, "F1", _SHEET)
         begin = window.beginning.offer

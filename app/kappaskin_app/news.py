@@ -33,7 +33,7 @@ class News(QObject):
             *(window.panels, window.cost, window.scene, window.timeline, window.transport),
             *(window.mark, window.mishaps, window.compare, window.stability),
             *(window.log, window.health, window.lesson, window.pointing, window.display),
-            *(window.design, window.presenting, window.picking),
+            *(window.design, window.presenting, window.picking, window.guide),
         )
 
     def follow_settings(self, settings: Settings) -> None:

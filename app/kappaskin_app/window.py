@@ -40,10 +40,12 @@ from kappaskin_app.mishaps import Mishaps
 from kappaskin_app.naming import Naming
 from kappaskin_app.news import News
 from kappaskin_app.opening import Opening
+from kappaskin_app.pages import Page
 from kappaskin_app.panels.compare import ComparePanel
 from kappaskin_app.panels.cost import CostPanel
 from kappaskin_app.panels.design import DesignPanel
 from kappaskin_app.panels.form import Form
+from kappaskin_app.panels.guide import GuidePanel
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.panels.lesson import LessonPanel
 from kappaskin_app.panels.log import LogPanel
@@ -102,7 +104,7 @@ class MainWindow(QMainWindow):
         self.health, self.testing = HealthPanel(), MapTesting(self)
         self.numbers = NumbersPanel()
         self.logged = Logged()
-        self.log = LogPanel(self.logged)
+        self.log, self.guide = LogPanel(self.logged), GuidePanel()
         self.compare = ComparePanel()
         self.comparing = Comparing(self.history, self.session, self)
         self.design, self.designing = DesignPanel(), Designing(self.history, self)
@@ -185,6 +187,7 @@ class MainWindow(QMainWindow):
         docks.put_below("design", "Design", self.design, "Ctrl+Alt+N")
         docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
         docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
+        docks.put_below("guide", "Guide", self.guide, "Ctrl+F1")
         return docks
 
     def _pointing(self) -> Pointing:
@@ -216,6 +219,11 @@ class MainWindow(QMainWindow):
         self.connect_to(self.panels.connection.source())
 
     # Small things.
+
+    def read(self, page: Page, heading: str = "") -> None:
+        """Show a page of the guide, from a heading in it on."""
+        self.docks.reveal("guide")
+        self.guide.read(page, heading)
 
     def tell(self, text: str) -> None:
         """Say something in passing."""

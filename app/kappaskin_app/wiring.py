@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt
 
 from kappaskin_app.adopting import Entrusting
 from kappaskin_app.guard import guarded
+from kappaskin_app.pages import page_called
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
@@ -16,7 +17,7 @@ def wire(window: "MainWindow") -> None:
     """Join all rooms of a window; of one signal, in the order in which they hear it."""
     for join in (
         *(_connection, _settings, _views, _calibration, _tare, _measurements, _health),
-        *(_recordings, _design, _lessons, _news, _refusals, _skin, _foot),
+        *(_recordings, _design, _lessons, _guide, _news, _refusals, _skin, _foot),
     ):
         join(window)
 
@@ -144,6 +145,11 @@ def _lessons(window: "MainWindow") -> None:
     window.lesson.attend(window.teaching)
     window.docks["lesson"].closed.connect(guarded(window.teaching.leave))
     window.teaching.pointed.connect(guarded(window.pointing.point))
+
+
+def _guide(window: "MainWindow") -> None:
+    for panel in (*window.panels.all(), window.compare.form, window.design.form):
+        panel.read_wanted.connect(guarded(lambda name: window.read(page_called(name))))
 
 
 def _news(window: "MainWindow") -> None:

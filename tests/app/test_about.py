@@ -1,3 +1,4 @@
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,9 +7,11 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.about import DOCKS as ABOUT_DOCKS
+from kappaskin_app.about import PAGES as ABOUT_PAGES
 from kappaskin_app.about import PANELS as ABOUT_PANELS
 from kappaskin_app.history import History
 from kappaskin_app.layouts.layout import DOCKS
+from kappaskin_app.pages import page_called
 from kappaskin_app.panels.compare import OtherForm
 from kappaskin_app.panels.design import DesignForm
 from kappaskin_app.panels.form import Form
@@ -44,6 +47,17 @@ def test_what_a_panel_is_for_is_shown_in_it_as_long_as_wanted(panels: Panels) ->
         assert panel.about.isVisibleTo(panel)
         panel.help.click()
         assert not panel.about.isVisibleTo(panel)
+
+
+def test_it_leads_on_to_a_page_of_the_guide(panels: Panels) -> None:
+    assert set(ABOUT_PAGES) == set(ABOUT_PANELS)
+    asked: list[str] = []
+    for panel in panels.all():
+        (link,) = re.findall(r'href="(\w+)"', panel.about.text())
+        panel.read_wanted.connect(asked.append)
+        panel.about.linkActivated.emit(link)
+        assert page_called(asked[-1]).headings
+    assert len(asked) == len(panels.all())
 
 
 def test_its_buttons_stand_beside_the_title_and_inside(panels: Panels, until) -> None:

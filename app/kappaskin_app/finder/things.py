@@ -1,4 +1,4 @@
-"""What can be found in a window: actions, settings and their values, scenes, panels, files."""
+"""What can be found in a window: actions, settings, scenes, panels, files, pages of the guide."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QComboBox, QDockWidget, QTabWidget, QWidget
 from kappaskin import scene_file
 from kappaskin_app.actions import plain
 from kappaskin_app.columns import scroll_to
+from kappaskin_app.pages import pages
 from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.settings import Choice, ask_of
@@ -43,6 +44,7 @@ def things_in(window: "MainWindow") -> list[Thing]:
         *_scenes(window),
         *_layouts(window),
         *_files(window),
+        *_guide(window),
     ]
 
 
@@ -157,6 +159,14 @@ def _files(window: "MainWindow") -> Iterator[Thing]:
         why_not = "" if file.is_file() else "not there any more: moved or deleted"
         act = partial(window.opening.open, file)
         yield Thing(f"file:{file}", f"Open {file.name}", f"{file.parent}", act, "", why_not)
+
+
+def _guide(window: "MainWindow") -> Iterator[Thing]:
+    for page in pages():
+        for heading in ("", *page.headings):
+            name = f"guide:{page.file.stem}{'#' if heading else ''}{heading}"
+            place = f"Guide, {page.title}" if heading else "Guide"
+            yield Thing(name, heading or page.title, place, partial(window.read, page, heading))
 
 
 def _layouts(window: "MainWindow") -> Iterator[Thing]:

@@ -8,7 +8,7 @@ AREAS = (LEFT, RIGHT, TOP, BOTTOM, FLOATING)
 BESIDE = ("lesson", "settings", "curvature")
 BELOW = (
     *("cost", "stability", "scene", "health", "compare", "design"),
-    *("element", "traces", "numbers", "log"),
+    *("element", "traces", "numbers", "log", "guide"),
 )
 DOCKS = BESIDE + BELOW
 

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import Status
-from kappaskin_app.about import PANELS
+from kappaskin_app.about import PAGES, PANELS
 from kappaskin_app.columns import scroll_to
 from kappaskin_app.guard import guarded
 from kappaskin_app.settings import Settings
@@ -25,10 +25,12 @@ _GROWN = 20  # ms after which the page of a panel that grew has grown too
 class Panel(QGroupBox):
     """A titled box with a message at its foot; `wished` says which setting is to be what.
 
-    In its corner a button says what it is for, at its head.
+    In its corner a button says what it is for, at its head, and `read_wanted` which page of the
+    guide a person wants to read on.
     """
 
     wished = Signal(str, object)
+    read_wanted = Signal(str)
 
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
@@ -40,12 +42,15 @@ class Panel(QGroupBox):
         self._theme, self._hint = LIGHT, False
         self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
         self._grown.timeout.connect(guarded(self._answer))
-        self.about = QLabel(PANELS.get(title, ""), wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        what = PANELS.get(title, "")
+        self.about = QLabel(_leading_on(title, what), wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.about.setTextInteractionFlags(how.TextBrowserInteraction)
+        self.about.linkActivated.connect(self.read_wanted)
         self.help = QToolButton(text="?", checkable=True)  # pyright: ignore[reportCallIssue]
         self.help.setAccessibleName(f"What {title} is for")
-        self.help.setToolTip(f"What this panel is for: {self.about.text()}")
+        self.help.setToolTip(f"What this panel is for: {what}")
         self.help.toggled.connect(self.about.setVisible)
-        self.help.setVisible(bool(self.about.text()))
+        self.help.setVisible(bool(what))
         self.corner = QWidget(self)
         self._corner = QHBoxLayout(self.corner)
         self._corner.setContentsMargins(0, 0, 0, 0)
@@ -99,6 +104,11 @@ class Panel(QGroupBox):
         if asked is not None and self.isAncestorOf(asked):
             scroll_to(self)
             scroll_to(asked)
+
+
+def _leading_on(title: str, what: str) -> str:
+    """What a panel is for, with a link to the page of the guide that tells more."""
+    return f'{what} <a href="{PAGES[title]}">More in the guide</a>' if title in PAGES else what
 
 
 def _corner_style(theme: Theme) -> str:

@@ -1,0 +1,113 @@
+"""The guide in the window: from link to link and back, in both themes, found by its headings."""
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QColor, QFont, QImage
+from PySide6.QtWidgets import QApplication
+
+from kappaskin_app.pages import FOLDER, page_called, pages
+from kappaskin_app.panels.guide import GuidePanel
+from kappaskin_app.theme import DARK, LIGHT, palette
+from kappaskin_app.window import MainWindow
+
+
+@pytest.fixture(scope="module")
+def panel(qapp: QApplication) -> Iterator[GuidePanel]:
+    made = GuidePanel()
+    made.resize(1270, 400)
+    yield made
+    made.close()
+    made.deleteLater()
+
+
+@pytest.fixture
+def shown(panel: GuidePanel) -> Iterator[GuidePanel]:
+    panel.show()
+    panel.read(pages()[0])
+    yield panel
+    panel.hide()
+
+
+def test_every_page_is_listed_under_its_own_title() -> None:
+    assert pages()[0].file.name == "README.md"
+    assert {page.file for page in pages()} == set(FOLDER.glob("*.md"))
+    for page in pages()[1:]:
+        assert page.file.read_text("utf-8").startswith(f"# {page.title}\n")
+        assert page.headings
+
+
+def test_a_link_leads_on_and_back_leads_back(shown: GuidePanel) -> None:
+    shown.text.setSource(shown.text.source().resolved(QUrl("calibrate.md")))
+    assert shown.contents.currentItem().text() == "Calibrate"
+    assert "What is left" in shown.text.toPlainText()
+    assert shown.back.isEnabled()
+    shown.back.click()
+    assert shown.contents.currentItem().text() == "Contents"
+    assert shown.forward.isEnabled()
+
+
+def test_a_page_that_is_none_of_the_guides_is_marked_as_none(shown: GuidePanel) -> None:
+    shown.text.setSource(QUrl.fromLocalFile(str(FOLDER.parent / "wire" / "wire.md")))
+    assert "wire format" in shown.text.toPlainText()
+    assert shown.contents.currentRow() == -1
+
+
+def test_a_heading_is_brought_to_the_top(shown: GuidePanel, qapp: QApplication) -> None:
+    shown.read(page_called("record"), "Feed a robot")
+    qapp.processEvents()
+    at_top = shown.text.cursorForPosition(shown.text.viewport().rect().topLeft()).block()
+    assert "Feed a robot" in (at_top.text(), at_top.next().text())
+
+
+def test_pages_fit_into_the_window_and_pictures_into_their_lines(shown: GuidePanel) -> None:
+    for page in pages():
+        shown.read(page)
+        assert shown.text.document().size().width() <= shown.text.viewport().width(), page.title
+    url = QUrl.fromLocalFile(str(FOLDER / "pictures" / "app.png"))
+    shown.resize(500, 400)
+    kind = shown.text.document().ResourceType.ImageResource
+    assert 0 < shown.text.loadResource(kind, url).width() < 500
+    shown.resize(1270, 400)
+
+
+def test_code_is_as_large_as_the_letters_around_it(shown: GuidePanel, qapp: QApplication) -> None:
+    shown.read(page_called("connect"))
+    before, larger = shown.font(), QFont(shown.font())
+    larger.setPointSizeF(1.5 * before.pointSizeF())
+    shown.setFont(larger)
+    qapp.processEvents()
+    for words in ("kappaskin doctor", "Ctrl+0"):
+        code = shown.text.document().find(words)
+        assert code.charFormat().fontPointSize() == larger.pointSizeF()
+    assert shown.contents.width() >= shown.contents.sizeHintForColumn(0)
+    shown.setFont(before)
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_a_page_has_the_colours_of_the_theme(shown: GuidePanel, qapp: QApplication, theme) -> None:
+    before = qapp.palette()
+    try:
+        qapp.setPalette(palette(theme))
+        shown.show_theme(theme)
+        shown.read(page_called("connect"))
+        qapp.processEvents()
+        picture = shown.text.viewport().grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+        rows = range(0, picture.height(), 2)
+        colours = {picture.pixelColor(x, y).name() for x in range(0, 600, 2) for y in rows}
+        assert {theme.base, theme.window, QColor(theme.text).name()} <= colours
+    finally:
+        qapp.setPalette(before)
+
+
+def test_a_heading_is_found_and_read_in_the_window(window: MainWindow, until) -> None:
+    finder = window.menus.finder
+    finder.open_empty()
+    finder.line.setText("feed a robot")
+    assert finder.found()[0].name == "guide:record#Feed a robot"
+    finder.line.returnPressed.emit()
+    until(lambda: window.guide.isVisible())
+    assert window.guide.contents.currentItem().text() == "Record and publish"
+    (help_menu,) = [a.menu() for a in window.menuBar().actions() if a.text() == "&Help"]
+    assert window.actions_by_name["dock-guide"] in help_menu.actions()

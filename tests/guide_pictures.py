@@ -1,0 +1,61 @@
+"""The guide's pictures, from the commands that their captions name.
+
+Run `python tests/guide_pictures.py` when a figure looks otherwise than it did. A picture of points
+is made smaller, of a few colours; one of lines stays as the command wrote it.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+from kappaskin.cli import main
+
+GUIDE = Path(__file__).parents[1] / "resources" / "kappaskin_resources" / "guide"
+_WINDOW, _FIGURE = 1280, 780  # px wide, of a window and of a figure that is printed finer
+_SHOWN = re.compile(r"!\[[^\]]+\]\(([^)]+)\)\n\n\*[^*`]*`(kappaskin [^`]+)`\*")
+
+
+def shown_on(page: Path) -> list[tuple[Path, str]]:
+    """The pictures on a page, each with the command that its caption names."""
+    found = _SHOWN.findall(page.read_text("utf-8"))
+    return [((page.parent / name).resolve(), command) for name, command in found]
+
+
+def drawn(command: str, name: str) -> Path:
+    """The file of this name that a command writes, somewhere in the folder it is run in."""
+    if main(shlex.split(command)[1:]) != 0:
+        raise SystemExit(f"{command}: failed")
+    (made,) = Path().rglob(name)
+    return made
+
+
+def small(picture: Path) -> Image.Image:
+    """A picture as wide as it is shown."""
+    with Image.open(picture) as image:
+        if image.width <= _WINDOW:
+            return image.convert("RGB")
+        high = round(image.height * _FIGURE / image.width)
+        return image.convert("RGB").resize((_FIGURE, high), Image.Resampling.LANCZOS)
+
+
+def keep(made: Path, picture: Path) -> None:
+    if picture.suffix == ".svg":
+        shutil.copy(made, picture)
+    else:
+        how = {"method": Image.Quantize.MAXCOVERAGE, "kmeans": 4, "dither": Image.Dither.NONE}
+        small(made).quantize(**how).save(picture, optimize=True)
+
+
+if __name__ == "__main__":
+    os.chdir(tempfile.mkdtemp())
+    for page in sorted(GUIDE.glob("*.md")):
+        for picture, command in shown_on(page):
+            if command.split()[1] in ("figures", "app"):
+                keep(drawn(command, picture.name), picture)
+                print(picture, f"{picture.stat().st_size / 1e3:.0f} kB", file=sys.stderr)

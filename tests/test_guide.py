@@ -1,0 +1,279 @@
+"""README and guide tell the truth: what a page shows is run in order, in a folder of its own.
+
+Fences say what a block is: `sh` are commands, `python` a script that goes on with the names of the
+one before, `toml` a file named in its first line, `text` what the block before it printed, `output`
+the same but for its numbers; ... stands for anything. The sensor at /dev/ttyACM0 is played by
+`kappaskin device`.
+"""
+
+import doctest
+import importlib.util
+import io
+import json
+import re
+import runpy
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from kappaskin.cli import _add_commands, app, main
+
+ROOT = Path(__file__).parents[1]
+GUIDE = Path(str(files("kappaskin_resources"))) / "guide"
+PAGES = [ROOT / "README.md", *sorted(GUIDE.glob("*.md"))]
+NAMES = [page.name if page.parent == GUIDE else "front" for page in PAGES]
+
+PICTURES = runpy.run_path(str(ROOT / "tests" / "guide_pictures.py"))
+SENSOR, PORT = "/dev/ttyACM0", "9870"
+WINDOWS = ("app", "demo", "replay")
+_OPENED: set[str] = set()  # what a page of before had opened too
+SHOWN = importlib.util.find_spec("PySide6") is not None
+ENOUGH = 90.0  # s for one command on a busy machine
+_SHADES = 6.0  # of 255, by which points may differ in the mean
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block: what kind, what it says, and the line of the page where it begins."""
+
+    kind: str
+    text: str
+    line: int
+
+
+def blocks_of(page: Path) -> list[Block]:
+    text = page.read_text("utf-8")
+    fences = re.finditer(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return [Block(m[1], m[2], text.count("\n", 0, m.start()) + 2) for m in fences]
+
+
+def commands_of(block: Block) -> list[str]:
+    return [line for line in block.text.replace("\\\n", "").splitlines() if line.strip()]
+
+
+@dataclass
+class Shell:
+    """Runs what a page shows, and gives back what it printed."""
+
+    stack: ExitStack
+    said_as: dict[str, str] = field(default_factory=dict)
+    names: dict[str, object] = field(default_factory=lambda: {"__name__": "__main__"})
+
+    def run(self, block: Block) -> str:
+        if block.kind == "python":
+            code = compile(self._here(block.text), "page", "exec")
+            return _printed(lambda: exec(code, self.names))
+        return "".join(self.command(line) for line in commands_of(block))
+
+    def command(self, line: str) -> str:
+        asked = 1 if "# exit code 1" in line else 2 if "# refused" in line else 0
+        words = [self._here(word) for word in shlex.split(line, comments=True)]
+        match words:
+            case ["pip", "install", what]:
+                assert re.fullmatch(r"kappaskin\[(\w+)\]", what)[1] in _extras()
+                return ""
+            case ["python3", "packaging/start.py", *task]:
+                assert f"def {(task or ['app'])[0]}(" in _start()
+                return ""
+            case ["kappaskin", *_, "&"]:
+                return self._beside(words[1:-1])
+            case ["kappaskin", name, *rest] if name in WINDOWS:
+                if SHOWN and line not in _OPENED:
+                    _OPENED.add(line)
+                    _open(name, *rest)
+                return ""
+            case ["kappaskin", *rest]:
+                codes: list[int] = []
+                printed = _printed(lambda: codes.append(main(rest)))
+                assert codes == [asked], f"{line}: exit code {codes}\n{printed}"
+                return self._said(printed)
+        raise AssertionError(f"{line}: expected kappaskin, pip or packaging/start.py")
+
+    def _here(self, word: str) -> str:
+        """A word of a command with the ports of this machine for those that a page names."""
+        if SENSOR in word and SENSOR not in self.said_as.values():
+            self._beside(["device", "circle"])
+        if PORT in word and PORT not in self.said_as.values():
+            self.said_as[str(_free_port())] = PORT
+        for here, there in self.said_as.items():
+            word = word.replace(there, here)
+        return word
+
+    def _said(self, printed: str) -> str:
+        for here, there in self.said_as.items():
+            printed = printed.replace(here, there)
+        return printed
+
+    def _beside(self, words: list[str]) -> str:
+        """What a command that goes on beside the next ones prints first."""
+        printed = self.stack.enter_context(_process(*words)).stdout.readline()
+        if words[0] == "device":
+            self.said_as[json.loads(printed)["port"]] = SENSOR
+        return self._said(printed)
+
+
+def _printed(act) -> str:
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    printed = io.StringIO()
+    try:
+        with redirect_stdout(printed), redirect_stderr(printed):
+            act()
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    return printed.getvalue()
+
+
+@contextmanager
+def _process(*words: str) -> Iterator[subprocess.Popen[str]]:
+    """A command that runs until it is told to stop, and then ends well."""
+    call = [sys.executable, "-m", "kappaskin", *words]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(call, text=True, **pipes) as process:
+        try:
+            yield process
+            process.send_signal(signal.SIGINT)
+            _, complaint = process.communicate(timeout=ENOUGH)
+            assert process.returncode == 0, complaint
+        finally:
+            process.kill()
+
+
+def _free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
+        found.bind(("127.0.0.1", 0))
+        return found.getsockname()[1]
+
+
+def _open(*words: str) -> None:
+    """Open a window as a page says, for a second."""
+    call = [sys.executable, "-m", "kappaskin", *words, "--seconds", "1"]
+    done = subprocess.run(call, capture_output=True, text=True, check=False, timeout=ENOUGH)
+    assert (done.returncode, done.stderr) == (0, ""), words
+
+
+@cache
+def _extras() -> set[str]:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    return set(project["optional-dependencies"])
+
+
+@cache
+def _start() -> str:
+    return (ROOT / "packaging" / "start.py").read_text("utf-8")
+
+
+def _alike(said: str, printed: str) -> bool:
+    how = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    return doctest.OutputChecker().check_output(said, printed, how)
+
+
+def _without_numbers(text: str) -> str:
+    """A text with one sign for each number, as it is written: 1,024, -3e-05."""
+    return re.sub(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
+
+
+def _keep(block: Block) -> None:
+    """Write the file that a block is."""
+    name = re.match(r"# (\S+\.toml)\n", block.text)
+    assert name, f"line {block.line}: expected the file's name in a comment at its head"
+    Path(name[1]).write_text(block.text, "utf-8")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_what_a_page_shows_runs_and_prints_what_it_says(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for kind in ("DATA", "CONFIG"):
+        monkeypatch.setenv(f"XDG_{kind}_HOME", str(tmp_path / kind))
+    printed = ""
+    with ExitStack() as stack:
+        shell = Shell(stack)
+        for block in blocks_of(page):
+            where = f"{page.name}, line {block.line}"
+            match block.kind:
+                case "sh" | "python":
+                    printed = shell.run(block)
+                case "toml":
+                    _keep(block)
+                case "text":
+                    assert _alike(block.text, printed), f"{where}: got\n{printed}"
+                case "output":
+                    alike = _alike(_without_numbers(block.text), _without_numbers(printed))
+                    assert alike, f"{where}: got\n{printed}"
+                case other:
+                    pytest.fail(f"{where}: no block is {other!r}")
+        for picture, command in PICTURES["shown_on"](page):
+            if shlex.split(command)[1] == "figures":
+                shell.command(command)
+            if made := list(tmp_path.rglob(picture.name)):
+                assert _look_alike(made[0], picture), picture
+
+
+def _words_in(drawing: Path) -> list[str]:
+    return re.findall(r"<text[^>]*>([^<]*)<", drawing.read_text("utf-8"))
+
+
+def _look_alike(made: Path, kept: Path) -> bool:
+    """Whether a picture shows what the command draws: its words, or its points but for shades."""
+    if kept.suffix == ".svg":
+        return _words_in(made) == _words_in(kept)
+    with Image.open(kept) as image:
+        off = np.subtract(PICTURES["small"](made), image.convert("RGB"), dtype=float)
+    return float(np.abs(off).mean()) < _SHADES
+
+
+@pytest.mark.parametrize("page", PAGES[1:], ids=NAMES[1:])
+def test_every_picture_is_small_and_its_caption_names_the_command(page: Path) -> None:
+    pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", page.read_text("utf-8"))
+    shown = PICTURES["shown_on"](page)
+    assert [picture for picture, _ in shown] == [(page.parent / one).resolve() for one in pictures]
+    for picture, command in shown:
+        assert picture.stem in command or command.startswith("kappaskin report"), command
+        assert picture.stat().st_size < 60_000, picture
+
+
+def test_no_command_hides_from_being_run() -> None:
+    for page in PAGES:
+        hidden = r"^(?: {4}|\t)(?:kappaskin|pip|python3) .*"
+        assert re.findall(hidden, page.read_text("utf-8"), re.MULTILINE) == [], page.name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_commands_named_in_the_text_are_understood(page: Path) -> None:
+    _add_commands()
+    text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    for said in re.findall(r"`kappaskin ([^`]+)`", text):
+        name, *rest = shlex.split(said.replace("\n", " "))
+        assert name in app, said
+        if rest:
+            app.parse_args([name, *rest], exit_on_error=False, print_error=False)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_links_lead_somewhere(page: Path) -> None:
+    text = page.read_text("utf-8")
+    for where in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text):
+        assert (page.parent / where).exists(), where
+    for target in re.findall(r"\]\((?:http[^)]*)\)", text):
+        assert target.startswith("](https://"), target
+
+
+def test_every_page_is_in_the_contents_and_in_one_order() -> None:
+    contents = (GUIDE / "README.md").read_text("utf-8")
+    listed = re.findall(r"^\d+\. \[[^\]]+\]\(([\w-]+\.md)\)", contents, re.MULTILINE)
+    assert sorted(listed) == sorted(page.name for page in PAGES[1:] if page.name != "README.md")
