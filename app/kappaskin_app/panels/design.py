@@ -129,9 +129,7 @@ class DesignPanel(QWidget):
         around, right = QHBoxLayout(self), QVBoxLayout()
         around.setContentsMargins(8, 4, 8, 6)
         around.setSpacing(10)
-        form = scrolled(self.form)
-        form.setMaximumWidth(form.minimumWidth())
-        around.addWidget(form)
+        around.addWidget(scrolled(self.form))
         self.predicted.bar.hide()  # it is that of the other beside it
         around.addWidget(self.predicted, 2)
         around.addWidget(self.simulated, 3)

@@ -62,18 +62,19 @@ FIELDS = {
     "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
 }
 
-_DIGITS = 1.6  # that a unit of width takes at least
+_DIGITS = 1.14  # as wide as a character on average, the space between two fields with it
 _SMALL = 0.85  # of a number's letters are those of its name
 _WIDTHS = {
-    "contact": 14,
-    "rate": 10,
-    "lost": 12,
-    "force": 10,
-    "depth": 10,
-    "age": 8,
-    "error": 7,
-    "rms": 7,
+    "contact": 22,
+    "rate": 15,
+    "lost": 18,
+    "force": 14,
+    "depth": 15,
+    "age": 10,
+    "error": 11,
+    "rms": 8,
 }
+"""Characters of each, as many as it mostly has."""
 
 
 def _with_error(value: float, sd: float, digits: int, unit: str) -> str:
