@@ -143,6 +143,7 @@ def _lessons(window: "MainWindow") -> None:
     window.lesson.attend(window.teaching)
     window.docks["lesson"].closed.connect(guarded(window.teaching.leave))
     window.teaching.pointed.connect(guarded(window.pointing.point))
+    window.teaching.taken_up.connect(guarded(partial(window.docks.reveal, "lesson")))
 
 
 def _news(window: "MainWindow") -> None:
@@ -175,8 +176,17 @@ def _skin(window: "MainWindow") -> None:
         heatmap.pointed.connect(guarded(window.display.point))
         heatmap.chosen.connect(guarded(wishes.choose))
         heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
-    window.picking.picked.connect(guarded(lambda _: window.docks.reveal("element")))
+    window.picking.picked.connect(guarded(lambda _: _show_element(window)))
+    measuring = window.display.measuring
+    measuring.stepped.connect(
+        guarded(lambda words, *places: window.history.step(words, measuring.have, *places))
+    )
     window.display.scale.lock_wanted.connect(guarded(window.looking.lock))
+
+
+def _show_element(window: "MainWindow") -> None:
+    window.docks.reveal("element")
+    window.layouts.note()  # a step of its own, before that of the element
 
 
 def _foot(window: "MainWindow") -> None:
