@@ -147,7 +147,8 @@ def _lessons(window: "MainWindow") -> None:
 
 
 def _news(window: "MainWindow") -> None:
-    """What is said in passing."""
+    """What is said in passing, or offered."""
+    window.offer.offered.connect(guarded(window.actions_by_name.retell))
     for room in (
         *(window.happenings, window.taring, window.taping, window.replaying, window.teaching),
         *(window.staging, window.opening, window.layouts, window.exports),

@@ -23,7 +23,7 @@ from kappaskin_app.views.rows import fit_rows
 
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_LOOKED = 30  # rows that decide how wide a column is
+_BESIDE = 14  # px left and right of a column's head together
 _LINES = 6  # that are seen of a table at least
 _EVERY = 0.5  # s between two readings: faster cannot be read
 
@@ -75,9 +75,8 @@ def _table(name: str, title: str, head: Sequence[str]) -> QTableWidget:
     table.setWordWrap(False)
     table.verticalHeader().hide()
     header = table.horizontalHeader()
-    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    header.setResizeContentsPrecision(_LOOKED)
-    header.setStretchLastSection(True)
+    header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+    header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
     return table
 
 
@@ -85,6 +84,9 @@ def _fill(table: QTableWidget, rows: Rows) -> None:
     """Write rows into a table, but for what stands there."""
     table.setRowCount(len(rows))
     fit_rows(table)
+    wide = table.fontMetrics().horizontalAdvance
+    heads = (table.horizontalHeaderItem(column).text() for column in range(table.columnCount()))
+    table.horizontalHeader().setMinimumSectionSize(max(map(wide, heads)) + _BESIDE)
     table.setMinimumHeight((_LINES + 1) * table.verticalHeader().defaultSectionSize())
     for row, texts in enumerate(rows):
         for column, text in enumerate(texts):

@@ -152,12 +152,13 @@ class CurvePlot(QWidget):
         middle = area.center().y()
         painter.drawLine(QPointF(area.left(), middle), QPointF(area.right(), middle))
         painter.setPen(QColor(theme.faint))
-        for value, top in ((high, area.top()), (low, area.bottom() - line)):
+        for value, top in ((high, area.top()), (low, area.bottom() - line)) if self.curves else ():
             words = f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
             box = QRectF(0, top, area.left() - 4, line)
             painter.drawText(box, flags.AlignRight | flags.AlignVCenter, words)
         below = QRectF(area.left(), area.bottom() + 2, area.width(), line)
-        for value, side in ((self._span[0], flags.AlignLeft), (self._span[1], flags.AlignRight)):
+        ends = ((self._span[0], flags.AlignLeft), (self._span[1], flags.AlignRight))
+        for value, side in ends if self.curves else ():
             words = f"{value:.3g} {self._x_unit}".replace("-", "\N{MINUS SIGN}")
             painter.drawText(below, side | flags.AlignVCenter, words)
         painter.setPen(QColor(theme.text))

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QCursor, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QToolButton, QWidget
 
@@ -22,7 +22,12 @@ class Offered:
 
 
 class Offer(QWidget):
-    """Shows words, and a button for each thing that is offered; hides once one is taken."""
+    """Shows words, and a button for each thing that is offered; hides once one is taken.
+
+    `offered` says that there are other buttons.
+    """
+
+    offered = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -61,6 +66,7 @@ class Offer(QWidget):
             self._ending.start()
         self.show()
         self._heighten()
+        self.offered.emit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
