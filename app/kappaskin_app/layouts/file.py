@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import platformdirs
+from PySide6.QtCore import QLockFile
 
 from kappaskin import Refusal
-from kappaskin_app.layouts.kept import Kept, from_text, to_text
+from kappaskin_app.layouts.kept import Kept, from_text, merged, to_text
 
 _LARGEST = 1_000_000  # bytes
+_PATIENCE = 500  # ms that another window may take to write
 
 
 def config_file() -> Path:
@@ -64,6 +66,17 @@ class KeptFile:
         except (OSError, UnicodeEncodeError) as error:
             return f"{self.path}: cannot be written ({error}); the window will not be as it is now"
         return ""
+
+    def merge(self, kept: Kept, before: Kept) -> str:
+        """Write what was changed since `before`, and leave the rest as another window wrote it."""
+        if not self.path.exists():
+            return self.write(kept)
+        lock = QLockFile(f"{self.path}.lock")
+        lock.tryLock(_PATIENCE)  # or without: the file is whole at any time
+        theirs, wrong = self.read()
+        wrong = self.write(kept if wrong else merged(kept, before, theirs)) or wrong
+        lock.unlock()
+        return wrong
 
     def _write(self, data: bytes) -> None:
         # Each under a name of its own: another window may be writing the same file.
