@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin import Recording, Refusal
+from kappaskin import Refusal
 
 app = App(name="app", help_format="markdown")
 demo = App(name="demo", help_format="markdown")
@@ -93,5 +93,7 @@ def replay(file: Path) -> None:
     file
         The recording.
     """
+    from kappaskin import Recording
+
     with Recording(file):  # or refused here
         run(source=f"replay:{file.absolute()}")

@@ -15,7 +15,6 @@ _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38, "compare": 0.36, "design": 0.4}
 _UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that one
 _LEAST = 40  # px of a dock that is scrolled, without its title
-_TITLE = 2  # lines of a dock's title, with what is around it
 _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 
 
@@ -118,12 +117,18 @@ class Docks:
             return
         dock.show()
         if dock in self.below and not dock.isFloating():
-            least = (
-                self.widget(name).minimumSizeHint().height() + _TITLE * dock.fontMetrics().height()
-            )
+            least = self._needed(name) + dock.height() - dock.widget().height()
             heighten(self._window, dock, _HEIGHTS.get(name, _HEIGHT), least)
         self._share_columns()
         dock.raise_()
+
+    def _needed(self, name: str) -> int:
+        """The px of height that what a dock shows needs, in lines as wide as the window."""
+        shown = self.widget(name)
+        layout = shown.layout()
+        if layout is not None and layout.hasHeightForWidth():
+            return layout.totalMinimumHeightForWidth(self._window.width())
+        return shown.minimumSizeHint().height()
 
     def _share_columns(self) -> None:
         heights = [round(share * self._window.height()) for share in _UPPER]

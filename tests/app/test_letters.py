@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.views.line import Line
+from kappaskin_app.views.readouts import Health
 from kappaskin_app.views.title import Title
 from kappaskin_app.window import MainWindow
 
@@ -59,6 +60,7 @@ def cut(inside: QWidget) -> list[str]:
 
 
 def test_the_header_is_read_whole(large: MainWindow) -> None:
+    large.readouts.show_health(Health(501.0, 42.0, 0.0123, 0.0004, 1234, 0, 5678))
     lines = [line for line in large.readouts.findChildren(Line) if not line.whole]
     assert [line.text() for line in lines] == []
 

@@ -6,7 +6,6 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import platformdirs
 from PySide6.QtCore import QLockFile
 
 from kappaskin import Refusal
@@ -14,11 +13,6 @@ from kappaskin_app.layouts.kept import Kept, from_text, merged, to_text
 
 _LARGEST = 1_000_000  # bytes
 _PATIENCE = 500  # ms that another window may take to write
-
-
-def config_file() -> Path:
-    """Where this user's window is kept."""
-    return platformdirs.user_config_path("kappaskin", appauthor=False) / "window.toml"
 
 
 @dataclass(frozen=True)
@@ -35,13 +29,6 @@ class KeptFile:
             return from_text(self._text()), ""
         except (OSError, UnicodeDecodeError, Refusal) as error:
             return Kept(), f"{self.path}: {error}; {self._put_aside()}, the window begins anew"
-
-    def theme(self) -> str:
-        """The name of the theme that is kept, none where none can be read."""
-        try:
-            return from_text(self._text()).theme
-        except (OSError, UnicodeDecodeError, Refusal):
-            return ""  # told by who reads all of it
 
     def _text(self) -> str:
         if self.path.stat().st_size > _LARGEST:

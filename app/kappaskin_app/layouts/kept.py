@@ -25,9 +25,9 @@ _Some = TypeVar("_Some")
 class Kept:
     """What a person chose of the window; all but the theme begins as if nothing ever was.
 
-    `place` is (x, y, width, height) in px, `letters` in percent, `keys` are the shortcuts changed, `done` and `files`
-    what was done and opened last, `own` the layouts saved under a name, `now` the last one, and
-    `start` whether ways to begin are offered.
+    `place` is (x, y, width, height) in px, `keys` are the shortcuts changed, `done` and `files`
+    what was done and opened last, `own` the layouts saved under a name, `now` the last one,
+    `start` whether ways to begin are offered, and `letters` how large they are, in percent.
     """
 
     theme: str = ""

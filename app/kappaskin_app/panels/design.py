@@ -122,6 +122,7 @@ class DesignPanel(QWidget):
             "save-design",
             "Write the design into a file that can be played, edited and studied.",
         )
+        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._designing: Designing | None = None
         self._lay_out()
 

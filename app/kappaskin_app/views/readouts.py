@@ -67,7 +67,7 @@ _SMALL = 0.85  # of a number's letters are those of its name
 _WIDTHS = {
     "contact": 22,
     "rate": 15,
-    "lost": 18,
+    "lost": 19,
     "force": 14,
     "depth": 15,
     "age": 10,
@@ -132,8 +132,8 @@ class Readouts(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(8, 2, 8, 2)
-        self._grid.setHorizontalSpacing(8)
+        self._grid.setContentsMargins(6, 2, 6, 2)
+        self._grid.setHorizontalSpacing(6)
         self._grid.setVerticalSpacing(0)
         self._names: list[QLabel] = []
         self._numbers: dict[str, Line] = {}
