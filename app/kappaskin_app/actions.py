@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMainWindow, QMenu
 
 from kappaskin import Refusal
 from kappaskin_app.guard import guarded
-from kappaskin_app.keytips import retell
+from kappaskin_app.keytips import KeyTips
 from kappaskin_app.tips import tip_of
 
 WITHIN = " > "
@@ -35,6 +35,7 @@ class Actions:
         self.entries: dict[str, Entry] = {}
         self._menus: dict[str, QMenu] = {}
         self._why_not: dict[str, str] = {}
+        self._tips = KeyTips(window)
 
     def add(
         self,
@@ -114,12 +115,12 @@ class Actions:
         if why_not := self.why_no_key(name, key):
             raise Refusal(why_not)
         self[name].setShortcut(QKeySequence(key))
-        self._retell()
+        self.retell()
 
-    def _retell(self) -> None:
+    def retell(self) -> None:
         """Let what names shortcuts name those of now."""
         changed = self.changed_keys()
-        retell(self._window, {self.own_key(name): key for name, key in changed.items()})
+        self._tips.retell({self.own_key(name): key for name, key in changed.items()})
 
     def why_no_key(self, name: str, key: str) -> str:
         """Why an action cannot have a shortcut; empty where it can."""
@@ -144,7 +145,7 @@ class Actions:
                 self.change_key(name, key)
             except Refusal as refusal:
                 refused.append(str(refusal))
-        self._retell()
+        self.retell()
         return refused
 
 

@@ -1,7 +1,7 @@
 """Widgets one below the other, as the docks beside the skin hold them, or beside each other."""
 
 from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QDockWidget,
     QHBoxLayout,
@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
 )
 
 _LOWEST = 240  # px of what is below the skin
+_HIGHEST = 0.5  # of the window's height, of what is below the skin and asks for more than its share
 
 
 def row(*widgets: QWidget) -> QWidget:
@@ -53,6 +54,10 @@ class _Scrolled(QScrollArea):
         if (inside := self.widget()) is not None:
             self.setMinimumWidth(inside.minimumSizeHint().width() + bar)
 
+    def showEvent(self, event: QShowEvent) -> None:
+        self.widen()  # what is hidden learns of other letters only now
+        super().showEvent(event)
+
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         laid_out = event.type() == QEvent.Type.LayoutRequest
         if laid_out and self._letters != self.font().pointSizeF():
@@ -69,9 +74,10 @@ def scroll_to(widget: QWidget) -> None:
         area.ensureWidgetVisible(widget)
 
 
-def heighten(window: QMainWindow, dock: QDockWidget, share: float) -> None:
-    """Give a `dock` below the skin its `share` of the height of the `window`."""
-    height = max(_LOWEST, round(share * window.height()))
+def heighten(window: QMainWindow, dock: QDockWidget, share: float, least: int) -> None:
+    """Give a `dock` below the skin its `share` of a `window`'s height, or `least` px if it can."""
+    least = min(least, round(_HIGHEST * window.height()))
+    height = max(_LOWEST, least, round(share * window.height()))
     window.resizeDocks([dock], [height], Qt.Orientation.Vertical)
 
 

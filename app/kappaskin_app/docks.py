@@ -4,15 +4,17 @@ from functools import partial
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QWidget
 
 from kappaskin_app.about import DOCKS
 from kappaskin_app.actions import Actions
 from kappaskin_app.columns import heighten
+from kappaskin_app.views.title import Title
 
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38, "compare": 0.36, "design": 0.4, "guide": 0.5}
 _UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that one
+_LEAST = 40  # px of a dock that is scrolled, without its title
 _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 
 
@@ -38,6 +40,11 @@ class Docks:
     def __getitem__(self, name: str) -> Dock:
         return self._docks[name]
 
+    def widget(self, name: str) -> QWidget:
+        """What a dock shows, without what scrolls it where there is no room for all of it."""
+        dock, shown = self[name], self[name].widget()
+        return shown.widget() if isinstance(shown, QScrollArea) and dock in self.below else shown
+
     def by_name(self) -> dict[str, QDockWidget]:
         return {**self._docks}
 
@@ -51,13 +58,19 @@ class Docks:
         dock = self._docks[name] = Dock(title, self._window)
         dock.setObjectName(name)
         dock.setToolTip(DOCKS.get(name, ""))  # also of what in it explains nothing itself
+        dock.setTitleBarWidget(Title(dock))
         dock.setWidget(widget)
         self._window.addDockWidget(area, dock)
 
     def put_below(self, name: str, title: str, widget: QWidget, key: str) -> None:
         """Have a widget below the skin, hidden until it is asked for with `key`."""
         before = self.below
-        self.put_beside(name, title, widget, _BELOW)
+        area = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
+        area.setFrameShape(QScrollArea.Shape.NoFrame)
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # a stop on the way of Tab that nobody sees
+        area.setMinimumHeight(_LEAST)
+        area.setWidget(widget)
+        self.put_beside(name, title, area, _BELOW)
         self._keys[name] = key
         dock = self[name]
         if before:
@@ -104,9 +117,18 @@ class Docks:
             return
         dock.show()
         if dock in self.below and not dock.isFloating():
-            heighten(self._window, dock, _HEIGHTS.get(name, _HEIGHT))
+            least = self._needed(name) + dock.height() - dock.widget().height()
+            heighten(self._window, dock, _HEIGHTS.get(name, _HEIGHT), least)
         self._share_columns()
         dock.raise_()
+
+    def _needed(self, name: str) -> int:
+        """The px of height that what a dock shows needs, in lines as wide as the window."""
+        shown = self.widget(name)
+        layout = shown.layout()
+        if layout is not None and layout.hasHeightForWidth():
+            return layout.totalMinimumHeightForWidth(self._window.width())
+        return shown.minimumSizeHint().height()
 
     def _share_columns(self) -> None:
         heights = [round(share * self._window.height()) for share in _UPPER]

@@ -3,20 +3,40 @@
 import re
 from collections.abc import Mapping
 
+from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QWidget
 
 _OWN, _SHOWN = "own-tip", "shown-tip"  # properties of a widget: its tooltip, and as it was retold
 _NONE = "no shortcut"
 
 
-def retell(window: QWidget, keys: Mapping[str, str]) -> None:
-    """Name in the tooltips of a `window` each of the `keys` as it is now."""
-    for widget in window.findChildren(QWidget):
+class KeyTips(QObject):
+    """Has the tooltips of a `window` name its keys as they are now."""
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__(window)
+        self._window = window
+        self._keys: Mapping[str, str] = {}
+
+    def retell(self, keys: Mapping[str, str]) -> None:
+        """Name each of the `keys` as it is now, in what tooltips say next too."""
+        if not keys and not self._keys:
+            return  # of a window whose keys are its own no event is looked at
+        self._keys = keys
+        for widget in self._window.findChildren(QWidget):
+            if widget.toolTip():
+                self._retell(widget)
+                widget.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ToolTipChange and isinstance(watched, QWidget):
+            self._retell(watched)
+        return False
+
+    def _retell(self, widget: QWidget) -> None:
         tip = widget.toolTip()
-        if not tip:
-            continue
         own = widget.property(_OWN) if tip == widget.property(_SHOWN) else tip
-        told = in_words(str(own), keys)
+        told = in_words(str(own), self._keys)
         if told != tip:
             widget.setProperty(_OWN, own)
             widget.setProperty(_SHOWN, told)

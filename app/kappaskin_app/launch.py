@@ -1,4 +1,7 @@
-"""Starts the engine, Qt and the window, and ends them in order."""
+"""Starts the engine, Qt and the window, and ends them in order.
+
+Nothing of the library is imported before something is seen.
+"""
 
 import logging
 import os
@@ -10,11 +13,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin import Engine, Refusal, orphans_folder
-
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
+    from kappaskin import Engine
     from kappaskin_app.logbook import Logbook
     from kappaskin_app.recovering import Recovering
     from kappaskin_app.views.splash import Splash
@@ -37,12 +39,12 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
     Where the window is `kept` in a file it begins as it was, and until the skin is drawn a splash
     says what is being loaded; a script that opens a window for some seconds needs neither.
     """
-    # Beside: the engine's process starts while this one loads Qt and VTK.
+    application = _application()
+    splash = _splash(kept) if kept is not None else None
+    # Beside: the engine's process starts while this one loads VTK.
     with ThreadPoolExecutor(1) as beside:
         starting = beside.submit(_connected, source)
         try:
-            application = _application()
-            splash = _splash(kept) if kept is not None else None
             for module, words in _LOADED.items():
                 if splash is not None:
                     splash.say(words)
@@ -73,6 +75,8 @@ def _application() -> "QApplication":
     from PySide6.QtGui import QIcon
     from PySide6.QtWidgets import QApplication
 
+    from kappaskin import Refusal
+
     application = QApplication.instance() or QApplication(sys.argv[:1])
     if not isinstance(application, QApplication):
         raise Refusal("expected a Qt application with widgets, got one without")
@@ -85,13 +89,13 @@ def _application() -> "QApplication":
 
 
 def _splash(kept: Path) -> "Splash":
-    from kappaskin_app.layouts.file import KeptFile
-    from kappaskin_app.settings import Settings
-    from kappaskin_app.theme import THEMES
+    from kappaskin_app.layouts.glance import theme_in
+    from kappaskin_app.theme import LIGHT, THEMES
     from kappaskin_app.views.splash import Splash
 
-    splash = Splash(THEMES[KeptFile(kept).theme() or Settings().theme])
+    splash = Splash(THEMES.get(theme_in(kept), LIGHT))
     splash.show()
+    splash.say("Loading the library")
     return splash
 
 
@@ -101,8 +105,10 @@ def _stand_behind() -> None:
         os.nice(_BEHIND)
 
 
-def _connected(source: str) -> Engine:
+def _connected(source: str) -> "Engine":
     """An engine that reads `source`, or one that a window left that is gone."""
+    from kappaskin import Engine, orphans_folder
+
     engine = Engine(orphans=orphans_folder())
     if engine.adopted is None:
         engine.connect(source)
@@ -154,11 +160,13 @@ def launch(
         if kept is not None:
             kept.close()
     if saved == [False]:
+        from kappaskin import Refusal
+
         raise Refusal(f"{screenshot}: the picture cannot be written; choose another place")
 
 
 def _kept_file() -> Path:
-    from kappaskin_app.layouts.file import config_file
+    from kappaskin_app.layouts.glance import config_file
 
     return config_file()
 

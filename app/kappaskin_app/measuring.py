@@ -9,57 +9,71 @@ from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.ruler import Ruler
 
 Array = NDArray[np.float64]
+Places = tuple[tuple[float, float], ...] | None
 
 _FIRST = "Measure: click a place on the skin; Esc ends"
 _SECOND = "Measure: click another place; Esc ends"
 
 
+_ASKED = (_FIRST, _SECOND)  # by how many places there are
+
+
 class Measuring(QObject):
-    """Takes clicks while it is `on`; a third one begins anew. `changed` says whether it is on."""
+    """Takes clicks while it is `on`; a third one begins anew. `changed` says whether it is on.
+
+    `stepped` tells what a person did, in words, and the `places` before and after: up to two, each
+    (x, y) in m, or None while nothing is measured.
+    """
 
     changed = Signal(bool)
+    stepped = Signal(str, object, object)
 
     def __init__(self, membrane: MembraneView) -> None:
         super().__init__(membrane)
         self._membrane, self.ruler = membrane, Ruler(membrane.plotter)
-        self.on = False
-        self._places: list[tuple[float, float]] = []
+        self.places: Places = None
         self._skin = membrane.skin
 
-    def turn(self) -> None:
-        self.end() if self.on else self._begin()
+    @property
+    def on(self) -> bool:
+        return self.places is not None
 
-    def _begin(self) -> None:
-        self.on, self._places = True, []
-        self.ruler.ask(_FIRST)
-        self._membrane.plotter.update()
-        self.changed.emit(True)
+    def turn(self) -> None:
+        if self.on:
+            self.end()
+        else:
+            self._step("measure", ())
 
     def end(self) -> None:
         if self.on:
-            self.on = False
-            self.ruler.hide()
-            self._membrane.plotter.update()
-            self.changed.emit(False)
+            self._step("end measuring", None)
 
     def take(self, x: float, y: float) -> None:
         """Measure from or to the place (x, y) in m."""
-        if len(self._places) == 2:
-            self._places = []
-        self._places.append((x, y))
+        before = self.places if self.places is not None and len(self.places) < 2 else ()
+        self._step("measure to here" if before else "measure from here", (*before, (x, y)))
+
+    def _step(self, words: str, after: Places) -> None:
+        self.stepped.emit(words, self.places, after)
+
+    def have(self, places: Places) -> None:
+        """Measure between these."""
+        was, self.places = self.on, places
         self._skin = self._membrane.skin
-        if len(self._places) == 1:
-            self.ruler.ask(_SECOND)
+        self.ruler.ask(_ASKED[len(places)] if places is not None and len(places) < 2 else "")
+        self._membrane.plotter.update()
+        if was != self.on:
+            self.changed.emit(self.on)
 
     def show(self, estimate: Estimate) -> None:
         """Measure on the skin as it is in `estimate`."""
         skin = self._membrane.skin
-        if not self.on or not self._places:
+        if not self.places:
             return
         if skin.patch != self._skin.patch:
-            self._begin()  # the places were on another skin
+            self.have(())  # the places were on another skin
             return
-        places = np.array(self._places)
+        places = np.array(self.places)
         found = None
         if len(places) == 2:
             found = distances(skin.patch, estimate.surface, *places)

@@ -105,12 +105,24 @@ class Menus(QObject):
         solid = {"the window": window, "the skin": window.centralWidget()}
         words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
         maps = {f"the map of {words[name]}": view for name, view in window.heatmaps.items()}
-        docks = {dock.windowTitle(): dock.widget() for dock in window.docks.below}
+        docks = {
+            dock.windowTitle(): window.docks.widget(dock.objectName())
+            for dock in window.docks.below
+        }
         flat = {"Picture of a &map": maps, "Picture of a &panel": docks}
         window.exports.register(self.actions, solid, flat)
 
     def _turn_sound(self) -> None:
-        self._show_sound(self._window.presenting.sound.turn())
+        sound, before = self._window.presenting.sound, self._window.presenting.sound.on
+        self._have_sound(not before)
+        if sound.on != before:  # or there is nothing to undo: nothing here can play it
+            words = "sound of the force on" if sound.on else "sound of the force off"
+            self._window.history.step(words, self._have_sound, before, sound.on)
+
+    def _have_sound(self, on: bool) -> None:
+        sound = self._window.presenting.sound
+        if sound.on != on:
+            self._show_sound(sound.turn())
 
     def _show_sound(self, why_not: str) -> None:
         self._window.tell(why_not)

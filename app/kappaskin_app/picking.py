@@ -51,10 +51,18 @@ class Picking(QObject):
 
     def pick(self, element: int) -> None:
         """Tell all about an element."""
-        self.element = element
-        self._next_plots = self._next_words = self._next_spectrum = 0.0
-        self._show_tracing()
         self.picked.emit(element)
+        if element != self.element:
+            self._history.step(f"pick element {element}", self._have, self.element, element)
+
+    def _have(self, element: int) -> None:
+        """Tell all about an element, or about none: of another skin there may be fewer."""
+        sensor = self._session.status.sensor
+        self.element = element if sensor is not None and element < len(sensor.layout) else -1
+        self._next_plots = self._next_words = self._next_spectrum = 0.0
+        if self.element < 0:
+            self.card.show_facts("", "")
+        self._show_tracing()
 
     def _choose(self, element: int) -> None:
         if self._history.settings.region != "elements":  # or a click chooses what is scanned

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
+from PySide6.QtGui import QColor, QFont, QFontDatabase, QGuiApplication, QPalette
 
 Colours = NDArray[np.uint8]
 
@@ -105,6 +105,11 @@ def letters(percent: float) -> QFont:
     font = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont)
     font.setPointSizeF(font.pointSizeF() * percent / 100)
     return font
+
+
+def grown(px: float) -> int:
+    """As many px in the letters of now as `px` are in the system's."""
+    return round(px * QGuiApplication.font().pointSizeF() / letters(100).pointSizeF())
 
 
 def slider_style(theme: Theme) -> str:

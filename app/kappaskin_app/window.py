@@ -191,7 +191,7 @@ class MainWindow(QMainWindow):
         return docks
 
     def _pointing(self) -> Pointing:
-        docks = {name: [self.docks[name].widget()] for name in DOCKS}
+        docks = {name: [self.docks.widget(name)] for name in DOCKS}
         numbers = {f"readout-{name}": parts for name, parts in self.readouts.parts.items()}
         forms = [panel for panel in self.panels.all() if isinstance(panel, Form)]
         return Pointing(forms, docks | numbers, self.docks.reveal, self)

@@ -145,6 +145,7 @@ def _lessons(window: "MainWindow") -> None:
     window.lesson.attend(window.teaching)
     window.docks["lesson"].closed.connect(guarded(window.teaching.leave))
     window.teaching.pointed.connect(guarded(window.pointing.point))
+    window.teaching.taken_up.connect(guarded(partial(window.docks.reveal, "lesson")))
 
 
 def _guide(window: "MainWindow") -> None:
@@ -153,7 +154,8 @@ def _guide(window: "MainWindow") -> None:
 
 
 def _news(window: "MainWindow") -> None:
-    """What is said in passing."""
+    """What is said in passing, or offered."""
+    window.offer.offered.connect(guarded(window.actions_by_name.retell))
     for room in (
         *(window.happenings, window.taring, window.taping, window.replaying, window.teaching),
         *(window.staging, window.opening, window.layouts, window.exports),
@@ -182,8 +184,17 @@ def _skin(window: "MainWindow") -> None:
         heatmap.pointed.connect(guarded(window.display.point))
         heatmap.chosen.connect(guarded(wishes.choose))
         heatmap.lock_wanted.connect(guarded(partial(wishes.wish, f"range_{name}")))
-    window.picking.picked.connect(guarded(lambda _: window.docks.reveal("element")))
+    window.picking.picked.connect(guarded(lambda _: _show_element(window)))
+    measuring = window.display.measuring
+    measuring.stepped.connect(
+        guarded(lambda words, *places: window.history.step(words, measuring.have, *places))
+    )
     window.display.scale.lock_wanted.connect(guarded(window.looking.lock))
+
+
+def _show_element(window: "MainWindow") -> None:
+    window.docks.reveal("element")
+    window.layouts.note()  # a step of its own, before that of the element
 
 
 def _foot(window: "MainWindow") -> None:

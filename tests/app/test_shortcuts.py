@@ -143,3 +143,17 @@ def test_a_menu_may_stand_within_another(actions: Actions) -> None:
     (export,) = [a for a in actions.window.menuBar().actions() if a.text() == "E&xport"]
     (picture,) = export.menu().actions()
     assert [action.text() for action in picture.menu().actions()] == ["map", "dock"]
+
+
+def test_a_tip_that_is_set_after_a_change_names_the_key_of_now(actions: Actions) -> None:
+    label = QLabel("x", actions.window)
+    label.setToolTip("Theme")
+    actions.change_key("theme", "Ctrl+J")
+    label.setToolTip("Not now; later with Ctrl+T")
+    assert label.toolTip() == "Not now; later with Ctrl+J"
+    late = QLabel("y", actions.window)
+    late.setToolTip("Ctrl+T")
+    actions.retell()
+    assert late.toolTip() == "Ctrl+J"
+    actions.take_keys({})
+    assert (label.toolTip(), late.toolTip()) == ("Not now; later with Ctrl+T", "Ctrl+T")

@@ -8,6 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.layouts.file import KeptFile
+from kappaskin_app.layouts.glance import theme_in
 from kappaskin_app.layouts.kept import Kept
 from kappaskin_app.theme import DARK, LIGHT, Theme
 from kappaskin_app.views.splash import Splash
@@ -78,9 +79,9 @@ def test_it_is_in_the_colours_of_its_theme(qapp: QApplication, theme: Theme) -> 
 
 def test_the_theme_that_is_kept_is_told_and_the_file_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "window.toml"
-    assert KeptFile(path).theme() == ""
+    assert theme_in(path) == ""
     KeptFile(path).write(Kept(theme="dark"))
-    assert KeptFile(path).theme() == "dark"
+    assert theme_in(path) == "dark"
     path.write_text("no TOML")
-    assert KeptFile(path).theme() == ""
+    assert theme_in(path) == ""
     assert [file.name for file in tmp_path.iterdir()] == ["window.toml"]

@@ -1,6 +1,7 @@
 """What is no setting comes back too: where the camera stands, docks, pages, files."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -215,3 +216,66 @@ def test_with_nothing_to_undo_the_action_says_so(here: MainWindow) -> None:
     here.wishes.wish("letters", 110.0)
     assert undo()
     assert here.actions_by_name["undo"].text() == "&Undo: letters 100 \N{RIGHTWARDS ARROW} 110 %"
+
+
+def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
+    measuring, undo = here.display.measuring, here.actions_by_name["undo"]
+    here.actions_by_name["measure"].trigger()
+    for place in ((0.02, 0.03), (0.05, 0.06)):
+        here.membrane.pointing.clicked.emit(*place)
+    assert _texts(here) == ["measure", "measure from here", "measure to here"]
+    undo.trigger()
+    assert measuring.places == ((0.02, 0.03),)
+    here.actions_by_name["measure"].trigger()
+    assert measuring.places is None
+    undo.trigger()
+    assert here.actions_by_name["measure"].isChecked()
+    assert measuring.places == ((0.02, 0.03),)
+    undo.trigger()
+    undo.trigger()
+    assert not measuring.on
+
+
+def test_the_element_that_was_picked_before_comes_back_and_then_its_dock_goes(
+    here: MainWindow,
+) -> None:
+    for element in (17, 44):
+        here.heatmaps["xx"].chosen.emit(element)
+        _settle()
+    assert _texts(here) == ["show Element", "pick element 17", "pick element 44"]
+    here.actions_by_name["undo"].trigger()
+    assert here.picking.element == 17
+    here.actions_by_name["undo"].trigger()
+    _settle()
+    assert here.picking.element == -1
+    assert "Click an element" in here.picking.card.title.text()
+    here.actions_by_name["undo"].trigger()
+    _settle()
+    assert here.docks["element"].isHidden()
+
+
+def test_an_element_that_the_skin_has_no_more_is_not_picked_again(here: MainWindow, until) -> None:
+    here.heatmaps["xx"].chosen.emit(90)
+    here.heatmaps["xx"].chosen.emit(3)
+    here.history.apply(replace(here.history.settings, elements_x=4, elements_y=4))
+    until(lambda: len(here.session.status.sensor.layout) == 16)
+    here.actions_by_name["undo"].trigger()
+    assert here.picking.element == -1
+
+
+def test_the_place_in_a_lesson_comes_back_with_its_settings(here: MainWindow) -> None:
+    teaching, undo, before = here.teaching, here.actions_by_name["undo"], here.history.settings
+    teaching.look()
+    teaching.take(next(iter(teaching.taken)))
+    at_first = here.history.settings
+    teaching.go(2)
+    assert _texts(here)[-1] == "lesson step 3"
+    undo.trigger()
+    assert (teaching.progress.step, here.history.settings) == (0, at_first)
+    teaching.leave()
+    assert teaching.progress is None
+    undo.trigger()
+    assert (teaching.progress.step, here.history.settings) == (0, at_first)
+    assert here.lesson.isVisible()
+    undo.trigger()
+    assert (teaching.progress, here.history.settings) == (None, before)

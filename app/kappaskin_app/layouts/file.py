@@ -6,17 +6,13 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import platformdirs
+from PySide6.QtCore import QLockFile
 
 from kappaskin import Refusal
-from kappaskin_app.layouts.kept import Kept, from_text, to_text
+from kappaskin_app.layouts.kept import Kept, from_text, merged, to_text
 
 _LARGEST = 1_000_000  # bytes
-
-
-def config_file() -> Path:
-    """Where this user's window is kept."""
-    return platformdirs.user_config_path("kappaskin", appauthor=False) / "window.toml"
+_PATIENCE = 500  # ms that another window may take to write
 
 
 @dataclass(frozen=True)
@@ -33,13 +29,6 @@ class KeptFile:
             return from_text(self._text()), ""
         except (OSError, UnicodeDecodeError, Refusal) as error:
             return Kept(), f"{self.path}: {error}; {self._put_aside()}, the window begins anew"
-
-    def theme(self) -> str:
-        """The name of the theme that is kept, none where none can be read."""
-        try:
-            return from_text(self._text()).theme
-        except (OSError, UnicodeDecodeError, Refusal):
-            return ""  # told by who reads all of it
 
     def _text(self) -> str:
         if self.path.stat().st_size > _LARGEST:
@@ -64,6 +53,17 @@ class KeptFile:
         except (OSError, UnicodeEncodeError) as error:
             return f"{self.path}: cannot be written ({error}); the window will not be as it is now"
         return ""
+
+    def merge(self, kept: Kept, before: Kept) -> str:
+        """Write what was changed since `before`, and leave the rest as another window wrote it."""
+        if not self.path.exists():
+            return self.write(kept)
+        lock = QLockFile(f"{self.path}.lock")
+        lock.tryLock(_PATIENCE)  # or without: the file is whole at any time
+        theirs, wrong = self.read()
+        wrong = self.write(kept if wrong else merged(kept, before, theirs)) or wrong
+        lock.unlock()
+        return wrong
 
     def _write(self, data: bytes) -> None:
         # Each under a name of its own: another window may be writing the same file.

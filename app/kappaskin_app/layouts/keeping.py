@@ -23,13 +23,14 @@ class Keeping(QObject):
         super().__init__(window)
         self._window = window
         self._file: KeptFile | None = None
+        self._kept = Kept()
 
     def begin(self, path: Path) -> None:
         """Have the window as it is kept at `path`, and keep it there from now on."""
         file, window = KeptFile(path), self._window
         kept, wrong = file.read()
         refused = self._restore(kept)
-        self._file = file
+        self._file, self._kept = file, self._now()
         for changed in (window.menus.sheet.changed, window.layouts.changed, window.opening.changed):
             changed.connect(guarded(self.write))
         if wrong or refused:
@@ -37,7 +38,10 @@ class Keeping(QObject):
 
     def write(self) -> None:
         """Keep the window as it is."""
-        if self._file is not None and (wrong := self._file.write(self._now())):
+        if self._file is None:
+            return
+        before, self._kept = self._kept, self._now()
+        if wrong := self._file.merge(self._kept, before):
             self._window.tell(wrong)
 
     def _restore(self, kept: Kept) -> list[str]:
@@ -48,8 +52,9 @@ class Keeping(QObject):
             window.setGeometry(clamped(QRect(*kept.place), screens))
         if kept.full:
             window.showMaximized()
-        chosen = {"theme": kept.theme} if kept.theme else {}
-        window.history.apply(replace(window.history.settings, **chosen, show_start=kept.start))
+        chosen = {"show_start": kept.start, "letters": kept.letters}
+        chosen |= {"theme": kept.theme} if kept.theme else {}
+        window.history.apply(replace(window.history.settings, **chosen))
         window.opening.recent = [Path(file) for file in kept.files]
         window.menus.finder.recent = list(kept.done)
         window.layouts.own = dict(kept.own)
@@ -62,6 +67,7 @@ class Keeping(QObject):
         return Kept(
             theme=window.history.settings.theme,
             start=window.history.settings.show_start,
+            letters=window.history.settings.letters,
             place=(place.x(), place.y(), place.width(), place.height()),
             full=window.isMaximized(),
             keys=window.actions_by_name.changed_keys(),

@@ -2,13 +2,14 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 import tomlkit
 
 from kappaskin import Refusal
 from kappaskin_app.layouts.layout import AREAS, FLOATING, LIVE, READY, Layout, Place
+from kappaskin_app.settings import Range, ask_of
 from kappaskin_app.theme import THEMES
 
 FORMAT = 1
@@ -25,8 +26,8 @@ class Kept:
     """What a person chose of the window; all but the theme begins as if nothing ever was.
 
     `place` is (x, y, width, height) in px, `keys` are the shortcuts changed, `done` and `files`
-    what was done and opened last, `own` the layouts saved under a name, `now` the last one, and
-    `start` whether ways to begin are offered.
+    what was done and opened last, `own` the layouts saved under a name, `now` the last one,
+    `start` whether ways to begin are offered, and `letters` how large they are, in percent.
     """
 
     theme: str = ""
@@ -38,6 +39,28 @@ class Kept:
     now: Layout = READY[LIVE]
     own: Mapping[str, Layout] = field(default_factory=dict)
     start: bool = True
+    letters: float = 100.0
+
+
+def merged(mine: Kept, before: Kept, theirs: Kept) -> Kept:
+    """What another window keeps, `theirs`, but for what was changed in `mine` since `before`."""
+    three = [
+        {f.name: getattr(kept, f.name) for f in fields(Kept)} for kept in (mine, before, theirs)
+    ]
+    return Kept(**_merged(*three))
+
+
+def _merged(
+    mine: Mapping[str, Any], before: Mapping[str, Any], theirs: Mapping[str, Any]
+) -> dict[str, Any]:
+    found = {key: value for key, value in theirs.items() if key in mine or key not in before}
+    for key, value in mine.items():
+        was, other = before.get(key), theirs.get(key)
+        if isinstance(value, Mapping) and isinstance(was, Mapping) and isinstance(other, Mapping):
+            found[key] = _merged(value, was, other)
+        elif value != was:
+            found[key] = value
+    return found
 
 
 # To text.
@@ -57,6 +80,7 @@ def to_text(kept: Kept) -> str:
 
 def _window(kept: Kept) -> dict[str, Any]:
     said: dict[str, Any] = {"theme": kept.theme, "start": kept.start, "full": kept.full}
+    said["letters"] = kept.letters
     said |= {"done": list(kept.done), "files": list(kept.files)}
     return said | ({"place": list(kept.place)} if kept.place else {})
 
@@ -100,6 +124,7 @@ def from_text(text: str) -> Kept:
         _layout(_part(document, "layout", dict, {})) if "layout" in document else READY[LIVE],
         _layouts(document),
         _part(window, "start", bool, True),
+        _letters(window),
     )
 
 
@@ -108,6 +133,14 @@ def _part(table: Mapping[str, Any], key: str, kind: type[_Some], otherwise: _Som
     if type(value) is not kind:
         raise Refusal(f"expected {key} to be a {kind.__name__}, got {value!r:.60}")
     return value
+
+
+def _letters(window: Mapping[str, Any]) -> float:
+    how, percent = ask_of("letters"), window.get("letters", 100.0)
+    known = type(percent) in (int, float) and isinstance(how, Range)
+    if not (known and how.least <= percent <= how.most):
+        raise Refusal(f"expected letters from 80 to 200 %, got {percent!r:.60}")
+    return float(percent)
 
 
 def _few(values: Any) -> Any:

@@ -1,6 +1,7 @@
 """A lesson on the window: its steps as undoable settings, its questions judged by what is seen."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -25,18 +26,32 @@ from kappaskin_app.settings import Settings
 _FILES = "Lesson (*.md)"
 
 
+@dataclass(frozen=True)
+class _Place:
+    """Where a person is: at which `step` of which lesson, with which `settings`.
+
+    `before` are the settings, and the source, that were before the lesson.
+    """
+
+    progress: Progress | None
+    step: int
+    settings: Settings
+    before: tuple[Settings, str] | None
+
+
 class Teaching(QObject):
     """Knows the lessons, by file, and how far each is; `changed` tells when that is another.
 
     `progress` is that of the lesson that is taken, None while none is; `message` says why an answer
     could not be judged, or a file not be read. `told` says what came of a wish, `pointed` at what
-    to point. It is told how to `connect` to a source, and gets pictures of what is seen and the
-    words below them.
+    to point, `taken_up` that a lesson which was left is taken again. It is told how to `connect`
+    to a source, and gets pictures of what is seen and the words below them.
     """
 
     changed = Signal()
     told = Signal(str)
     pointed = Signal(tuple)
+    taken_up = Signal()
 
     def __init__(
         self,
@@ -92,44 +107,62 @@ class Teaching(QObject):
     def take(self, file: str) -> None:
         """Begin the lesson in `file`, or go on where it was left."""
         progress = self.taken[file]
-        if self._before is None:
-            self._before = self._history.settings, self._session.source
-        self.progress = progress
-        self._go(0 if progress.at_end else progress.step)
+        self._go(progress, 0 if progress.at_end else progress.step)
 
     def leave(self) -> None:
         """Have the settings, and the source, from before the lesson."""
         if self._before is None:
             return
-        (settings, source), self._before = self._before, None
-        self.progress, self.message = None, ""
+        settings, source = self._before
         before = {name: getattr(settings, name) for name in whole({})}
-        self._history.change("Leave the lesson", -1, **before)
+        self._step("leave the lesson", _Place(None, 0, replace(self._now.settings, **before), None))
         if source != self._session.source and not source.startswith("sim:"):
             self._connect(source)
-        self.pointed.emit(())
-        self.changed.emit()
 
     def go(self, step: int) -> None:
         """Go to another step of the lesson."""
         if self.progress is not None and step != self.progress.step:
-            self._go(step)
+            self._go(self.progress, step)
 
-    def _go(self, step: int) -> None:
-        progress = self.progress
-        if progress is None:
-            return
-        back = step <= progress.step
-        progress.go(step)
-        self.message = ""
-        there = None if progress.at_end else progress.lesson.steps[progress.step]
-        sets = None if there is None else there.sets
-        if back and there is not None:
-            sets = progress.lesson.begins(progress.step)
+    def _go(self, progress: Progress, step: int) -> None:
+        lesson, step = progress.lesson, min(max(step, 0), len(progress.lesson.steps))
+        sets = lesson.steps[step].sets if step < len(lesson.steps) else None
+        if step <= progress.step and step < len(lesson.steps):
+            sets = lesson.begins(step)
+        now = self._now
+        before = now.before or (now.settings, self._session.source)
         if sets is not None:
-            self._put(f"Lesson step {progress.step + 1}", sets)
-        self.pointed.emit(there.point if there else ())
+            self._simulate()
+        settings = now.settings if sets is None else replace(now.settings, **whole(sets))
+        self._step(f"lesson step {step + 1}", _Place(progress, step, settings, before))
+        if sets is not None:
+            self._play(sets)
+
+    # Where it is, which can be undone.
+
+    @property
+    def _now(self) -> _Place:
+        step = self.progress.step if self.progress else 0
+        return _Place(self.progress, step, self._history.settings, self._before)
+
+    def _step(self, text: str, after: _Place) -> None:
+        if after != self._now:
+            self._history.step(text, self._have, self._now, after)
+
+    def _have(self, place: _Place) -> None:
+        """Be at a place, and have its settings."""
+        left, progress = self.progress is None, place.progress
+        self.progress, self._before, self.message = progress, place.before, ""
+        if progress is not None:
+            progress.go(place.step)
+        if place.settings != self._history.settings:
+            self._history.apply(place.settings)
+        at_work = progress is not None and not progress.at_end
+        self.pointed.emit(progress.lesson.steps[place.step].point if progress and at_work else ())
         self.changed.emit()
+        if left and progress is not None:
+            self._simulate()
+            self.taken_up.emit()
 
     def answer(self, given: str) -> None:
         """Judge an answer by what the window shows now."""
@@ -172,11 +205,18 @@ class Teaching(QObject):
         made.deleteLater()
 
     def _put(self, text: str, sets: Mapping[str, Any]) -> None:
-        """Have the settings that a step or a button says, on the simulated skin."""
+        """Have the settings that a button says, on the simulated skin."""
+        self._simulate()
+        self._history.change(text, -1, **whole(sets))
+        self._play(sets)
+
+    def _simulate(self) -> None:
         session = self._session
         if not session.inside or session.status.state in ("off", "lost"):
             self._connect("sim:")
-        self._history.change(text, -1, **whole(sets))
+
+    def _play(self, sets: Mapping[str, Any]) -> None:
+        session = self._session
         if "scene" in sets:
             session.seek(0.0)
         if not session.running:

@@ -21,7 +21,8 @@ from kappaskin_app.panels.calibration.parts import button, number, sentence
 from kappaskin_app.panels.form import Form
 from kappaskin_app.scale import SteadyRange
 from kappaskin_app.settings import METHOD_SHORT, Settings
-from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Theme
+from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Theme, grown
+from kappaskin_app.views.rows import fit_rows
 from kappaskin_app.views.surface_map import SurfaceMap
 
 _ASKS = (
@@ -33,8 +34,7 @@ _ASKS = (
     "other_tared",
 )
 _COLUMNS = ("", "A", "B", "B \N{MINUS SIGN} A")
-_ROW = 21  # px
-_DIGITS = 51  # of room for the figures
+_FIGURES = 408  # px wide, the table
 _MICROMETRES, _MILLIMETRES = 1e6, 1e3
 _SURFACE = "Displacement of the skin, on the scale of A and B together; the cross is the contact."
 _DIFFERENCE = "B less A, in \N{MICRO SIGN}m on a scale of its own."
@@ -80,9 +80,7 @@ class ComparePanel(QWidget):
         around = QHBoxLayout(self)
         around.setContentsMargins(8, 4, 8, 6)
         around.setSpacing(10)
-        form = scrolled(self.form)
-        form.setMaximumWidth(form.minimumWidth())
-        around.addWidget(form)
+        around.addWidget(scrolled(self.form))
         self.maps["a"].bar.hide()  # it is that of B beside it
         for view in self.maps.values():
             around.addWidget(view, 2 if view.bar.isHidden() else 3)
@@ -99,12 +97,9 @@ class ComparePanel(QWidget):
         table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         table.setTabKeyNavigation(False)
         table.verticalHeader().hide()
-        table.verticalHeader().setDefaultSectionSize(_ROW)
         header = table.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        digit = table.fontMetrics().horizontalAdvance("0")
-        table.setMinimumWidth(_DIGITS * digit)
         return table
 
     def attend(self, comparing: Comparing) -> None:
@@ -175,6 +170,7 @@ class ComparePanel(QWidget):
 
     def _show_figures(self, pair: Pair) -> None:
         figures = pair.figures()
+        fit_rows(self.table)
         if self.table.rowCount() != len(figures):
             self.table.setRowCount(len(figures))
             for row in range(len(figures)):
@@ -197,6 +193,7 @@ class ComparePanel(QWidget):
                     item.setText(text)
 
     def show_theme(self, theme: Theme) -> None:
+        self.table.setMinimumWidth(grown(_FIGURES))
         self.form.show_theme(theme)
         for view in self.maps.values():
             view.show_theme(theme)

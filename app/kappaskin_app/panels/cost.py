@@ -18,7 +18,7 @@ from kappaskin_app.amounts import NONE, duration, length
 from kappaskin_app.costing import Costing, Frontier, gives, in_words
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, sentence, text_label
-from kappaskin_app.theme import LIGHT, Theme, slider_style
+from kappaskin_app.theme import LIGHT, Theme, grown, slider_style
 from kappaskin_app.views.cost_plot import CostPlot
 from kappaskin_app.views.effects import EffectsTable
 from kappaskin_app.views.line import Line
@@ -110,9 +110,6 @@ class CostPanel(QWidget):
         ask.addWidget(label)
         ask.addWidget(self.wanted, 1)
         ask.addWidget(self.wanted_words)
-        self.wanted_words.setMinimumWidth(
-            self.wanted_words.fontMetrics().horizontalAdvance("0.000 mm")
-        )
         right.addLayout(ask)
         right.addWidget(self.cheapest)
         right.addStretch(1)
@@ -125,13 +122,14 @@ class CostPanel(QWidget):
         words = QWidget()
         words.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
-        words.setFixedWidth(_WORDS)
+        self._words = words
         around = QHBoxLayout(self)
         around.setContentsMargins(8, 4, 8, 6)
         around.setSpacing(12)
         around.addWidget(self.plot, 1)
         around.addWidget(words)
-        around.addWidget(self._beside())
+        self._side = self._beside()
+        around.addWidget(self._side)
 
     def _beside(self) -> QWidget:
         """The table of effects, with its title."""
@@ -150,7 +148,6 @@ class CostPanel(QWidget):
         inside.addWidget(title)
         inside.addWidget(self.effects, 1)
         inside.addWidget(self.no_effects, 1)
-        beside.setFixedWidth(_EFFECTS)
         return beside
 
     def attend(self, costing: Costing) -> None:
@@ -161,6 +158,10 @@ class CostPanel(QWidget):
 
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
+        self._words.setFixedWidth(grown(_WORDS))
+        self._side.setFixedWidth(grown(_EFFECTS))
+        wide = self.wanted_words.fontMetrics().horizontalAdvance("0.000 mm")
+        self.wanted_words.setMinimumWidth(wide)
         self.plot.show_theme(theme)
         self.effects.show_theme(theme)
         self.no_effects.setStyleSheet(f"color: {theme.faint};")

@@ -122,6 +122,7 @@ class DesignPanel(QWidget):
             "save-design",
             "Write the design into a file that can be played, edited and studied.",
         )
+        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._designing: Designing | None = None
         self._lay_out()
 
@@ -129,9 +130,7 @@ class DesignPanel(QWidget):
         around, right = QHBoxLayout(self), QVBoxLayout()
         around.setContentsMargins(8, 4, 8, 6)
         around.setSpacing(10)
-        form = scrolled(self.form)
-        form.setMaximumWidth(form.minimumWidth())
-        around.addWidget(form)
+        around.addWidget(scrolled(self.form))
         self.predicted.bar.hide()  # it is that of the other beside it
         around.addWidget(self.predicted, 2)
         around.addWidget(self.simulated, 3)

@@ -17,7 +17,7 @@ from kappaskin_app.columns import scrolled
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, in_a_row, text_label
 from kappaskin_app.picturing import Look, Picturing
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import LIGHT, Theme, grown
 from kappaskin_app.views.card import PICTURE, PLAYING, CardPainter, picture_size
 
 # What is pleasant to watch, then what the paper has, then what one effect does.
@@ -130,11 +130,9 @@ class GalleryPanel(QWidget):
             label.setTextFormat(Qt.TextFormat.PlainText)
         bold = self.title.font()
         bold.setBold(True)
-        bold.setPointSizeF(1.15 * bold.pointSizeF())
         self.title.setFont(bold)
         beside = QWidget()
-        beside.setMinimumWidth(_WORDS[0])
-        beside.setMaximumWidth(_WORDS[1])
+        self._beside = beside
         column = QVBoxLayout(beside)
         column.setContentsMargins(0, 4, 0, 4)
         words = scrolled(self.title, self.text, self.file)
@@ -169,6 +167,8 @@ class GalleryPanel(QWidget):
             self._show_words()
 
     def show_theme(self, theme: Theme) -> None:
+        self._beside.setMinimumWidth(grown(_WORDS[0]))
+        self._beside.setMaximumWidth(grown(_WORDS[1]))
         self._theme = self.cards.painter.theme = theme
         self.file.setStyleSheet(f"color: {theme.faint};")
         self.cards.viewport().update()

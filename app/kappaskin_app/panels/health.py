@@ -17,9 +17,9 @@ from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.calibration.parts import sentence, text_label
 from kappaskin_app.panels.press import PressPage
 from kappaskin_app.theme import Theme
+from kappaskin_app.views.rows import fit_rows
 
 _COLUMNS = ("Element", "Channel", "What", "Since", "Figure")
-_ROW = 22  # px
 _TIP = (
     "Channels that are dead, stuck, noisy, on a rail, swapped, drifting or off. They are left out "
     "of the shape until they agree with those around them again; a dead, stuck or swapped one "
@@ -63,7 +63,6 @@ class HealthPanel(QWidget):
         table.setTabKeyNavigation(False)  # Tab leads on, the arrows go through the list
         table.setWordWrap(False)
         table.verticalHeader().hide()
-        table.verticalHeader().setDefaultSectionSize(_ROW)
         header = table.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setStretchLastSection(True)
@@ -85,6 +84,7 @@ class HealthPanel(QWidget):
             words += f" The first {len(health.findings)} are listed."
         if words != self.words.text():
             self.words.setText(words)
+        fit_rows(self.table)
         self.table.setRowCount(len(health.findings))
         for row, finding in enumerate(health.findings):
             age = max(0.0, now - finding.since)

@@ -19,10 +19,12 @@ from PySide6.QtWidgets import (
 from kappaskin import Estimate, Sensor
 from kappaskin_app.guard import guarded
 from kappaskin_app.table import ELEMENTS, FACTS, Rows, csv_of, elements_of, facts_of
+from kappaskin_app.views.rows import fit_rows
 
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_ROOM = 6  # px above and below a line together
+_BESIDE = 14  # px left and right of a column's head together
+_LINES = 6  # that are seen of a table at least
 _EVERY = 0.5  # s between two readings: faster cannot be read
 
 
@@ -72,14 +74,20 @@ def _table(name: str, title: str, head: Sequence[str]) -> QTableWidget:
     table.setTabKeyNavigation(False)  # Tab leads on, the arrows go through the table
     table.setWordWrap(False)
     table.verticalHeader().hide()
-    table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+    header = table.horizontalHeader()
+    header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+    header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
     return table
 
 
 def _fill(table: QTableWidget, rows: Rows) -> None:
     """Write rows into a table, but for what stands there."""
     table.setRowCount(len(rows))
-    table.verticalHeader().setDefaultSectionSize(table.fontMetrics().height() + _ROOM)
+    fit_rows(table)
+    wide = table.fontMetrics().horizontalAdvance
+    heads = (table.horizontalHeaderItem(column).text() for column in range(table.columnCount()))
+    table.horizontalHeader().setMinimumSectionSize(max(map(wide, heads)) + _BESIDE)
+    table.setMinimumHeight((_LINES + 1) * table.verticalHeader().defaultSectionSize())
     for row, texts in enumerate(rows):
         for column, text in enumerate(texts):
             item = table.item(row, column)

@@ -18,11 +18,12 @@ from kappaskin_app.panels.basis import in_use
 from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.seeing import Seeing
 from kappaskin_app.settings import Settings
-from kappaskin_app.theme import Theme
+from kappaskin_app.theme import Theme, grown
 from kappaskin_app.views.mode_map import ModeMap
 from kappaskin_app.views.spectrum import SpectrumPlot
 
 _COLUMNS = 3
+_SHAPE = 210  # px wide
 _GRID = 65  # points of a map along each side
 _REAL = "The hard cases are for the simulation inside the app (Ctrl+M)."
 _TRY = "Hard cases to try; Back undoes each in one step."
@@ -80,7 +81,7 @@ class StabilityPanel(QWidget):
         shape = QWidget()
         middle.setContentsMargins(0, 0, 0, 0)
         shape.setLayout(middle)
-        shape.setFixedWidth(210)
+        self._shape = shape
         grid = QGridLayout()
         grid.setSpacing(4)
         for number, widget in enumerate(self.buttons):
@@ -137,6 +138,7 @@ class StabilityPanel(QWidget):
             self.refused.setVisible(bool(text))
 
     def show_theme(self, theme: Theme) -> None:
+        self._shape.setFixedWidth(grown(_SHAPE))
         self.plot.show_theme(theme)
         self.map.show_theme(theme)
         self.refused.setStyleSheet(f"color: {theme.alert};")

@@ -1,15 +1,16 @@
 """What the colours mean: a scale with its limits and unit, which may be locked."""
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QFont, QFontMetrics, QImage, QPainter, QPaintEvent
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
 from kappaskin_app.shades import Tint
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
 from kappaskin_app.views.lettering import read_from_afar
 
-_WIDTH, _COLOURS = 70, 22  # px of the bar with its numbers, and without
+_COLOURS, _GAP = 22, 4  # px of the bar without its numbers, and right of them
+_WIDEST = "\N{MINUS SIGN}0.005"  # of the numbers, more or less
 _SWATCH = 10  # px of a colour in the legend
 
 
@@ -24,7 +25,21 @@ class ColourBar(QWidget):
         self._tint = Tint(DIVERGING, (-1.0, 1.0), "1/m")
         self.legend: tuple[tuple[str, str], ...] = ()
         """Colours, as #rrggbb, with their words, the lowest first."""
-        self.setFixedWidth(_WIDTH)
+        self.widen()
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(_COLOURS, 3 * self.fontMetrics().height() + 10)
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self.widen()
+
+    def widen(self) -> None:
+        """Have room for numbers and legend in the letters of now."""
+        wide = self.fontMetrics().horizontalAdvance
+        legend = max((_SWATCH + wide(words) for _, words in self.legend), default=0)
+        self.setFixedWidth(max(_COLOURS + wide(_WIDEST), 8 + legend) + _GAP)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -50,6 +65,7 @@ class ColourBar(QWidget):
             was.colours is not tint.colours
         ):
             self._tint, self.legend = tint, legend
+            self.widen()
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -74,7 +90,7 @@ class ColourBar(QWidget):
         painter.drawImage(bar, image)
         painter.drawText(QPointF(2, painter.fontMetrics().ascent()), self._tint.unit)
         low, high = self.limits
-        for share in (0.0, 0.5, 1.0):
+        for share in (0.0, 0.5, 1.0) if bar.height() >= 3 * line else (0.0, 1.0):
             y = bar.bottom() - share * bar.height()
             text = f"{low + share * (high - low):.3g}".replace("-", "\N{MINUS SIGN}")
             top = min(max(y - line / 2, bar.top()), bar.bottom() - line)
@@ -131,8 +147,6 @@ class SkinScale(QWidget):
         for part in (self.lock, self.times):
             part.setVisible(not unit)
         self.setFont(read_from_afar(unit))
-        larger = self.fontMetrics().height() / QFontMetrics(QFont()).height() if unit else 1.0
-        self.bar.setFixedWidth(round(_COLOURS + larger * (_WIDTH - _COLOURS)))
 
     def show_what(self, symbol: str, tip: str) -> None:
         """Say by its `symbol` in HTML what colours the skin; the `tip` explains it."""

@@ -14,11 +14,12 @@ from kappaskin_app.settings import METHOD_SHORT
 from kappaskin_app.theme import LIGHT, SERIES, Theme
 from kappaskin_app.views.log_axis import LogAxis
 
-_LEFT, _BOTTOM, _TOP = 76.0, 34.0, 10.0
-_LEGEND = 196.0  # px right of the plot
+_TOP = 10.0
+_BESIDE = 28.0  # px left of the words of the legend
 _SIZE = 4.0  # px from a point's middle to its rim
 _NEAR = 10.0  # px from the mouse to the point that it means
 _APART = 10.0  # px between two written times
+_LONGEST = "0.05 mm"  # of the errors beside the axis
 _AXES = "RMS error (up), arithmetic in a frame"
 _ROWS = len(METHOD_SHORT) + 5  # of the legend
 
@@ -39,11 +40,15 @@ class CostPlot(QWidget):
         self._theme, self._empty = LIGHT, ""
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(470, _ROWS * self.fontMetrics().height())
         self.setAccessibleName("Error against time")
 
     def sizeHint(self) -> QSize:
         return QSize(800, 190)
+
+    def minimumSizeHint(self) -> QSize:
+        metrics = self.fontMetrics()
+        wide = metrics.horizontalAdvance(_LONGEST + _AXES) + self._legend
+        return QSize(round(wide), _ROWS * metrics.height())
 
     def show_costs(
         self, frontier: Frontier, present: Cost | None, live: Point, empty: str = ""
@@ -67,7 +72,14 @@ class CostPlot(QWidget):
 
     @property
     def _area(self) -> QRectF:
-        return QRectF(self.rect()).adjusted(_LEFT, _TOP, -_LEGEND, -_BOTTOM)
+        metrics = self.fontMetrics()
+        left, below = metrics.horizontalAdvance(_LONGEST) + 8, 2 * metrics.height() + 2
+        return QRectF(self.rect()).adjusted(left, _TOP, -self._legend, -below)
+
+    @property
+    def _legend(self) -> float:
+        """The px right of the plot."""
+        return _BESIDE + 8 + max(map(self.fontMetrics().horizontalAdvance, _SHORT.values()))
 
     def at(self, error: float, time: float) -> QPointF:
         """Where an error in m at a time in s is drawn."""
@@ -157,7 +169,7 @@ class CostPlot(QWidget):
                 free = y
                 painter.setPen(QColor(theme.faint))
                 top = min(y - line / 2, area.bottom() - line + 3)
-                box = QRectF(0, top, _LEFT - 5, line)
+                box = QRectF(0, top, area.left() - 5, line)
                 painter.drawText(box, flags.AlignRight | flags.AlignVCenter, _tick(value, length))
         painter.setPen(QColor(theme.faint))
         below = QRectF(area.left(), self.height() - line - 1, area.width(), line)
@@ -205,7 +217,7 @@ class CostPlot(QWidget):
 
     def _paint_legend(self, painter: QPainter, area: QRectF) -> None:
         theme, flags = self._theme, Qt.AlignmentFlag
-        left, width = area.right() + 14, _LEGEND - 28
+        left, width = area.right() + 10, self._legend - _BESIDE
         used = [m for m in _METHODS if any(c.setting.method == m for c in self.frontier.costs)]
         rows = [*used, "own", "other", "present", "live", "best"]
         line = min(painter.fontMetrics().height() + 3.0, (self.height() - 6.0) / len(rows))

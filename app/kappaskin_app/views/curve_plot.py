@@ -15,7 +15,8 @@ from kappaskin_app.theme import DARK, LIGHT, SERIES, Theme
 
 Array = NDArray[np.float64]
 
-_LEFT, _RIGHT, _TOP = 46.0, 8.0, 4.0
+_RIGHT, _TOP = 8.0, 4.0
+_WIDEST = "\N{MINUS SIGN}0.15"  # of the numbers, more or less
 _THIN = 1.0  # px: what is a little wider takes Qt fourteen times as long
 _DENSE = 2  # places in each px: more are drawn one over the other
 _NEAR = 12.0  # px from a curve at which it is meant
@@ -47,13 +48,16 @@ class CurvePlot(QWidget):
         self.curves: tuple[Curve, ...] = ()
         self._limit, self._marked = 1.0, -1
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(150, 70)
         self.setMouseTracking(True)
         self.setAccessibleName(title)
         self.setToolTip(tip)
 
     def sizeHint(self) -> QSize:
         return QSize(260, 130)
+
+    def minimumSizeHint(self) -> QSize:
+        line = self.fontMetrics().height()
+        return QSize(9 * line, 4 * line)
 
     def show_curves(
         self,
@@ -82,9 +86,13 @@ class CurvePlot(QWidget):
         self.update()
 
     @property
+    def _left(self) -> float:
+        return self.fontMetrics().horizontalAdvance(_WIDEST) + 8.0
+
+    @property
     def _area(self) -> QRectF:
         line = self.fontMetrics().height()
-        return QRectF(self.rect()).adjusted(_LEFT, _TOP + line, -_RIGHT, -line - 4)
+        return QRectF(self.rect()).adjusted(self._left, _TOP + line, -_RIGHT, -line - 4)
 
     def _places(self, curve: Curve) -> list[list[QPointF]]:
         """The curve in pieces between what is missing."""
@@ -144,12 +152,13 @@ class CurvePlot(QWidget):
         middle = area.center().y()
         painter.drawLine(QPointF(area.left(), middle), QPointF(area.right(), middle))
         painter.setPen(QColor(theme.faint))
-        for value, top in ((high, area.top()), (low, area.bottom() - line)):
+        for value, top in ((high, area.top()), (low, area.bottom() - line)) if self.curves else ():
             words = f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
-            box = QRectF(0, top, _LEFT - 4, line)
+            box = QRectF(0, top, area.left() - 4, line)
             painter.drawText(box, flags.AlignRight | flags.AlignVCenter, words)
         below = QRectF(area.left(), area.bottom() + 2, area.width(), line)
-        for value, side in ((self._span[0], flags.AlignLeft), (self._span[1], flags.AlignRight)):
+        ends = ((self._span[0], flags.AlignLeft), (self._span[1], flags.AlignRight))
+        for value, side in ends if self.curves else ():
             words = f"{value:.3g} {self._x_unit}".replace("-", "\N{MINUS SIGN}")
             painter.drawText(below, side | flags.AlignVCenter, words)
         painter.setPen(QColor(theme.text))

@@ -8,6 +8,7 @@ from kappaskin import EffectCost
 from kappaskin_app.amounts import NONE, duration, length
 from kappaskin_app.effects import called
 from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.views.rows import fit_rows
 
 _COLUMNS = {
     "Effect": "What spoils the readings of the scene that was measured.",
@@ -18,7 +19,6 @@ _COLUMNS = {
     "Without": "RMS error of the shape without the effect, everything else as it is; bold where "
     "that is what is simulated.",
 }
-_PADDING = 3  # px that a row is higher than its line
 
 
 class EffectsTable(QTableWidget):
@@ -38,9 +38,6 @@ class EffectsTable(QTableWidget):
         header.setHighlightSections(False)
         header.setMinimumSectionSize(20)
         self.verticalHeader().hide()
-        line = self.fontMetrics().height()
-        self.verticalHeader().setMinimumSectionSize(line)
-        self.verticalHeader().setDefaultSectionSize(line + _PADDING)
         self.setShowGrid(False)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
@@ -59,6 +56,7 @@ class EffectsTable(QTableWidget):
         self._fill()
 
     def _fill(self) -> None:
+        fit_rows(self)
         self.setRowCount(len(self._shown))
         for row, cost in enumerate(self._shown):
             errors = ((cost.rms_with, cost.kept), (cost.rms_without, not cost.kept))

@@ -16,7 +16,7 @@ from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, Load, Sensor
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme, grown
 from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.box import WHOLE, Box, Shares
 from kappaskin_app.views.drag import LoadDrag
@@ -31,6 +31,7 @@ from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
+_LETTERS = 14  # px, of the caption
 _LIFT = 0.006  # of the skin's size above the surface, or half of a line drowns in it
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
@@ -67,7 +68,7 @@ class MembraneView(QWidget):
         self._fitting = QTimer(self, singleShot=True, interval=0)  # pyright: ignore[reportCallIssue]
         self._fitting.timeout.connect(guarded(self.gaze.fit))
         self._box = Box()
-        self.setMinimumSize(320, 240)
+        self.setMinimumSize(320, 160)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
         """(when, age of its frame in s) of each drawing completed."""
         self.age_sd = float("inf")
@@ -106,7 +107,6 @@ class MembraneView(QWidget):
         self.caption: Any = pv.Text("")
         self.caption.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
         self.caption.position = 0.015, 0.94  # of the picture, from its lower left corner
-        self.caption.prop.font_size = 14
         plotter.add_actor(self.caption, reset_camera=False, render=False)
         self.alarm = Alarm(plotter)
 
@@ -311,7 +311,7 @@ class MembraneView(QWidget):
         self._theme = theme
         self.plotter.set_background(theme.scene, top=theme.scene_top)
         self.sides.show_colour(theme.text)
-        self.caption.prop.color = theme.text
+        self.caption.prop.color, self.caption.prop.font_size = theme.text, grown(_LETTERS)
         self.alarm.show_theme(theme)
         self.surface.show_theme(theme)
         self.plotter.update()

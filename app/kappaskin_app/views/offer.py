@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QCursor
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtGui import QCursor, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QToolButton, QWidget
 
 from kappaskin_app.guard import guarded
@@ -22,7 +22,12 @@ class Offered:
 
 
 class Offer(QWidget):
-    """Shows words, and a button for each thing that is offered; hides once one is taken."""
+    """Shows words, and a button for each thing that is offered; hides once one is taken.
+
+    `offered` says that there are other buttons.
+    """
+
+    offered = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -60,6 +65,21 @@ class Offer(QWidget):
         if seconds:
             self._ending.start()
         self.show()
+        self._heighten()
+        self.offered.emit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._heighten()
+
+    def _heighten(self) -> None:
+        """Claim the height of all lines: a main window asks for no height that goes by width."""
+        self.setMinimumHeight(self.heightForWidth(self.width()))
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self._heighten()
 
     def _button(self, offered: Offered) -> QPushButton:
         button = QPushButton(offered.text, self)

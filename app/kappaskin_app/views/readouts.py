@@ -62,18 +62,19 @@ FIELDS = {
     "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
 }
 
-_DIGITS = 1.6  # that a unit of width takes at least
+_DIGITS = 1.14  # as wide as a character on average, the space between two fields with it
 _SMALL = 0.85  # of a number's letters are those of its name
 _WIDTHS = {
-    "contact": 14,
-    "rate": 10,
-    "lost": 12,
-    "force": 10,
-    "depth": 10,
-    "age": 8,
-    "error": 7,
-    "rms": 7,
+    "contact": 22,
+    "rate": 15,
+    "lost": 19,
+    "force": 14,
+    "depth": 15,
+    "age": 10,
+    "error": 11,
+    "rms": 8,
 }
+"""Characters of each, as many as it mostly has."""
 
 
 def _with_error(value: float, sd: float, digits: int, unit: str) -> str:
@@ -131,8 +132,8 @@ class Readouts(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(8, 2, 8, 2)
-        self._grid.setHorizontalSpacing(8)
+        self._grid.setContentsMargins(6, 2, 6, 2)
+        self._grid.setHorizontalSpacing(6)
         self._grid.setVerticalSpacing(0)
         self._names: list[QLabel] = []
         self._numbers: dict[str, Line] = {}

@@ -7,12 +7,13 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from kappaskin import Distances
-from kappaskin_app.theme import WANTED, Theme
+from kappaskin_app.theme import WANTED, Theme, grown
 from kappaskin_app.views.drawn import DrawnSkin
 from kappaskin_app.views.unlit import UNLIT, pixels
 
 Array = NDArray[np.float64]
 
+_LETTERS = 15  # px
 _STEPS = 48  # of the line along the skin
 
 
@@ -35,7 +36,6 @@ class Ruler:
         self.text: Any = pv.Text("")
         self.text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
         self.text.position = 0.015, 0.03  # of the picture, from its lower left corner
-        self.text.prop.font_size = 15
         plotter.add_actor(self.text, reset_camera=False, render=False)
         self.hide()
 
@@ -60,7 +60,7 @@ class Ruler:
             self.text.input = told(found)
 
     def show_theme(self, theme: Theme) -> None:
-        self.text.prop.color = theme.text
+        self.text.prop.color, self.text.prop.font_size = theme.text, grown(_LETTERS)
 
 
 def told(found: Distances) -> str:

@@ -5,9 +5,12 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
+from kappaskin_app.theme import grown
 from kappaskin_app.views.camera import Direction
 from kappaskin_app.views.drawn import MM, DrawnSkin
 from kappaskin_app.views.unlit import UNLIT, pixels
+
+_LETTERS = 15  # px
 
 
 class Sides:
@@ -20,7 +23,7 @@ class Sides:
         self._lines: Any = pv.PolyData(np.zeros((3, 3)), lines=[3, 1, 0, 2])
         self.actor = plotter.add_mesh(self._lines, line_width=pixels(plotter, 1), **UNLIT)
         self.actor.visibility = False
-        self.labels: list[Any] = [pv.Label(size=15) for _ in range(3)]
+        self.labels: list[Any] = [pv.Label() for _ in range(3)]
         for label in self.labels:
             plotter.add_actor(label, reset_camera=False, render=False)
 
@@ -46,4 +49,4 @@ class Sides:
     def show_colour(self, colour: str) -> None:
         self.actor.prop.color = colour
         for label in self.labels:
-            label.prop.color = colour
+            label.prop.color, label.size = colour, grown(_LETTERS)

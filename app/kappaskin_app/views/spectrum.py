@@ -10,7 +10,8 @@ from kappaskin_app.seeing import Spectrum
 from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.views.log_axis import LogAxis
 
-_LEFT, _BOTTOM, _TOP, _RIGHT = 46.0, 34.0, 10.0, 12.0
+_TOP, _RIGHT = 10.0, 12.0
+_AXIS = "Singular value (up) of each shape"
 _POWERS = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
 )
@@ -29,7 +30,6 @@ class SpectrumPlot(QWidget):
         self._axis = LogAxis(0.1, 1.0)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(240, 130)
         self.setAccessibleName("Singular values")
         self.setToolTip(
             "How much the elements read of each shape: the singular values of the curvature "
@@ -40,6 +40,10 @@ class SpectrumPlot(QWidget):
 
     def sizeHint(self) -> QSize:
         return QSize(420, 190)
+
+    def minimumSizeHint(self) -> QSize:
+        metrics = self.fontMetrics()
+        return QSize(metrics.horizontalAdvance(_AXIS) + 4, 8 * metrics.height())
 
     def show_spectrum(self, spectrum: Spectrum | None, number: int, empty: str) -> None:
         """Draw it, with the shape `number` ringed; without one, `empty` is written."""
@@ -57,7 +61,9 @@ class SpectrumPlot(QWidget):
 
     @property
     def _area(self) -> QRectF:
-        return QRectF(self.rect()).adjusted(_LEFT, _TOP, -_RIGHT, -_BOTTOM)
+        metrics = self.fontMetrics()
+        left, below = metrics.horizontalAdvance(_power(2e-10)) + 8, 2 * metrics.height() + 2
+        return QRectF(self.rect()).adjusted(left, _TOP, -_RIGHT, -below)
 
     def place_of(self, number: int) -> QPointF:
         """Where the value of the shape `number` is drawn; one without a value at the floor."""
@@ -119,15 +125,15 @@ class SpectrumPlot(QWidget):
             painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
             painter.setPen(QColor(theme.faint))
             top = min(y - line / 2, area.bottom() - line + 3)
-            box = QRectF(0, top, _LEFT - 5, line)
+            box = QRectF(0, top, area.left() - 5, line)
             painter.drawText(box, flags.AlignRight | flags.AlignVCenter, _power(value))
         for number in sorted({1, (count + 1) // 2, count}):
             x = self.place_of(number).x()
-            box = QRectF(x - 30, area.bottom() + 1, 60, line)
+            box = QRectF(x - 2 * line, area.bottom() + 1, 4 * line, line)
             painter.setPen(QColor(theme.faint))
             painter.drawText(box, flags.AlignCenter, f"{number}")
-        below = QRectF(area.left() - 20, self.height() - line - 1, area.width() + 30, line)
-        painter.drawText(below, flags.AlignCenter, "Singular value (up) of each shape")
+        below = QRectF(0, self.height() - line - 1, self.width(), line)
+        painter.drawText(below, flags.AlignCenter, _AXIS)
         painter.setPen(QPen(QColor(theme.line), 1))
         painter.drawRect(area)
 

@@ -14,6 +14,7 @@ from kappaskin_app.views.line import Line
 Array = NDArray[np.float64]
 
 _DOT = 1.8  # px, the radius of a point
+_LINES = 5  # of letters, as high as a map is at least
 _CROSS = 6.0  # px from the middle of a contact's cross to its ends
 
 
@@ -23,7 +24,6 @@ class _Map(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(80, 80)
         self._image: QImage | None = None
         self._contact, self._sides, self._faded = np.full(2, np.nan), (1.0, 1.0), False
         self.line = QColor("#888888")
@@ -31,6 +31,10 @@ class _Map(QWidget):
 
     def sizeHint(self) -> QSize:
         return QSize(180, 180)
+
+    def minimumSizeHint(self) -> QSize:
+        side = _LINES * self.fontMetrics().height()
+        return QSize(side, side)
 
     def show_map(self, rgb: Colours | None, contact: Array, sides: tuple[float, float]) -> None:
         """Colours (ny, nx, 3), None for nothing; the contact (2,) in m on a skin with `sides`."""

@@ -1,0 +1,116 @@
+"""With letters twice as large, in a window of the usual size, nothing is cut."""
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QComboBox,
+    QLabel,
+    QTableWidget,
+    QWidget,
+)
+
+from kappaskin_app.views.line import Line
+from kappaskin_app.views.readouts import Health
+from kappaskin_app.views.title import Title
+from kappaskin_app.window import MainWindow
+
+
+@pytest.fixture(scope="module")
+def shared(qapp: QApplication, until) -> Iterator[MainWindow]:
+    qapp.setStyle("Fusion")
+    window = MainWindow("sim:")
+    window.show()
+    until(lambda: bool(window.object.text()))
+    window.wishes.wish("letters", 200.0)
+    yield window
+    window.history.stack.setIndex(0)
+    window.close()
+    window.deleteLater()
+
+
+@pytest.fixture
+def large(shared: MainWindow) -> Iterator[MainWindow]:
+    """The one window of these tests."""
+    shared.show()
+    _settle()
+    yield shared
+    shared.hide()
+
+
+def _settle() -> None:
+    for _ in range(4):
+        QApplication.processEvents()
+
+
+def cut(inside: QWidget) -> list[str]:
+    """What is seen of `inside` and has less room than it needs."""
+    kinds = (QAbstractButton, QLabel, QComboBox)
+    seen = [one for kind in kinds for one in inside.findChildren(kind) if one.isVisible()]
+    texts = [one for one in seen if not (isinstance(one, QLabel) and one.wordWrap())]
+    return [
+        f"{type(one).__name__} {one.objectName()} {getattr(one, 'text', str)()}"
+        for one in texts
+        if isinstance(one, QComboBox) or one.text()
+        if one.width() < one.minimumSizeHint().width() - 1
+        or one.height() < one.fontMetrics().height() - 1
+    ]
+
+
+def test_the_header_is_read_whole(large: MainWindow) -> None:
+    large.readouts.show_health(Health(501.0, 42.0, 0.0123, 0.0004, 1234, 0, 5678))
+    lines = [line for line in large.readouts.findChildren(Line) if not line.whole]
+    assert [line.text() for line in lines] == []
+
+
+def test_titles_of_docks_have_those_letters(large: MainWindow) -> None:
+    size = QApplication.font().pointSizeF()
+    titles = [dock.findChild(Title).words for dock in large.docks.by_name().values()]
+    assert {title.font().pointSizeF() for title in titles} == {size}
+    seen = [title.height() for title in titles if title.isVisible()]
+    assert seen
+    assert min(seen) >= large.fontMetrics().height()
+
+
+@pytest.mark.parametrize(
+    "name", ["cost", "stability", "scene", "health", "numbers", "log", "compare", "design"]
+)
+def test_a_dock_below_shows_all_or_scrolls_it(large: MainWindow, name: str) -> None:
+    large.docks.reveal(name)
+    _settle()
+    wrong = cut(large.docks[name])
+    rows = [
+        (table.objectName(), table.rowHeight(0))
+        for table in large.docks[name].findChildren(QTableWidget)
+        if table.isVisible() and table.rowCount()
+        if table.rowHeight(0) < table.fontMetrics().height()
+    ]
+    size = large.width(), large.height()
+    large.docks[name].hide()
+    _settle()
+    assert (wrong, rows) == ([], [])
+    assert size == (1280, 800)
+
+
+def test_ways_to_begin_stand_whole_above_a_dock(large: MainWindow) -> None:
+    large.docks.reveal("design")
+    large.beginning.offer()
+    _settle()
+    wrong, size = cut(large.offer), (large.width(), large.height())
+    low = max(button.geometry().bottom() for button in large.offer.buttons)
+    inside = low < large.offer.height()
+    large.offer.hide()
+    large.docks["design"].hide()
+    assert (wrong, inside, size) == ([], True, (1280, 800))
+
+
+def test_the_pages_beside_the_skin_show_all_or_scroll_it(large: MainWindow) -> None:
+    wrong = []
+    for page in range(large.panels.count()):
+        large.panels.setCurrentIndex(page)
+        _settle()
+        wrong += cut(large.panels.widget(page))
+    large.panels.setCurrentIndex(0)
+    assert wrong == []
