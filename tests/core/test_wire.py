@@ -302,7 +302,7 @@ WRONG_CHECK[-4:] = struct.pack("<I", zlib.crc32(WRONG_CHECK[:-4]))
 )
 def test_what_is_thrown_away_is_counted_under_its_reason(message: bytes, reason: str) -> None:
     decoder = Decoder()
-    assert [m.sequence for m in decoder.feed(message + scan(0))] == [0]
+    assert [m.sequence for m in decoder.feed(scan(0) + message + scan(1))] == [0, 1]
     assert balanced(decoder).discarded == ((reason, len(message)),)
 
 
@@ -365,6 +365,22 @@ def test_bytes_never_fed_are_counted_as_overrun() -> None:
     seen = decoder.accounting(overrun=10)
     assert seen.discarded == (("overrun", 10),)
     assert seen.bytes_in == seen.bytes_good + seen.bytes_discarded == len(scan(0)) + 10
+
+
+def test_what_waits_for_more_is_held_as_it_came() -> None:
+    decoder, rest = Decoder(), scan(1)[:30]
+    for byte in scan(0) + rest:
+        decoder.feed(bytes([byte]))
+    assert decoder.held == rest
+
+
+@pytest.mark.parametrize(
+    ("thrown", "share"),
+    [(900_000, "90 %"), (3_060, "0.31 %"), (10, "0.001 %"), (9, "under 0.001 %")],
+)
+def test_the_share_that_was_thrown_away_is_told_in_two_digits(thrown: int, share: str) -> None:
+    seen = Accounting(bytes_in=1_000_000, discarded=(("garbage", thrown), ("checksum", 0)))
+    assert f"; {share} of bytes discarded: garbage {thrown:,}" in seen.words
 
 
 # Sequence numbers
@@ -433,6 +449,14 @@ def test_a_device_that_comes_back_goes_on_or_begins_anew(first, same, lost, rest
     sequence.resume(same)
     assert (sequence.lost, sequence.restarts) == (lost, restarts)
     assert sequence.span == sequence.accepted + sequence.lost
+
+
+def test_nothing_is_said_of_a_line_that_was_not_interrupted_or_is_silent_since() -> None:
+    sequence, _ = taken([5000, 5001])
+    sequence.resume(False)
+    sequence.interrupt()
+    sequence.resume(False)
+    assert (sequence.lost, sequence.restarts, sequence.span) == (0, 0, 2)
 
 
 def test_a_frame_too_late_to_tell_from_a_restart_starts_anew() -> None:
