@@ -1,6 +1,7 @@
 """The wire format: bytes cut and spoiled anywhere, and every one of them accounted for."""
 
 import struct
+import weakref
 import zlib
 from itertools import pairwise
 
@@ -339,6 +340,17 @@ def test_channels_beyond_16_bits_do_not_wrap_to_low_ones() -> None:
     (got,) = Decoder().feed(runs((65535, 3), (4, 0), counts=3))
     assert isinstance(got, Samples)
     assert got.channels.tolist() == [65535, 65536, 65537]
+
+
+def test_of_many_scan_lists_only_the_last_are_remembered() -> None:
+    decoder, lists = Decoder(), []
+    for channel in range(300):
+        message = encode_samples(channel, 0.0, np.array([channel]), np.zeros(1, np.int32), 2)
+        ((_, _, channels, _),) = decoder.feed(message)
+        assert channels.tolist() == [channel]
+        lists.append(weakref.ref(channels))
+    del channels
+    assert sum(one() is not None for one in lists) <= 64
 
 
 def test_garbage_without_an_end_is_not_kept() -> None:
