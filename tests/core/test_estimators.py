@@ -119,6 +119,15 @@ def test_the_bands_cover_the_surface(method):
 
 
 @every_frame_alone
+def test_what_remembers_nothing_follows_by_what_is_held(method):
+    fit, held = made(method), noisy()
+
+    answer = fit.follow(np.full((3, 100), np.nan), np.full((3, 100), np.nan), held)
+
+    np.testing.assert_array_equal(answer.coefficients, fit(held).coefficients)
+
+
+@every_frame_alone
 def test_a_batch_is_answered_frame_by_frame(method):
     K = noisy(frames=6)
     K[2, :, 40:43] = np.nan

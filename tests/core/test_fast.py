@@ -472,6 +472,15 @@ def test_elements_that_stand_on_no_grid_are_refused(positions):
         Fast(SineBasis(LONG, 1, 1), layout)
 
 
+def test_half_of_a_grid_s_elements_are_enough_to_stand_on_it():
+    half = REGULAR.positions[np.r_[0:30, 30:80:5]]  # three rows, and the first column
+
+    Fast(SineBasis(LONG, 1, 1), SensorLayout.scattered(LONG, half))
+
+    with pytest.raises(Refusal, match="regular grid"):
+        Fast(SineBasis(LONG, 1, 1), SensorLayout.scattered(LONG, half[:-1]))
+
+
 def test_a_layout_is_not_taken_at_its_word():
     untrue = replace(REGULAR, positions=REGULAR.positions * 0.9)
 

@@ -19,7 +19,7 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.scene import contact_of, scaled_to
+from kappaskin.scene import TABLE_1_NOISE, contact_of, scaled_to
 
 PATCH = Patch(0.1, 0.1)
 
@@ -68,6 +68,7 @@ def test_table_1s_noise_is_even_between_plus_and_minus_0_40():
     drawn = noise.start((100_000,), np.random.default_rng(0))(np.zeros(100_000), 0.0)
 
     assert 0.3999 < np.abs(drawn).max() <= 0.40 + 1e-12
+    assert drawn.std() == pytest.approx(TABLE_1_NOISE, rel=1e-2)
 
 
 def test_without_a_name_the_default_scene_is_loaded():

@@ -1,6 +1,7 @@
 """The wire format: bytes cut and spoiled anywhere, and every one of them accounted for."""
 
 import struct
+import weakref
 import zlib
 from itertools import pairwise
 
@@ -302,7 +303,7 @@ WRONG_CHECK[-4:] = struct.pack("<I", zlib.crc32(WRONG_CHECK[:-4]))
 )
 def test_what_is_thrown_away_is_counted_under_its_reason(message: bytes, reason: str) -> None:
     decoder = Decoder()
-    assert [m.sequence for m in decoder.feed(message + scan(0))] == [0]
+    assert [m.sequence for m in decoder.feed(scan(0) + message + scan(1))] == [0, 1]
     assert balanced(decoder).discarded == ((reason, len(message)),)
 
 
@@ -341,6 +342,17 @@ def test_channels_beyond_16_bits_do_not_wrap_to_low_ones() -> None:
     assert got.channels.tolist() == [65535, 65536, 65537]
 
 
+def test_of_many_scan_lists_only_the_last_are_remembered() -> None:
+    decoder, lists = Decoder(), []
+    for channel in range(300):
+        message = encode_samples(channel, 0.0, np.array([channel]), np.zeros(1, np.int32), 2)
+        ((_, _, channels, _),) = decoder.feed(message)
+        assert channels.tolist() == [channel]
+        lists.append(weakref.ref(channels))
+    del channels
+    assert sum(one() is not None for one in lists) <= 64
+
+
 def test_garbage_without_an_end_is_not_kept() -> None:
     decoder = Decoder()
     for _ in range(300):
@@ -365,6 +377,22 @@ def test_bytes_never_fed_are_counted_as_overrun() -> None:
     seen = decoder.accounting(overrun=10)
     assert seen.discarded == (("overrun", 10),)
     assert seen.bytes_in == seen.bytes_good + seen.bytes_discarded == len(scan(0)) + 10
+
+
+def test_what_waits_for_more_is_held_as_it_came() -> None:
+    decoder, rest = Decoder(), scan(1)[:30]
+    for byte in scan(0) + rest:
+        decoder.feed(bytes([byte]))
+    assert decoder.held == rest
+
+
+@pytest.mark.parametrize(
+    ("thrown", "share"),
+    [(900_000, "90 %"), (3_060, "0.31 %"), (10, "0.001 %"), (9, "under 0.001 %")],
+)
+def test_the_share_that_was_thrown_away_is_told_in_two_digits(thrown: int, share: str) -> None:
+    seen = Accounting(bytes_in=1_000_000, discarded=(("garbage", thrown), ("checksum", 0)))
+    assert f"; {share} of bytes discarded: garbage {thrown:,}" in seen.words
 
 
 # Sequence numbers
@@ -433,6 +461,14 @@ def test_a_device_that_comes_back_goes_on_or_begins_anew(first, same, lost, rest
     sequence.resume(same)
     assert (sequence.lost, sequence.restarts) == (lost, restarts)
     assert sequence.span == sequence.accepted + sequence.lost
+
+
+def test_nothing_is_said_of_a_line_that_was_not_interrupted_or_is_silent_since() -> None:
+    sequence, _ = taken([5000, 5001])
+    sequence.resume(False)
+    sequence.interrupt()
+    sequence.resume(False)
+    assert (sequence.lost, sequence.restarts, sequence.span) == (0, 0, 2)
 
 
 def test_a_frame_too_late_to_tell_from_a_restart_starts_anew() -> None:
