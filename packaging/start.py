@@ -158,9 +158,7 @@ def bundle(arguments: list[str], shown: dict[str, str]) -> int:
     return run([tool("python"), str(ROOT / "packaging/bundle/build.py"), *arguments], shown)
 
 
-TASKS = {
-    task.__name__: task for task in (app, test, fast, cover, bench, fuzz, core, bundle)
-}
+TASKS = {task.__name__: task for task in (app, test, fast, cover, bench, fuzz, core, bundle)}
 
 
 # --- the setup
