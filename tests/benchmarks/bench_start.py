@@ -6,8 +6,6 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
-
 _FIRST = Path(__file__).with_name("first_picture.py")
 _BARE = Path(__file__).with_name("bare_window.py")
 
@@ -18,21 +16,14 @@ def _import(statement: str) -> float:
     return time.perf_counter() - start
 
 
-# Nothing else is loaded by the first; the second are the names of the README's example.
-@pytest.mark.parametrize(
-    "ours",
-    [
-        "import kappaskin",
-        "from kappaskin import LeastSquares, Patch, Plate, PointLoad, SensorLayout, SineBasis",
-        "from kappaskin import Engine",
-    ],
-)
-def test_importing_the_library_costs_little_more_than_numpy_and_scipy(figure, ours) -> None:
-    theirs = "import numpy, scipy.linalg, scipy.fft"
-    taken = [(_import(ours), _import(theirs)) for _ in range(9)]
-    ratio = statistics.median(own for own, _ in taken) / statistics.median(it for _, it in taken)
-    figure(f"{ours}: {ratio:.2f} times {theirs}")
-    assert ratio <= (1.5 if "Engine" not in ours else 2.0)
+def test_importing_the_library_costs_little_more_than_numpy_and_scipy(figure) -> None:
+    ours, theirs = [], []
+    for _ in range(9):
+        theirs.append(_import("import numpy, scipy.linalg, scipy.fft"))
+        ours.append(_import("import kappaskin"))
+    ratio = statistics.median(ours) / statistics.median(theirs)
+    figure(f"import kappaskin: {ratio:.2f} times import numpy, scipy.linalg, scipy.fft")
+    assert ratio <= 1.5
 
 
 def _drawn(script: Path) -> tuple[float, float]:
@@ -41,6 +32,24 @@ def _drawn(script: Path) -> tuple[float, float]:
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     passed, spent = map(float, done.stdout.split())
     return passed, spent
+
+
+# A name brings the rooms that it needs: the names of the README's example, and the live process.
+_BEGUN = {
+    "from kappaskin import LeastSquares, Patch, Plate, PointLoad, SensorLayout, SineBasis": 1.5,
+    "from kappaskin import Engine": 2.0,
+}
+
+
+def test_the_names_that_one_begins_with_cost_little_more_than_numpy_and_scipy(figure) -> None:
+    for names, most in _BEGUN.items():
+        ours, theirs = [], []
+        for _ in range(9):
+            theirs.append(_import("import numpy, scipy.linalg, scipy.fft"))
+            ours.append(_import(names))
+        taken = statistics.median(ours) / statistics.median(theirs)
+        figure(f"{names}: {taken:.2f} times import numpy, scipy.linalg, scipy.fft")
+        assert taken <= most
 
 
 def test_the_first_picture_is_there_within_three_seconds(figure) -> None:
