@@ -177,6 +177,7 @@ def _start() -> str:
 
 
 def _alike(said: str, printed: str) -> bool:
+    said = re.sub(r"^\.\.\.\n", "...", said, flags=re.MULTILINE)  # any lines, or none
     how = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     return doctest.OutputChecker().check_output(said, printed, how)
 
