@@ -34,6 +34,7 @@ class Docks:
     def __init__(self, window: QMainWindow) -> None:
         self._window = window
         self._docks: dict[str, Dock] = {}
+        self._shown: dict[str, QWidget] = {}
         self._keys: dict[str, str] = {}
         self._above: dict[str, str] = {}
 
@@ -42,8 +43,7 @@ class Docks:
 
     def widget(self, name: str) -> QWidget:
         """What a dock shows, without what scrolls it where there is no room for all of it."""
-        dock, shown = self[name], self[name].widget()
-        return shown.widget() if isinstance(shown, QScrollArea) and dock in self.below else shown
+        return self._shown[name]
 
     def by_name(self) -> dict[str, QDockWidget]:
         return {**self._docks}
@@ -56,6 +56,7 @@ class Docks:
     def put_beside(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
         """Show a widget in a column beside the skin."""
         dock = self._docks[name] = Dock(title, self._window)
+        self._shown[name] = widget
         dock.setObjectName(name)
         dock.setToolTip(DOCKS.get(name, ""))  # also of what in it explains nothing itself
         dock.setTitleBarWidget(Title(dock))
@@ -71,6 +72,7 @@ class Docks:
         area.setMinimumHeight(_LEAST)
         area.setWidget(widget)
         self.put_beside(name, title, area, _BELOW)
+        self._shown[name] = widget
         self._keys[name] = key
         dock = self[name]
         if before:

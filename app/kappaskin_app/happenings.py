@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QIcon
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -41,6 +41,7 @@ class Happenings(QDialog):
         self.copy_button.setToolTip("Copy the list as text.")
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         for button in buttons.buttons():
+            button.setIcon(QIcon())  # no other button has one
             button.setToolTip("Put this away (Esc); F4 brings it back.")
         buttons.addButton(self.copy_button, QDialogButtonBox.ButtonRole.ActionRole)
         buttons.rejected.connect(self.reject)

@@ -237,7 +237,9 @@ def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: Ma
     for name, shown in (("Study", window.cost), ("Calibrate", window.health), ("Live", None)):
         window.layouts.choose(name)
         seen = [dock for dock in window.docks.below if not dock.isHidden()]
-        assert [dock.widget() for dock in seen] == ([shown] if shown else [])
+        assert [window.docks.widget(dock.objectName()) for dock in seen] == (
+            [shown] if shown else []
+        )
     window.layouts.choose("Teach")
     assert window.lesson.isVisible()
     window.layouts.choose("Presenter")

@@ -137,8 +137,9 @@ def _part(table: Mapping[str, Any], key: str, kind: type[_Some], otherwise: _Som
 
 def _letters(window: Mapping[str, Any]) -> float:
     how, percent = ask_of("letters"), window.get("letters", 100.0)
-    known = type(percent) in (int, float) and isinstance(how, Range)
-    if not (known and how.least <= percent <= how.most):
+    if type(percent) not in (int, float) or not (
+        isinstance(how, Range) and how.least <= percent <= how.most
+    ):
         raise Refusal(f"expected letters from 80 to 200 %, got {percent!r:.60}")
     return float(percent)
 
