@@ -44,6 +44,8 @@ from kappaskin.recording.reading import Recording
 from kappaskin.sources.simulated import SimulatedSource
 from kappaskin.verify import Verdict, verifying
 
+pytestmark = pytest.mark.slow
+
 RATE = 100.0
 SMALL = Setup(Ni=5, Nj=4, nx=9, ny=7)
 
