@@ -16,6 +16,7 @@ import psutil
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
+from kappaskin_app import guard
 from kappaskin_app.window import MainWindow
 
 SETTLE = 70.0  # s: by then each change was made four times, and each panel shown
@@ -27,7 +28,7 @@ _CHANGES: tuple[dict[str, Any], ...] = (
     {"colour_by": "first"},
     {"maps": ("xx", "mean", "residual_xy")},
     {"show_band": True, "show_directions": True},
-    {"load_x": 0.03},
+    {"x": 0.03},
     {"method": "least-squares", "functions_x": 8},
     {"theme": "light"},
     {"maps": ("xx", "yy", "xy"), "colour_by": "displacement"},
@@ -90,10 +91,12 @@ def soaked(
     for every, going in ((_EVERY, _changing(window)), (_FILE, _recording(window, folder))):
         next(going)
         steps.append((every, lambda going=going: next(going)))
+    failures: list[str] = []
+    guard.on_failure(failures.append)  # where a slot that raised would be heard of no more
     timers = []
     for every, step in steps:
         timers.append(QTimer(interval=round(1e3 * every)))
-        timers[-1].timeout.connect(step)
+        timers[-1].timeout.connect(guard.guarded(step))
         timers[-1].start()
     QTimer.singleShot(round((SETTLE + seconds) * 1e3), application.quit)
     application.exec()
@@ -101,6 +104,8 @@ def soaked(
         timer.stop()
     lost = window.session.status.accounting.lost
     window.close()
+    if failures:
+        raise RuntimeError(f"expected nothing to fail, got {len(failures)} times {failures[0]!r}")
     at, *held = np.array(seen).T
     lasted = at[-1] - at[0]
     window_mb, _, _, engine_mb, _, _ = (float(np.polyfit(at, each, 1)[0]) for each in held)

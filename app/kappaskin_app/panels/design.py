@@ -203,7 +203,7 @@ class DesignPanel(QWidget):
             f"{_told(found.rms)} RMS over the skin, {_told(found.worst)} at worst."
         ]
         if check is not None:
-            ratio = float(np.sqrt(np.nanmean(check.sd**2))) / found.rms
+            ratio = check.rms_sd / found.rms
             words.append(
                 f"Simulated: {ratio:.3f} times as predicted. With what the functions cannot follow "
                 f"of a point in the middle, {_told(check.rms)} RMS."

@@ -18,6 +18,7 @@ from kappaskin import (
     SensorLayout,
     check,
     edges_of,
+    predicted_sd,
     prospect,
 )
 
@@ -45,7 +46,7 @@ def test_a_simulation_varies_by_as_much_as_is_predicted(patch, by):
     seen = told.sd > 0.2 * told.worst
     # Of 2000 frames a standard deviation is known to 1.6 %.
     np.testing.assert_allclose(last.sd[seen] / told.sd[seen], 1, atol=0.08)
-    assert np.sqrt(np.nanmean(last.sd**2)) == pytest.approx(told.rms, rel=0.03)
+    assert last.rms_sd == pytest.approx(told.rms, rel=0.03)
     assert last.frames == 2000
 
 
@@ -54,6 +55,19 @@ def test_the_error_bar_is_proportional_to_noise_and_to_one_over_the_root_of_elem
 
     assert prospect(designed(noise=0.6)).rms == pytest.approx(2 * once.rms)
     assert prospect(designed(m=16)).rms == pytest.approx(once.rms / 2, rel=0.02)
+
+
+@pytest.mark.parametrize(("patch", "off"), [(FLAT, 1e-9), (DISK, 2e-3)], ids=str)
+def test_the_rms_is_that_over_the_area(patch, off):
+    design = designed(patch)
+    estimator = design.estimator()
+    points, weights = estimator.basis.quadrature()
+
+    variance = predicted_sd(estimator, 0.3, points) ** 2
+
+    assert prospect(design).rms == pytest.approx(
+        math.sqrt(np.average(variance, weights=weights)), off
+    )
 
 
 def test_the_rate_is_what_three_conversions_of_each_element_leave():

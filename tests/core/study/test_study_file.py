@@ -59,6 +59,35 @@ def test_values_of_one_table_go_together(study_of):
     assert [tuple(point.values.values()) for point in points] == [([6, 6], 0.04), ([9, 9], 0.05)]
 
 
+@pytest.mark.parametrize(("place", "values"), [("seed", [1, 2]), ("rate", [10.0, 20.0])])
+def test_what_stands_in_no_table_is_varied_too(study_of, place, values):
+    points = list(study_of(f"[[vary]]\n{place} = {values}").points())
+
+    assert [json.loads(point.document)[place] for point in points] == values
+
+
+DRAW = '[[draw]]\nwhat = "{}"\nkind = "whole"\nlow = 1\nhigh = 7\n'
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        '[[vary]]\n"touch[1].x" = [0.04]\n' + DRAW.format("touch[1].x"),
+        DRAW.format("reference") + DRAW.format("reference"),
+        '[[vary]]\n"effects.uniform-noise" = [{ rms = 0.1 }]\n"effects.uniform-noise.rms" = [0.2]',
+    ],
+)
+def test_what_would_be_said_twice_is_refused(study_of, more):
+    assert "expected to vary or draw each thing once, got" in refused(study_of, more)
+
+
+@pytest.mark.parametrize("what", ["seed", "measure.frames", "draw[1].low", "title", "stop.most"])
+def test_a_draw_that_would_change_nothing_is_refused(study_of, what):
+    said = refused(study_of, DRAW.format(what))
+
+    assert said.startswith("small.toml, line 34: draw[1].what: expected to vary or draw what is")
+
+
 def test_a_study_that_varies_nothing_is_one_point(study_of):
     assert len(list(study_of().points())) == 1
 
@@ -70,6 +99,7 @@ def test_a_study_that_varies_nothing_is_one_point(study_of):
         ('[[vary]]\n"elemants.grid" = [[6, 6]]', ["line 34", "did you mean elements?"]),
         ('[[vary]]\n"touch[2].x" = [0.04]', ["line 34", "one of 1 tables", "number 2"]),
         ('[[vary]]\n"touch.x" = [0.04]', ["line 34", "touch[1]"]),
+        ('[[vary]]\n"touch[00].x" = [0.04]', ["line 34", "expected a place in this file"]),
         ('[[vary]]\n"elements.grid" = []', ["vary[1]", "got none"]),
         ("[[vary]]\n", ["vary[1]", "got none"]),
         ('[[vary]]\n"elements.grid" = 3', ["line 34", "expected a list, got 3"]),

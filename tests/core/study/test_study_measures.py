@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kappaskin import Refusal
+from kappaskin import METHODS, Refusal
 from kappaskin.studies.design import Task, run
 from kappaskin.studies.design.task import version
 
@@ -73,6 +73,40 @@ def test_frames_in_which_nothing_presses_tell_no_contact(study_of):
     assert found["at-load"].count == 3
 
 
+def test_loads_that_cancel_have_no_share_of_a_force(study_of):
+    pushed = POINT.replace("0.05", "0.02").replace("0.1", "-0.1")
+
+    found = measured(study_of("", (POINT, f"{POINT}\n[[touch]]\n{pushed}"), measuring("force")))
+
+    assert found["force"].count == 0
+
+
+def test_bands_hold_all_of_a_shape_that_is_exact(study_of):
+    resting = POINT, POINT.replace("force = 0.1", "force = 0.0")
+
+    assert measured(study_of("", resting, QUIET, measuring("covered")))["covered"].mean == 1.0
+
+
+def test_without_spare_readings_there_are_no_bands(study_of):
+    strip = "size = [0.1, 0.1]", 'shape = "strip"\nsize = [0.1, 0.1]'
+    six = ("[6, 6]", "[6, 1]"), ("functions = [4, 4]", "functions = [6, 1]")
+
+    assert measured(study_of("", strip, *six, measuring("covered")))["covered"].count == 0
+
+
+def test_noise_that_is_left_out_is_not_predicted(study_of):
+    off = 'choose = "linear"', 'choose = "linear"\noff = ["uniform-noise"]'
+
+    assert measured(study_of("", off, measuring("predicted")))["predicted"].mean == 0.0
+
+
+@pytest.mark.parametrize("method", ["bayes", "tracking"])
+def test_of_a_prior_nothing_is_predicted(study_of, method):
+    found = measured(study_of("", ("[fit]", f'[fit]\nmethod = "{method}"'), measuring("predicted")))
+
+    assert found["predicted"].count == 0
+
+
 def test_a_fit_takes_time(study_of):
     assert 1e-6 < measured(study_of("", measuring("time")))["time"].mean < 1.0
 
@@ -124,3 +158,12 @@ def test_a_method_that_remembers_begins_every_block_anew(study_of):
     measured(study, block=1)
 
     assert measured(study) == first
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nothing_changes_by_what_is_measured_before(study_of, method):
+    def rms(*before):
+        names = measuring(*before, "rms")
+        return measured(study_of("", ("[fit]", f'[fit]\nmethod = "{method}"'), names))["rms"]
+
+    assert rms("contact", "time") == rms("time") == rms()

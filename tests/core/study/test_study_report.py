@@ -95,6 +95,13 @@ def test_the_csv_has_all_digits_of_every_point(folder):
     assert [row["blocks failed"] for row in rows] == ["3", "3", "0", "0"]
 
 
+def test_blocks_that_failed_have_no_frames(folder):
+    page = (folder / "report.html").read_text("utf-8")
+
+    assert page.count("<td>0</td></tr>") == 2
+    assert page.count("<td>20</td></tr>") == 2
+
+
 def test_figures_stand_beside_the_page(folder):
     svg = (folder / "rms.svg").read_text("utf-8")
 
@@ -107,7 +114,7 @@ def test_what_is_not_computed_yet_is_said_to_be_missing(study_of, tmp_path):
 
     told = table_text(study, known_of(study, Folder.opened(tmp_path, study)))
 
-    assert told.count("0 of 2 blocks are computed") == 4
+    assert told.count("0 of 2 blocks are computed by this version") == 4
     assert "6 x 6  0.1         -       0" in told
 
 
@@ -132,7 +139,7 @@ def test_workers_and_a_scheduler_are_one_or_the_other(run):
         (1.0e-3, 2.0e-3, "1.0 ± 2.0"),
         (123.456e-3, 34.5e-3, "123 ± 34"),
         (1e-3, 1e-16, "1"),
-        (1e-3, float("nan"), "1"),
+        (1e-3, float("nan"), "1 ± ?"),
         (0.0, 0.0, "0"),
     ],
 )

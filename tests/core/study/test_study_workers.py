@@ -14,15 +14,22 @@ import pytest
 from kappaskin import Refusal
 from kappaskin.studies.design import Folder, cluster, processes, run, run_study
 from kappaskin.studies.design.task import Task, version
+from kappaskin.studies.design.workers import kind
 
 pytestmark = pytest.mark.slow
 
 NEEDS_DASK = pytest.mark.skipif(find_spec("distributed") is None, reason="Dask is not installed")
+ALIKE = f"{version()}, threads of BLAS 1"
 LONGER = "least = 2\nmost = 4", "least = 30\nmost = 30"
 
 
-def results(known):
-    return [one.results for one in known]
+def results(study, path):
+    """What the folder at `path` holds of each block."""
+    folder = Folder(path)
+    return [
+        {block: folder.result(Task(point.document, block, version())) for block in range(30)}
+        for point in study.points()
+    ]
 
 
 def here(study):
@@ -54,10 +61,10 @@ def test_processes_give_the_numbers_of_this_one_though_one_is_killed(study_of, t
     study, kill = study_of("", LONGER), Killer(newest_child)
 
     with processes(2) as workers:
-        found = run_study(study, Folder.opened(tmp_path, study), workers, kill)
+        run_study(study, Folder.opened(tmp_path, study), workers, kill)
 
     assert kill.killed
-    assert results(found) == here(study)
+    assert results(study, tmp_path) == here(study)
 
 
 @pytest.mark.parametrize("count", [0, 100_000])
@@ -103,7 +110,7 @@ def test_a_cluster_gives_the_numbers_of_this_process_though_a_worker_is_killed(
     while True:
         try:
             with cluster(address) as workers:
-                found = run_study(study, Folder.opened(tmp_path / "out", study), workers, kill)
+                run_study(study, Folder.opened(tmp_path / "out", study), workers, kill)
             break
         except Refusal:  # not all are up yet
             if time.monotonic() > deadline:
@@ -111,7 +118,7 @@ def test_a_cluster_gives_the_numbers_of_this_process_though_a_worker_is_killed(
 
     assert kill.killed
     assert second.poll() is None
-    assert results(found) == here(study)
+    assert results(study, tmp_path / "out") == here(study)
 
 
 @pytest.mark.skipif(find_spec("distributed") is not None, reason="Dask is installed")
@@ -132,6 +139,13 @@ def test_a_scheduler_that_is_not_there_is_refused_at_once(address):
         pass
 
     assert time.monotonic() - began < 5
+
+
+def test_a_worker_tells_the_threads_that_its_bits_depend_on(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+
+    assert kind() == ALIKE.replace("BLAS 1", "BLAS 4")
 
 
 class Told:
@@ -158,7 +172,8 @@ class Told:
     ("versions", "told"),
     [
         ({}, "expected workers, got none in 5 s; start some by dask worker"),
-        ({"a": version(), "b": "kappaskin 9"}, "got 1 of 2 with another, b with kappaskin 9"),
+        ({"a": ALIKE, "b": "kappaskin 9"}, "got 1 of 2 with another, b with kappaskin 9"),
+        ({"a": ALIKE.replace("BLAS 1", "BLAS 2")}, "start them with OPENBLAS_NUM_THREADS=1"),
     ],
 )
 def test_workers_that_would_give_other_numbers_are_refused(monkeypatch, versions, told):

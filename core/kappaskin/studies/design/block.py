@@ -11,6 +11,7 @@ from kappaskin.bases import Basis
 from kappaskin.effects import Hysteresis
 from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator, Fit
+from kappaskin.fit.fit import in_time
 from kappaskin.frames import Array, Touch, Truth
 from kappaskin.mechanics import Plate
 from kappaskin.scene import Scene, kept_of
@@ -59,8 +60,14 @@ class Block:
         return self.simulator.scene
 
     @cached_property
+    def fits(self) -> list[Fit]:
+        """The fit of each frame, by an estimator that may remember those before."""
+        return [self.estimator(K) for K in self.curvature]
+
+    @cached_property
     def fit(self) -> Fit:
-        return self.estimator(self.curvature)
+        """The fit of all frames, each of which is taken in once by what remembers."""
+        return in_time(self.fits) if self.estimator.remembers else self.estimator(self.curvature)
 
     @cached_property
     def coefficients(self) -> Array:
@@ -97,13 +104,13 @@ class Block:
     def touches(self) -> list[Touch]:
         """The contact that each frame tells."""
         find = _contact_finder(self.estimator, self.scene.plate, self.scene.edge)
-        return [find(K, self.estimator(K)) for K in self.curvature]
+        return [find(K, fit) for K, fit in zip(self.curvature, self.fits, strict=True)]
 
     def objects(self) -> Generator[ContactObject]:
         """The object that each frame tells."""
         find = _object_finder(self.estimator, self.scene.plate, self.scene.edge)
-        for K, touch in zip(self.curvature, self.touches, strict=True):
-            yield find(K, float(self.estimator(K).noise), touch)
+        for K, fit, touch in zip(self.curvature, self.fits, self.touches, strict=True):
+            yield find(K, float(fit.noise), touch)
 
 
 def _times(scene: Scene, frames: int) -> Array:

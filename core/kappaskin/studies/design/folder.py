@@ -35,8 +35,8 @@ class Folder:
                     f"{path}: expected an empty folder or one of the study {study.name}, got that "
                     f"of {owner}; choose another by --out"
                 )
-            folder._write(path / _TEXT, study.text)
             folder._write(path / _ABOUT, json.dumps({"study": study.name}))
+            folder._write(path / _TEXT, study.text)
         except OSError as error:
             raise Refusal(
                 f"{path}: expected a folder that can be written to ({error}); choose another"

@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal
 from kappaskin.fit import Estimator
 from kappaskin.frames import Array
 from kappaskin.placement import predicted_sd
-from kappaskin.scene import Indenter, Scene
+from kappaskin.scene import Indenter, Scene, kept_of
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.block import Block
 
@@ -27,13 +27,15 @@ class Measure:
     """Something to measure: values (T,) of a block's frames, NaN where a frame tells none.
 
     `title` is what it is called, `unit` what it is shown in, `scale` how many of those the value's
-    own unit has. Where there are no frames to average over, it is one value.
+    own unit has. Where there are no frames to average over, it is one value. A `share` is one of
+    something, from nothing to all.
     """
 
     title: str
     unit: str
     scale: float
     of: Callable[[Block], Array]
+    share: bool = False
 
 
 def _at_load(block: Block) -> Array:
@@ -50,7 +52,8 @@ def _contact(block: Block) -> Array:
 def _force(block: Block) -> Array:
     """As a share of the largest force in the block."""
     found, true = np.array([touch.force for touch in block.touches]), block.forces()
-    return np.abs(found - true) / np.abs(true).max()
+    largest = np.abs(true).max()
+    return np.abs(found - true) / (largest if largest else np.nan)
 
 
 def _found(block: Block) -> Array:
@@ -79,12 +82,13 @@ def _covered(block: Block) -> Array:
     points = points[patch.contains(points)]
     reach = scipy.special.stdtrit(np.maximum(block.fit.spare, 1), 0.975)
     bands = np.reshape(reach, (-1, 1)) * block.fit.surface_sd(points)
-    return np.mean(np.abs(block.off(points)) < bands, axis=1)
+    held = np.mean(np.abs(block.off(points)) <= bands, axis=1)
+    return np.where(np.isnan(block.fit.noise), np.nan, held)  # which makes no bands
 
 
 def noise_of(scene: Scene) -> float:
-    """The standard deviation in 1/m of all noise that differs from reading to reading."""
-    each = [getattr(effect, "rms", 0.0) for effect in scene.reading_effects]
+    """The standard deviation in 1/m of all noise there is that differs from reading to reading."""
+    each = [getattr(effect, "rms", 0.0) for effect in kept_of(scene)]
     return math.hypot(*each)
 
 
@@ -95,6 +99,8 @@ def _predicted_rms(estimator: Estimator, noise: float) -> float:
 
 
 def _predicted(block: Block) -> Array:
+    if block.estimator.has_prior:  # which counts on other skins than one at rest
+        return np.array([np.nan])
     return np.array([_predicted_rms(block.estimator, noise_of(block.scene))])
 
 
@@ -103,7 +109,7 @@ def _rate(block: Block) -> Array:
 
 
 def _time(block: Block) -> Array:
-    taken = list[float]()
+    taken, _ = list[float](), block.fit  # what remembers takes the frames in before
     for K in block.curvature[np.arange(_CALLS) % len(block.curvature)]:
         begun = time.perf_counter()
         block.estimator(K)
@@ -116,9 +122,9 @@ MEASURES = {
     "at-load": Measure("error at the load, signed", "mm", 1e3, _at_load),
     "contact": Measure("distance of the contact found", "mm", 1e3, _contact),
     "force": Measure("error of the force, of the largest", "%", 1e2, _force),
-    "found": Measure("frames with a contact found", "%", 1e2, _found),
+    "found": Measure("frames with a contact found", "%", 1e2, _found, share=True),
     "radius": Measure("error of the object's radius", "%", 1e2, _radius),
-    "covered": Measure("skin within the 95 % bands", "%", 1e2, _covered),
+    "covered": Measure("skin within the 95 % bands", "%", 1e2, _covered, share=True),
     "predicted": Measure("RMS error by noise alone, predicted", "mm", 1e3, _predicted),
     "rate": Measure("frame rate that the conversions allow", "frames/s", 1.0, _rate),
     "time": Measure("time to fit a frame", "us", 1e6, _time),

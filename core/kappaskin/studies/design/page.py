@@ -34,12 +34,13 @@ def page_of(study: Study, known: Sequence[Known], figures: Mapping[str, str]) ->
         for name, svg in figures.items()
     ]
     remarks = "".join(f"<li>{html.escape(remark)}</li>" for remark in remarks_on(study, known))
-    computed = sum(len(one.results) for one in known)
+    computed = sum(one.done for one in known)
     parts = [
         f"<h1>{html.escape(study.title)}</h1>",
         f"<p>{html.escape(study.description.strip())}</p>",
         f"<p class='faint'>{len(known)} points, {computed} blocks of "
-        f"{study.base.measure.frames} frames. Bars and ± are 95 % intervals of the mean.</p>",
+        f"{study.base.measure.frames} frames. Bars and ± are 95 % intervals of the mean. "
+        "What varies is in the units of scene files: m, 1/m, N and s.</p>",
         f"<h2>To be known with it</h2><ul>{remarks}</ul>" if remarks else "",
         *drawn,
         "<h2>Table</h2>",

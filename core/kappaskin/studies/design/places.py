@@ -2,18 +2,19 @@
 
 import copy
 import re
+from itertools import pairwise
 from typing import Any, cast
 
 from kappaskin.errors import Refusal
 
-_PART = re.compile(r"([\w-]+)(?:\[(\d+)\])?")
+_PART = re.compile(r"([\w-]+)(?:\[([1-9]\d{0,8})\])?")
 
 
 def parts_of(place: str) -> list[str | int]:
     """The keys of a place such as touch[1].x, tables of an array counted from one there."""
     found = list[str | int]()
     for part in place.split("."):
-        if not (match := _PART.fullmatch(part)) or match[2] == "0":
+        if not (match := _PART.fullmatch(part)):
             raise Refusal(
                 f"expected a place in this file such as elements.grid or touch[1].x, got {place!r}"
             )
@@ -25,11 +26,10 @@ def parts_of(place: str) -> list[str | int]:
 
 def put(said: dict[str, Any], place: str, value: Any) -> None:
     """Have `said` say `value` at `place`; tables on the way there are made."""
-    *way, last = parts_of(place)
-    at: Any = said
-    for part, following in zip(way, [*way[1:], last], strict=True):
+    parts, at = parts_of(place), cast("Any", said)
+    for part, following in pairwise(parts):
         at = _inside(at, part, place, isinstance(following, int))
-    if isinstance(last, int):
+    if isinstance(last := parts[-1], int):
         raise Refusal(f"expected the name of a value at the end of {place!r}")
     if not isinstance(at, dict):
         raise Refusal(f"expected a table around {place!r}, got {at!r:.60}")

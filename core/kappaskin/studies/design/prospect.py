@@ -47,6 +47,20 @@ class Design:
         )
 
 
+def _shares(on: Mask) -> Array:
+    """How much of the skin each point of a map stands for, (ny, nx): half on its first and last."""
+    shares = on.astype(float)
+    shares[[0, -1]] /= 2
+    shares[:, [0, -1]] /= 2
+    return shares / shares.sum()
+
+
+def _over_skin(sd: Array) -> float:
+    """The square root of the mean variance over the skin, in m."""
+    on = np.isfinite(sd)
+    return float(np.sqrt(_shares(on)[on] @ sd[on] ** 2))
+
+
 @dataclass(frozen=True, eq=False)
 class Prospect:
     """What is predicted of a design: `sd` (ny, nx) of the displacement in m, NaN off the skin.
@@ -64,7 +78,7 @@ class Prospect:
     @property
     def rms(self) -> float:
         """The square root of the mean variance over the skin, in m."""
-        return float(np.sqrt(np.nanmean(self.sd**2)))
+        return _over_skin(self.sd)
 
     @property
     def worst(self) -> float:
@@ -83,6 +97,11 @@ class Check:
     frames: int
     sd: Array
     rms: float
+
+    @property
+    def rms_sd(self) -> float:
+        """The square root of the mean variance over the skin, in m, as its prospect's `rms`."""
+        return _over_skin(self.sd)
 
 
 def _points(patch: Patch) -> tuple[Array, Array, Mask, Array]:
@@ -118,7 +137,7 @@ def check(design: Design, frames: int = _MOST, seed: int = 0) -> Generator[Check
     _, _, on, points = _points(design.scene.plate.patch)
     scene = replace(design.scene, layout=estimator.layout, seed=seed)
     simulator, scan = Simulator(scene), scene.sensor().scan()
-    rows = estimator.basis.at(points)
+    rows, shares = estimator.basis.at(points), _shares(on)[on]
     true_rows = scene.basis.at(points)
     count, mean, squares, off = 0, np.zeros(len(points)), np.zeros(len(points)), 0.0
     while count < frames:
@@ -127,7 +146,7 @@ def check(design: Design, frames: int = _MOST, seed: int = 0) -> Generator[Check
         known = np.array([truth.coefficients.ravel() for truth in truths if truth is not None])
         told = estimator(read.reshape(T, 3, -1)).coefficients.reshape(T, -1) @ rows.T
         apart = told - known @ true_rows.T
-        off += float(np.sum(apart**2))
+        off += float(np.sum(apart**2 @ shares))
         # Chan's way to add what differs from one mean to what does from another.
         here = apart.mean(axis=0)
         share = T / (count + T)
@@ -135,4 +154,4 @@ def check(design: Design, frames: int = _MOST, seed: int = 0) -> Generator[Check
         mean += share * (here - mean)
         count += T
         sd = np.sqrt(squares / max(count - 1, 1))
-        yield Check(count, _on_map(on, sd), float(np.sqrt(off / (count * len(points)))))
+        yield Check(count, _on_map(on, sd), float(np.sqrt(off / count)))

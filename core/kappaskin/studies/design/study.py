@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from kappaskin.errors import Refusal
 from kappaskin.scene import parsed, read_scene_text
 from kappaskin.scene.lines import Lines
 from kappaskin.scene.table import Table
+from kappaskin.studies.design.draws import Distribution
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.places import with_values
+from kappaskin.studies.design.places import parts_of, with_values
 from kappaskin.studies.design.setup import Setup, read_setup, setup_of
 from kappaskin.studies.design.vary import Axis, check_product, points_of, read_axis
 
@@ -26,6 +28,7 @@ STUDIES = tuple(sorted(file.stem for file in _FOLDER.iterdir() if file.suffix ==
 
 _AROUND = ("vary", "stop")
 _TOLD = ("title", "text")  # which change no number
+_NO_SCENE = (*_AROUND, *_TOLD, "measure")
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,11 @@ class Study:
             return place
         return f"{name} of {self.base.draws[int(head[5:-1]) - 1][0]}"
 
+    @property
+    def count(self) -> int:
+        """How many points there are."""
+        return prod(map(len, self.axes))
+
     def points(self) -> Iterator[Point]:
         """Every combination of what is varied."""
         for values in points_of(self.axes):
@@ -118,7 +126,7 @@ def read_study(text: str, file: Path) -> Study:
     own = {key: value for key, value in said.items() if key not in (*_AROUND, *_TOLD)}
     with top.blamed("vary"):
         check_product(axes, stop.points)
-    _check_places(tables, axes)
+    _check_places(top, axes, base.draws)
     for table, axis in zip(tables, axes, strict=True):
         for values in axis:  # each with everything else as it is: not as many as there are points
             _check(table, next(iter(values)), own, values)
@@ -137,17 +145,32 @@ def _stop(table: Table, measured: tuple[str, ...]) -> Stop:
     return made if made.of else replace(made, of=measured[:1])
 
 
-def _check_places(tables: list[Table], axes: tuple[Axis, ...]) -> None:
-    seen = set[str]()
-    for table, axis in zip(tables, axes, strict=True):
+def _check_places(
+    top: Table, axes: tuple[Axis, ...], draws: tuple[tuple[str, Distribution], ...]
+) -> None:
+    """Refuse what would be said twice, and what changes nothing that is simulated."""
+    seen = list[list[str | int]]()
+    for table, axis in zip(top.tables("vary"), axes, strict=True):
         for place in axis.places:
-            if place in seen:
-                raise table.refusal("expected to vary each thing once, got it twice", place)
-            if place.split(".")[0].split("[")[0] in (*_AROUND, *_TOLD, "measure"):
-                raise table.refusal(
-                    "expected to vary what is simulated, not what the study does with it", place
-                )
-            seen.add(place)
+            _check_place(table, place, place, _NO_SCENE, seen)
+    for table, (place, _) in zip(top.tables("draw"), draws, strict=True):
+        # A block has drawn by then, and has a seed of its own.
+        _check_place(table, "what", place, (*_NO_SCENE, "draw", "seed"), seen)
+
+
+def _check_place(
+    table: Table, key: str, place: str, barred: tuple[str, ...], seen: list[list[str | int]]
+) -> None:
+    with table.blamed(key):
+        parts = parts_of(place)
+        if parts[0] in barred:
+            raise Refusal(
+                "expected to vary or draw what is simulated, not what the study does with it"
+            )
+        # A table says again all that stands in it.
+        if any(parts[: len(other)] == other[: len(parts)] for other in seen):
+            raise Refusal(f"expected to vary or draw each thing once, got {place} twice")
+    seen.append(parts)
 
 
 def _check(table: Table, key: str, said: dict[str, Any], values: dict[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import threading
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
@@ -9,6 +10,7 @@ from importlib import metadata
 from typing import Any
 
 import numpy as np
+import scipy
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -17,7 +19,7 @@ from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.places import with_values
 from kappaskin.studies.design.setup import Setup, estimator_of, setup_of
 
-MEANING = 1
+MEANING = 2
 """Goes up with every change that makes the same study give other numbers."""
 
 _ONE_BY_ONE = threading.Lock()  # what blocks share is not made for several threads
@@ -26,10 +28,11 @@ _ONE_BY_ONE = threading.Lock()  # what blocks share is not made for several thre
 @cache
 def version() -> str:
     """What a worker must have to give the same numbers."""
-    return f"kappaskin {metadata.version('kappaskin')}, meaning {MEANING}, NumPy {np.__version__}"
+    ours = f"kappaskin {metadata.version('kappaskin')}, meaning {MEANING}"
+    return f"{ours}, NumPy {np.__version__}, SciPy {scipy.__version__}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Moments:
     """How many values there were, their mean, and the squares of what they differ from it, added.
 
@@ -42,13 +45,15 @@ class Moments:
 
     @classmethod
     def of(cls, values: Array) -> "Moments":
-        if np.isinf(values).any():
-            raise Refusal("expected finite errors, got infinity: the arithmetic overflowed")
         known = values[~np.isnan(values)]
         if not len(known):
             return cls(0, 0.0, 0.0)
-        mean = float(known.mean())
-        return cls(len(known), mean, float(np.sum((known - mean) ** 2)))
+        with np.errstate(over="ignore", invalid="ignore"):
+            mean = float(known.mean())
+            squares = float(np.sum((known - mean) ** 2))
+        if not math.isfinite(squares):
+            raise Refusal("expected finite errors, got infinity: the arithmetic overflowed")
+        return cls(len(known), mean, squares)
 
 
 Measured = dict[str, Moments]

@@ -1,5 +1,6 @@
 """Who computes tasks: processes of this machine, or the workers of a Dask cluster."""
 
+import os
 import socket
 import time
 from collections.abc import Generator
@@ -123,6 +124,12 @@ def _knock(address: str) -> None:
     socket.create_connection((place.hostname, place.port), _PATIENCE).close()
 
 
+def kind() -> str:
+    """What the last bits depend on of the worker that is asked: products add up by threads."""
+    threads = os.environ.get("OPENBLAS_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "many"))
+    return f"{version()}, threads of BLAS {threads}"
+
+
 def _check_workers(client: Any, address: str) -> None:
     """Refuse a scheduler without workers, and workers that would give other numbers."""
     try:
@@ -133,15 +140,17 @@ def _check_workers(client: Any, address: str) -> None:
             f"{address} --nthreads 1"
         ) from None
     try:
-        told: dict[str, str] = client.run(version)
+        told: dict[str, str] = client.run(kind)
     except Exception as error:  # whatever a worker without kappaskin, or with an old one, raises
         raise Refusal(
             f"{address}: expected workers with {version()}, got some that cannot tell theirs "
             f"({error}); install the same kappaskin[dask] there"
         ) from error
-    if others := {worker: other for worker, other in told.items() if other != version()}:
+    alike = f"{version()}, threads of BLAS 1"
+    if others := {worker: other for worker, other in told.items() if other != alike}:
         worker, other = next(iter(others.items()))
         raise Refusal(
-            f"{address}: expected workers with {version()}, got {len(others)} of {len(told)} "
-            f"with another, {worker} with {other}; install the same on all"
+            f"{address}: expected workers with {alike}, got {len(others)} of {len(told)} "
+            f"with another, {worker} with {other}; install the same on all, and "
+            "start them with OPENBLAS_NUM_THREADS=1"
         )
