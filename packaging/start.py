@@ -130,10 +130,9 @@ def cover(arguments: list[str], shown: dict[str, str]) -> int:
     with tempfile.TemporaryDirectory() as folder:
         variables = shown | {"COVERAGE_FILE": str(Path(folder, "coverage"))}
         tests = ["run", "-m", "pytest", "-n3", "-q", LIBRARY, *arguments]
-        for words in (tests, ["combine", "-q"], ["report"]):
-            if code := run([*coverage, *words], variables, cwd=ROOT):
-                return code
-    return 0
+        steps = (tests, ["combine", "-q"], ["report"])
+        codes = [run([*coverage, *words], variables, cwd=ROOT) for words in steps]
+    return next(filter(None, codes), 0)
 
 
 def bench(arguments: list[str], shown: dict[str, str]) -> int:

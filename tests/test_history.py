@@ -72,7 +72,8 @@ def test_each_figure_is_told_with_its_newest_values_in_order(bench: dict) -> Non
 
 
 def test_the_history_kept_is_readable_and_names_no_host() -> None:
-    kept = [json.loads(line) for line in (_CONFTEST.parent / "history.jsonl").open()]
+    history = (_CONFTEST.parent / "history.jsonl").read_text("utf-8")
+    kept = [json.loads(line) for line in history.splitlines()]
 
     assert kept
     assert all(" cores, " in line["machine"] for line in kept)

@@ -18,6 +18,8 @@ from kappaskin.studies.compare.solvers import iterated, lstsq, pinv
 from kappaskin.studies.compare.works import WITHIN
 from kappaskin.studies.tables import Case, table_1
 
+pytestmark = pytest.mark.slow
+
 PAGE = Path(kappaskin_resources.__file__).parent / "guide" / "checked-against-others.md"
 OURS = "Kappaskin, least squares"
 

@@ -1,6 +1,7 @@
 """What the monitor says of what comes over a line."""
 
 import os
+import re
 import time
 from collections.abc import Iterator
 
@@ -83,10 +84,10 @@ def test_a_scan_is_told_by_its_first_counts_and_its_extremes(device) -> None:
 
 
 def test_of_many_scans_a_few_are_shown_and_the_rest_counted(device) -> None:
-    device.says(b"".join(scan(q) for q in range(100)))
-    text = device.says(scan(100))
-    assert text.count("samples") == 1
-    assert "99 more before it" in text
+    text = device.says(b"".join(scan(q) for q in range(100))) + device.says(scan(100))
+    shown, counted = text.count("samples"), re.findall(r"(\d+) more before it", text)
+    assert shown < 20  # 2, but on a busy machine
+    assert shown + sum(map(int, counted)) == 101
     assert "101 messages accepted, 0 lost" in device.monitor.summary()
 
 

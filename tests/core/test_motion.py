@@ -131,6 +131,8 @@ def test_a_record_is_straight_between_its_times_and_begins_anew() -> None:
 @pytest.mark.parametrize(
     ("make", "why"),
     [
+        (lambda: Orbit(-0.01, 2.0), "a radius >= 0 m"),
+        (lambda: Hold(0.0), "a step that takes"),
         (lambda: Press(1.0, to=1000.5), "share of 0 to 1000 to press to, got 1000.5"),
         (lambda: Press(1.0, to=-0.1), "share of 0 to 1000"),
         (lambda: Hold(1.0, "sudden"), "ease among smooth, linear, got 'sudden'"),
@@ -142,6 +144,7 @@ def test_a_record_is_straight_between_its_times_and_begins_anew() -> None:
         (lambda: Recorded(np.arange(3.0), np.zeros((3, 2))), "poses \\(T, 3\\)"),
         (lambda: Recorded(np.array([0.5, 1.0]), np.zeros((2, 3))), "begin with 0"),
         (lambda: Recorded(np.array([0.0, 1.0, 1.0]), np.zeros((3, 3))), "and rise"),
+        (lambda: Recorded(np.array([0.0, 2e9]), np.zeros((2, 3))), "a record of"),
         (lambda: Recorded(np.array([0.0, 1e-9]), np.zeros((2, 3))), "a record of 1e-06 to"),
         (lambda: Recorded(np.arange(2.0), np.array([[0, 0, -0.1], [0, 0, 1]])), "got -0.1 to 1"),
     ],

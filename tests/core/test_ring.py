@@ -208,6 +208,7 @@ def all_of(number: float) -> Estimate:
     return Estimate(**parts | {"touch": touch, "geometry": geometry})
 
 
+@pytest.mark.slow
 def test_another_process_never_shows_half_an_estimate_or_half_a_status(ring, monkeypatch) -> None:
     monkeypatch.setattr("kappaskin.ring._MOST_SLOTS", 2)
     slot = slot_type(pipeline_of(Setup(8, 8, 129, 129)))

@@ -215,6 +215,7 @@ def test_the_share_that_is_done_is_told(whole, tmp_path) -> None:
     assert shares[-1] > 0.9
 
 
+@pytest.mark.slow
 def test_a_process_of_its_own_saves_as_much(whole, tmp_path) -> None:
     out, told = tmp_path / "out.mcap", list[float | Repaired]()
     work = Repairing(whole, out)
@@ -226,6 +227,7 @@ def test_a_process_of_its_own_saves_as_much(whole, tmp_path) -> None:
     assert out.exists()
 
 
+@pytest.mark.slow
 def test_one_given_up_leaves_nothing(whole, tmp_path) -> None:
     out = tmp_path / "out.mcap"
     work = Repairing(whole, out)
