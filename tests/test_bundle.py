@@ -65,7 +65,7 @@ def test_files_are_told_by_the_endings_that_the_app_gives_them():
 
     patterns = [glob.get("pattern") for kind in kinds() for glob in kind.findall(f"{MIME}glob")]
 
-    names = ("press.mcap", "press.mcap.part", OWN.name, "calibration-SIM-0001-20261122.toml")
+    names = ("press.mcap", "press.mcap.part", OWN.name, "SIM-0001-20261122.calibration.toml")
     for name in names:
         assert sum(Path(name).match(pattern) for pattern in patterns) == 1, name
     assert not any(Path("pyproject.toml").match(pattern) for pattern in patterns)

@@ -28,6 +28,11 @@ def test_every_ready_scene_says_what_there_is_to_see(name):
     assert scene.text.endswith(".\n")
 
 
+@pytest.mark.parametrize("file", ["mine.toml", "mine.scene.toml"])
+def test_a_scene_is_called_as_its_file_is_whatever_it_ends_in(file):
+    assert read_scene(HEAD, Path(file)).name == "mine"
+
+
 def test_what_a_file_says_is_what_the_scene_is():
     text = (
         TOUCH + 'path = [\n{ step = "press", seconds = 0.5 },\n{ step = "release", seconds = 1 }]\n'

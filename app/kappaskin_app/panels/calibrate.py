@@ -91,7 +91,7 @@ class CalibratePanel(Panel):
         if self._calibrating is None or self._calibrating.result is None:
             return
         found = self._calibrating.result.report.calibration
-        name = f"calibration-{found.serial_number}-{found.date.astimezone():%Y%m%d}.toml"
+        name = f"{found.serial_number}-{found.date.astimezone():%Y%m%d}.calibration.toml"
         path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, FILES)
         if path:
             self._calibrating.save(Path(path))
