@@ -5,6 +5,7 @@
     python3 packaging/start.py test [ARGUMENTS]    runs every check; ARGUMENTS go to pytest
     python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; ARGUMENTS go to pytest
     python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
+    python3 packaging/start.py mutate ROOM [COUNT] changes touch, wire, fit or scene, for tests
 
 Standard library only. A second start with nothing changed installs nothing.
 """
@@ -121,7 +122,12 @@ def fuzz(arguments: list[str], shown: dict[str, str]) -> int:
     return run([tool("python"), str(ROOT / "tests" / "fuzz" / "fuzz.py"), *arguments], shown)
 
 
-TASKS = {"app": app, "test": test, "bench": bench, "fuzz": fuzz}
+def mutate(arguments: list[str], shown: dict[str, str]) -> int:
+    """Change a room of the core in one place at a time, and say what no test notices."""
+    return run([tool("python"), str(ROOT / "tests" / "mutation" / "mutate.py"), *arguments], shown)
+
+
+TASKS = {"app": app, "test": test, "bench": bench, "fuzz": fuzz, "mutate": mutate}
 
 
 # --- the setup
