@@ -19,7 +19,8 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.scene import TABLE_1_NOISE, contact_of, scaled_to
+from kappaskin.scene import TABLE_1_NOISE, Pressing, contact_of, moments_of, scaled_to
+from kappaskin.scene.limits import check_elements
 
 PATCH = Patch(0.1, 0.1)
 
@@ -144,3 +145,38 @@ def test_an_orbit_that_cannot_be_is_refused(radius, period):
 def test_a_scene_that_is_too_fast_for_its_converter_is_no_sensor():
     with pytest.raises(Refusal, match="lower the rate or the conversion time"):
         replace(load_scene("centre"), rate=700.0).sensor()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_is_looked_at_all_over_once(name):
+    scene = load_scene(name)
+
+    moments = np.array(moments_of(scene))
+
+    assert moments[0] == 0
+    assert (np.diff(moments) > 0).all()
+    if scene.moves or scene.laid:
+        assert set(scene.moments) <= set(moments.tolist())
+        assert scene.duration * 0.97 < moments[-1] <= scene.duration
+        assert np.diff(moments).max() <= scene.duration / 48 * (1 + 1e-9)
+
+
+def test_a_rigid_object_presses_as_the_point_loads_that_it_makes():
+    scene = load_scene("pencil")
+    time = max(scene.moments, key=lambda time: scene.stimuli[0].pose_at(time).amount)
+
+    pressed = Pressing(scene, scene.plate)(time)
+
+    force = sum(load.modal(scene.basis) for load in pressed.loads)
+    np.testing.assert_allclose(force, pressed.force, atol=1e-9 * np.abs(pressed.force).max())
+    asked = scene.stimuli[0].what.force * scene.stimuli[0].pose_at(time).amount
+    assert sum(load.force for load in pressed.loads) == pytest.approx(asked, rel=1e-3)
+    np.testing.assert_allclose(contact_of(pressed.loads), pressed.contact, atol=1e-9)
+
+
+def test_so_many_elements_as_the_wire_tells_apart_and_no_more():
+    check_elements(2**16 // 3)
+    check_elements(2**16 // 6, 2)
+    for too_many in ((2**16 // 3 + 1,), (2**16 // 6 + 1, 2)):
+        with pytest.raises(Refusal, match="at most 21845 elements"):
+            check_elements(*too_many)
