@@ -21,6 +21,7 @@ from kappaskin import (
 )
 from kappaskin.scene import TABLE_1_NOISE, Pressing, contact_of, moments_of, scaled_to
 from kappaskin.scene.limits import check_elements
+from kappaskin.scene.motion import Path, Press, Release, Slide
 
 PATCH = Patch(0.1, 0.1)
 
@@ -123,6 +124,18 @@ def test_without_motion_loads_stay():
     loads = (PointLoad(0.05, 0.05), LineLoad(0.01, 0.02, 0.03, 0.04))
 
     assert scene(*loads).loads_at(17.0) == loads
+
+
+def test_a_load_presses_as_hard_as_its_motion_says_where_that_has_taken_it():
+    way = Path((Press(1.0, "linear"), Slide(1.0, "linear", (0.02, 0.0)), Release(1.0, "linear")))
+    moved = scene(PointLoad(0.05, 0.05, 0.4), motion=way)
+
+    told = [moved.loads_at(time) for time in (0.0, 0.25, 1.5, 2.75)]
+
+    assert told[0] == ()
+    assert [(load.x, load.force) for (load,) in told[1:]] == [
+        pytest.approx(expected) for expected in ((0.05, 0.1), (0.06, 0.4), (0.07, 0.1))
+    ]
 
 
 def test_a_load_off_the_skin_is_refused():

@@ -39,7 +39,6 @@ from changes import Change, changed, places
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 CORE = ROOT / "core" / "kappaskin"
-WORK = 6.0  # s of work that the tests which meet one change may take
 CALLS = 20  # of a function, whose lines are looked at for a test
 MEMORY = 8 * 2**30  # bytes that a change may have a test ask for
 _ARGUMENTS = ["-x", "-q", "--assert=plain", "--rootdir", str(ROOT)]
@@ -138,12 +137,7 @@ class Reach:
             return took[file], file, test not in reached, self.seconds[test]
 
         others = {test for test in self.seconds if test.split("::")[0] in took}
-        chosen, left = list[str](), WORK
-        for test in sorted(others - self.failed, key=order):
-            left -= self.seconds[test]
-            if left > 0:
-                chosen.append(test)
-        return chosen
+        return sorted(others - self.failed, key=order)
 
 
 def forked(work: Callable[[], int], seconds: float) -> int:
