@@ -91,14 +91,14 @@ class Keeping:
 
     def look(self, source: Source | None) -> str:
         """Why it ended by itself, when it did since the last look; `written` is new."""
-        if self._recorder is not None:
-            self.written = self._recorder.written
-            if not self.written.active:
-                self.end(source)
-                return self.written.trouble
-        elif self._ending:
-            self.written = self._ending[-1].written
-            self._ending = [one for one in self._ending if one.written.active]
+        newest = self._recorder or (self._ending[-1] if self._ending else None)
+        if newest is not None:
+            self.written = newest.written
+        # Each holds all that its last frames went through.
+        self._ending = [one for one in self._ending if one.written.active]
+        if self._recorder is not None and not self.written.active:
+            self.end(source)
+            return self.written.trouble
         return ""
 
     def close(self) -> None:

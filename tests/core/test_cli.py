@@ -291,3 +291,16 @@ def test_a_reader_who_has_gone_is_no_error(unbuffered: str) -> None:
     )
     os.close(write)
     assert (found.returncode, found.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("study", "placement", "--workers"),
+        ("simulate", "centre", "--out", "x.npz", "--frames"),
+        ("listen", "--udp"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_half_a_thing_is_refused(run, command) -> None:
+    refused(run(*command, "2.5"), "expected a whole number such as 2, got '2.5'")

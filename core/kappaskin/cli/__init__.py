@@ -8,6 +8,7 @@ from cyclopts import App, CycloptsError
 
 from kappaskin.cli import (
     calibrate,
+    compare,
     cost,
     device,
     doctor,
@@ -50,6 +51,7 @@ for command in (
     press.press,
     regions.regions,
     cost.cost,
+    compare.compare,
     stability.stability,
     study.study,
     report.report,

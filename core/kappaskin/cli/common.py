@@ -3,12 +3,12 @@
 import json
 import signal
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
@@ -23,6 +23,18 @@ REFUSED = 2
 
 Switch = Annotated[bool, Parameter(negative="")]
 """An option that is there or not."""
+
+
+def _whole(_: type, tokens: Sequence[Token]) -> int:
+    text = tokens[0].value
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"expected a whole number such as 2, got {text!r}") from None
+
+
+Whole = Annotated[int, Parameter(converter=_whole)]
+"""A whole number; of itself the command line would take 2.5 for 2."""
 
 Pair = Annotated[str, Parameter(allow_leading_hyphen=True)]
 """Two numbers such as 8x8; a hyphen is let through so that -1x8 is refused as that."""

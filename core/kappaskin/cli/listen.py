@@ -3,13 +3,13 @@
 import math
 import time
 
-from kappaskin.cli.common import FAILED, Switch, check_time, print_json, stops
+from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
 from kappaskin.publish.listening import Listener
 
 _READ = 0.1  # s
 
 
-def listen(*, udp: int = 9870, seconds: float = math.inf, json: Switch = False) -> int:
+def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False) -> int:
     """Print what is published to a UDP port of this machine, until stopped (Ctrl+C).
 
     Contacts (ten a second) with their error bars and their age when sent, every loss on the

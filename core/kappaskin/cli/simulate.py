@@ -3,12 +3,12 @@
 import sys
 from pathlib import Path
 
-from kappaskin.cli.common import save_arrays
+from kappaskin.cli.common import Whole, save_arrays
 from kappaskin.scene import load_scene
 from kappaskin.studies.simulated import simulated
 
 
-def simulate(scene: str = "", *, frames: int, out: Path, seed: int | None = None) -> None:
+def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None) -> None:
     """Simulate a scene into an NPZ file.
 
     It has `counts` and `curvature` (T, 3, P), the `truth` (T, Ni, Nj) in m, `time` (T,) in s, the

@@ -6,7 +6,7 @@ import time
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from kappaskin.cli.common import FAILED
+from kappaskin.cli.common import FAILED, Whole
 from kappaskin.errors import Refusal
 from kappaskin.studies.design import Folder, load_study, run_study
 from kappaskin.studies.design.table import table_text
@@ -38,7 +38,7 @@ class _Teller:
 
 
 def study(
-    file: str, *, workers: int | None = None, scheduler: str = "", out: Path | None = None
+    file: str, *, workers: Whole | None = None, scheduler: str = "", out: Path | None = None
 ) -> int:
     """Compute a design study: how good a sensor would be, before it is built.
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -49,7 +50,10 @@ def computed(study, path, workers=None):
 
 
 def results(known):
-    return [one.results for one in known]
+    """All that is known of each point."""
+    return [
+        (one.done, one.failures, *(one.mean(name) for name in one.study.measures)) for one in known
+    ]
 
 
 def task_of(study, block=0):
@@ -120,7 +124,7 @@ def test_numbers_and_blocks_do_not_depend_on_the_number_of_workers(study_of, tmp
     first = computed(study, tmp_path / "first", one)
 
     assert results(computed(study, tmp_path / "other", other)) == results(first)
-    assert {len(known.results) for known in first} <= {2, 3, 4}
+    assert {known.done for known in first} <= {2, 3, 4}
 
 
 def test_what_is_computed_is_not_computed_again(study_of, tmp_path):
@@ -144,11 +148,11 @@ def test_a_stopped_study_goes_on_where_it_was(study_of, tmp_path):
     stopping = Here(stopped)
     with pytest.raises(KeyboardInterrupt):
         computed(study, tmp_path / "out", stopping)
-    known = sum(len(one.results) for one in known_of(study, Folder(tmp_path / "out")))
+    known = sum(one.done for one in known_of(study, Folder(tmp_path / "out")))
     second = computed(study, tmp_path / "out", rest)
 
     assert results(second) == results(computed(study, tmp_path / "whole"))
-    assert len(rest.tasks) == sum(len(one.results) for one in second) - known
+    assert len(rest.tasks) == sum(one.done for one in second) - known
 
 
 def test_a_changed_study_computes_only_what_changed(study_of, tmp_path):
@@ -178,7 +182,7 @@ def test_a_failing_point_does_not_stop_the_rest_and_is_tried_again(study_of, tmp
 
     assert not good.failures
     assert "use at most 6 x 6 functions" in bad.failures[0]
-    assert len(bad.results) == study.stop.least
+    assert bad.done == study.stop.least
     again = Here()
     computed(study, tmp_path / "out", again)
     assert len(again.tasks) == study.stop.least
@@ -242,8 +246,9 @@ def test_a_task_that_kills_workers_fails_alone(study_of, tmp_path):
 
     for known in found:
         assert known.failures == ["the process that computed it died, and so did a second one"]
-        assert [block for block, result in known.results.items() if isinstance(result, str)] == [1]
-        assert sorted(known.results) == [0, 1, 2, 3]
+        folder, point = Folder(tmp_path / "out"), known.point.document
+        kept = [folder.result(Task(point, block, version())) for block in range(known.done)]
+        assert [isinstance(result, str) for result in kept] == [False, True, False, False]
 
 
 @pytest.mark.parametrize("large", [np.inf, 1e200])
@@ -270,13 +275,16 @@ def test_a_folder_of_another_study_or_of_none_is_refused(study_of, tmp_path):
 def test_the_rule_stops_where_the_interval_is_narrow_enough(study_of, tmp_path):
     stop = ("least = 2\nmost = 4", 'least = 3\nmost = 99\nwithin = 0.06\nof = ["rms"]')
 
-    (known,) = computed(study_of("", stop), tmp_path / "out")
+    study = study_of("", stop)
+
+    (known,) = computed(study, tmp_path / "out")
 
     mean = known.mean("rms")
     assert mean.half <= 0.06 * mean.mean
-    assert 3 < len(known.results) < 99
+    assert 3 < known.done < 99
     # One round before, it was not.
-    before = Mean.of([known.results[n]["rms"] for n in range(math.ceil(len(known.results) / 1.6))])
+    folder, rounds = Folder(tmp_path / "out"), range(math.ceil(known.done / 1.6))
+    before = Mean.of([folder.result(task_of(study, block))["rms"] for block in rounds])
     assert before.half > 0.06 * before.mean
 
 
@@ -311,6 +319,18 @@ def test_the_order_in_which_blocks_come_changes_no_bit(study_of):
         downward.take(block, {"rms": Moments(1, mean, 0.0)})
 
     assert upward.mean("rms") == downward.mean("rms")
+
+
+def test_what_is_held_of_a_point_does_not_grow_with_its_blocks(study_of):
+    def held(blocks):
+        study = study_of("", ("least = 2\nmost = 4", f"least = {blocks}\nmost = {blocks}"))
+        known = Known(next(study.points()), study)
+        for block in range(blocks):
+            known.take(block, {"rms": Moments(1, float(block), 0.0)})
+        known.study = None  # the same for all points
+        return len(pickle.dumps(known))
+
+    assert held(500) <= held(5) + 20
 
 
 def test_frames_that_tell_nothing_are_left_out():

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import cycle
+from typing import TypeVar
 
 import numpy as np
 
@@ -27,6 +28,7 @@ SETTLING, DRAWS = 8, 40
 _POINTS = 101  # of the surface along each side, edges included, as in Table 1
 _TURNS, _BUDGET = (7, 41), 10e-3  # least and most of them that are timed, and about how long in s
 _CALLS, _SLOW = 5, 1e-3  # in a turn; one of a method whose frame takes longer, in s
+_Made = TypeVar("_Made")
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +202,7 @@ class Bench:
             fit(curvature[0])
             return fit
 
-        exactly, memory = _traced(lambda: started(exact))
+        exactly, memory = traced(lambda: started(exact))
         begun = time.perf_counter()
         fit = started(read)
         setup_time = time.perf_counter() - begun
@@ -233,7 +235,7 @@ def _judged(judge: _Judge, fit: Estimator, curvature: Array) -> tuple[Array, Arr
     return e, rms
 
 
-def _traced(made: Callable[[], Estimator]) -> tuple[Estimator, int]:
+def traced(made: Callable[[], _Made]) -> tuple[_Made, int]:
     """What is made, and the bytes that were held besides at the highest point of making it."""
     mine = not tracemalloc.is_tracing()
     if mine:
@@ -241,8 +243,8 @@ def _traced(made: Callable[[], Estimator]) -> tuple[Estimator, int]:
     try:
         tracemalloc.reset_peak()
         before = tracemalloc.get_traced_memory()[0]
-        fit = made()
-        return fit, tracemalloc.get_traced_memory()[1] - before
+        thing = made()
+        return thing, tracemalloc.get_traced_memory()[1] - before
     finally:
         if mine:
             tracemalloc.stop()
@@ -261,13 +263,14 @@ def _medians(
     calls, least, most = 1, *_TURNS
     end = time.perf_counter() + _BUDGET
     while len(theirs) < least or (len(theirs) < most and time.perf_counter() < end):
-        ours += [_seconds(fit, next(frames)) for _ in range(calls)]
-        theirs.append(_seconds(np.linalg.lstsq, M, K))
+        ours += [seconds(fit, next(frames)) for _ in range(calls)]
+        theirs.append(seconds(np.linalg.lstsq, M, K))
         calls = _CALLS if ours[0] < _SLOW else 1
     return statistics.median(ours), statistics.median(theirs)
 
 
-def _seconds(call: Callable[..., object], *arguments: Array) -> float:
+def seconds(call: Callable[..., object], *arguments: object) -> float:
+    """How long a call with these `arguments` takes."""
     begun = time.perf_counter()
     call(*arguments)
     return time.perf_counter() - begun

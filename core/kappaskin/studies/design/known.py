@@ -1,6 +1,7 @@
 """Blocks of a point to what is known of each measure there, and to how many more it takes."""
 
 import math
+import sys
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +16,7 @@ _MORE = 1.5  # times the blocks that were not enough
 _DOUBT = 0.05  # what an interval of 95 % leaves
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Mean:
     """The `mean` of a measure with the `half` width of its 95 % interval, and the `sd` of a value.
 
@@ -60,11 +61,18 @@ def _half(means: Array, weights: Array, mean: float) -> float:
 
 @dataclass(eq=False)
 class Known:
-    """What is known of one `point`: the results of its blocks by number, or why they failed."""
+    """What is known of one `point`: how many blocks are `done`, and why some failed.
+
+    Results are held until no more are wanted, and then what they come to alone: a study of many
+    points takes little more memory than one of few.
+    """
 
     point: Point
     study: Study
-    results: dict[int, Measured | str] = field(default_factory=dict)
+    done: int = 0
+    _results: dict[int, Measured | str] = field(default_factory=dict[int, "Measured | str"])
+    _means: dict[str, Mean] = field(default_factory=dict[str, Mean])
+    _failures: list[str] = field(default_factory=list[str])
     wanted: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -75,22 +83,35 @@ class Known:
 
         They follow from the results of all before alone, whoever computed them in whatever order.
         """
-        self.results[block] = result
-        if len(self.results) < self.wanted or self.failures or self.enough:
+        self._results[block] = sys.intern(result) if isinstance(result, str) else result
+        self.done += 1
+        if not self.complete:
             return range(0)
-        before = self.wanted
-        self.wanted = min(math.ceil(_MORE * before), self.study.stop.most)
+        before, most = self.wanted, self.study.stop.most
+        if before == most or self.failures or self.enough:
+            self._close()
+            return range(0)
+        self.wanted = min(math.ceil(_MORE * before), most)
         return range(before, self.wanted)
+
+    def _close(self) -> None:
+        self._means = {name: self.mean(name) for name in self.study.measures}
+        self._failures = self.failures
+        self._results.clear()
+
+    def _in_order(self) -> list[Measured | str]:
+        return [self._results[block] for block in sorted(self._results)]
 
     @property
     def failures(self) -> list[str]:
-        """Why blocks failed."""
-        return [result for result in self.results.values() if isinstance(result, str)]
+        """Why blocks failed, in their order."""
+        held = [result for result in self._in_order() if isinstance(result, str)]
+        return self._failures or held
 
     @property
     def complete(self) -> bool:
         """Whether all blocks that it takes were computed."""
-        return len(self.results) == self.wanted
+        return self.done == self.wanted
 
     @property
     def enough(self) -> bool:
@@ -100,6 +121,7 @@ class Known:
 
     def mean(self, measure: str) -> Mean:
         """What is known of a measure, from its blocks in order."""
-        each = [self.results[block] for block in sorted(self.results)]
-        blocks = [result[measure] for result in each if not isinstance(result, str)]
+        if self._means:
+            return self._means[measure]
+        blocks = [result[measure] for result in self._in_order() if not isinstance(result, str)]
         return Mean.of(blocks, MEASURES[measure].share)

@@ -34,7 +34,7 @@ def page_of(study: Study, known: Sequence[Known], figures: Mapping[str, str]) ->
         for name, svg in figures.items()
     ]
     remarks = "".join(f"<li>{html.escape(remark)}</li>" for remark in remarks_on(study, known))
-    computed = sum(len(one.results) for one in known)
+    computed = sum(one.done for one in known)
     parts = [
         f"<h1>{html.escape(study.title)}</h1>",
         f"<p>{html.escape(study.description.strip())}</p>",

@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from dataclasses import dataclass
 
@@ -41,12 +41,19 @@ class _Run:
 
     def __init__(self, study: Study, folder: Folder, workers: Workers) -> None:
         self._folder, self._workers = folder, workers
-        self.known = [Known(point, study) for point in study.points()]
-        self._first = ((known, block) for known in self.known for block in range(study.stop.least))
+        self.known = list[Known]()
+        self._first = self._begun(study)
         self._next = deque[tuple[Known, int]]()
         self._running = dict["Future[Measured]", tuple[Known, Task]]()
         self._suspects, self._alone = set[str](), deque[tuple[Known, Task]]()
-        self.progress = Progress(len(self.known) * study.stop.least, time.monotonic())
+        self.progress = Progress(study.count * study.stop.least, time.monotonic())
+
+    def _begun(self, study: Study) -> Iterator[tuple[Known, int]]:
+        """Point by point what every one begins with."""
+        for point in study.points():
+            self.known.append(Known(point, study))
+            for block in range(study.stop.least):
+                yield self.known[-1], block
 
     def fill(self) -> bool:
         """Hand out tasks until all workers have enough; whether any are at work.

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,11 @@ class Study:
         if not head.startswith("draw["):
             return place
         return f"{name} of {self.base.draws[int(head[5:-1]) - 1][0]}"
+
+    @property
+    def count(self) -> int:
+        """How many points there are."""
+        return prod(map(len, self.axes))
 
     def points(self) -> Iterator[Point]:
         """Every combination of what is varied."""

@@ -49,7 +49,7 @@ def rows_of(study: Study, known: Sequence[Known]) -> list[list[str]]:
     rows: list[list[str]] = []
     for one in known:
         means = [mean_text(one.mean(name), MEASURES[name]) for name in study.measures]
-        frames = str((len(one.results) - len(one.failures)) * study.base.measure.frames)
+        frames = str((one.done - len(one.failures)) * study.base.measure.frames)
         rows.append([*map(value_text, one.point.values.values()), *means, frames])
     return rows
 
@@ -62,12 +62,10 @@ def remarks_on(study: Study, known: Sequence[Known]) -> list[str]:
         told = ", ".join(f"{study.called(place)} {value_text(value)}" for place, value in values)
         at = f"at {told}" if told else "everywhere"
         if failures := one.failures:
-            failed = f"{len(failures)} of {len(one.results)} blocks failed"
+            failed = f"{len(failures)} of {one.done} blocks failed"
             remarks.append(f"{at}: {failed}: {failures[0]}")
         elif not one.complete:
-            remarks.append(
-                f"{at}: {len(one.results)} of {one.wanted} blocks are computed by this version"
-            )
+            remarks.append(f"{at}: {one.done} of {one.wanted} blocks are computed by this version")
         elif not one.enough:
             what = ", ".join(study.stop.of)
             remarks.append(
@@ -106,7 +104,7 @@ def table_csv(study: Study, known: Sequence[Known]) -> str:
         for name in study.measures:
             mean, scale = one.mean(name), MEASURES[name].scale
             told += [scale * mean.mean, scale * mean.half, scale * mean.sd, mean.count]
-        write([*values, *told, len(one.results), len(one.failures)])
+        write([*values, *told, one.done, len(one.failures)])
     return text.getvalue()
 
 

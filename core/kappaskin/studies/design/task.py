@@ -32,7 +32,7 @@ def version() -> str:
     return f"{ours}, NumPy {np.__version__}, SciPy {scipy.__version__}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Moments:
     """How many values there were, their mean, and the squares of what they differ from it, added.
 
