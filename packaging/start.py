@@ -7,6 +7,7 @@
     python3 packaging/start.py cover [ARGUMENTS]   tells which lines of the library no test runs
     python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history tells how it went
     python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
+    python3 packaging/start.py mutate ROOM [COUNT] changes touch, wire, fit or scene, for tests
     python3 packaging/start.py core [ARGUMENTS]    tests the library where no GUI is installed
     python3 packaging/start.py bundle [--try]      makes a folder that needs no Python, tries it
 
@@ -157,7 +158,14 @@ def bundle(arguments: list[str], shown: dict[str, str]) -> int:
     return run([tool("python"), str(ROOT / "packaging/bundle/build.py"), *arguments], shown)
 
 
-TASKS = {task.__name__: task for task in (app, test, fast, cover, bench, fuzz, core, bundle)}
+def mutate(arguments: list[str], shown: dict[str, str]) -> int:
+    """Change a room of the core in one place at a time, and say what no test notices."""
+    return run([tool("python"), str(ROOT / "tests" / "mutation" / "mutate.py"), *arguments], shown)
+
+
+TASKS = {
+    task.__name__: task for task in (app, test, fast, cover, bench, fuzz, mutate, core, bundle)
+}
 
 
 # --- the setup

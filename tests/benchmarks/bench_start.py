@@ -6,6 +6,8 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 _FIRST = Path(__file__).with_name("first_picture.py")
 _BARE = Path(__file__).with_name("bare_window.py")
 

@@ -8,6 +8,7 @@ import pytest
 from kappaskin import LeastSquares, Patch, Plate, PointContact, PointLoad, SensorLayout, basis_for
 from kappaskin.touch.climb import Optimum
 from kappaskin.touch.contacts import EVEN, ROUND, arcs, ends, ring
+from kappaskin.touch.hypotheses import hypotheses
 from kappaskin.touch.inside import narrow
 from kappaskin.touch.skin import ElasticSkin
 
@@ -102,3 +103,18 @@ def test_a_contact_beside_the_rim_is_doubted_where_that_is_held(edge, doubted):
 
     assert touch.present
     assert touch.near_rim == doubted
+
+
+@pytest.mark.parametrize("seed", [115, 180, 510])
+def test_a_cylinder_explains_an_edge_as_well_for_an_edge_is_the_narrowest(seed):
+    rng, layout = np.random.default_rng(seed), SensorLayout.regular(SQUARE, 10, 10)
+    coarse, fine = (ElasticSkin(Plate(SQUARE), layout, "hinged", k) for k in (15, 40))
+    place, force, angle = rng.uniform(0.03, 0.07, 2), rng.uniform(0.3, 1.5), rng.uniform(0, 3.1)
+    p = np.array([*place, force, angle, rng.uniform(0.004, 0.05) ** 2, rng.uniform(-0.3, 0.3)])
+    K = fine.readings(ends(0.0)(p))[0].reshape(3, -1) + rng.normal(0, 0.231, (3, 100))
+    fit = LeastSquares(basis_for(SQUARE, "hinged", 8, 8), layout)(K)
+    touch = PointContact(Plate(SQUARE), layout)(K, fit)
+
+    found = hypotheses(coarse, fine, K.ravel(), np.ones(300, bool), float(fit.noise), touch)
+
+    assert found.cylinder.best.cost < found.edge.best.cost + 1

@@ -19,7 +19,9 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.scene import TABLE_1_NOISE, contact_of, scaled_to
+from kappaskin.scene import TABLE_1_NOISE, Pressing, contact_of, moments_of, scaled_to
+from kappaskin.scene.limits import check_elements
+from kappaskin.scene.motion import Path, Press, Release, Slide
 
 PATCH = Patch(0.1, 0.1)
 
@@ -124,6 +126,18 @@ def test_without_motion_loads_stay():
     assert scene(*loads).loads_at(17.0) == loads
 
 
+def test_a_load_presses_as_hard_as_its_motion_says_where_that_has_taken_it():
+    way = Path((Press(1.0, "linear"), Slide(1.0, "linear", (0.02, 0.0)), Release(1.0, "linear")))
+    moved = scene(PointLoad(0.05, 0.05, 0.4), motion=way)
+
+    told = [moved.loads_at(time) for time in (0.0, 0.25, 1.5, 2.75)]
+
+    assert told[0] == ()
+    assert [(load.x, load.force) for (load,) in told[1:]] == [
+        pytest.approx(expected) for expected in ((0.05, 0.1), (0.06, 0.4), (0.07, 0.1))
+    ]
+
+
 def test_a_load_off_the_skin_is_refused():
     with pytest.raises(Refusal, match=r"on the patch of 0\.1 x 0\.1 m"):
         scene(PointLoad(0.05, 0.101))
@@ -144,3 +158,38 @@ def test_an_orbit_that_cannot_be_is_refused(radius, period):
 def test_a_scene_that_is_too_fast_for_its_converter_is_no_sensor():
     with pytest.raises(Refusal, match="lower the rate or the conversion time"):
         replace(load_scene("centre"), rate=700.0).sensor()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_is_looked_at_all_over_once(name):
+    scene = load_scene(name)
+
+    moments = np.array(moments_of(scene))
+
+    assert moments[0] == 0
+    assert (np.diff(moments) > 0).all()
+    if scene.moves or scene.laid:
+        assert set(scene.moments) <= set(moments.tolist())
+        assert scene.duration * 0.97 < moments[-1] <= scene.duration
+        assert np.diff(moments).max() <= scene.duration / 48 * (1 + 1e-9)
+
+
+def test_a_rigid_object_presses_as_the_point_loads_that_it_makes():
+    scene = load_scene("pencil")
+    time = max(scene.moments, key=lambda time: scene.stimuli[0].pose_at(time).amount)
+
+    pressed = Pressing(scene, scene.plate)(time)
+
+    force = sum(load.modal(scene.basis) for load in pressed.loads)
+    np.testing.assert_allclose(force, pressed.force, atol=1e-9 * np.abs(pressed.force).max())
+    asked = scene.stimuli[0].what.force * scene.stimuli[0].pose_at(time).amount
+    assert sum(load.force for load in pressed.loads) == pytest.approx(asked, rel=1e-3)
+    np.testing.assert_allclose(contact_of(pressed.loads), pressed.contact, atol=1e-9)
+
+
+def test_so_many_elements_as_the_wire_tells_apart_and_no_more():
+    check_elements(2**16 // 3)
+    check_elements(2**16 // 6, 2)
+    for too_many in ((2**16 // 3 + 1,), (2**16 // 6 + 1, 2)):
+        with pytest.raises(Refusal, match="at most 21845 elements"):
+            check_elements(*too_many)

@@ -363,6 +363,14 @@ def test_a_choice_is_the_same_once_written_and_read(choice):
     assert again(replace(PRESSED, choice=choice)).choice == choice
 
 
+def test_elements_a_hair_apart_are_written_without_a_grid_that_no_memory_holds():
+    near = SensorLayout.scattered(SQUARE, [(0.05, 0.05), (0.05 + 1e-7, 0.05 + 1e-7)])
+
+    read = again(replace(BARE, layout=near))
+
+    np.testing.assert_array_equal(read.layout.positions, near.positions)
+
+
 def test_what_is_on_though_there_is_nothing_of_it_is_left_out():
     scene = replace(BARE, choice=Choice(auto=True, on=frozenset({"creep", "quantisation"})))
 

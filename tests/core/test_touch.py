@@ -36,7 +36,7 @@ class Skin:
         draws = np.random.default_rng(seed).normal(0, NOISE, (frames, 3, len(self.layout)))
         return self.touches(self.curvature(load) + draws)
 
-    def position_bound(self, load, step=1e-6):
+    def position_bound(self, load, step=1e-6, read=True):
         """The Cramer-Rao bound on the standard deviations of x, y and of the force."""
 
         def moved(dx, dy):
@@ -44,6 +44,7 @@ class Skin:
 
         by_x, by_y = moved(1, 0) - moved(-1, 0), moved(0, 1) - moved(0, -1)
         J = np.column_stack([by_x, by_y, self.curvature(load.scaled(1 / load.force)).ravel()])
+        J = J[np.broadcast_to(read, (3, len(self.layout))).ravel()]
         return NOISE * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
 
 
@@ -220,6 +221,20 @@ def test_the_error_bars_of_the_contact_cover_the_load(place):
 
     # 68 % with a standard error of 1.6 %.
     np.testing.assert_allclose(np.mean(np.abs(z) < 1, axis=0), 0.68, atol=0.06)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_error_bars_are_those_of_place_and_force_together(sign):
+    load, noise = PointLoad(0.048, 0.045, 0.2), np.random.default_rng(0).normal(0, 1e-3, (3, 100))
+    p, q = np.arange(100) % 10, np.arange(100) // 10
+    read = sign * (p - q) > 1  # on one side of a diagonal: x and y are not told apart alike
+    K = PAPER.curvature(load) + noise
+
+    touch = PAPER.touches(np.where(read, K, np.nan))
+
+    bound = PAPER.position_bound(load, read=read)
+    told = np.array([*touch.position_sd, touch.force_sd])
+    np.testing.assert_allclose(told / told[0], bound / bound[0], rtol=5e-3)
 
 
 def test_with_few_readings_the_intervals_are_wider_as_student_says():
