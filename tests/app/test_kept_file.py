@@ -1,14 +1,16 @@
 """What a window keeps in a file between two starts, and files that cannot be used."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kappaskin import Refusal
 from kappaskin_app.layouts.file import KeptFile
-from kappaskin_app.layouts.kept import Kept, to_text
+from kappaskin_app.layouts.kept import Kept, from_text, to_text
 from kappaskin_app.layouts.layout import READY
 
 HOSTILE = (
@@ -98,3 +100,39 @@ def test_the_text_is_read_by_a_person() -> None:
     assert 'theme = "dark"' in text
     assert 'picture = "F12"' in text
     assert 'settings = {area = "left", shown = true, share = 0.25}' in text
+
+
+def test_of_two_windows_each_keeps_what_it_changed_and_what_it_forgot(tmp_path: Path) -> None:
+    file, mine = KeptFile(tmp_path / "window.toml"), READY["Study"]
+    begun = Kept(theme="light", keys={"picture": "F12", "tare": "F9"}, own={"A": mine, "B": mine})
+    assert file.merge(begun, Kept()) == ""
+    one = replace(begun, theme="dark", own={"A": mine, "B": mine, "One": mine})
+    other = replace(begun, letters=150.0, keys={"picture": "F8"}, own={"B": READY["Teach"]})
+    for window in (one, other):
+        assert file.merge(window, begun) == ""
+    assert file.read()[0] == Kept(
+        theme="dark",
+        letters=150.0,
+        keys={"picture": "F8"},
+        own={"B": READY["Teach"], "One": mine},
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["window.toml"]
+
+
+def test_what_a_window_did_not_touch_is_as_the_other_left_it_at_its_second_writing_too(
+    tmp_path: Path,
+) -> None:
+    file, begun = KeptFile(tmp_path / "window.toml"), Kept(theme="light")
+    file.merge(begun, Kept())
+    file.merge(replace(begun, theme="dark"), begun)
+    mine = replace(begun, files=("a",))
+    file.merge(mine, begun)
+    file.merge(replace(mine, done=("theme",)), mine)
+    assert file.read()[0] == Kept(theme="dark", files=("a",), done=("theme",))
+
+
+def test_letters_are_kept_and_those_that_no_form_offers_are_refused(tmp_path: Path) -> None:
+    assert from_text(to_text(Kept(letters=150.0))).letters == 150.0
+    for bad in ("1000", "nan", "true", "'large'"):
+        with pytest.raises(Refusal, match="letters from 80 to 200"):
+            from_text(f"format = 1\n[window]\nletters = {bad}")
