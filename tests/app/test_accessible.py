@@ -86,8 +86,8 @@ def test_tab_goes_through_every_panel_as_it_is_read(window: MainWindow) -> None:
     for name in ("scene", "cost", "stability", "health", "compare"):
         window.actions_by_name[f"dock-{name}"].trigger()
         # Beside each other stand columns, of which each is gone through.
-        seen += len(stops_in(window.docks[name].widget()))
-        wrong += turned_back(window.docks[name].widget(), columns=True)
+        seen += len(stops_in(window.docks.widget(name)))
+        wrong += turned_back(window.docks.widget(name), columns=True)
     assert wrong == []
     assert seen > 60
 

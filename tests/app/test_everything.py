@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QDialog,
-    QDockWidget,
     QFileDialog,
     QScrollBar,
     QTabWidget,
@@ -116,7 +115,7 @@ def _use(control: QWidget) -> None:
 def test_every_control_can_be_used(window: MainWindow, nothing_chosen, until) -> None:
     kinds = QAbstractButton, QAbstractSpinBox, QComboBox, QAbstractSlider
     pages = [window.panels.widget(number) for number in range(window.panels.count())]
-    pages += [dock.widget() for dock in window.findChildren(QDockWidget)]
+    pages += [window.docks.widget(name) for name in window.docks.by_name()]
     used, form = set[QWidget](), window.scene.editor
     for page in pages:
         for tabs in [page] if isinstance(page, QTabWidget) else [None]:
