@@ -371,6 +371,11 @@ def test_a_length_that_is_believed_takes_no_more_than_it_says() -> None:
         assert balanced(decoder).buffered <= LONGEST + 26
 
 
+def test_of_nothing_that_came_nothing_became_of_anything() -> None:
+    assert Accounting().balanced
+    assert Accounting() == Decoder().accounting()
+
+
 def test_bytes_never_fed_are_counted_as_overrun() -> None:
     decoder = Decoder()
     decoder.feed(scan(0))

@@ -1,6 +1,7 @@
 """The library against the vectors beside the wire format's page."""
 
 import json
+import re
 from importlib.resources import files
 from typing import Any
 
@@ -10,9 +11,11 @@ import pytest
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
 from kappaskin.sources.wire import (
     Command,
+    Fault,
     Information,
     Kind,
     Message,
+    Operation,
     Reply,
     Samples,
     encode,
@@ -36,6 +39,20 @@ def read(whole: bytes) -> Message:
 
 def channels(runs: list[list[int]]) -> list[int]:
     return [first + n for first, length in runs for n in range(length)]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "named"),
+    [(Operation, "operation"), (Fault, "status"), (Kind, "kind")],
+    ids=["operations", "faults", "kinds"],
+)
+def test_numbers_mean_what_the_firmware_s_header_says(numbers, named: str) -> None:
+    header = (files("kappaskin_resources") / "firmware" / "kappaskin_wire.h").read_text("utf-8")
+    (said,) = re.findall(rf"enum kappaskin_{named} {{(.*?)}};", header, re.DOTALL)
+    listed = dict(re.findall(r"KAPPASKIN_(\w+?)(?:_KIND)? = (\d+)", said))
+
+    ours = {name: int(one) for name, one in numbers.__members__.items() if one}
+    assert ours == {name: int(n) for name, n in listed.items() if int(n)}
 
 
 @named("good")
