@@ -85,8 +85,9 @@ def _fill(table: QTableWidget, rows: Rows) -> None:
     table.setRowCount(len(rows))
     fit_rows(table)
     wide = table.fontMetrics().horizontalAdvance
-    heads = (table.horizontalHeaderItem(column).text() for column in range(table.columnCount()))
-    table.horizontalHeader().setMinimumSectionSize(max(map(wide, heads)) + _BESIDE)
+    heads = map(table.horizontalHeaderItem, range(table.columnCount()))
+    widest = max((wide(head.text()) for head in heads if head is not None), default=0)
+    table.horizontalHeader().setMinimumSectionSize(widest + _BESIDE)
     table.setMinimumHeight((_LINES + 1) * table.verticalHeader().defaultSectionSize())
     for row, texts in enumerate(rows):
         for column, text in enumerate(texts):
