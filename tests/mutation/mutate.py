@@ -124,7 +124,7 @@ class Reach:
         # Not every line of a long statement is told to have run.
         at = ((str(made.file), line) for line in (made.begun, made.line))
         reached = set[str]().union(*(self.lines.get(line, set()) for line in at))
-        if "" in reached:
+        if not reached or "" in reached:  # or in none of the calls that were looked at
             all_of_it = [tests for (file, _), tests in self.lines.items() if file == str(made.file)]
             reached = set[str]().union(*all_of_it)
         took: dict[str, float] = defaultdict(float)
