@@ -1,5 +1,6 @@
 """With letters twice as large, in a window of the usual size, nothing is cut."""
 
+import threading
 from collections.abc import Iterator
 
 import pytest
@@ -24,6 +25,11 @@ def shared(qapp: QApplication, until) -> Iterator[MainWindow]:
     window = MainWindow("sim:")
     window.show()
     until(lambda: bool(window.object.text()))
+    # Their threads are those of no one test.
+    for name, thread in (("stability", "singular-values_0"), ("design", "design_0")):
+        window.docks.reveal(name)
+        until(lambda thread=thread: thread in {each.name for each in threading.enumerate()})
+        window.docks[name].hide()
     window.wishes.wish("letters", 200.0)
     yield window
     window.history.stack.setIndex(0)

@@ -1,5 +1,6 @@
 """What is no setting comes back too: where the camera stands, docks, pages, files."""
 
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,10 @@ def shared(qapp: QApplication, until) -> Iterator[MainWindow]:
     window = MainWindow("sim:")
     window.show()
     until(lambda: bool(window.object.text()))  # its threads are those of no one test
+    window.heatmaps["xx"].chosen.emit(0)
+    until(lambda: "error-bars_0" in {thread.name for thread in threading.enumerate()})
+    window.history.stack.undo()
+    window.docks["element"].hide()
     yield window
     window.close()
     window.deleteLater()
