@@ -182,10 +182,10 @@ def test_how_many_elements_there_are_is_told_once_it_is_known() -> None:
 
 
 def test_every_line_of_the_legend_has_room(measured: MainWindow, until) -> None:
-    plot, dock = measured.cost.plot, measured.cost.parent()
+    plot, dock = measured.cost.plot, measured.docks["cost"]
     was = dock.height()
     measured.resizeDocks([dock], [1], Qt.Orientation.Vertical)
-    until(lambda: plot.height() < 200)
+    until(lambda: dock.height() < was)
     assert plot.height() >= 13 * plot.fontMetrics().height()
     measured.resizeDocks([dock], [was], Qt.Orientation.Vertical)
 

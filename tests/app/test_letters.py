@@ -18,6 +18,8 @@ from kappaskin_app.views.readouts import Health
 from kappaskin_app.views.title import Title
 from kappaskin_app.window import MainWindow
 
+_THREADS = {"stability": "singular-values_0", "design": "design_0", "scene": "gallery_0"}
+
 
 @pytest.fixture(scope="module")
 def shared(qapp: QApplication, until) -> Iterator[MainWindow]:
@@ -26,7 +28,7 @@ def shared(qapp: QApplication, until) -> Iterator[MainWindow]:
     window.show()
     until(lambda: bool(window.object.text()))
     # Their threads are those of no one test.
-    for name, thread in (("stability", "singular-values_0"), ("design", "design_0")):
+    for name, thread in _THREADS.items():
         window.docks.reveal(name)
         until(lambda thread=thread: thread in {each.name for each in threading.enumerate()})
         window.docks[name].hide()

@@ -6,7 +6,6 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractSpinBox,
-    QDockWidget,
     QSlider,
     QTabBar,
     QTableWidget,
@@ -284,9 +283,7 @@ def test_singular_values_are_those_of_the_scaled_operator() -> None:
 
 def test_the_panels_below_the_skin_cannot_be_dropped_into_a_column(window: MainWindow) -> None:
     beside = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
-    for panel in (window.cost, window.stability):
-        dock = panel.parent()
-        assert isinstance(dock, QDockWidget)
+    for dock in (window.docks["cost"], window.docks["stability"]):
         assert dock.isAreaAllowed(Qt.DockWidgetArea.BottomDockWidgetArea)
         assert not any(dock.isAreaAllowed(area) for area in beside)
 

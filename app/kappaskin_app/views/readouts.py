@@ -71,8 +71,8 @@ _WIDTHS = {
     "force": 14,
     "depth": 15,
     "age": 10,
-    "error": 11,
-    "rms": 8,
+    "error": 10,
+    "rms": 9,
 }
 """Characters of each, as many as it mostly has."""
 
