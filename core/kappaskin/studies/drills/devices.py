@@ -1,5 +1,6 @@
 """Drills on the device and its plug: it stalls, floods, is deaf, restarts, is another, is gone."""
 
+import math
 import os
 import signal
 import time
@@ -12,6 +13,7 @@ from kappaskin.studies.drills.rewrite import Says, Times, untold
 from kappaskin.studies.drills.stand import Stand
 
 _WITHIN = 1.0  # s
+_START = 20.0  # s until a device that has just begun answers
 _BACK = 2.0  # s after a port's return
 _BLOCKED = 0.3  # s that a read may take on a busy machine
 _GROWTH = 10 * 2**20  # bytes
@@ -191,6 +193,8 @@ def _device_clock(stand: Stand) -> Outcome:
 def _host_clock(stand: Stand) -> Outcome:
     """Set this machine's clock, forth and back."""
     stand.settle()
+    # A ping unanswered at first is sent again after seconds; before an answer no clock is known.
+    stand.until(lambda: stand.last and stand.last.taken_sd < math.inf, _START)
     followed: list[bool] = []
     for ahead in (30.0, 10.0):
         stand.clock = lambda ahead=ahead: time.monotonic() + ahead
