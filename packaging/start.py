@@ -121,7 +121,7 @@ def test(arguments: list[str], shown: dict[str, str]) -> int:
 
 def fast(arguments: list[str], shown: dict[str, str]) -> int:
     """Run the library's tests but those that are slow or start a process."""
-    command = [tool("pytest"), "-n3", "-q", "-m", "not slow", LIBRARY, *arguments]
+    command = [tool("pytest"), "-n2", "-q", "-m", "not slow", LIBRARY, *arguments]
     return run(command, shown, cwd=ROOT)
 
 
