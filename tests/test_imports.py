@@ -51,6 +51,15 @@ def test_a_name_of_the_library_loads_its_room_and_those_below_alone(code, rooms)
     assert ours == rooms
 
 
+def test_a_command_that_is_typed_loads_what_it_needs_alone():
+    loaded = loaded_by("from kappaskin.cli import main\nmain(['device', '--help'])")
+
+    commands = {name.split(".")[2] for name in loaded if name.startswith("kappaskin.cli.")}
+    assert commands == {"common", "device"}
+    assert "kappaskin_app" not in loaded
+    assert "kappaskin.studies" not in loaded
+
+
 def test_every_exported_name_is_what_type_checkers_see():
     [seen] = [
         node

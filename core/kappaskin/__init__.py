@@ -111,6 +111,7 @@ if TYPE_CHECKING:
     from kappaskin.press import PressTest as PressTest
     from kappaskin.press import Verdict as Verdict
     from kappaskin.press import elements_to_press as elements_to_press
+    from kappaskin.processes import load_beside as load_beside
     from kappaskin.publish import Latency as Latency
     from kappaskin.publish import Published as Published
     from kappaskin.publish import PublishNews as PublishNews
@@ -223,6 +224,7 @@ else:
         "pipeline": "Pipeline Setup",
         "placement": "PLACEMENTS elements_placed predicted_sd",
         "press": "Phase PressTest Verdict elements_to_press",
+        "processes": "load_beside",
         "publish": "Latency Published PublishNews Receiver",
         "quantities": "QUANTITIES ErrorBars Quantities of_form",
         "recording.disk": "is_written",

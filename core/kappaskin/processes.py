@@ -47,6 +47,15 @@ def beginning_processes() -> Generator[Context]:
                 os.environ[name] = value
 
 
+def load_beside() -> None:
+    """Begin to load the library in a process beside; an `Engine` that waits for it begins sooner.
+
+    Nothing where the system cannot fork from such a process.
+    """
+    with beginning_processes():
+        pass
+
+
 def _begin_deaf() -> None:
     """Begin the process that the others come from, deaf to Ctrl+C, as they are then.
 

@@ -1,3 +1,4 @@
+import gc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -7,6 +8,7 @@ from PySide6.QtGui import QGuiApplication, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from kappaskin_app.launch import _all_stays
 from kappaskin_app.layouts.file import KeptFile
 from kappaskin_app.layouts.glance import theme_in
 from kappaskin_app.layouts.kept import Kept
@@ -85,3 +87,16 @@ def test_the_theme_that_is_kept_is_told_and_the_file_left_alone(tmp_path: Path) 
     path.write_text("no TOML")
     assert theme_in(path) == ""
     assert [file.name for file in tmp_path.iterdir()] == ["window.toml"]
+
+
+def test_garbage_is_not_looked_for_while_all_is_loaded_and_is_again_even_where_that_fails() -> None:
+    looked_for: list[bool] = []
+
+    def load() -> None:
+        looked_for.append(gc.isenabled())
+        raise ImportError
+
+    with pytest.raises(ImportError), _all_stays():
+        load()
+
+    assert [*looked_for, gc.isenabled()] == [False, True]

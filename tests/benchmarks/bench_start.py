@@ -44,10 +44,10 @@ def _drawn(script: Path) -> tuple[float, float]:
     return passed, spent
 
 
-def test_the_first_picture_is_there_within_three_seconds(figure) -> None:
+def test_the_first_picture_is_there_within_three_seconds(figure, ratio) -> None:
     taken = [_drawn(_FIRST)[0] for _ in range(4)]
     figure(f"first picture of the skin: {min(taken[1:]):.2f} s warm ({taken[0]:.2f} s at first)")
-    assert min(taken[1:]) < 3.0
+    ratio("first picture of the skin, of the 3 s allowed", min(taken[1:]) / 3, at_most=1)
 
 
 def test_the_first_picture_takes_little_more_than_a_bare_window_does(figure, ratio) -> None:

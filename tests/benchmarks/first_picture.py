@@ -1,19 +1,40 @@
-"""Opens the app as its command does.
+"""Runs `kappaskin app` until the skin is drawn.
 
-Prints how long after the time given the skin was drawn, and what processor time that took here.
+Prints how long after the time given that was, and what processor time it took here.
 """
 
 import math
 import sys
 import time
+from pathlib import Path
+from typing import Any
 
-from kappaskin_app.launch import opened
+from kappaskin.cli import main
+
+_LOOK = 1  # ms
+
+
+def _watched(source: str, kept: Path | None = None) -> Any:
+    """The window, which closes as soon as the skin was drawn."""
+    from PySide6.QtCore import QTimer  # not before the app does
+
+    application, window = opened(source, kept)
+
+    def look() -> None:
+        if any(math.isfinite(age) for _, age in window.membrane.ages):
+            timer.stop()
+            print(time.monotonic() - started, time.process_time())
+            window.close()
+
+    timer = QTimer(window, interval=_LOOK)
+    timer.timeout.connect(look)
+    timer.start()
+    return application, window
+
 
 if __name__ == "__main__":
-    started = float(sys.argv[1])
-    application, window = opened("sim:")
-    while not any(math.isfinite(age) for _, age in window.membrane.ages):
-        application.processEvents()
-        time.sleep(0.001)
-    print(time.monotonic() - started, time.process_time())
-    window.close()
+    from kappaskin_app import launch
+
+    started, opened = float(sys.argv[1]), launch.opened
+    launch.opened = _watched
+    sys.exit(main(["app"]))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
@@ -293,6 +294,19 @@ def test_a_reader_who_has_gone_is_no_error(unbuffered: str) -> None:
     )
     os.close(write)
     assert (found.returncode, found.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(("asked", "threads"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
+def test_a_command_computes_in_one_thread_unless_it_is_told_otherwise(asked, threads) -> None:
+    if threads > (psutil.cpu_count() or 1):
+        pytest.skip("more threads than processors")
+    of_blas = {"OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"}
+    inherited = {name: value for name, value in os.environ.items() if name not in of_blas}
+    told = "import kappaskin.cli, numpy, psutil; print(psutil.Process().num_threads())"
+
+    found = subprocess.check_output([sys.executable, "-c", told], env=inherited | asked)
+
+    assert int(found) == threads
 
 
 @pytest.mark.parametrize(

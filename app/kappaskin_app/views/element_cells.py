@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from kappaskin import SensorLayout
 from kappaskin_app.theme import Colours
@@ -29,7 +29,7 @@ class ElementCells:
             width = height = _PIXELS
             x, y = layout.patch.cell_centres(width, height)
             pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-            self._which = np.asarray(cKDTree(layout.positions).query(pixels)[1])
+            self._which = np.asarray(scipy.spatial.KDTree(layout.positions).query(pixels)[1])
         self._image: Any = pv.ImageData(dimensions=(width, height, 1))
         self._image.point_data["rgb"] = np.zeros((width * height, 3), np.uint8)
         self.pixels = self._image.point_data["rgb"]

@@ -4,35 +4,12 @@ import os
 import sys
 from importlib import metadata
 
+# Before NumPy is loaded, as in the engine: small products lose by threading, and threads that spin
+# for each other on busy cores took twenty times as long.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from cyclopts import App, CycloptsError
 
-from kappaskin.cli import (
-    calibrate,
-    compare,
-    cost,
-    device,
-    doctor,
-    drill,
-    export,
-    figures,
-    info,
-    listen,
-    monitor,
-    plan,
-    press,
-    publish,
-    reconstruct,
-    record,
-    regions,
-    repair,
-    report,
-    simulate,
-    stability,
-    study,
-    tables,
-    tare,
-    verify,
-)
 from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
 from kappaskin.errors import Refusal
@@ -43,51 +20,61 @@ app = App(
     version=metadata.version("kappaskin"),
     help_format="markdown",
 )
-for command in (
-    tables.tables,
-    reconstruct.reconstruct,
-    calibrate.calibrate,
-    tare.tare,
-    press.press,
-    regions.regions,
-    cost.cost,
-    compare.compare,
-    stability.stability,
-    study.study,
-    report.report,
-    plan.plan,
-    simulate.simulate,
-    device.device,
-    drill.drill,
-    export.export,
-    monitor.monitor,
-    record.record,
-    info.info,
-    verify.verify,
-    repair.repair,
-    publish.publish,
-    listen.listen,
-    figures.figures,
-    doctor.doctor,
+# Only names, until one is typed or all are listed: no command waits for what others need.
+for _command in (
+    "tables",
+    "reconstruct",
+    "calibrate",
+    "tare",
+    "press",
+    "regions",
+    "cost",
+    "compare",
+    "stability",
+    "study",
+    "report",
+    "plan",
+    "simulate",
+    "device",
+    "drill",
+    "export",
+    "monitor",
+    "record",
+    "info",
+    "verify",
+    "repair",
+    "publish",
+    "listen",
+    "figures",
+    "doctor",
 ):
-    app.command(command)
+    app.command(f"kappaskin.cli.{_command}:{_command}")
 
 
 def _add_commands() -> None:
     for entry in metadata.entry_points(group="kappaskin.commands"):
         if entry.name not in app:
-            app.command(entry.load(), name=entry.name)
+            app.command(entry.value, name=entry.name)
 
 
-def _named(arguments: list[str] | None) -> str:
-    """The command that was typed, as far as there is one."""
+def _load_all() -> None:
+    """Load every command: a list of them says what each does."""
+    for name in app:
+        app[name]
+
+
+def _typed(arguments: list[str] | None) -> str:
+    """The command that was typed, or nothing where it is none of ours."""
     first, *_ = (sys.argv[1:] if arguments is None else arguments) or [""]
-    return f"kappaskin {first}" if first and first in app else "kappaskin"
+    return first if first in app and not first.startswith("-") else ""
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit code is 0 when done, 1 or 2 as `FAILED` and `REFUSED` say."""
     _add_commands()
+    typed = _typed(arguments)
+    if not typed:
+        _load_all()
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
@@ -96,7 +83,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"kappaskin: {refusal}", file=sys.stderr)
         return REFUSED
     except CycloptsError as error:
-        print(f"kappaskin: {error} See `{_named(arguments)} --help`.", file=sys.stderr)
+        named = f"kappaskin {typed}".strip()
+        print(f"kappaskin: {error} See `{named} --help`.", file=sys.stderr)
         return REFUSED
     except MemoryError as error:
         print(f"kappaskin: {error}; ask for less of it, or of finer things", file=sys.stderr)
