@@ -32,10 +32,11 @@ from kappaskin import (
     load_scene,
     schedule,
 )
+from kappaskin.calibration import summary
 from kappaskin.calibration.file import from_toml
 from kappaskin.effects import ReadingEffect, Size, Survey
 from kappaskin.errors import SourceError
-from kappaskin.guide import summary, take_sweep
+from kappaskin.sweeping import take_sweep
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources.device import PseudoDevice
@@ -86,7 +87,7 @@ def test_json_tells_every_channel_and_nothing_else(run, tmp_path) -> None:
 
 def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> None:
     creeping = replace(SCENE, effects=(Creep(0.05, 2.0), *SCENE.effects[1:]))
-    monkeypatch.setattr("kappaskin.guide.load_scene", lambda name: creeping)
+    monkeypatch.setattr("kappaskin.sweeping.load_scene", lambda name: creeping)
     out = tmp_path / "s.toml"
     _, printed, told = run("calibrate", "sim:creeping", "--out", out, "--hold", "10", *FAST)
     assert "held for 10 s" in told
@@ -106,7 +107,7 @@ def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monke
             return lambda curvature, _: curvature * alive
 
     broken = replace(SCENE, effects=(Broken(), GaussianNoise(0.2)))
-    monkeypatch.setattr("kappaskin.guide.load_scene", lambda name: broken)
+    monkeypatch.setattr("kappaskin.sweeping.load_scene", lambda name: broken)
     out = tmp_path / "s.toml"
 
     code, printed, _ = run("calibrate", "sim:broken", "--out", out, *FAST)
@@ -207,7 +208,7 @@ class Rig:
 
 
 def guided(rig: Rig, monkeypatch, **options):
-    monkeypatch.setattr("kappaskin.guide.open_source", lambda _: rig)
+    monkeypatch.setattr("kappaskin.sweeping.open_source", lambda _: rig)
     options = {"seconds": 0.004} | options
     return take_sweep("a port", RADII, rig.ask, rig.told.append, **options)
 
@@ -229,6 +230,21 @@ def test_a_person_is_asked_for_each_cylinder_and_shown_what_was_read(monkeypatch
     report = calibrate(sweep, sensor, datetime.now(UTC))
     assert report.passed.all()
     assert "48 of 48 channels passed" in summary(report)[0]
+
+
+def test_a_frame_that_another_overtook_spoils_no_step(monkeypatch) -> None:
+    class Overtaken(Rig):
+        def read(self, timeout: float) -> list[Frame]:
+            frames = super().read(timeout)
+            if self.n < 100:
+                frames[3], frames[4] = frames[4], frames[3]
+            return frames
+
+    rig = Overtaken()
+
+    guided(rig, monkeypatch)
+
+    assert not any("clock went back" in told for told in rig.told)
 
 
 def test_redo_takes_the_last_step_again(monkeypatch) -> None:
@@ -273,7 +289,7 @@ def test_what_was_read_before_enter_does_not_count(monkeypatch) -> None:
 
 
 def test_a_device_that_falls_silent_is_refused(monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.guide._SILENCE", 0.05)
+    monkeypatch.setattr("kappaskin.sweeping._SILENCE", 0.05)
     rig = Rig()
     take = rig.read
     rig.read = lambda timeout: take(timeout) if len(rig.asked) < 5 else time.sleep(0.01) or []

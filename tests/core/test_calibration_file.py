@@ -137,6 +137,22 @@ def test_a_file_is_replaced_whole_or_not_at_all(path, monkeypatch):
     assert list(path.parent.iterdir()) == [path]
 
 
+def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
+    with pytest.raises(Refusal, match=r"cannot be written .*surrogates"):
+        save_calibration(replace(CALIBRATION, name="\ud800"), tmp_path / "a.toml")
+
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_calibration_of_more_channels_than_the_sensor_has_is_refused():
+    one, zero = np.ones(C + 3), np.zeros(C + 3)
+    more = dict.fromkeys(("offset", "gain_sd", "offset_sd"), zero)
+    with pytest.raises(Refusal, match="in other places than when it was calibrated"):
+        replace(CALIBRATION, gain=one, **more, hysteresis=None, creep=None, failures=()).check(
+            SENSOR
+        )
+
+
 @pytest.mark.parametrize("place", ["no/such/folder/skin.toml", "."])
 def test_a_place_that_is_none_is_refused(tmp_path, place):
     with pytest.raises(Refusal, match="expected a file in a folder that exists"):
@@ -229,6 +245,7 @@ def test_a_heading_that_is_none_is_refused(path):
         ("line__gain", 1.0),
         ("line__gain", [-1.0] * C),
         ("creep__time_constant", "long"),
+        ("creep__time_constant", 10**400),
         ("creep__time_constant", [20.0]),
         ("creep__share", [math.nan] * C),
         ("hysteresis__weights", [[1.0] * C]),

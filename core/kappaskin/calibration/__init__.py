@@ -18,6 +18,7 @@ from kappaskin.calibration.schedule import Presentation as Presentation
 from kappaskin.calibration.schedule import Step as Step
 from kappaskin.calibration.schedule import radii_for as radii_for
 from kappaskin.calibration.schedule import schedule as schedule
+from kappaskin.calibration.summary import summary as summary
 from kappaskin.calibration.tare import Tare as Tare
 from kappaskin.calibration.tares import Kept as Kept
 from kappaskin.calibration.tares import Tares as Tares

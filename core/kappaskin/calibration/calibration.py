@@ -120,7 +120,7 @@ class Calibration:
                 f"{sensor.name} {sensor.serial_number}; choose the file of this sensor, or "
                 "calibrate it"
             )
-        if fingerprint(sensor.layout) != self.layout:
+        if (fingerprint(sensor.layout), sensor.channels) != (self.layout, len(self.gain)):
             raise Refusal(
                 f"{sensor.name} {sensor.serial_number} has {sensor.layout} in other places than "
                 "when it was calibrated; calibrate it again"

@@ -57,7 +57,7 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
-    except OSError as error:
+    except (OSError, UnicodeEncodeError) as error:
         raise Refusal(f"{path}: cannot be written ({error}); choose another place") from error
     finally:
         part.unlink(missing_ok=True)
@@ -142,7 +142,7 @@ def calibration_in(data: bytes, path: Path) -> Calibration:
             else None,
             failures=tuple((int(c), str(why)) for c, why in said["failures"].items()),
         )
-    except (ValueError, TypeError, AttributeError) as error:
+    except (ValueError, TypeError, AttributeError, OverflowError) as error:
         raise Refusal(f"{path}: cannot be used ({error}); {_AGAIN}") from error
 
 

@@ -5,10 +5,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from kappaskin.calibration import calibrate as calibrated
-from kappaskin.calibration import check_place, save_calibration
+from kappaskin.calibration import check_place, save_calibration, summary
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
-from kappaskin.guide import summary, take_sweep
+from kappaskin.sweeping import take_sweep
 
 
 def _millimetres(text: str) -> tuple[float, ...]:

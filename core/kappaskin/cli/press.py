@@ -4,7 +4,7 @@ import sys
 
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
-from kappaskin.press_guide import press_elements
+from kappaskin.map_testing import press_elements
 
 
 def press(

@@ -70,6 +70,13 @@ def test_the_rms_is_that_over_the_area(patch, off):
     )
 
 
+@pytest.mark.parametrize("patch", [FLAT, Patch(0.03, 0.02, 0.0129, strip=True)], ids=str)
+def test_the_rate_is_that_of_a_scan_by_the_sensor(patch):
+    design = designed(patch)
+
+    assert prospect(design).rate == pytest.approx(design.scene.sensor().scan().rate)
+
+
 def test_the_rate_is_what_three_conversions_of_each_element_leave():
     design = designed()
 

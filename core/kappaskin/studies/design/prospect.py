@@ -124,7 +124,7 @@ def prospect(design: Design) -> Prospect:
     x, y, on, points = _points(design.scene.plate.patch)
     sd = predicted_sd(estimator, noise_of(design.scene), points)
     layout = estimator.layout
-    rate = 1 / design.scene.transduction.scan_time(int(layout.live.sum()))
+    rate = 1 / design.scene.transduction.scan_time(3 * len(layout))
     return Prospect(x, y, _on_map(on, sd), layout.positions, rate)
 
 

@@ -60,9 +60,9 @@ class _Run:
 
         A task that was in hand when a worker died may be what kills them: it is handed out alone.
         """
-        if self._alone:
-            if not self._running:
-                self._submit(*self._alone.popleft())
+        if self._alone and not self._running:
+            self._submit(*self._alone.popleft())
+        if self._alone or any(task.key in self._suspects for _, task in self._running.values()):
             return True
         while len(self._running) < _AHEAD * self._workers.count:
             known, block = self._next.popleft() if self._next else next(self._first, (None, 0))

@@ -9,12 +9,12 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Frame
-from kappaskin.guide import Listener, Tell, Virtual
 from kappaskin.mechanics import PointLoad
 from kappaskin.press import Phase, PressTest, Verdict, elements_to_press
 from kappaskin.scene import Scene, load_scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources import SIMULATION, SimulatedSource, open_source
+from kappaskin.sweeping import Listener, Tell, Virtual
 
 _OF_THE_RANGE = 0.5  # of what a channel can read, that a simulated finger makes of it
 _FINEST = 15  # functions along each side at least: or a bent strip answers everywhere alike

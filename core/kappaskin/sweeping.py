@@ -1,5 +1,6 @@
-"""A source to a calibration: asks for one cylinder after the other, or follows who lays them."""
+"""A source to a sweep: asks for one cylinder after the other, or follows who lays them."""
 
+import math
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -9,7 +10,6 @@ import numpy as np
 
 from kappaskin.calibration import (
     ADVICE,
-    CalibrationReport,
     Presentation,
     Procedure,
     Step,
@@ -18,7 +18,7 @@ from kappaskin.calibration import (
     schedule,
 )
 from kappaskin.errors import Refusal, SourceError
-from kappaskin.frames import COMPONENTS, Array, Frame
+from kappaskin.frames import OVERTAKEN, Array, Frame
 from kappaskin.scene import load_scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources import SIMULATION, SimulatedSource, Source, open_source
@@ -27,7 +27,6 @@ _READ = 0.05  # s that one read may wait
 _SILENCE = 5.0  # s without a frame after which the source counts as dead
 _MOST_FRAMES = 5000  # kept of one step, evenly: more tell no more
 _LONGEST = 3600.0  # s on one step
-_WORST = 5  # channels that a summary names
 
 Tell = Callable[[str], None]
 Ask = Callable[[str], str]
@@ -95,8 +94,9 @@ class Listener:
 
 def _keep(kept: list[Frame], frame: Frame, seconds: float) -> None:
     """Add `frame` to those `kept` of a step of so many `seconds`, unless it comes too soon."""
-    # Not the signed difference: a clock that went back is for the procedure to refuse.
-    if not kept or abs(frame.device_time - kept[-1].device_time) >= seconds / _MOST_FRAMES:
+    after = frame.device_time - kept[-1].device_time if kept else math.inf
+    # One that others overtook is left out; a clock that went back is for the procedure to refuse.
+    if after >= seconds / _MOST_FRAMES or after < -OVERTAKEN:
         kept.append(frame)
 
 
@@ -139,7 +139,7 @@ def _prompt(step: Step, total: int, again: bool) -> str:
     return f"{step.number}/{total}  {step}: {then}{redo}: "
 
 
-def _guide(listener: Listener, procedure: Procedure, seconds: float, ask: Ask, tell: Tell) -> None:
+def _asking(listener: Listener, procedure: Procedure, seconds: float, ask: Ask, tell: Tell) -> None:
     """Ask for each step and take it, until all are done."""
     tell(ADVICE)
     while step := procedure.step:
@@ -184,42 +184,7 @@ def take_sweep(
         steps = _steps(listener.sensor, radii, hold)
         procedure = Procedure(listener.sensor, steps)
         if dwell is None:
-            _guide(listener, procedure, seconds, ask, tell)
+            _asking(listener, procedure, seconds, ask, tell)
         else:
             _follow(listener, procedure, Presentation(steps, dwell), tell)
         return listener.sensor, procedure.sweep()
-
-
-def summary(report: CalibrationReport) -> list[str]:
-    """What a person wants to know of a calibration, line by line."""
-    calibration, P = report.calibration, len(report.noise) // 3
-
-    def spread(values: Array) -> str:
-        return f"{values.min():.3g} to {values.max():.3g}"
-
-    lines = [
-        f"{calibration.name} {calibration.serial_number}: {int(report.passed.sum())} of "
-        f"{int(report.passed.sum()) + len(report.failed)} channels passed; curvature in 1/m",
-        f"{'':<11}{'gain':<18}{'offset':<18}{'widest loop (left)':<22}error (of a line alone)",
-    ]
-    for c, name in enumerate(COMPONENTS):
-        here = np.flatnonzero(report.passed[c * P : (c + 1) * P]) + c * P
-        if here.size:
-            loops = report.gaps[:, here].max(), report.gaps_left[:, here].max()
-            errors = report.fitted.left_out[here].max(), report.line.left_out[here].max()
-            lines.append(
-                f"{name:<11}{spread(report.fitted.gain[here]):<18}"
-                f"{spread(report.fitted.offset[here]):<18}"
-                f"{'{:.2f} ({:.2f})'.format(*loops):<22}{errors[0]:.3f} ({errors[1]:.2f})"
-            )
-    if calibration.creep:
-        share = float(np.median(calibration.creep.share[report.passed]))
-        lines.append(f"creep      {100 * share:.1f} % in {calibration.creep.time_constant:.3g} s")
-    worst = np.argsort(np.where(report.passed, -report.fitted.left_out, 0.0))[:_WORST]
-    told = (f"{_named(c, P)} {report.fitted.left_out[c]:.3f}" for c in worst)
-    lines.append(f"worst      {', '.join(told)}")
-    return lines + [f"failed     {_named(c, P)}: {why}" for c, why in report.failed.items()]
-
-
-def _named(channel: int, elements: int) -> str:
-    return f"{COMPONENTS[channel // elements]} of element {channel % elements}"
