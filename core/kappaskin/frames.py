@@ -14,6 +14,9 @@ Mask = NDArray[np.bool_]
 COMPONENTS = ("xx", "yy", "xy")
 """Curvature components, in the one order used everywhere."""
 
+OVERTAKEN = 1.0
+"""Seconds that a frame may be older than one before it, by a device's clock: more, it restarted."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:

@@ -91,6 +91,10 @@ class Scanner:
         self._turn = 0
         self._live = np.flatnonzero(sensor.layout.live.ravel())
         self._chosen: NDArray[np.intp] | None = None
+        if region.by_channel and not self._live.size:
+            raise Refusal(
+                f"expected channels to scan, got {sensor.layout}, all of them dead; scan everything"
+            )
 
     @property
     def rate(self) -> float:

@@ -60,6 +60,7 @@ class Line:
         return np.array(told).T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slower", [-50e-6, 0.0, 50e-6, 5e-3])
 def test_the_bound_holds_for_an_hour_of_drift_and_is_near_half_a_round_trip(slower):
     line = Line(slower)

@@ -9,13 +9,17 @@ import select
 import struct
 import threading
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from kappaskin import Port, SourceError, load_scene
+from kappaskin import Pipeline, Port, Setup, SourceError, load_scene
+from kappaskin.keeping import Keeping
+from kappaskin.recording.reading import Recording
+from kappaskin.retrace import Retrace
 from kappaskin.sources import SerialSource, information, ports, serial_line
 from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.tuning import BAUD_RATES
@@ -247,6 +251,12 @@ def test_information_that_changes_on_the_line_is_said(streaming):
     assert "says something else of itself" in reader.told("changed")
 
 
+def test_a_device_that_says_much_of_itself_is_told_of_in_few_words(streaming):
+    device, reader = streaming
+    device.say(encode_information(11, 0.022, text_of(serial_number=200_000 * "7")))
+    assert len(reader.told("other")) <= 500
+
+
 def test_a_device_that_begins_anew_on_the_line_is_said_and_goes_on(streaming):
     device, reader = streaming
     device.say(stream(500, 510))
@@ -283,6 +293,37 @@ def test_messages_between_the_line_and_who_is_there_wait_and_are_not_lost(stream
     back.say(encode_information(20, 0.04, TEXT) + scan(21))
     reader.took(21)
     assert [frame.sequence for frame in reader.frames[10:]] == [*range(11, 20), 21]
+
+
+@pytest.mark.parametrize("when", ["gone", "back, and nobody said yet who"])
+@pytest.mark.parametrize("earlier", [False, True], ids=["first", "second"])
+def test_a_recording_that_begins_without_the_device_goes_through_what_was_computed(
+    when, earlier, streaming, plug, tmp_path
+):
+    device, reader = streaming
+    source = reader.source
+    side = SimpleNamespace(pipeline=Pipeline(source.sensor, Setup(nx=5, ny=5)), left=None)
+    with closing(Keeping()) as keeping:
+        if earlier:
+            keeping.begin(tmp_path / "earlier.mcap", source, side)
+        pull(device, reader)
+        if when == "gone":
+            keeping.begin(tmp_path / "a.mcap", source, side)
+        back = put_back(plug, reader)
+        back.say(scan(11))
+        reader.until(lambda: source.accounting().good == 12)
+        if when != "gone":
+            keeping.begin(tmp_path / "a.mcap", source, side)
+        back.say(encode_information(12, 0.024, TEXT) + scan(13))
+        reader.took(13)
+
+    with Recording(tmp_path / "a.mcap") as recording:
+        retrace = Retrace(recording)
+        again = [frame for message in recording.messages() for frame in retrace(message)]
+    assert retrace.pipeline is not None
+    assert [(f.sequence, f.taken, f.taken_sd) for f in again] == [
+        (f.sequence, f.taken, f.taken_sd) for f in reader.frames[10:]
+    ]
 
 
 def test_half_a_message_at_the_end_of_the_line_is_cut_off_and_no_part_of_the_next(streaming, plug):

@@ -202,6 +202,13 @@ def test_elements_that_the_skin_has_not_are_refused(elements):
         Scanner(SENSOR, Region("elements", elements=elements))
 
 
+@pytest.mark.parametrize("around", ["turns", "adaptive"])
+def test_a_share_of_no_live_channel_is_refused(around):
+    dead = replace(SENSOR, layout=SENSOR.layout.without(range(100)))
+    with pytest.raises(Refusal, match="all of them dead; scan everything"):
+        Scanner(dead, Region(around))
+
+
 @pytest.mark.parametrize("elements", [(1.5,), ("a",), (None,), ((1, 2),)])
 def test_elements_that_are_no_whole_numbers_are_refused(elements):
     with pytest.raises(Refusal, match="whole numbers"):

@@ -1,6 +1,7 @@
 """The simulated source keeps a device's pace by any clock, and counts what it leaves out."""
 
 import math
+from contextlib import closing
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,7 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    Amplifier,
+    Choice,
+    DiscLoad,
     Frame,
+    Indenter,
     Patch,
     Plate,
     PointLoad,
@@ -20,11 +25,17 @@ from kappaskin import (
     Scene,
     SensorLayout,
     Simulator,
+    Stimulus,
     Transduction,
     load_scene,
 )
 from kappaskin.effects import CorruptedFrames, DroppedFrames
+from kappaskin.mechanics import Sphere
+from kappaskin.recorder import Recorder
+from kappaskin.recording.messages import LINES
+from kappaskin.recording.reading import Recording
 from kappaskin.sources import SimulatedSource, open_source
+from kappaskin.sources.wire import pack_runs, unpack_runs
 
 pytestmark = pytest.mark.slow
 
@@ -218,7 +229,31 @@ def test_a_scene_that_is_refused_leaves_the_one_that_plays() -> None:
     with pytest.raises(Refusal, match="lower the rate"):
         source.play(fingertip(m=32, rate=5000.0))
 
+    amplified = replace(fingertip().transduction, amplifier=Amplifier(gain=1e9))
+    with pytest.raises(Refusal, match="expected electronics that read"):
+        source.play(replace(fingertip(), transduction=amplified))
+    crushed = Stimulus(Indenter(Sphere(0.01), 0.05, 0.05, force=1e6))
+    with pytest.raises(Refusal, match="press with less force"):
+        source.play(replace(source.scene, stimuli=(crushed,), choice=Choice(auto=True)))
+
     assert source.sensor is sensor
+    assert not source.scene.indenter
+    (frame,) = source.read(0.0)
+    assert len(frame.counts) == sensor.channels
+    assert frame.truth is not None
+    assert frame.truth.contact.tolist() == [0.05, 0.05]
+
+
+def test_an_object_that_a_drum_head_refuses_leaves_the_load_that_presses() -> None:
+    clock = Clock()
+    drum = Plate(Patch(0.1, 0.1), rigidity=0.0, tension=10.0)
+    disc = (Stimulus(DiscLoad(0.05, 0.05, 0.01, 0.1)),)
+    source = source_of("centre", clock, plate=drum, stimuli=disc)
+    ball = Stimulus(Indenter(Sphere(0.01), 0.05, 0.05, force=0.1))
+
+    with pytest.raises(Refusal, match="does not tell how thick"):
+        source.play(replace(source.scene, stimuli=(ball,)))
+
     (frame,) = source.read(0.0)
     assert frame.truth is not None
     assert frame.truth.contact.tolist() == [0.05, 0.05]
@@ -263,6 +298,26 @@ def test_a_part_of_the_skin_comes_as_often_as_its_scan_allows() -> None:
     # Six conversions of 5 us.
     np.testing.assert_allclose(np.diff([f.device_time for f in frames]), 30e-6, rtol=1e-9)
     assert source.accounting().accepted == len(frames) == pytest.approx(0.01 / 30e-6, abs=2)
+
+
+def test_a_region_that_no_list_on_the_wire_could_tell_is_read_and_recorded_with_more(
+    tmp_path,
+) -> None:
+    skin, clock = load_scene("centre"), Clock()
+    layout = SensorLayout.regular(skin.plate.patch, 20, 20)
+    source = source_of(clock=clock, layout=layout, rate=10.0)
+    chessboard = [p for p in range(400) if (p % 20 + p // 20) % 2 == 0]
+    source.scan(part_of(source, 10.0, *chessboard))
+    with closing(Recorder(tmp_path / "a.mcap", clock.now)) as recorder:
+        source.record(recorder)
+
+        (frame,) = source.read(1.0)
+
+    wished = [c * 400 + p for c in range(3) for p in chessboard]
+    assert set(wished) <= set(frame.channels.tolist())
+    assert len(unpack_runs(pack_runs(frame.channels))) == len(frame.channels)
+    with Recording(tmp_path / "a.mcap") as recording:
+        assert recording.counts[LINES.name] == 1
 
 
 def test_rates_may_change_at_any_frame_without_a_jump_in_time() -> None:

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from kappaskin import Frame, load_scene
+from kappaskin.recorder import Recorder
+from kappaskin.recording.reading import Recording
 from kappaskin.sources import ReplayedSource, SerialSource, SimulatedSource, Source
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.information import to_json
+from kappaskin.sources.reenact import Reenactment
 from kappaskin.sources.wire import Information, Samples, encode_information, encode_samples
 
 SCENE = replace(load_scene("circle"), rate=100.0)
@@ -142,3 +145,24 @@ def test_a_tape_gets_what_the_same_frames_are_made_of(source) -> None:
 def test_it_can_be_closed_twice(source) -> None:
     source.close()
     source.close()
+
+
+def test_a_recording_brings_the_same_frames_again(source, tmp_path) -> None:
+    if isinstance(source, ReplayedSource):
+        pytest.skip("what a recording brings is not recorded again")
+    recorder = Recorder(tmp_path / "a.mcap", time.monotonic())
+    source.record(recorder)
+
+    frames = frames_of(source)
+
+    recorder.close()
+    again = Reenactment("a.mcap")
+    with Recording(tmp_path / "a.mcap") as recording:
+        found = [frame for message in recording.messages() for frame in again(message)]
+    assert [of_one(frame) for frame in found] == [of_one(frame) for frame in frames]
+
+
+def of_one(frame: Frame) -> tuple[object, ...]:
+    """All that is read of a frame; text for times, since NaN is not itself."""
+    times = (frame.device_time, frame.host_time, frame.taken, frame.taken_sd)
+    return frame.sequence, repr(times), frame.channels.tobytes(), frame.counts.tobytes()

@@ -83,7 +83,9 @@ def test_elements_by_hand_are_scanned_as_fast_as_asked_until_they_are_not(source
     read_until(source, scans(*ELEMENTS))
     read_until(source, lambda _: device.rate == 900.0)
     frames = [read_until(source, scans(*ELEMENTS)) for _ in range(50)]
-    assert np.median(np.diff([f.device_time for f in frames])) == pytest.approx(1 / 900, rel=1e-2)
+    took = np.diff([f.device_time for f in frames])
+    each = took / np.diff([f.sequence for f in frames])  # on a busy machine some are passed over
+    assert np.median(each) == pytest.approx(1 / 900, rel=1e-2)
 
     assert steered(source, Region()) is None
 

@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kappaskin.frames import OVERTAKEN
+
 _FASTEST = 1e-2  # s/s that a clock may go wrong before its drift is known: a resonator's worst
 _WANDER = 5e-6  # s/s by which the drift itself may change within the window: a clock warming up
 _GRAIN = 1e-6  # s, the step of a device's clock
@@ -13,7 +15,6 @@ _WINDOW = 100.0  # s of exchanges that tell the drift
 _BUCKET = 1.0  # s of which only the quickest exchange is kept, and the quickest message
 _SOON = 0.05  # s after which one that shows the map wrong is taken in
 _MESSAGES = 30  # quickest ones that are kept
-_BACK = 1.0  # s that a message may be older than one before it
 _DELAY = 0.5  # s, longer than a message is under way where no exchange tells how long
 _DOUBTS = 2  # messages in a row that contradict the map before it is given up
 _WRAP = 2**32 * 1e-6  # s after which a counter of 32 bits in us begins again at 0
@@ -117,7 +118,7 @@ class ClockMap:
             return device_time + (self._wraps - 1) * _WRAP  # a late one, of before the wrap
         if step < 10.0 - _WRAP:
             self._wraps += 1
-        elif step < -_BACK:
+        elif step < -OVERTAKEN:
             self._wraps = 0
         self._last = device_time
         return device_time + self._wraps * _WRAP
@@ -128,7 +129,7 @@ class ClockMap:
         late = host_time - device_time - self._offset - self._drift * away
         early = -self._early - self._spread * abs(away)
         # Not the opposites, or NaN, of the first message too, would pass.
-        if not (early < late < math.inf and device_time > self._latest - _BACK):
+        if not (early < late < math.inf and device_time > self._latest - OVERTAKEN):
             self._contradicted(device_time, host_time)
             return
         self._doubted = 0
@@ -156,7 +157,7 @@ class ClockMap:
         reach = self.bound(answered)
         fits = middle - reach <= high and low <= middle + reach
         first = math.isnan(self._offset)
-        if not first and not (fits and answered > self._latest - _BACK):
+        if not first and not (fits and answered > self._latest - OVERTAKEN):
             self._unanswered += 1
             if self._unanswered < _DOUBTS:
                 return

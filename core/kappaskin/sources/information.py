@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.bases import check_edge
+from kappaskin.effects import Within
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
 from kappaskin.patch import Disk, Patch, Polygon
+from kappaskin.scene.limits import SKIN, check_sides
 from kappaskin.sensor import Sensor
 from kappaskin.transduction import Amplifier, Converter, HalfBridge, Multiplexer, Transduction
 
@@ -54,6 +56,8 @@ def _outline(patch: Patch) -> dict[str, Any]:
         return {"outline": "disk"}
     return {"outline": patch.vertices} if isinstance(patch, Polygon) else {}
 
+
+_READS = Within(1e-3, 1e9, "1/m")
 
 _Part = TypeVar("_Part", HalfBridge, Multiplexer, Amplifier, Converter)
 
@@ -168,6 +172,20 @@ def _plate(patch: Patch, said: dict[str, Any]) -> Plate:
     return Plate(patch, float(said["rigidity"]), fluid=said["fluid"], **numbers)
 
 
+def _check_sizes(plate: Plate, transduction: Transduction) -> None:
+    """Refuse what no sensor is like, and no arithmetic is made for."""
+    check_sides(plate.patch)
+    for name, within in SKIN.items():
+        if (value := getattr(plate, name)) and value not in within:
+            raise Refusal(f"expected a {name} of {within}, got {value:g}; give it in SI units")
+    reads = abs(transduction.resolution) * max(map(abs, transduction.limits))
+    if reads not in _READS:
+        raise Refusal(
+            f"expected electronics that read up to {_READS}, got {reads:g}; give bridge, "
+            "amplifier and converter in SI units"
+        )
+
+
 def from_json(text: str) -> Sensor:
     """The sensor that `text` tells of; raises `SourceError` when it cannot be understood."""
     try:
@@ -175,10 +193,12 @@ def from_json(text: str) -> Sensor:
         layout = _layout(said)
         edge = said["edge"]
         check_edge(layout.patch, edge)
+        transduction, plate = _transduction(said), _plate(layout.patch, said)
+        _check_sizes(plate, transduction)
         return Sensor(
             layout,
-            _transduction(said),
-            _plate(layout.patch, said),
+            transduction,
+            plate,
             edge,
             float(said["rate"]),
             said["name"],

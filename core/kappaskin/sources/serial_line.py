@@ -91,9 +91,11 @@ class SerialSource:
 
     def record(self, tape: Tape | None) -> None:
         """Tell `tape` from now on all that frames come from; nobody without one."""
+        now = self._clock()
         self._taping.to(tape)
-        if self._line is not None:
-            self._taping.begin(self._clock(), self._pending, self._decoder.held)
+        self._taping.begin(now, self._pending, self._decoder.held)
+        if self._line is None:
+            self._taping.ended(now)
 
     def scan(self, scanner: Scanner | None) -> None:
         """Let the device scan what `scanner` chooses, a few times a second; all without one."""

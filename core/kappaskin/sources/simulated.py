@@ -7,17 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from kappaskin.errors import Refusal
 from kappaskin.frames import Event, Frame
 from kappaskin.intrinsic import ForceTorqueSensor, Wrench
 from kappaskin.region import Scanner
+from kappaskin.scan import Scan
 from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.simulate import Simulator
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.clock import Known
 from kappaskin.sources.information import from_json, to_json
+from kappaskin.sources.scanning import in_few_runs
 from kappaskin.sources.tape import Tape
-from kappaskin.sources.wire import encode_scan, pack_runs
+from kappaskin.sources.wire import MOST_RUNS, encode_scan, pack_runs
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
 _DEPTH = 0.02  # m from the middle of the skin down to the force/torque sensor
@@ -48,9 +51,10 @@ class SimulatedSource:
 
     def _become(self, scene: Scene, due: float, playing: Playing) -> None:
         """Be the device of `scene`, whose next frame is due at device time `due` in s."""
-        self._simulator, self._text = Simulator(scene, playing), to_json(scene.sensor())
+        text = to_json(scene.sensor())
         # As anybody else would know it from what it says: in the last bit not what the scene has.
-        self._sensor = from_json(self._text)
+        sensor = from_json(text)
+        self._simulator, self._text, self._sensor = Simulator(scene, playing), text, sensor
         # Since frame `_first`, due at device time `_since`, frames come at `_rate`.
         self._first, self._since = self._n, due
         self._rate: float = self._sensor.rate
@@ -71,12 +75,20 @@ class SimulatedSource:
     def play(self, scene: Scene) -> None:
         """Go on with another scene, from the same moment; one that is refused changes nothing."""
         if to_json(scene.sensor()) == self._text:
-            self._simulator.change(scene)
+            self._change(scene)
             return
         self._become(scene, self._due(), self.playing)
         # The next frame is due now: making what the skin needs took a while, but nothing is lost.
         self._start = self._clock() - self._since
         self.record(self._tape)
+
+    def _change(self, scene: Scene) -> None:
+        was = self.scene
+        try:
+            self._simulator.change(scene)
+        except Refusal:
+            self._simulator.change(was)
+            raise
 
     def record(self, tape: Tape | None) -> None:
         """Tell `tape` from now on what such a device would send; nobody without one."""
@@ -116,7 +128,7 @@ class SimulatedSource:
         """The next frame; its scan decides when the one after it begins."""
         due, scan, rate = self._due(), self._all, self._sensor.rate
         if self._scanner is not None:
-            scan = self._scanner()
+            scan = self._sayable(self._scanner())
             rate = min(self._scanner.rate, scan.rate)
         if rate != self._rate:
             self._first, self._since, self._rate = self._n, due, rate
@@ -125,6 +137,13 @@ class SimulatedSource:
         # A device tells its time in whole us.
         told = round(due * 1e6) * 1e-6
         return replace(frame, device_time=told, taken=told + self._start, taken_sd=0.0)
+
+    def _sayable(self, scan: Scan) -> Scan:
+        """The scan, with as few more channels as let one list on the wire tell of it."""
+        if len(scan.channels) <= MOST_RUNS:
+            return scan
+        channels = in_few_runs(scan.channels)
+        return scan if len(channels) == len(scan.channels) else self._sensor.scan(channels)
 
     def wrench(self) -> Wrench:
         """What `base` reads of the contact, at the time of the last frame."""

@@ -28,7 +28,10 @@ class Taping:
         if self._tape is None:
             return
         self._met = ""
-        self._meet(self._tape)
+        if self._means.sensor is not None:  # frames go through what was made of one that is gone
+            self._meet(self._tape)
+            if not self._means.known:
+                self._tape.ended(now)
         for came, message in waiting:
             if isinstance(message, Samples):
                 sequence, began, channels, counts = message
@@ -64,9 +67,10 @@ class Taping:
         self._mapped = []
         for now, data in came:
             self._tape.came(now, data)
-        self._meet(self._tape)  # told in those bytes: here for whoever begins after them
+        if self._means.known:
+            self._meet(self._tape)  # told in those bytes: here for whoever begins after them
 
     def _meet(self, tape: Tape) -> None:
-        if self._means.known and self._means.text != self._met:
+        if self._means.text != self._met:
             self._met = self._means.text
             tape.met(self._met)

@@ -6,6 +6,7 @@ from kappaskin.frames import Event
 from kappaskin.sensor import Sensor
 from kappaskin.sources.accounting import Sequence
 
+_LONGEST = 500  # characters: a device may say anything of itself, and each status has 64 events
 _SUMMED = 1.0  # s of which lost messages are told together
 
 
@@ -20,7 +21,7 @@ class Telling:
 
     def __call__(self, kind: str, text: str) -> None:
         """Tell this too."""
-        self._events.append(Event(self._clock(), kind, text))
+        self._events.append(Event(self._clock(), kind, text[:_LONGEST]))
 
     def taken(self) -> list[Event]:
         """What happened since the last time that this was asked."""
