@@ -1,6 +1,7 @@
 """What is live to a recording, while one is asked for."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from kappaskin.errors import Refusal
@@ -19,6 +20,7 @@ class Keeping:
 
     def __init__(self) -> None:
         self._recorder: Recorder | None = None
+        self._newest: Recorder | None = None  # that `written` is of, until it has ended
         self._ending: list[Recorder] = []
         self._live = True  # what a recording brings is not recorded again
         self.written = Written()
@@ -32,10 +34,11 @@ class Keeping:
         self.end(source)
         if path is None:
             return
+        self._newest = None
         try:
             if isinstance(source, ReplayedSource):
                 raise Refusal("expected a live source to record, got a recording; copy its file")
-            recorder = self._recorder = Recorder(path, time.monotonic())
+            recorder = self._recorder = self._newest = Recorder(path, time.monotonic())
         except Refusal as refusal:
             self.written = Written(str(path), trouble=str(refusal))
             return
@@ -74,6 +77,11 @@ class Keeping:
         if self._recorder is not None and side.left is not None and self._live:
             self._recorder.left_out(*side.left)
 
+    def brought(self, events: Sequence[Event]) -> None:
+        """The source tells what happened."""
+        for event in events if self._live else ():
+            self.happened(event)
+
     def happened(self, event: Event) -> None:
         if self._recorder is not None:
             self._recorder.happened(event)
@@ -93,15 +101,17 @@ class Keeping:
 
     def look(self, source: Source | None) -> str:
         """Why it ended by itself, when it did since the last look; `written` is new."""
-        newest = self._recorder or (self._ending[-1] if self._ending else None)
-        if newest is not None:
-            self.written = newest.written
+        if self._newest is not None:
+            self.written = self._newest.written
         # Each holds all that its last frames went through.
         self._ending = [one for one in self._ending if one.written.active]
-        if self._recorder is not None and not self.written.active:
-            self.end(source)
-            return self.written.trouble
-        return ""
+        if self.written.active:
+            return ""
+        self._newest = None
+        if self._recorder is None:
+            return ""
+        self.end(source)
+        return self.written.trouble
 
     def close(self) -> None:
         """End what is kept, and wait until it is on the disk."""

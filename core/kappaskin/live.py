@@ -270,8 +270,8 @@ class Loop:
         if state != was.state or ((trouble or was.state == LOST) and trouble != was.message):
             self._status = replace(self._status, state=state, message=trouble)
         events = source.events()
-        for event in events:
-            self._happen(event)
+        self._status = self._status.after(events)
+        self._keeping.brought(events)
         told = self._steering is None or self._steering.refusal == was.region_refusal
         if self._steering is not None and not told:
             self._status = replace(self._status, region_refusal=self._steering.refusal)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Event, Frame, Truth
-from kappaskin.memory import Memory
+from kappaskin.memory import Memory, Remembering
 from kappaskin.pipeline import Pipeline
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import Layout, encode
@@ -111,7 +112,11 @@ class Recorder:
         """The scene is this from now on."""
         name = f"scene-{len(self._attached)}.toml"
         self._attached.add(name)
-        self._file.attach(name, "application/toml", write_scene(scene).encode())
+        try:
+            told = write_scene(scene)
+        except Refusal as refusal:  # an object from a file of its own, say
+            told = f"# {scene.name}: {refusal}\n"
+        self._file.attach(name, "application/toml", told.encode())
 
     def set_up(self, pipeline: Pipeline) -> None:
         """Frames go through `pipeline` from now on."""
@@ -150,7 +155,7 @@ class Recorder:
     def take(self, frame: Frame, estimate: Estimate) -> None:
         """Take down what a frame came to, as often as there is room for it."""
         views, time = self._views, estimate.host_time
-        if views is None or not self._contacts(time):
+        if views is None or not (self._contacts(time) or views.every):
             return
         self._file.put(m.CONTACTS, time, _contact(estimate, self._file.stamp(time)))
         if views.room(time):
@@ -207,6 +212,9 @@ class _Views:
             cloud[f"fields.{n}.count"] = 1
         self._cloud = Layout(m.POINT_CLOUD, cloud)
         self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
+        fit = pipeline.fit
+        self.every = isinstance(fit, Remembering) and not fit.remembers
+        """Whether estimates depend on which others were made, and so all have to be told."""
         bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
         self.room = _Room(min(_HEAVY, _BYTES / bytes_each))
 

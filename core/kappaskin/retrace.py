@@ -51,7 +51,10 @@ class Retrace:
         self._take(message)
 
     def _take(self, message: Message) -> None:
-        if message.topic == m.LEFT_OUTS.name:
+        if message.topic == m.DEVICE.name:
+            self.sensor = None  # another source, if of the same device: it begins at rest
+            self._meet()
+        elif message.topic == m.LEFT_OUTS.name:
             self._leave_out(decode(m.LEFT_OUT, message.data))
         elif self._setup is not None:
             return
@@ -77,6 +80,7 @@ class Retrace:
             return
         self.sensor, self.pipeline, self._last = self._reenact.sensor, None, None
         self._waiting.clear()
+        self._memory.clear()
         if self._setup is not None and self.sensor is not None:
             self.pipeline = Pipeline(self.sensor, self._setup)
 

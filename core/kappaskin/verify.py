@@ -44,10 +44,10 @@ _NAMED_AS: dict[str, Callable[[Estimate], Any]] = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of it: `compared` recorded messages, made of `frames`; `different` ones of them.
+    """What came of it: contacts, curvatures and shapes `compared`, of `frames`; `different` ones.
 
     `first` tells the first difference, `largest` is the largest one as a share of the largest
-    number beside it. `missing` counts recorded estimates whose frames are not there.
+    number beside it. `missing` counts recorded results whose frames are not there.
     """
 
     frames: int
@@ -64,7 +64,7 @@ class Verdict:
     @property
     def words(self) -> str:
         """The verdict as a sentence or two."""
-        told = f"{self.compared:,} recorded estimates of {self.frames:,} frames"
+        told = f"{self.compared:,} recorded results of {self.frames:,} frames"
         if not self.compared:
             return f"{told}: there is nothing to compare"
         parts = [f"{told}: {'the same bit for bit' if self.same else 'not the same'}"]

@@ -2,10 +2,23 @@
 
 import gc
 import time
+import tomllib
+from contextlib import closing
+from dataclasses import replace
+from datetime import UTC, datetime
 from types import SimpleNamespace
 
+import numpy as np
+import pytest
+
+from kappaskin import METHODS, SCENES, Calibration, Pipeline, Setup, load_scene
+from kappaskin.calibration.calibration import fingerprint
+from kappaskin.effects import SECOND_GENERATION_LOOPS, StuckElements
 from kappaskin.keeping import Keeping
 from kappaskin.recorder import Recorder
+from kappaskin.recording.reading import Recording
+from kappaskin.sources import SimulatedSource
+from kappaskin.verify import verifying
 
 NO_SIDE = SimpleNamespace(pipeline=None, left=None)
 
@@ -45,3 +58,106 @@ def test_what_was_written_last_is_told_when_nothing_is_recorded_any_more(tmp_pat
 
     assert keeping.written.path == str(tmp_path / "a.mcap")
     assert not keeping.written.active
+
+
+def test_that_another_recording_is_refused_is_told_while_the_last_one_still_ends(tmp_path) -> None:
+    keeping, taken = Keeping(), tmp_path / "b.mcap"
+    taken.write_bytes(b"somebody's")
+    keeping.begin(tmp_path / "a.mcap", None, NO_SIDE)
+
+    keeping.begin(taken, None, NO_SIDE)
+
+    for _ in range(2):
+        assert keeping.look(None) == ""
+        assert keeping.written.path == str(taken)
+        assert "is there already" in keeping.written.trouble
+        keeping.close()
+
+
+def test_what_was_connected_twice_comes_to_the_same_again(tmp_path) -> None:
+    now, path = [100.0], tmp_path / "a.mcap"
+    scene = replace(load_scene("circle"), rate=100.0)
+    with closing(Keeping()) as keeping:
+        keeping.begin(path, None, NO_SIDE)
+        for generation in (1, 2):
+            source = SimulatedSource(scene, lambda: now[0])
+            keeping.listen(source)
+            pipeline = Pipeline(source.sensor, calibrated(source.sensor), generation)
+            keeping.set_up(SimpleNamespace(pipeline=pipeline))
+            for _ in range(10):
+                now[0] += 0.01
+                for frame in source.read(0.0):
+                    keeping.take(frame, pipeline(frame))
+            keeping.ended()
+
+    *_, verdict = verifying(path)
+
+    assert verdict.same, verdict.words
+
+
+def test_what_another_device_remembered_is_not_taken_for_that_of_the_next(tmp_path) -> None:
+    now, path = [100.0], tmp_path / "a.mcap"
+    before = SimulatedSource(load_scene("circle"), lambda: now[0])
+    source = SimulatedSource(load_scene("fingertip"), lambda: now[0])
+    with closing(Keeping()) as keeping:
+        gone = Pipeline(before.sensor, calibrated(before.sensor))
+        keeping.begin(path, before, SimpleNamespace(pipeline=gone, left=None))
+        keeping.ended()
+        keeping.listen(source)
+        pipeline = Pipeline(source.sensor, calibrated(source.sensor), 1)
+        keeping.set_up(SimpleNamespace(pipeline=pipeline))
+        now[0] += 0.01
+        for frame in source.read(0.0):
+            keeping.take(frame, pipeline(frame))
+
+    *_, verdict = verifying(path)
+
+    assert verdict.same, verdict.words
+
+
+def calibrated(sensor) -> Setup:
+    """With loops to be undone: what is read depends on all that was before."""
+    ones, date = np.ones(sensor.channels), datetime(2026, 1, 1, tzinfo=UTC)
+    said = sensor.name, sensor.serial_number, sensor.firmware, fingerprint(sensor.layout), date
+    loops = SECOND_GENERATION_LOOPS.operator(sensor.channels)
+    return Setup(
+        4, 4, 9, 9, calibration=Calibration(*said, ones, 0 * ones, 0 * ones, 0 * ones, loops)
+    )
+
+
+def test_every_ready_scene_is_recorded_one_that_no_file_tells_by_its_name(tmp_path) -> None:
+    with closing(Recorder(tmp_path / "a.mcap", 0.0)) as recorder:
+        for name in SCENES:
+            recorder.plays(load_scene(name))
+
+    with Recording(tmp_path / "a.mcap") as recording:
+        told = [recording.attachment(f"scene-{n}.toml").decode() for n in range(len(SCENES))]
+    for name, text in zip(SCENES, told, strict=True):
+        said = tomllib.loads(text)
+        assert said.get("format") == 1 or text.startswith(f"# {name}: expected ")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_recorded_from_the_middle_comes_to_the_same_again(method, tmp_path) -> None:
+    now, path = [100.0], tmp_path / "a.mcap"
+    scene = load_scene("failing-elements")
+    others = tuple(e for e in scene.effects if not isinstance(e, StuckElements))
+    scene = replace(scene, rate=100.0, effects=(StuckElements((27, 63), 0.01), *others))
+    source = SimulatedSource(scene, lambda: now[0])
+    pipeline = Pipeline(source.sensor, replace(calibrated(source.sensor), method=method))
+
+    def play(seconds: float) -> None:
+        for _ in range(round(10 * seconds)):
+            now[0] += 0.1  # ten frames that arrive at once
+            for frame in source.read(0.0):
+                keeping.take(frame, pipeline(frame))
+
+    with closing(Keeping()) as keeping:
+        play(0.2)
+        keeping.begin(path, source, SimpleNamespace(pipeline=pipeline, left=None))
+        play(0.4)
+
+    *_, verdict = verifying(path)
+
+    assert verdict.same, verdict.words

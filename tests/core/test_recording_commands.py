@@ -41,9 +41,10 @@ def test_stopped_it_ends_its_file(tmp_path) -> None:
             process.send_signal(number)
             told, _ = process.communicate(timeout=20)
             assert process.returncode == 0
-        assert "0 of" in told
         with Recording(path) as recording:
             assert recording.whole
+            # Who else wants the cores may cost frames before; stopping loses none of the file.
+            assert f"{path}: {sum(recording.counts.values()):,} messages in " in told
         path.unlink()
 
 

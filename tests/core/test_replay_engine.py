@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from kappaskin import LONGEST_NOTE, Engine, Recording, Refusal, Setup, Status, setups_of
+from kappaskin.recording.cdr import decode
+from kappaskin.recording.messages import EVENTS, LOG
 from kappaskin.sources import ReplayedSource
 from kappaskin.verify import Verdict, verifying
 
@@ -210,3 +212,20 @@ def test_a_file_cut_off_while_it_is_played_ends_the_replay_alone(
 def test_a_note_too_long_for_a_status_is_refused() -> None:
     with Engine(Setup()) as engine, pytest.raises(Refusal, match="at most 500 characters"):
         engine.note("x" * (LONGEST_NOTE + 1))
+
+
+def test_what_a_recording_brings_happens_but_is_not_recorded_again(
+    recording: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "new.mcap"
+    with Engine(Setup()) as engine:
+        engine.record(path)
+        engine.connect(f"replay:{recording}")
+        until(lambda: "the object is changed" in [e.text for e in engine.status().events])
+        engine.note("by whom this is recorded")
+        engine.record(None)
+        until(path.exists)
+
+    with Recording(path) as opened:
+        told = [decode(LOG, message.data)["msg"] for message in opened.messages_on(EVENTS)]
+    assert told == ["by whom this is recorded"]

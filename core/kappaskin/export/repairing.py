@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from kappaskin.recording.disk import is_written
 from kappaskin.recording.repair import Repaired, check_new, repairing
 from kappaskin.recording.writing import part_of
 from kappaskin.studies.beside import Beside
@@ -28,7 +29,6 @@ class Repairing:
 
     def close(self) -> None:
         """End it, done or not."""
-        over = self._beside.done
         self._beside.close()
-        if not over:
+        if not is_written(self._part):  # by another that began it meanwhile
             self._part.unlink(missing_ok=True)

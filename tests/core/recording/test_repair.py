@@ -1,5 +1,6 @@
 """What is saved of a recording that was damaged, and that it is said what was not."""
 
+import multiprocessing
 import random
 
 import pytest
@@ -232,6 +233,19 @@ def test_one_given_up_leaves_nothing(whole, tmp_path) -> None:
     out = tmp_path / "out.mcap"
     work = Repairing(whole, out)
     part_of(out).write_bytes(b"as far as it is")
+    work.close()
+    assert not list(tmp_path.glob("out*"))
+
+
+@pytest.mark.slow
+def test_one_whose_process_died_leaves_nothing(whole, tmp_path) -> None:
+    out = tmp_path / "out.mcap"
+    work = Repairing(whole, out)
+    (child,) = (p for p in multiprocessing.active_children() if p.name == "kappaskin-repair")
+    child.kill()
+    part_of(out).write_bytes(b"as far as it was")
+    with pytest.raises(Refusal, match="ended unexpectedly"):
+        list(iter(work.poll, None))
     work.close()
     assert not list(tmp_path.glob("out*"))
 
