@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Frame, Mask
+from kappaskin.frames import OVERTAKEN, Array, Frame, Mask
 from kappaskin.memory import Remembering
 
 
@@ -40,6 +40,7 @@ class Hold(Remembering):
             np.copyto(self._values, flat)
             self._times.fill(frame.device_time)
             return curvature, np.isfinite(curvature)
+        self._times[self._times > frame.device_time + OVERTAKEN] = -np.inf
         self._values[frame.channels] = flat[frame.channels]
         self._times[frame.channels] = frame.device_time
         age = frame.device_time - self._times

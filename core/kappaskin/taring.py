@@ -15,7 +15,7 @@ import numpy as np
 from kappaskin.calibration import Tare
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.errors import Refusal
-from kappaskin.frames import COMPONENTS, Array
+from kappaskin.frames import COMPONENTS, OVERTAKEN, Array
 from kappaskin.sensor import Sensor
 from kappaskin.touch import LoadSeeker
 
@@ -67,7 +67,7 @@ class Taring:
             return
         if self._times:
             after = device_time - self._times[-1]
-            if after < 0:
+            if after < -OVERTAKEN:
                 raise Refusal("the device's clock went back: it restarted; tare again")
             if after < _ROUNDING * SECONDS / self._most:
                 return
@@ -227,7 +227,7 @@ class DriftWatch:
     def follow(self, device_time: float, curvature: Array, surface: Array, noise: float) -> None:
         """Take in readings (3, P) in 1/m with their `noise`, and the surface (ny, nx) in m."""
         elapsed = device_time - self._time
-        if 0 <= elapsed < _EVERY or not math.isfinite(noise):
+        if -OVERTAKEN <= elapsed < _EVERY or not math.isfinite(noise):  # too soon, or overtaken
             return
         if not (self._frames and 0 <= elapsed < _TAU):
             # A first frame, one after a gap, or a clock that went back.

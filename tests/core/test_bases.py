@@ -445,6 +445,7 @@ def rate(held_skin, p):
     return -np.polyfit(np.log(ks), np.log(errors), 1)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("p", [0, 1, 3])
 def test_the_error_falls_at_the_rate_that_the_edge_conditions_set(held_skin, p):
     order = BROKEN[held_skin.edge][p]

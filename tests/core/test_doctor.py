@@ -11,6 +11,8 @@ from serial.tools.list_ports_common import ListPortInfo
 from kappaskin import doctor
 from kappaskin.cli import main
 
+pytestmark = pytest.mark.slow  # the first that asks for the system's name runs uname
+
 
 @pytest.fixture
 def bare(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -189,6 +189,7 @@ every_scenery = pytest.mark.parametrize("seed", range(8))
 every_judged = pytest.mark.parametrize("effect", JUDGED, ids=lambda effect: effect.name)
 
 
+@pytest.mark.slow
 @every_scenery
 @every_judged
 def test_leaving_an_effect_out_changes_no_reading_by_more_than_it_says(effect, seed):

@@ -371,6 +371,17 @@ def test_a_clock_that_goes_back_begins_anew() -> None:
     assert not monitor.kinds.any()
 
 
+def test_a_frame_that_others_overtook_changes_nothing_that_is_found() -> None:
+    frames = frames_of("circle", 8)
+    monitor, _ = watched(frames, hold([57], 1.7))
+    found = monitor.kinds.copy()
+    assert found.any()
+
+    monitor(frames[-2])
+
+    np.testing.assert_array_equal(monitor.kinds, found)
+
+
 def test_one_element_or_two_are_watched_without_neighbours_to_ask() -> None:
     patch = Patch(0.1, 0.1)
     for m in (1, 2):

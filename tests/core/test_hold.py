@@ -95,6 +95,15 @@ def test_a_device_that_restarted_holds_nothing_from_before():
     assert np.flatnonzero(np.isfinite(on)).tolist() == [1, 2, 3]
 
 
+def test_what_is_from_before_a_restart_is_not_held_when_the_clock_comes_there_again():
+    hold = Hold(3 * P, 0.1)
+    taken(hold, 50.0, EVERY, 1.0)
+    for time in (0.0, 49.99, 50.01):
+        curvature, _ = taken(hold, time, [1, 2], 2.0)
+
+    assert np.flatnonzero(np.isfinite(curvature)).tolist() == [1, 2]
+
+
 def test_a_channel_that_a_device_sends_twice_is_taken_once():
     curvature, fresh = taken(Hold(3 * P, 0.1), 0.0, [5, 5, 6], 1.0)
 

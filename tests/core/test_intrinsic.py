@@ -159,6 +159,7 @@ def test_the_same_seed_gives_the_same_wrench_and_its_noise_is_as_told():
 # Error bars
 
 
+@pytest.mark.slow
 @SKINS
 @pytest.mark.parametrize("traction", [(0.0, 0.0), (0.2, -0.3)])
 def test_the_error_bars_are_those_of_many_draws(patch, traction):

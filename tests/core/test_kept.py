@@ -53,6 +53,19 @@ def test_a_damaged_file_is_computed_anew_and_mended(folder: Path, cut: int):
     assert np.array_equal(answer["roots"], np.sqrt(np.arange(4)))
 
 
+def test_whichever_byte_is_spoilt_it_is_computed_anew(folder: Path):
+    compute = Asked()
+    kept("roots", compute)
+    (file,) = folder.iterdir()
+    whole = file.read_bytes()
+    for place in range(len(whole)):
+        file.write_bytes(whole[:place] + bytes([whole[place] ^ 0x21]) + whole[place + 1 :])
+        answer = kept("roots", compute)
+        assert np.array_equal(answer["roots"], np.sqrt(np.arange(4)))
+
+    assert compute.times == 1 + len(whole)
+
+
 def test_a_flipped_bit_is_found(folder: Path):
     compute = Asked(100)
     kept("roots", compute)

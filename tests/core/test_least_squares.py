@@ -534,6 +534,7 @@ def test_the_error_bars_cover_the_truth_as_often_as_they_should(name, signal):
     np.testing.assert_allclose(covered, expected, atol=0.02)
 
 
+@pytest.mark.slow
 @every_setup_with_readings_to_spare
 def test_the_noise_is_estimated_without_bias(setup):
     fit = factored(*setup)

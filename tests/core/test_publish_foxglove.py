@@ -344,6 +344,15 @@ def test_a_host_that_is_not_this_machine_is_refused(host: str) -> None:
         opened(target_of(f"foxglove://{host}:8765"))
 
 
+def test_a_kind_of_address_that_this_machine_does_not_have_is_refused(monkeypatch) -> None:
+    def lacking(family: int, kind: int) -> socket.socket:
+        raise OSError(97, "Address family not supported by protocol")
+
+    monkeypatch.setattr(socket, "socket", lacking)
+    with pytest.raises(Refusal, match=r"cannot be listened on \(Address family not supported"):
+        opened(target_of("foxglove://127.0.0.1:8799"))
+
+
 def test_only_this_machine_is_served_if_nothing_else_is_said(server) -> None:
     assert place(server)[0] == "127.0.0.1"
 

@@ -179,6 +179,11 @@ WRONG = {
         TOUCH.replace("force = 0.2", "force = 1e300"),
         r"line 11: touch\[1\].force: expected a force of -1e.06 to 1e.06 N",
     ),
+    "a grid beyond writing": (
+        HEAD + f"[elements]\ngrid = [{10**4000}, {10**4000}]\n",
+        "at most 21845",
+    ),
+    "a number beyond computing": (f"rate = {10**400}\n" + HEAD, "line 1: rate: expected a number"),
     "an endless number": ("seed = " + "9" * 5000 + "\n" + HEAD, "a mistake in it: .*digits"),
     "lists in lists": ("a = " + "[" * 9999 + "]" * 9999 + HEAD, "nested too deep"),
     "keys in keys": ("a" + ".a" * 99999 + " = 1\n" + HEAD, "nested too deep"),

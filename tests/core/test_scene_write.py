@@ -74,6 +74,7 @@ def counts(scene: Scene, frames: int = 4):
     return [simulator.frame(n, lambda: 0.0).counts for n in range(frames)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SCENES if name not in FROM_FILES])
 def test_a_ready_scene_is_the_same_once_written_and_read(name):
     scene = load_scene(name)

@@ -66,6 +66,7 @@ def test_a_shape_of_the_basis_comes_back_to_rounding(held_skin):
     )
 
 
+@pytest.mark.slow
 def test_of_a_finer_shape_little_is_missed(held_skin):
     _, finer, c, K = touched(held_skin)
     fit = LeastSquares(held_skin.basis(6, 6), layout(held_skin))
@@ -78,6 +79,7 @@ def test_of_a_finer_shape_little_is_missed(held_skin):
     assert missed < (0.07 if held_skin.name == "long" else 0.03)
 
 
+@pytest.mark.slow
 def test_the_contact_is_found_where_the_load_is(held_skin):
     load, _, _, K = touched(held_skin)
     fit = LeastSquares(held_skin.basis(6, 6), layout(held_skin))

@@ -26,7 +26,7 @@ from kappaskin import (
 )
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.effects import FlickerNoise, Temperature
-from kappaskin.taring import Rest, Taring
+from kappaskin.taring import DriftWatch, Rest, Taring
 from kappaskin.touch import LoadSeeker
 
 pytestmark = pytest.mark.slow
@@ -336,6 +336,13 @@ def test_a_device_that_restarts_meanwhile_is_refused():
         taken(SCENE, frames=[*frames[60:], *frames[:60]])
 
 
+def test_a_frame_that_another_overtook_is_no_restart():
+    frames = frames_of(SCENE)
+    frames[60], frames[61] = frames[61], frames[60]
+
+    assert taken(SCENE, frames=frames).frames == 100
+
+
 def test_frames_of_before_it_was_asked_for_do_not_count():
     taring = Taring(SENSOR, 10.0)
     for n in range(600):
@@ -404,6 +411,16 @@ def test_drift_is_what_the_readings_wandered_by():
     assert drift.curvature == pytest.approx(0.5, rel=0.1)
     assert not drift.loaded
     assert drift.device_time > 5.0
+
+
+def test_frames_that_others_overtook_do_not_keep_the_drift_from_being_told():
+    watch, off = DriftWatch(SEEKER), np.random.default_rng(0).normal(0, 0.5, (3, 100))
+    for n in range(300):
+        late = 0.05 if n % 50 == 49 else 0.0
+        watch.follow(0.02 * n - late, off, np.zeros((9, 9)), 0.2)
+        watch.tell()
+
+    assert watch.tell().curvature == pytest.approx(0.5, rel=0.1)
 
 
 def test_noise_is_no_drift():

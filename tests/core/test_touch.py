@@ -154,6 +154,12 @@ def test_without_load_and_noise_there_is_no_contact():
     assert np.isnan([*touch.position, touch.force, touch.displacement]).all()
 
 
+def test_where_no_reading_is_left_there_is_no_contact():
+    nothing = np.full((3, 100), np.nan)
+
+    assert not PAPER.contact(nothing, PAPER.fit(np.zeros((3, 100)))).present
+
+
 def test_noise_alone_is_no_contact_in_5000_frames():
     draws = np.random.default_rng(0).normal(0, NOISE, (5000, 3, 100))
 
@@ -190,6 +196,7 @@ def test_the_cramer_rao_bound_of_table_1s_skin_is_the_known_one(place, position_
     assert 100 * force / load.force == pytest.approx(force_percent, abs=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [(0.05, 0.05), (0.02, 0.08)])
 def test_over_4000_draws_the_contact_is_efficient_unbiased_and_covered(place):
     load = as_hard_as_table_1(*place)

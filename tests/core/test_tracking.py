@@ -25,7 +25,6 @@ from kappaskin import (
 from kappaskin.fit.choosing import telling_most
 from kappaskin.fit.kalman import MovingModes
 from kappaskin.fit.prior import prior_root
-from kappaskin.studies.long_run import long_run
 
 pytestmark = pytest.mark.slow
 
@@ -497,23 +496,6 @@ def test_twenty_thousand_steps_leave_the_covariance_definite_and_where_it_was(dt
     tolerance = 1e-9 if dtype is np.float64 else 1e-3
     assert np.min(seen) > 0
     np.testing.assert_allclose(seen[-1], seen[1], rtol=tolerance)
-
-
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_it_is_as_good_at_the_end_of_a_run_as_at_its_start(dtype):
-    blocks = long_run(2_800, dtype)  # the contact presses, goes round and lifts twice
-
-    assert all(0.003 < block["least_sd_mm"] <= block["most_sd_mm"] < 0.5 for block in blocks)
-    assert np.mean([block["covered"] for block in blocks]) == pytest.approx(0.95, abs=0.04)
-    # A frame in which the contact lifts has readings from before and after.
-    assert all(block["noise"] == pytest.approx(0.3, rel=0.15) for block in blocks)
-    rms = np.array([block["rms_mm"] for block in blocks])
-    assert rms[5:].mean() < 1.2 * rms[:5].mean()
-
-
-def test_a_run_too_short_for_its_rows_is_refused():
-    with pytest.raises(Refusal, match="at least 10 frames"):
-        long_run(9)
 
 
 # The next channels

@@ -1,11 +1,11 @@
 """Arrays that take seconds to compute, kept in the user's folder of caches for the next process."""
 
 import hashlib
+import io
 import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 import platformdirs
@@ -15,6 +15,7 @@ from kappaskin.frames import Array
 
 _MEANING = 1  # another number for whatever makes other arrays of the same question
 _MOST = 16  # files
+_MARK = hashlib.sha256().digest_size  # bytes: what a file begins with
 _LARGEST = 64_000_000  # bytes of one: more is read no faster than it is computed
 
 
@@ -26,15 +27,20 @@ def kept(question: str, compute: Callable[[], dict[str, Array]]) -> dict[str, Ar
     """
     asked = f"{_MEANING} {np.__version__} {scipy.__version__} {question}"
     file = _folder() / f"{hashlib.sha256(asked.encode()).hexdigest()[:24]}.npz"
-    with suppress(OSError, ValueError, EOFError, BadZipFile), file.open("rb") as opened:
-        arrays = dict(np.load(opened))
-        file.touch()  # the oldest go first
-        return arrays
+    with suppress(OSError):
+        data = file.read_bytes()
+        if data.startswith(_mark(data[_MARK:])):
+            file.touch()  # the oldest go first
+            return dict(np.load(io.BytesIO(data[_MARK:])))
     arrays = compute()
     if sum(values.nbytes for values in arrays.values()) <= _LARGEST:
         with suppress(OSError):
             _write(file, arrays)
     return arrays
+
+
+def _mark(data: bytes) -> bytes:
+    return hashlib.sha256(data).digest()
 
 
 def _folder() -> Path:
@@ -44,9 +50,11 @@ def _folder() -> Path:
 def _write(file: Path, arrays: dict[str, Array]) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_suffix(f".{os.getpid()}")  # whole when it has its name
+    made = io.BytesIO()
+    np.savez(made, **arrays)  # pyright: ignore[reportArgumentType]
+    data = made.getvalue()
     try:
-        with part.open("wb") as to:
-            np.savez(to, **arrays)  # pyright: ignore[reportArgumentType]
+        part.write_bytes(_mark(data) + data)
         part.replace(file)
     finally:
         part.unlink(missing_ok=True)

@@ -69,7 +69,7 @@ def _tell_machine(json: bool) -> None:
         _line(name, found[name])
     for package, version in found["packages"].items():
         _line(package, version or "not installed")
-    _line("display", found["display"] or "none (a virtual one will be used)")
+    _line("display", found["display"] or "none (`xvfb-run` gives a virtual one)")
     for port in found["serial_ports"]:
         said = Port(**port)
         may = "" if said.opened else f"  no permission. {permission_line(said.port)}"

@@ -1,6 +1,7 @@
 """Least squares without the elements that the rest of the skin contradicts, and why."""
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, cast
@@ -10,7 +11,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from kappaskin.bases import Basis
-from kappaskin.errors import RankDeficient
+from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.fit.bayes import Evidence
 from kappaskin.fit.estimator import Estimator, numbers
 from kappaskin.fit.fit import Fit, in_time
@@ -19,6 +20,7 @@ from kappaskin.fit.prior import prior_root
 from kappaskin.fit.remembered import Remembered
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
+from kappaskin.memory import Memory, Remembering
 
 _FUNCTIONS = 15  # along each side at least, of the shapes that elements are judged by
 _ALARM = 1e-3  # chance that a frame of good readings has any of them suspected
@@ -71,7 +73,7 @@ class _Verdict:
 # well, needs blocks of Q alone: K_E is off by Q_EE^-1 (Q K)_E, with covariance sigma^2 Q_EE^-1
 # (leaving one out, as in kriging: doi:10.1007/BF01033232). Leaving E out changes
 # Q to Q - Q_.E Q_EE^-1 Q_E. for the rest.
-class Robust(Estimator):
+class Robust(Estimator, Remembering):
     """Least squares from the elements that agree with each other.
 
     An element is suspected when its three readings are further from what the others tell of them
@@ -84,6 +86,8 @@ class Robust(Estimator):
     then told as large.
     """
 
+    REMEMBERED = ("_history",)
+
     def _set_up(self) -> None:
         basis, layout = self.basis, self.layout
         self._linear = LeastSquares(basis, layout, self.sigma, self.rim_sd, self.dtype)
@@ -95,7 +99,7 @@ class Robust(Estimator):
         P = len(layout)
         sensing = np.maximum(layout.live.sum(axis=0), 1)
         self._limit: Array = scipy.special.chdtri(sensing, _ALARM / P)
-        self._history = _History()
+        self._history = _History(P)
         self._judges(self.readable, self._judge)
 
     def _take_presses(self, rich: Basis) -> None:
@@ -146,7 +150,7 @@ class Robust(Estimator):
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
         """The fit to a skin at rest, which is no frame of the past."""
-        past, self._history = self._history, _History()
+        past, self._history = self._history, _History(len(self.layout))
         try:
             return super().at_rest(missing)
         finally:
@@ -268,11 +272,26 @@ def _crossed(left: Array, right: Array, P: int) -> Array:
     return np.matmul(left, right.swapaxes(1, 2))
 
 
-class _History:
-    """Why elements are suspected, as far as the last frames tell."""
+class _History(Remembering):
+    """Why some of P elements are suspected, as far as the last frames tell."""
 
-    def __init__(self) -> None:
+    def __init__(self, P: int) -> None:
+        self._P = P
         self._frames: deque[tuple[Array, Mask, Array]] = deque(maxlen=_FRAMES)
+
+    def remembered(self, before: str = "") -> Memory:
+        frames = [np.vstack(frame).astype(float) for frame in self._frames]
+        return {f"{before}frames": np.array(frames)} if frames else {}
+
+    def recall(self, memory: Mapping[str, NDArray[np.float64]], before: str = "") -> None:
+        kept = memory.get(f"{before}frames", np.empty((0, 7, self._P)))
+        if kept.ndim != 3 or kept.shape[1:] != (7, self._P):
+            raise Refusal(
+                f"expected {before}frames of shape (T, 7, {self._P}) to go on from, got "
+                f"shape {kept.shape}"
+            )
+        self._frames.clear()
+        self._frames.extend((frame[:3], frame[3] > 0, frame[4:]) for frame in kept)
 
     def __call__(self, K: Array, suspects: Mask, off: Array) -> NDArray[np.uint8]:
         """Numbers (P,) of `WHY` for readings K (3, P) that are `off` (3, P) in 1/m."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.frames import Array, Frame, Mask
+from kappaskin.frames import OVERTAKEN, Array, Frame, Mask
 from kappaskin.health.contradiction import Contradiction
 from kappaskin.health.explain import (
     DEAD,
@@ -74,8 +74,10 @@ class Monitor:
 
     def __call__(self, frame: Frame) -> bool:
         """Take in the next frame; True where `kinds` may be others from it on."""
-        if frame.device_time < self._last:  # the clock of a device that began anew
+        if frame.device_time < self._last - OVERTAKEN:  # the clock of a device that began anew
             self.begin_anew()
+        if frame.device_time < self._last:  # one that others overtook
+            return next(self._steps, False)
         self._last = frame.device_time
         look = self._window(frame)
         if look is not None:

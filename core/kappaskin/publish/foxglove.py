@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from typing import Any
 
 from kappaskin.errors import Refusal
 from kappaskin.publish.channels import CONTACT, LOG, POSE, SHAPE, SKIN, STATUS, logged
@@ -41,20 +42,29 @@ def opened(target: Target) -> "Foxglove":
             "address of this machine, or 0.0.0.0 for all of them"
         ) from error
     family, _, _, _, address = min(found, key=lambda each: each[0] != socket.AF_INET)
-    server = socket.socket(family, socket.SOCK_STREAM)
     try:
-        if sys.platform != "win32":  # there it would let two servers share a port
-            server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        server.bind(address)
-        server.listen(MOST_CLIENTS)
+        server = _listening(family, address)
     except OSError as error:
-        server.close()
         raise Refusal(
             f"{target}: cannot be listened on ({reason(error)}); choose another port, or "
             "an address of this machine"
         ) from error
-    server.setblocking(False)
     return Foxglove(server)
+
+
+def _listening(family: int, address: Any) -> socket.socket:
+    """A socket that listens and never waits."""
+    made = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        if sys.platform != "win32":  # there it would let two servers share a port
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind(address)
+        made.listen(MOST_CLIENTS)
+        made.setblocking(False)
+    except OSError:
+        made.close()
+        raise
+    return made
 
 
 class Foxglove:

@@ -33,7 +33,7 @@ def check_sides(patch: Patch) -> None:
 def check_elements(m: int, n: int = 1) -> None:
     """Refuse more elements than a device could send the readings of."""
     if m * n > _MOST_ELEMENTS:
-        raise Refusal(f"expected at most {_MOST_ELEMENTS} elements, got {m * n}; take fewer")
+        raise Refusal(f"expected at most {_MOST_ELEMENTS} elements, got {m} x {n}; take fewer")
 
 
 def check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:

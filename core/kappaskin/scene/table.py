@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields
 from types import UnionType
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
@@ -92,7 +92,8 @@ class Table:
             if len(each) == len(values):
                 return tuple(self._as(v, k, key) for v, k in zip(values, each, strict=True))
         elif kind is float and isinstance(value, int | float) and not isinstance(value, bool):
-            return float(value)
+            with suppress(OverflowError):  # of a whole number of hundreds of digits
+                return float(value)
         elif type(value) is kind:
             return value
         raise self.refusal(f"expected {_expected(kind)}, got {value!r:.60}", key)

@@ -81,7 +81,9 @@ class PointContact:
         """The tables for the readings `used` (3 P,)."""
         M = self._M[used]
         loads = loads_on(self.basis, M.T @ M, self._gives)
-        return _Tables(loads, loads.on_grid(self._x, self._y), max(len(M) - 3, 1))
+        norm = loads.on_grid(self._x, self._y)
+        norm[norm <= 0] = math.inf  # a load that these readings do not see explains nothing
+        return _Tables(loads, norm, max(len(M) - 3, 1))
 
     def __call__(self, curvature: Array, fit: Fit) -> Touch:
         """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
