@@ -38,8 +38,9 @@ PANELS: Mapping[str, str] = {
         "receivers of twenty lines come with the library."
     ),
     "Shape": (
-        "The simulated skin at rest, flat or bent, and how its edge is held. What it does under a "
-        "load follows from D \u2207\u2074w = p, D = E h\u00b3 / 12 (1 \u2212 \u03bd\u00b2)."
+        "The simulated skin at rest, flat or bent, and how its edge is held. What a flat one does "
+        "under a load follows from "
+        "D \u2207\u2074w = p, D = E h\u00b3 / (12 (1 \u2212 \u03bd\u00b2))."
     ),
     "Elements": (
         "How many sense, on a regular grid. Each reads three curvatures where it is: xx = "
@@ -87,7 +88,7 @@ PAGES: Mapping[str, str] = {
 
 DOCKS: Mapping[str, str] = {
     "settings": "What a person chooses: connection, load, basis, view, skin, sensor, calibration",
-    "lesson": "Lessons of a quarter of an hour, from what a gage feels to mending a sensor",
+    "lesson": "Lessons of ten to fifteen minutes, from what a gage feels to mending a sensor",
     "curvature": "What each element reads, map by map: curvature xx, yy, xy or what View says",
     "cost": "What each method and setting takes and how far it errs; a click on a point takes it",
     "stability": "Which shapes the elements see well, by singular values, and the hard cases",

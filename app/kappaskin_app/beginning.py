@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _LASTS = 60.0  # s, unless somebody is at it
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _TIP = (
-    "What moves below is a simulated fingertip: drag the red arrow. All of this is in the menus "
+    "What moves below is a simulated skin: drag the red arrow. All of this is in the menus "
     "too, and Help > Ways to begin shows it again."
 )
 
@@ -58,7 +58,7 @@ class Beginning(QObject):
             ),
             Offered(
                 "&Begin a lesson",
-                "Eleven of a quarter of an hour: from what a gage feels to mending a sensor.",
+                "Eleven of ten to fifteen minutes: from what a gage feels to mending a sensor.",
                 lambda: window.docks.reveal("lesson"),
             ),
             Offered(

@@ -314,8 +314,10 @@ class Calibrating(QObject):
             return
         try:
             report = computed.result()
-        except Refusal as refusal:
-            self.cancel(f"No calibration came of it: {refusal}.")
+        except Exception as error:  # whatever it is, it would come again at every look
+            self.cancel(f"No calibration came of it: {error or type(error).__name__}.")
+            if not isinstance(error, Refusal):
+                raise
             return
         self.result = Result(procedure.sensor, procedure.sweep(), report)
         self.cancel()

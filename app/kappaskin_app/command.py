@@ -20,7 +20,8 @@ def _require_display() -> None:
     if sys.platform.startswith("linux") and not shown:
         raise Refusal(
             "expected a display (DISPLAY or WAYLAND_DISPLAY), found none; "
-            "`python3 packaging/start.py` opens the app on a virtual one"
+            "`xvfb-run kappaskin app`, or `python3 packaging/start.py` in the project's folder, "
+            "opens the app on a virtual one"
         )
 
 

@@ -57,7 +57,8 @@ DEMONSTRATIONS = (
     Demonstration(
         "Drop a quarter",
         "25 elements read nothing, and functions are fine enough to hide there: noise enters such "
-        "a shape thousands of times. See the RMS error above, then the same with a prior.",
+        "a shape thousands of times as strongly. See the RMS error above, then the same with a "
+        "prior.",
         {"dead_elements": _QUARTER, "load_case": "centre"},
     ),
     Demonstration(

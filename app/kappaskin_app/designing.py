@@ -48,7 +48,7 @@ def scene_of(settings: Settings) -> Scene:
     plate, electronics = Plate(patch), Transduction()
     converter = replace(electronics.converter, conversion_time=s.design_conversion)
     electronics = replace(electronics, converter=converter)
-    fastest = 1 / electronics.scan_time(int(layout.live.sum()))
+    fastest = 1 / electronics.scan_time(3 * len(layout))
     return Scene(
         "design",
         plate,

@@ -84,8 +84,8 @@ class ExportDialog(WorkDialog):
     def _choose_file(self) -> None:
         name, kind = QFileDialog.getSaveFileName(self, "Export to", "", _FORMATS)
         if name:
-            path = Path(name)
-            self.to.setText(str(path if path.suffix else path.with_suffix(kind[-5:-1])))
+            path, ending = Path(name), kind.rpartition("*")[2].rstrip(")")
+            self.to.setText(str(path if path.suffix else path.with_suffix(ending)))
 
     @property
     def _at_once(self) -> bool:

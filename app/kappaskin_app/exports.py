@@ -75,10 +75,10 @@ class Exports(QObject):
             self.told.emit(f"Show {title} first: what is hidden has no picture")
             return
         caption = self.caption()  # of now, and not of when the file is chosen
-        path = chosen_file(self._window, title, flat)
-        if path is None:
-            return
         try:
+            path = chosen_file(self._window, title, flat)
+            if path is None:
+                return
             save_view(view, path, title, caption, flat, self.save)
             if path.suffix.lower() != ".png":  # which is told of once it is there
                 self.told.emit(f"Saved {path}")

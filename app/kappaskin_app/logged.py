@@ -41,11 +41,15 @@ class Logged(logging.Handler):
         logging.getLogger().addHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
-        text = record.getMessage().partition("\n")[0]
+        try:
+            text, whole = record.getMessage().partition("\n")[0], self.format(record)
+        except Exception:  # what does not fit its own words; who logged it is to go on
+            self.handleError(record)
+            return
         error = record.exc_info[1] if record.exc_info else None
         if error is not None:
             text += f": {type(error).__name__}: {error}".partition("\n")[0]
-        self.lines.append(Line(record.created, record.levelno, text, self.format(record)))
+        self.lines.append(Line(record.created, record.levelno, text, whole))
         self.count += 1
 
     def clear(self) -> None:

@@ -97,6 +97,7 @@ class Picking(QObject):
         status, now = self._session.status, time.monotonic()
         if status.meetings != self._met:
             self._met, self.element = status.meetings, -1
+            self._past.forget(0)  # another skin may have as many elements, on a clock that goes on
             self.card.show_facts("", "")
         key = status.meetings, estimate.generation
         if key != self._of:

@@ -11,6 +11,7 @@ from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin import Refusal, Status
+from kappaskin_app.working import with_ending
 
 _MARGIN, _TEXT = 8, 11  # px
 _MOST = 1000  # px of a caption
@@ -117,10 +118,9 @@ def _unwritable(path: Path) -> Refusal:
 
 
 def chosen_file(parent: QWidget, title: str, flat: bool) -> Path | None:
-    """The file that a person chooses for a picture, if any."""
+    """The file that a person chooses for a picture, if any; a `Refusal` as of `with_ending`."""
     kinds = "Picture (*.png);;Drawing (*.svg)" if flat else "Picture (*.png)"
     name, kind = QFileDialog.getSaveFileName(parent, f"Export {title}", "", kinds)
     if not name:
         return None
-    path = Path(name)
-    return path if path.suffix else path.with_suffix(kind[-5:-1])
+    return Path(name) if Path(name).suffix else with_ending(name, kind[-5:-1])

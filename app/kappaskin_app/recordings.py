@@ -2,6 +2,7 @@
 
 import itertools
 import shlex
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -55,8 +56,9 @@ def repairing(file: Path) -> str:
 
 
 def _found(folder: Path, pattern: str) -> list[Path]:
-    try:
-        dated = [(path.stat().st_mtime, path) for path in folder.glob(pattern)]
-    except OSError:  # no such folder, or one that may not be read: then there are none
-        return []
+    dated: list[tuple[float, Path]] = []
+    with suppress(OSError):  # no such folder, or one that may not be read: then there are none
+        for path in folder.glob(pattern):
+            with suppress(OSError):  # it went meanwhile, or leads nowhere
+                dated.append((path.stat().st_mtime, path))
     return [path for _, path in sorted(dated, reverse=True)]

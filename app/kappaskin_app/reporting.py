@@ -75,9 +75,10 @@ def _write(
     parts = {name: text.encode() for name, text in told.texts.items()}
     parts["doctor.json"] = json.dumps(doctor(), indent=1).encode()
     for file in sorted([*logs.glob(f"{LOG}*"), *logs.glob(CRASHES)]):
-        parts[file.name] = file.read_bytes()
-    home = str(Path.home()).encode()
-    parts = {name: text.replace(home, b"~") for name, text in parts.items()}
+        parts[file.name] = _content(file)
+    home = str(Path.home())
+    for written in (home, json.dumps(home)[1:-1]):  # as it is, and as JSON has it
+        parts = {name: text.replace(written.encode(), b"~") for name, text in parts.items()}
     if told.estimate is not None:
         parts["shown.npz"] = _readings(told.estimate)
     try:
@@ -91,6 +92,13 @@ def _write(
         why = error.strerror or error
         raise Refusal(f"{path}: cannot be written ({why}); choose another place") from error
     return f"{path}: {', '.join(parts)}"
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        return f"cannot be read ({error.strerror or error})".encode()
 
 
 def _readings(estimate: Estimate) -> bytes:

@@ -45,7 +45,12 @@ def _value(name: str, value: Any) -> Any:
     """What a setting is from what JSON made of it."""
     was = getattr(_BEGUN, name)
     if name == "written":
-        return value and Written(str(value["text"]), Path(value["file"]))
+        try:
+            return value and Written(str(value["text"]), Path(value["file"]))
+        except (TypeError, KeyError) as error:
+            raise Refusal(
+                f"{name}: expected text and file, got {value!r:.40}; leave it out"
+            ) from error
     if isinstance(was, tuple) and isinstance(value, list):
         return tuple(value)
     if isinstance(was, float) and type(value) is int:

@@ -17,6 +17,7 @@ from kappaskin_app.settings import Settings
 from kappaskin_app.simulation import OWN, text_of, written
 from kappaskin_app.views.timeline import Timeline
 from kappaskin_app.wishes import Wishes
+from kappaskin_app.working import with_ending
 
 _FILES = "Scene (*.toml)"
 _PLANNING = "Each effect is sized and timed\N{HORIZONTAL ELLIPSIS}"
@@ -84,13 +85,13 @@ class Staging(QObject):
         """Ask for a file, `name` to begin with, and `write` a scene there."""
         file, _ = QFileDialog.getSaveFileName(self._window, "Save the scene", name, _FILES)
         if file:
-            path = Path(file).with_suffix(".toml")
             try:
+                path = with_ending(file, ".toml")
                 write(path)
                 self.used.emit(path)
                 self.told.emit(f"Saved {path}")
             except (OSError, Refusal) as error:
-                self.told.emit(f"Could not write {path}: {error}")
+                self.told.emit(f"Could not write {file}: {error}")
 
     def pause(self) -> None:
         """Let the scene stand still, or go on."""

@@ -163,7 +163,8 @@ class Wishes:
         second = math.dist((x, y), (settings.x_end, settings.y_end))
         self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
         self._gesture, self._grabbed_in = self._history.new_gesture(), settings.written
-        writes = settings.written is not None and not session.refusal  # what is seen is in it
+        # What is seen is in it: no other scene stays, nor does until this one is made.
+        writes = settings.written is not None and not (session.refusal or session.making)
         self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
         self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
         self._place = x, y

@@ -53,6 +53,10 @@ class WorkDialog(QDialog):
         self.setMinimumWidth(_WIDTH)
         self.form, self.bar, self.words = QFormLayout(), QProgressBar(), QLabel()
         self.bar.setRange(0, 1000)
+        keeping = self.bar.sizePolicy()
+        keeping.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(keeping)
+        self.bar.hide()  # while there is nothing to tell, or what was told came to nothing
         self.words.setWordWrap(True)
         self.begin_button, self.cancel_button = QPushButton(verb), QPushButton("&Cancel")
         self.cancel_button.setAutoDefault(False)
@@ -89,12 +93,12 @@ class WorkDialog(QDialog):
         """Show it, as new unless it is at work."""
         if not self.busy:
             self.words.clear()
-            self.bar.reset()
+            self.bar.hide()
         self.show()
         self.raise_()
 
     def _begin(self) -> None:
-        self.bar.reset()
+        self.bar.hide()
         try:
             self._going = self._work()
         except Refusal as refusal:
@@ -102,6 +106,7 @@ class WorkDialog(QDialog):
             return
         self.words.setText("Writing\N{HORIZONTAL ELLIPSIS}")
         self.bar.setValue(0)
+        self.bar.show()
         self._timer.start()
         self._allow()
 
@@ -116,24 +121,26 @@ class WorkDialog(QDialog):
                     self.bar.setValue(self.bar.maximum())
                     self._end(self._said(told))
                     return
-        except Refusal as refusal:
-            self.bar.reset()
-            self._end(str(refusal))
+        except Exception as error:  # whatever it is, it would come again at every look
+            self.bar.hide()
+            self._end(str(error) or type(error).__name__)
+            if not isinstance(error, Refusal):
+                raise
 
     def cancel(self) -> None:
         """End what is at work, or close."""
         if self._going is None:
             self.reject()
         else:
-            self.bar.reset()
+            self.bar.hide()
             self._end("Cancelled; nothing was written.")
 
     def _end(self, words: str) -> None:
         """Be done, in `words`."""
         self._timer.stop()
-        if self._going is not None:
-            self._going.close()
-            self._going = None
+        going, self._going = self._going, None
+        if going is not None:
+            going.close()
         self.words.setText(words)
         high = self.heightForWidth(self.width())
         self.resize(self.width(), max(self.height(), high))  # or the fields would be pressed flat
@@ -148,6 +155,20 @@ class WorkDialog(QDialog):
 def path_in(line: QLineEdit) -> Path:
     """The file that is named in a line."""
     return Path(line.text().strip())
+
+
+def with_ending(name: str, ending: str) -> Path:
+    """The file that a person chose by its `name`, with an `ending` if that lacks it.
+
+    Refused where that is another one, which is there: nobody was asked whether to write over it.
+    """
+    path = Path(name)
+    if path.suffix.lower() == ending:
+        return path
+    path = path.with_suffix(ending)
+    if path.exists():
+        raise Refusal(f"{path} is there already: choose it by its whole name to write over it")
+    return path
 
 
 def named(words: str, line: QLineEdit) -> QLabel:

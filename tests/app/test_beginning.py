@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QVBoxLayout, QWidget
 
@@ -132,3 +133,14 @@ def test_ways_to_begin_go_when_something_is_begun_and_give_way_to_what_a_crash_l
     window.wishes.wish("functions_x", 6)
     assert window.offer.isVisible()
     recovering.close()
+
+
+def test_what_is_offered_for_good_stays_though_the_last_offer_was_to_end(
+    bench: Bench, qtbot
+) -> None:
+    QCursor.setPos(bench.mapToGlobal(bench.rect().bottomRight()))
+    bench.show_offer(60.0)
+    bench.offer.away.click()
+    bench.show_offer()
+    qtbot.wait(50)
+    assert bench.offer.isVisible()

@@ -269,6 +269,26 @@ def test_unattended_steps_make_a_calibration_that_can_be_used_undone_saved_and_l
     assert history.settings.calibration == used
 
 
+def test_a_computation_that_fails_ends_the_procedure_and_is_told(
+    bench: Bench, until: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise ValueError("no such gain")
+
+    monkeypatch.setattr("kappaskin_app.calibrating.calibrate", fails)
+    calibrating = bench.calibrating
+    calibrating.begin(RADII[::2], 0.2)
+    calibrating.take_all()
+    while calibrating.step is not None:
+        bench.read(5)
+    with pytest.raises(ValueError, match="no such gain"):  # for the log
+        done(bench, until)
+    calibrating.follow(bench.status)  # and not again
+    assert calibrating.procedure is None
+    assert bench.laid[-1] is None
+    assert calibrating.message == "No calibration came of it: no such gain."
+
+
 def test_a_file_that_is_no_calibration_of_this_sensor_is_refused(
     bench: Bench, tmp_path: Path
 ) -> None:

@@ -52,6 +52,7 @@ def test_without_a_display_the_remedy_is_named() -> None:
     bare = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     done = run("--seconds", "1", env=bare)
     assert done.returncode == 2
+    assert "`xvfb-run kappaskin app`" in done.stderr  # where there is no project's folder
     assert "packaging/start.py" in done.stderr
     assert "Traceback" not in done.stderr
 

@@ -8,7 +8,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
-from kappaskin import load_scene, prospect
+from kappaskin import load_scene, prospect, write_scene
+from kappaskin.scene import read_scene
 from kappaskin_app.designing import design_of, scene_of
 from kappaskin_app.panels.design import DesignForm, _meant, _place
 from kappaskin_app.settings import Designed, Range, Settings, ask_of
@@ -30,6 +31,13 @@ def test_every_outline_is_designed_with_its_usual_lengths(name: str):
 
     assert 0 < told.rms < told.worst < 1e-3
     assert len(told.positions) == len(scene_of(shaped(name)).layout)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_outline_is_a_scene_that_opens_however_slow_its_converter_is(name: str):
+    scene = scene_of(replace(shaped(name), design_conversion=ask_of("design_conversion").most))
+
+    assert read_scene(write_scene(scene), Path("a.toml")).rate == scene.rate
 
 
 @pytest.mark.parametrize("name", RANGES)

@@ -12,6 +12,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import Refusal
+from kappaskin_app.exporting import ExportDialog
 from kappaskin_app.pictures import save_view
 from kappaskin_app.window import MainWindow
 
@@ -164,11 +165,11 @@ def test_enter_exports_and_leaves_the_questions_for_files_alone(
     assert not dialog.choose_file.isEnabled()
     dialog.cancel_button.click()
     assert dialog.choose_file.isEnabled()
-    assert dialog.bar.value() < 0  # no share of what is not there
-    dialog.bar.setValue(dialog.bar.maximum())  # as it stands when one is written
+    assert not dialog.bar.isVisible()  # no share of what is not there
+    dialog.bar.show()  # as it stands when one is written
     dialog.to.setText(str(recording.with_name("out.doc")))
     qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
-    assert dialog.bar.value() < 0
+    assert not dialog.bar.isVisible()
 
 
 def test_an_export_is_cancelled_with_nothing_left(window, recording) -> None:
@@ -195,6 +196,20 @@ def test_only_what_makes_sense_is_asked(name: str, span: bool, at: bool, window)
         dialog.every.setValue(0.1)
         assert dialog.begin.isEnabled()
         assert not dialog.at.isEnabled()
+
+
+def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
+    qtbot, named, monkeypatch, tmp_path
+) -> None:
+    dialog, asked, endings = ExportDialog(), list[str](), list[str]()
+    qtbot.addWidget(dialog)
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: asked.append(a[-1]) or ("", ""))
+    dialog.choose_file.click()
+    for kind in asked[0].split(";;"):
+        named(tmp_path / "out", kind)
+        dialog.choose_file.click()
+        endings.append(Path(dialog.to.text()).suffix)
+    assert endings == [".csv", ".npz", ".h5", ".vtp", ".pvd", ".stl"]
 
 
 def test_what_is_refused_is_said_in_the_dialog(window, tmp_path) -> None:

@@ -31,6 +31,8 @@ HOSTILE = (
     "format = 1\n[layouts]\nA = 3",
     "format = 1\n[shortcuts]\npicture = ['Ctrl+S']",
     "a = " + 5000 * "[" + 5000 * "]",
+    "a = " + 5000 * "9",
+    f"format = 1\n[layout]\ncost = {{ area = 'left', share = {400 * '9'} }}",
     "\x00",
     "format = 1\n" + "\n".join(f"[layouts.a{n}]" for n in range(200)),
 )

@@ -170,6 +170,8 @@ def test_a_mistake_is_told_with_its_line(block: str, line: int, said: str) -> No
         (HEAD + "## One\nA\n```toml\n```\n```toml\n```\n", "one block"),
         (HEAD + "## One\nA\n```toml\nset = {}", "closed by"),
         (HEAD + "## One\nA\n" * 41, "1 to 40 steps"),
+        (HEAD.replace("5", "9" * 5000) + "## One\nA", "expected TOML"),
+        (HEAD.replace("5", "0x" + "f" * 5000) + "## One\nA", "expected TOML"),
         (HEAD.replace("5", '"5"') + "## One\nA", "line 4: expected minutes to be a whole number"),
     ],
 )

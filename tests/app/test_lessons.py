@@ -155,7 +155,7 @@ def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWin
     asking = window.lesson.step.asking
     for _ in range(2):
         asking.check.click()
-    assert "makes the dent a little sharper" in asking.feedback.text()
+    assert "each way make the dent sharper" in asking.feedback.text()
     assert asking.show_how.isVisible()
     asking.show_how.click()
     assert window.history.settings.functions_x == 6
@@ -166,7 +166,7 @@ def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWin
     window.lesson.list.begin.click()
     assert window.teaching.progress.step == 3
     window.teaching.go(0)
-    assert "makes the dent a little sharper" in window.lesson.step.asking.feedback.text()
+    assert "each way make the dent sharper" in window.lesson.step.asking.feedback.text()
 
 
 def test_what_is_said_to_an_answer_is_scrolled_to(window: MainWindow, until) -> None:

@@ -122,3 +122,15 @@ def test_the_pages_beside_the_skin_show_all_or_scroll_it(large: MainWindow) -> N
         wrong += cut(large.panels.widget(page))
     large.panels.setCurrentIndex(0)
     assert wrong == []
+
+
+def test_how_long_the_sides_of_the_skin_are_is_read_whole(large: MainWindow) -> None:
+    plotter, sides = large.membrane.plotter, large.membrane.sides
+    wide = plotter.render_window.GetSize()[0]
+    for label in sides.labels:
+        across = [0, 0, 0, 0]
+        label.GetBoundingBox(plotter.renderer, across)
+        at = label.GetPositionCoordinate().GetComputedViewportValue(plotter.renderer)[0]
+        assert across[1] > across[0]
+        assert at + across[0] >= 0, label.input
+        assert at + across[1] <= wide, label.input

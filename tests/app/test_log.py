@@ -102,3 +102,12 @@ def test_once_closed_nothing_is_kept_and_logging_is_as_before() -> None:
     log.warning("afterwards")
     assert not logged.lines
     assert (logging.getLogger().handlers, log.level) == (handlers, level)
+
+
+def test_a_line_that_cannot_be_written_does_not_end_who_logged_it(
+    panel: LogPanel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(logging, "raiseExceptions", False)  # or each handler prints it
+    logging.getLogger("another").warning("%d of them", "many")
+    panel.look()
+    assert listed(panel) == []

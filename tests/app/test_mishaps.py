@@ -123,6 +123,22 @@ def test_a_report_names_no_home_folder_and_takes_the_log_along(tmp_path: Path) -
         assert report.read(LOG) == b"in ~/secret"
 
 
+def test_a_home_folder_is_not_named_where_a_text_has_to_escape_it(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(Path, "home", lambda: Path("/home/j\u00fcrgen"))
+    path = tmp_path / "report.zip"
+    doctor = {"python": "/home/j\u00fcrgen/bin/python"}
+    finished(Reporting(path, Told({}), tmp_path, lambda: doctor))
+    with zipfile.ZipFile(path) as report:
+        assert json.loads(report.read("doctor.json")) == {"python": "~/bin/python"}
+
+
+def test_a_log_that_cannot_be_read_is_told_in_the_report(tmp_path: Path) -> None:
+    (tmp_path / LOG).mkdir()
+    finished(Reporting(tmp_path / "report.zip", Told({}), tmp_path, dict))
+    with zipfile.ZipFile(tmp_path / "report.zip") as report:
+        assert report.read(LOG) == b"cannot be read (Is a directory)"
+
+
 def test_a_report_that_is_cancelled_leaves_nothing(tmp_path: Path) -> None:
     go_on = threading.Event()
     reporting = Reporting(

@@ -140,3 +140,12 @@ def test_while_elements_are_chosen_to_scan_a_click_in_a_heatmap_picks_none(
     window.heatmaps["xx"].chosen.emit(44)
     assert window.picking.element == -1
     assert window.history.settings.region_elements == (44,)
+
+
+def test_another_skin_with_as_many_elements_has_no_past(window: MainWindow, until) -> None:
+    session, past = window.session, window.picking._past  # noqa: SLF001
+    until(lambda: len(past.of([0])[0]) > 100)
+    met = session.status.meetings
+    window.wishes.wish("side_x", 0.15)
+    until(lambda: session.status.meetings != met and session.estimate is not None)
+    assert len(past.of([0])[0]) < 100

@@ -43,6 +43,8 @@ def test_what_a_text_does_not_say_is_as_at_the_beginning() -> None:
         ("{", "settings as JSON"),
         ('{"version": 2, "settings": {}}', "version 1, got 2"),
         ('{"version": 1, "settings": {"functions_x": "many"}}', "functions_x: expected int"),
+        ('{"version": 1, "settings": {"written": 5}}', "written: expected text and file"),
+        ('{"version": 1, "settings": {"written": {"text": ""}}}', "expected text and file"),
         ('{"version": 1, "settings": {"show_truth": 1}}', "show_truth: expected bool"),
     ],
 )

@@ -256,6 +256,12 @@ def test_the_newest_come_first_and_only_eight(tmp_path: Path) -> None:
     assert newest(tmp_path / "nowhere") == []
 
 
+def test_a_link_that_leads_nowhere_hides_no_recording(tmp_path: Path) -> None:
+    (tmp_path / "there.mcap").touch()
+    (tmp_path / "gone.mcap").symlink_to(tmp_path / "nowhere.mcap")
+    assert newest(tmp_path) == [tmp_path / "there.mcap"]
+
+
 def test_figures_of_a_recording_are_short() -> None:
     assert [size_of(n) for n in (0, 999, 3_400, 12_345_678, 7_250_000_000)] == [
         "0 B",

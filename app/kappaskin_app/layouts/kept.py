@@ -109,7 +109,7 @@ def from_text(text: str) -> Kept:
     """What the file tells; refused where it is damaged, or of a later version."""
     try:
         document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise Refusal(f"it is no TOML ({error})") from error
     if (version := document.get("format")) != FORMAT:
         raise Refusal(f"expected format {FORMAT}, got {version!r}: another version wrote it")
@@ -199,7 +199,7 @@ def _place(table: Mapping[str, Any]) -> Place:
 
 
 def _share(table: Mapping[str, Any], key: str) -> float:
-    share = float(table[key]) if type(table.get(key)) in (int, float) else 0.0
+    share = table[key] if type(table.get(key)) in (int, float) else 0.0
     if not 0 <= share <= 1:
-        raise Refusal(f"expected a share of the window from 0 to 1, got {share}")
-    return share
+        raise Refusal(f"expected a share of the window from 0 to 1, got {share!r:.60}")
+    return float(share)

@@ -197,8 +197,10 @@ class _Table:
     @classmethod
     def parse(cls, name: str, text: str, line: int) -> "_Table":
         try:
-            return cls(name, text, line, tomllib.loads(text))
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
+            said = tomllib.loads(text)
+            repr(said)  # refused here: a number in hexadecimal that is too long to be told
+            return cls(name, text, line, said)
+        except (ValueError, RecursionError) as error:  # also of a number too long to read
             at = _AT_LINE.search(str(error))
             where = line + int(at[1]) - 1 if at else line
             why = _AT_LINE.sub("", str(error)).strip()

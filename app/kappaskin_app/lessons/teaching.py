@@ -193,7 +193,11 @@ class Teaching(QObject):
         if progress is None:
             return
         settings, views, caption = self._history.settings, self._views(), self._caption()
-        path = chosen_file(self._window, "the figure", flat=True)
+        try:
+            path = chosen_file(self._window, "the figure", flat=True)
+        except Refusal as refusal:
+            self.told.emit(str(refusal))
+            return
         if path is None:
             return
         made = sheet(progress, student, views, settings, now)

@@ -40,7 +40,10 @@ class WholeBox(QSpinBox):
 
     def fixup(self, text: str) -> str:
         typed = _typed(text.removesuffix(self.suffix()), self.value())
-        return str(int(min(max(typed, self.minimum()), self.maximum())))
+        return str(round(min(max(typed, self.minimum()), self.maximum())))
+
+    def valueFromText(self, text: str) -> int:
+        return round(_typed(text.removesuffix(self.suffix()), self.value()))
 
 
 class RealBox(QDoubleSpinBox):
@@ -53,6 +56,9 @@ class RealBox(QDoubleSpinBox):
     def fixup(self, text: str) -> str:
         typed = _typed(text.removesuffix(self.suffix()), self.value())
         return self.textFromValue(min(max(typed, self.minimum()), self.maximum()))
+
+    def valueFromText(self, text: str) -> float:
+        return _typed(text.removesuffix(self.suffix()), self.value())
 
 
 class ChoiceBox(QComboBox):

@@ -42,11 +42,18 @@ def put_in(text: str, place: Place, key: str, value: Any) -> str:
     owner: Any = document
     for name in place:
         if isinstance(name, str) and name not in owner:
-            owner[name] = tomlkit.table(is_super_table=name != place[-1])
+            owner[name] = _new(owner, is_super=name != place[-1])
         owner = owner[name]
     said = {name: one for name, one in owner.items() if name not in instead_of(key)}
     _set(document, place, said | {key: value})
     return _tidy(text, document)
+
+
+def _new(owner: Any, is_super: bool) -> Any:
+    """A table to put into `owner`: into its line, if it stands in one."""
+    if isinstance(owner, InlineTable):
+        return tomlkit.inline_table()
+    return tomlkit.table(is_super_table=is_super)
 
 
 def remove(text: str, place: Place) -> str:
@@ -194,7 +201,7 @@ def _table(said: Mapping[str, Any]) -> Table:
 
 def _item(value: Any) -> Any:
     """The value as parts of a scene are written: tables in a line, arrays of them in several."""
-    return tomlkit.parse(f"value = {_written(value)}")["value"]
+    return tomlkit.parse(f"value = {_written(value)}\n")["value"]
 
 
 def _written(value: Any) -> str:

@@ -94,7 +94,8 @@ class Scanning:
             "Scan",
             "Sampling a region of interest buys rate (paper, section 6.2). The force/torque sensor "
             "stands at the base of the fingertip (intrinsic contact sensing). What tells most is "
-            "chosen by the estimator Tracking; with any other the channels take turns.",
+            "chosen by the estimator Tracking; with any other the channels take turns. A sensor on "
+            "a line scans around the contact or chosen elements; the rest is simulated only.",
             (
                 ("off", "All elements"),
                 ("skin", "Around the contact"),

@@ -43,7 +43,7 @@ class Fit:
         Range(
             "Functions along x",
             "Ni, the number of functions along x (Eq. 1). More follow finer shapes and more noise; "
-            "m elements along x decide at most m of them.",
+            "with more than elements both along x and along y, readings cannot decide all of them.",
             1,
             64,
             1,

@@ -13,7 +13,6 @@ Array = NDArray[np.float64]
 
 _LOW = 0.2  # of the shorter side: how far in the view reaches below the skin at rest
 _MARGIN = 0.06  # of the longer side: room for the labels beside the edges and the arrow above
-_LABEL = 78.0  # px that one takes
 
 
 @dataclass(frozen=True)
@@ -41,10 +40,10 @@ DIRECTIONS = {
 _NUMBERS = 12  # that say how a camera stands
 
 
-def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, wide: float) -> None:
-    """Look at the whole of `skin` from `direction`, in a picture of so many px (`wide`).
+def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, label: float) -> None:
+    """Look at the whole of `skin` from `direction`.
 
-    With room for the labels to its left and right, which do not shrink with it.
+    With room to its left and right for a label each, which takes this share of the picture's width.
     """
     camera = renderer.GetActiveCamera()
     body = _around(skin, 0.0)
@@ -59,7 +58,7 @@ def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, wide: float
     seen = np.array([_in_view(renderer, *point) for point in _around(skin, _MARGIN)])
     least, most = seen.min(axis=0), seen.max(axis=0)
     skin_alone = np.ptp([_in_view(renderer, *point)[0] for point in body])
-    beside = max(2.0 - 4.0 * _LABEL / wide, 0.5) / float(skin_alone)
+    beside = (2.0 - 4.0 * label) / float(skin_alone)
     zoom = min(1.94 / float(np.max(most - least)), beside)
     camera.Zoom(zoom)
     camera.SetWindowCenter(*(zoom * (least + most) / 2))

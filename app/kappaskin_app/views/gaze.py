@@ -56,16 +56,19 @@ class Gaze(QObject):
             self.place()
 
     def fit(self) -> None:
-        """After the picture has another size: have all of the skin in it, unless it was turned."""
-        if not self._camera:
+        """After picture or letters have another size: have all in it, unless it was turned."""
+        if self._camera:
+            self._sides.fit(self._plotter.width())
+        else:
             self.place()
 
     def place(self) -> None:
         """Look as is asked for, at this skin."""
         renderer, direction = self._plotter.renderer, DIRECTIONS.get(self._look, FROM_THE_LEFT)
+        label = self._sides.fit(self._plotter.width())
         if self._camera:
             place_camera(renderer, self.skin, self._camera)
         else:
-            fit_camera(renderer, self.skin, direction, self._plotter.width())
+            fit_camera(renderer, self.skin, direction, label)
         self._sides.show_from(None if self._camera else direction)
         self._plotter.update()

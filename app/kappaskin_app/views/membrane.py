@@ -314,6 +314,7 @@ class MembraneView(QWidget):
         self.caption.prop.color, self.caption.prop.font_size = theme.text, grown(_LETTERS)
         self.alarm.show_theme(theme)
         self.surface.show_theme(theme)
+        self.gaze.fit()
         self.plotter.update()
 
     def close_plotter(self) -> None:

@@ -61,6 +61,7 @@ class Offer(QWidget):
         self.buttons = [self._button(each) for each in offered]
         for before, after in pairwise([self, *self.buttons, self.away]):
             QWidget.setTabOrder(before, after)
+        self._ending.stop()  # that of the last one, which may have been put away
         self._ending.setInterval(round(1e3 * seconds))
         if seconds:
             self._ending.start()

@@ -11,6 +11,8 @@ from kappaskin_app.views.drawn import MM, DrawnSkin
 from kappaskin_app.views.unlit import UNLIT, pixels
 
 _LETTERS = 15  # px
+_LONG = 5.2  # times as long as its letters are high: a label with a space beside it
+_MOST = 0.2  # of a picture's width that one label may take
 
 
 class Sides:
@@ -46,7 +48,14 @@ class Sides:
         for axis, label in enumerate(self.labels[1:]):
             label.SetVisibility(direction is None or direction.sees(axis))
 
+    def fit(self, wide: float) -> float:
+        """The share of a picture of so many px (`wide`) that a label takes, in letters that fit."""
+        size = max(1, min(grown(_LETTERS), int(_MOST * wide / _LONG)))
+        for label in self.labels:
+            label.size = size
+        return _LONG * size / wide
+
     def show_colour(self, colour: str) -> None:
         self.actor.prop.color = colour
         for label in self.labels:
-            label.prop.color, label.size = colour, grown(_LETTERS)
+            label.prop.color = colour

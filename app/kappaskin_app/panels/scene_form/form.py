@@ -40,7 +40,7 @@ class SceneForm(QScrollArea):
         self._showing = True  # a box that loses the focus meanwhile says what was typed in it
         try:
             said = tomllib.loads(text)
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):  # also of a number too long to read
             self._content.setEnabled(False)
         else:
             self._content.setEnabled(True)

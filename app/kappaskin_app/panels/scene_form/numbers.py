@@ -62,9 +62,6 @@ class NumberBox(RealBox):
     def textFromValue(self, value: float) -> str:
         return shown(value * self._how.scale, self._how)
 
-    def valueFromText(self, text: str) -> float:
-        return float(text.removesuffix(self.suffix()))
-
     def stepBy(self, steps: int) -> None:
         value = self.value()
         # Seen from where it goes: below 10 steps are those of 9.

@@ -139,7 +139,7 @@ _HOW = {
     "bits": _how("Resolution", "Bits of a reading.", ("bits", 1.0), 8, 24),
     "full_scale": _how("Full scale", "Reads between minus and plus this.", _VOLT, 0.0),
     "converter.offset": _how("Offset", "What it reads of no voltage.", _VOLT),
-    "conversion_time": _how("Conversion", "Time that one channel takes.", US, 0.0),
+    "conversion_time": _how("Conversion", "Time that it takes for one channel.", US, 0.0),
     "what": _choice(
         "What",
         "What presses: a load is given, of a rigid object the skin finds how it lies against it.",

@@ -1,12 +1,19 @@
+import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QApplication
 
 from kappaskin import SCENES, Refusal, load_scene, planned, read_scene, scene_file
-from kappaskin_app.scene_text import OFF, ON, PLANNED, forced, shifted
+from kappaskin_app.history import History
+from kappaskin_app.scene_text import OFF, ON, PLANNED, changes, forced, shifted
+from kappaskin_app.settings import Settings, Written
 from kappaskin_app.touching import Held, touches_at
+from kappaskin_app.wishes import Wishes
 
 READY = [name for name in SCENES if load_scene(name).stimuli]
 
@@ -132,3 +139,39 @@ def test_a_text_that_cannot_be_changed_is_refused() -> None:
         shifted(text_of("two-contacts"), 2, 0.0, 0.0)
     with pytest.raises(Refusal, match="expected a touch 1 to change, got a text with 0"):
         shifted("format = 1", 0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("making", "dragged"), [(False, True), (True, False)])
+def test_a_touch_is_not_dragged_in_a_text_that_is_not_seen_yet(
+    qapp: QApplication, making: bool, dragged: bool
+) -> None:
+    written = Written(text_of("two-contacts"), scene_file("two-contacts"))
+    history, scene = History(Settings(written=written)), load_scene("two-contacts")
+    session = SimpleNamespace(
+        scene=scene, time=0.5 * scene.duration, refusal="", making=making, move=lambda _: None
+    )
+    wishes = Wishes(history, cast("Any", session))
+    touch = touches_at(scene, session.time)[0]
+    x, y = touch.load.centre()
+    wishes.grab(x, y)
+    wishes.drag(x + 1e-3, y)
+    wishes.release()
+    assert (history.settings.written != written) == dragged
+
+
+def test_a_step_is_added_before_the_last_release_under_headings_too() -> None:
+    steps = [{"step": "press", "seconds": 1.0}, {"step": "release", "seconds": 1.0}]
+    text = "[[touch]]\n" + "".join(
+        f'\n[[touch.path]]\nstep = "{one["step"]}"\nseconds = 1.0\n' for one in steps
+    )
+    assert tomllib.loads(text)["touch"][0]["path"] == steps
+    after = changes.add_step(text, ("touch", 0, "path"), "hold")
+    path = tomllib.loads(after)["touch"][0]["path"]
+    assert [path[0], path[2]] == steps
+    assert path[1]["step"] == "hold"
+    assert '\n\n[[touch.path]]\nstep = "release"' in after
+
+
+def test_a_value_is_put_into_a_new_table_of_one_that_stands_in_a_line() -> None:
+    after = changes.put_in("electronics = { gain = 2.0 }\n", ("electronics", "bridge"), "k", 2.1)
+    assert tomllib.loads(after) == {"electronics": {"gain": 2.0, "bridge": {"k": 2.1}}}

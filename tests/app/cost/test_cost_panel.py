@@ -1,109 +1,18 @@
+"""What accuracy costs, on one window that has measured all of it: points, slider, effects."""
+
 import math
-import multiprocessing
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QApplication
 
 from kappaskin import Cost, EffectCost, Refused, Setting
-from kappaskin_app import costing
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.costing import in_words
 from kappaskin_app.effects import called
-from kappaskin_app.settings import METHOD_NAMES, Settings
-from kappaskin_app.simulation import scene_of, scene_of_sensor
+from kappaskin_app.settings import METHOD_NAMES
 from kappaskin_app.views.cost_plot import CostPlot
 from kappaskin_app.window import MainWindow
-
-
-@pytest.fixture(autouse=True, scope="module")
-def few() -> Iterator[None]:
-    """So few settings that measuring them takes no time."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(costing, "METHODS", ("least-squares", "bayes"))
-        patch.setattr(costing, "FUNCTIONS", (4, 8, 12))
-        patch.setattr(costing, "ELEMENTS", (6,))
-        yield
-
-
-@pytest.fixture(scope="module")
-def shared(qapp: QApplication, few: None, until) -> Iterator[MainWindow]:
-    """One window for all that only look at it, once everything is measured."""
-    qapp.setStyle("Fusion")
-    window = MainWindow("sim:")
-    window.show()
-    until(lambda: window.session.estimate is not None)
-    window.actions_by_name["dock-cost"].trigger()
-    until(lambda: _all_measured(window), 60.0)
-    window.history.stack.clear()  # the dock stays, whatever is undone
-    window.hide()
-    yield window
-    window.close()
-    window.deleteLater()
-    qapp.processEvents()
-
-
-@pytest.fixture
-def measured(shared: MainWindow, until) -> Iterator[MainWindow]:
-    """The window as it was when everything was measured, shown."""
-    shared.show()
-    shared.activateWindow()
-    stack = shared.history.stack
-    while stack.canUndo():
-        stack.undo()
-    until(lambda: shared.costing.scene is not None)
-    if shared.costing.unlike():
-        shared.cost.again.click()
-    until(lambda: _all_measured(shared), 60.0)
-    until(lambda: shared.cost.plot.frontier == shared.costing.frontier())
-    setting = Setting("least-squares", (8, 8), (10, 10))
-    until(lambda: shared.costing.present == setting)  # the engine takes it up in its own time
-    until(lambda: isinstance(shared.costing.predicted(), Cost))
-    until(lambda: shared.cost.setting.text() == in_words(setting))
-    yield shared
-    shared.hide()
-
-
-def _all_measured(window: MainWindow) -> bool:
-    done, asked = window.costing.progress
-    return asked > 0 and done == asked and not window.costing.running
-
-
-def _processes() -> list[str]:
-    names = [child.name for child in multiprocessing.active_children()]
-    return [name for name in names if name == "kappaskin-cost"]
-
-
-def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
-    window: MainWindow, until, qtbot
-) -> None:
-    assert not window.cost.isVisible()
-    until(lambda: window.session.status.sensor is not None)
-    assert not _processes()
-    qtbot.keyClick(window, Qt.Key.Key_F9)
-    assert window.cost.isVisible()
-    until(lambda: _processes() == ["kappaskin-cost"])
-    until(lambda: window.cost.bar.isVisible())
-    until(lambda: window.costing.progress[0] > 0, 60.0)
-    drawn = len(window.membrane.ages)
-    until(lambda: len(window.membrane.ages) > drawn + 2)
-
-
-def test_nobody_looking_ends_the_measuring_and_a_look_takes_it_up_again(
-    window: MainWindow, until
-) -> None:
-    dock = window.actions_by_name["dock-cost"]
-    dock.trigger()
-    until(lambda: window.costing.progress[0] > 0, 60.0)
-    dock.trigger()
-    assert not window.costing.running
-    assert not _processes()
-    kept = dict(window.costing.costs)
-    dock.trigger()
-    until(lambda: _all_measured(window), 60.0)
-    assert all(window.costing.costs[setting] is cost for setting, cost in kept.items())
 
 
 def test_every_method_and_basis_is_measured_and_what_is_refused_is_not_drawn(
@@ -160,25 +69,11 @@ def test_what_is_predicted_and_what_is_measured_stand_beside_each_other(
     assert 0 < time < 1
 
 
-def test_the_setting_in_use_is_measured_first(window: MainWindow, until) -> None:
-    window.history.change("Odd", -1, method="bayes", functions_x=7, functions_y=5)
-    until(lambda: window.session.status.setup.Ni == 7)
-    window.actions_by_name["dock-cost"].trigger()
-    until(lambda: window.costing.progress[0] > 0, 60.0)
-    assert next(iter(window.costing.costs)) == Setting("bayes", (7, 5), (10, 10))
-
-
 @pytest.mark.parametrize("method", [name for name, _ in METHOD_NAMES])
 def test_any_setting_in_use_is_read_whole(measured: MainWindow, method: str) -> None:
     line = measured.cost.setting
     line.show_text(in_words(Setting(method, (12, 12), (16, 16))))
     assert line.whole
-
-
-def test_how_many_elements_there_are_is_told_once_it_is_known() -> None:
-    setting = Setting("bayes", (8, 8), None)
-    assert in_words(setting).endswith("functions")
-    assert in_words(setting, 92).endswith("functions, 92 elements")
 
 
 def test_every_line_of_the_legend_has_room(measured: MainWindow, until) -> None:
@@ -243,15 +138,6 @@ def test_a_region_is_said_not_to_be_in_what_is_predicted(measured: MainWindow, u
     until(lambda: message.text().endswith("without the region."))
     measured.history.stack.undo()
     until(lambda: not message.isVisible())
-
-
-def test_a_skin_without_a_load_is_refused_in_words(window: MainWindow, until) -> None:
-    window.session.scene = scene_of(Settings(load_case="point", force=0.0))
-    window.actions_by_name["dock-cost"].trigger()
-    until(lambda: window.costing.refusal != "", 60.0)
-    until(lambda: window.cost.message.isVisible())
-    assert "load" in window.cost.message.text()
-    assert not window.costing.running
 
 
 def _rows(window: MainWindow) -> dict[str, list[str]]:
@@ -378,24 +264,3 @@ def test_another_basis_is_measured_too_and_another_skin_only_when_asked(
     until(lambda: "under another load" in message.text())
     measured.history.change("Bits", -1, bits=12)
     until(lambda: "with other electronics" in message.text())
-
-
-def test_a_real_sensor_has_no_effects_to_leave_out(window: MainWindow, until) -> None:
-    window.session.source = "/dev/real"
-    window.actions_by_name["dock-cost"].trigger()
-    until(lambda: window.cost.no_effects.isVisible(), 60.0)
-    assert window.cost.no_effects.text() == (
-        "What spoils the readings of a sensor is in them already: nothing can be left out."
-    )
-    until(lambda: window.costing.progress[0] > 0, 60.0)
-    assert not window.costing.effects
-    assert not window.cost.effects.isVisible()
-
-
-def test_a_real_sensor_is_reckoned_with_its_own_skin_and_noise() -> None:
-    sensor = scene_of(Settings(elements_x=7, dead_elements=(3,), edge="clamped")).sensor()
-    scene = scene_of_sensor(sensor, 0.3)
-    assert (scene.plate, scene.layout, scene.edge) == (sensor.plate, sensor.layout, "clamped")
-    assert [effect.rms for effect in scene.effects] == [0.3]
-    (load,) = scene.loads
-    assert load.centre().tolist() == pytest.approx([0.05, 0.05])

@@ -1,0 +1,95 @@
+"""When costs are measured, and of what: the setting in use, this skin, a real sensor's."""
+
+import multiprocessing
+
+import pytest
+from PySide6.QtCore import Qt
+
+from kappaskin import Setting
+from kappaskin_app.costing import in_words
+from kappaskin_app.settings import Settings
+from kappaskin_app.simulation import scene_of, scene_of_sensor
+from kappaskin_app.window import MainWindow
+
+from .conftest import all_measured
+
+pytestmark = pytest.mark.usefixtures("few")
+
+
+def _processes() -> list[str]:
+    names = [child.name for child in multiprocessing.active_children()]
+    return [name for name in names if name == "kappaskin-cost"]
+
+
+def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
+    window: MainWindow, until, qtbot
+) -> None:
+    assert not window.cost.isVisible()
+    until(lambda: window.session.status.sensor is not None)
+    assert not _processes()
+    qtbot.keyClick(window, Qt.Key.Key_F9)
+    assert window.cost.isVisible()
+    until(lambda: _processes() == ["kappaskin-cost"])
+    until(lambda: window.cost.bar.isVisible())
+    until(lambda: window.costing.progress[0] > 0, 60.0)
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 2)
+
+
+def test_nobody_looking_ends_the_measuring_and_a_look_takes_it_up_again(
+    window: MainWindow, until
+) -> None:
+    dock = window.actions_by_name["dock-cost"]
+    dock.trigger()
+    until(lambda: window.costing.progress[0] > 0, 60.0)
+    dock.trigger()
+    assert not window.costing.running
+    assert not _processes()
+    kept = dict(window.costing.costs)
+    dock.trigger()
+    until(lambda: all_measured(window), 60.0)
+    assert all(window.costing.costs[setting] is cost for setting, cost in kept.items())
+
+
+def test_the_setting_in_use_is_measured_first(window: MainWindow, until) -> None:
+    window.history.change("Odd", -1, method="bayes", functions_x=7, functions_y=5)
+    until(lambda: window.session.status.setup.Ni == 7)
+    window.actions_by_name["dock-cost"].trigger()
+    until(lambda: window.costing.progress[0] > 0, 60.0)
+    assert next(iter(window.costing.costs)) == Setting("bayes", (7, 5), (10, 10))
+
+
+def test_how_many_elements_there_are_is_told_once_it_is_known() -> None:
+    setting = Setting("bayes", (8, 8), None)
+    assert in_words(setting).endswith("functions")
+    assert in_words(setting, 92).endswith("functions, 92 elements")
+
+
+def test_a_skin_without_a_load_is_refused_in_words(window: MainWindow, until) -> None:
+    window.session.scene = scene_of(Settings(load_case="point", force=0.0))
+    window.actions_by_name["dock-cost"].trigger()
+    until(lambda: window.costing.refusal != "", 60.0)
+    until(lambda: window.cost.message.isVisible())
+    assert "load" in window.cost.message.text()
+    assert not window.costing.running
+
+
+def test_a_real_sensor_has_no_effects_to_leave_out(window: MainWindow, until) -> None:
+    window.session.source = "/dev/real"
+    window.actions_by_name["dock-cost"].trigger()
+    until(lambda: window.cost.no_effects.isVisible(), 60.0)
+    assert window.cost.no_effects.text() == (
+        "What spoils the readings of a sensor is in them already: nothing can be left out."
+    )
+    until(lambda: window.costing.progress[0] > 0, 60.0)
+    assert not window.costing.effects
+    assert not window.cost.effects.isVisible()
+
+
+def test_a_real_sensor_is_reckoned_with_its_own_skin_and_noise() -> None:
+    sensor = scene_of(Settings(elements_x=7, dead_elements=(3,), edge="clamped")).sensor()
+    scene = scene_of_sensor(sensor, 0.3)
+    assert (scene.plate, scene.layout, scene.edge) == (sensor.plate, sensor.layout, "clamped")
+    assert [effect.rms for effect in scene.effects] == [0.3]
+    (load,) = scene.loads
+    assert load.centre().tolist() == pytest.approx([0.05, 0.05])

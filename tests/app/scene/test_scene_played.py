@@ -1,0 +1,131 @@
+"""A scene that plays in a window: stopped, sought, dragged, and connected to again."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+
+from kappaskin import scene_file
+
+from .conftest import EDIT, EFFECTS_PAGE, plays
+
+
+def test_the_timeline_stops_seeks_and_goes_on(window, panel, until, qtbot) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    assert window.timeline.isVisible()
+    qtbot.keyClick(window, Qt.Key.Key_P, Qt.KeyboardModifier.ControlModifier)
+    until(lambda: window.session.status.playing.speed == 0)
+    window.timeline.sought.emit(0.05)
+    assert window.session.time == 0.05  # at once, or keys in a row would go from where it was
+    until(lambda: window.session.status.playing.at == 0.05)
+    first = window.session.estimate.sequence
+    until(lambda: window.session.estimate.sequence > first + 50)
+    assert window.session.time == pytest.approx(0.05)
+    depth = window.session.estimate.surface.copy()
+    window.timeline.sought.emit(0.75)
+    until(lambda: np.abs(window.session.estimate.surface).max() < 0.2 * np.abs(depth).max())
+    window.timeline.play_wanted.emit(True)
+    until(lambda: window.session.status.playing.speed == 1)
+
+
+def test_where_nothing_moves_there_is_no_timeline(window, panel, until) -> None:
+    panel.gallery.chosen.emit("fingertip")
+    until(lambda: plays(window, "fingertip"))
+    until(lambda: not window.timeline.isVisible())
+
+
+def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
+    window, panel, until
+) -> None:
+    panel.gallery.chosen.emit("sphere")
+    until(lambda: plays(window, "sphere"))
+    window.session.run(False)
+    window.session.seek(1.5)
+    until(lambda: len(window.membrane.drag.handles) == 1)
+    x, y = window.membrane.drag.handles[0].tolist()
+    scene = window.session.scene
+    drag = window.membrane.drag
+    drag.grabbed.emit(x, y)
+    for step in range(1, 11):
+        drag.dragged.emit(x + 1e-3 * step, y)
+    there = np.array([x + 0.01, y])
+    until(lambda: np.abs(window.session.estimate.true_contact - there).max() < 2e-3)
+    drag.given_up.emit()
+    until(lambda: window.session.scene.stimuli == scene.stimuli)
+    drag.grabbed.emit(x, y)
+    drag.dragged.emit(x + 0.01, y)
+    drag.released.emit()
+    until(lambda: f"x = {x + 0.01:g}" in window.history.settings.written.text)
+    until(lambda: np.abs(window.session.estimate.true_contact - there).max() < 2e-3)
+    window.history.stack.undo()
+    until(lambda: window.session.scene.stimuli[0].what.x == pytest.approx(x))
+    drag.grabbed.emit(x, y)
+    drag.dragged.emit(x + 0.01, y)
+    panel.gallery.chosen.emit("hum")  # or undone, with the mouse held
+    until(lambda: plays(window, "hum"))
+    written = window.history.settings.written
+    drag.dragged.emit(x + 0.02, y)
+    drag.released.emit()
+    assert window.session.scene.name == "hum"
+    assert window.history.settings.written == written
+
+
+def test_every_touch_is_drawn_however_many_there_are(window, panel, until) -> None:
+    head = scene_file("tapping").read_text().split("[[touch]]")[0]
+    places = [(0.02 + 0.02 * (n % 4), 0.02 + 0.02 * (n // 4)) for n in range(12)]
+    touch = '[[touch]]\nwhat = "disc"\nx = {}\ny = {}\nradius = 0.005\nforce = 0.02\n'
+    panel.editor.edited.emit(head + "".join(touch.format(*place) for place in places))
+    until(lambda: len(window.membrane.drag.handles) == len(places))
+    red = [actor for actor in window.membrane.plotter.renderer.GetActors() if _is_red(actor)]
+    arrows = [actor for actor in red if actor.visibility and any(actor.position)]
+    assert len(arrows) == len(places)
+    (circles,) = [actor for actor in red if actor not in arrows and actor.visibility]
+    assert circles.mapper.dataset.n_lines == len(places)
+
+
+def _is_red(actor) -> bool:
+    return getattr(actor, "prop", None) is not None and actor.prop.color == "#e8543f"
+
+
+def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene(
+    window, panel, until
+) -> None:
+    panel.gallery.chosen.emit("sphere")
+    until(lambda: plays(window, "sphere"))
+    panel.setCurrentIndex(EFFECTS_PAGE)
+    window.session.run(False)
+    window.session.seek(1.5)
+    until(lambda: len(window.membrane.drag.handles) == 1)
+    scene, good = window.session.scene, window.history.settings.written.text
+    bad = good.replace("[skin]", "[skin")
+    panel.editor.edited.emit(bad)
+    until(lambda: panel.tabText(EDIT) == "&Edit (not played)")
+    assert not panel.effects.table.isEnabled()
+    x, y = window.membrane.drag.handles[0].tolist()
+    drag = window.membrane.drag
+    drag.grabbed.emit(x, y)
+    drag.dragged.emit(x + 0.01, y)
+    drag.released.emit()
+    assert window.history.settings.written.text == bad
+    assert window.session.scene is scene
+    panel.editor.edited.emit(good)
+    until(lambda: panel.tabText(EDIT) == "&Edit")
+    assert panel.effects.table.isEnabled()
+
+
+def test_connecting_again_goes_on_with_the_scene_that_was_played(window, panel, until) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    killed = window.session.engine.pid
+    os.kill(killed, signal.SIGTERM)
+    until(lambda: window.session.engine.pid not in (killed, None))  # LOST may not have been drawn
+    window.actions_by_name["connect"].trigger()
+    until(lambda: window.badge.text() == "SIM" and plays(window, "tapping"))
+    assert window.history.settings.written.file == scene_file("tapping")
+    window.actions_by_name["disconnect"].trigger()
+    until(lambda: window.badge.text() == "OFF")
+    panel.gallery.chosen.emit("hum")  # which is to play it
+    until(lambda: window.badge.text() == "SIM" and plays(window, "hum"))

@@ -1,0 +1,184 @@
+"""Settings in the window: typed, stepped, refused where they are, undone and redone."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QLineEdit,
+)
+
+from kappaskin_app.panels.form import Form
+from kappaskin_app.settings import Settings
+from kappaskin_app.window import MainWindow
+
+
+def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot) -> None:
+    window.history.change("Functions along x", -1, functions_x=5)
+    until(lambda: window.session.estimate.coefficients.shape == (5, 8))
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    until(lambda: window.history.settings.functions_x == 8)
+    until(lambda: window.session.estimate.coefficients.shape == (8, 8))
+
+
+def test_ctrl_z_works_while_an_editor_has_the_focus(window: MainWindow, qtbot) -> None:
+    box = window.panels.basis.editor("functions_x")
+    box.setFocus()
+    qtbot.keyClick(box, Qt.Key.Key_Down)
+    assert window.history.settings.functions_x == 7
+    qtbot.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert window.history.settings.functions_x == 8
+
+
+def test_the_wheel_changes_no_editor_without_the_focus(window: MainWindow, qtbot) -> None:
+    box = window.panels.noise.editor("noise_seed")
+    window.panels.basis.editor("functions_x").setFocus()
+    here = QPointF(box.rect().center())
+    event = QWheelEvent(
+        here,
+        QPointF(box.mapToGlobal(here.toPoint())),
+        QPoint(0, 0),
+        QPoint(0, 120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(box, event)
+    assert window.history.settings.noise_seed == 0
+
+
+def test_a_basis_the_readings_do_not_decide_is_refused_in_its_panel(
+    window: MainWindow, until
+) -> None:
+    window.history.change("Functions", -1, functions_x=12, functions_y=12)
+    message = window.panels.basis.message
+    until(lambda: "determine 140 of the 144" in message.text())
+    assert window.session.estimate.coefficients.shape == (8, 8)
+    window.history.stack.undo()
+    until(lambda: not message.text())
+
+
+def test_noise_turned_off_leaves_only_what_the_basis_cannot_follow(
+    window: MainWindow, until
+) -> None:
+    window.history.change("Still", -1, load_case="line", noise_kind="none")
+    until(lambda: window.session.estimate.error_rms < 1.0e-6)
+    window.history.change("Noise", -1, noise_kind="gaussian", noise_rms=2.0)
+    until(lambda: window.session.estimate.error_rms > 5e-5)
+
+
+def test_too_large_a_number_typed_becomes_the_largest_not_another(
+    window: MainWindow, qtbot
+) -> None:
+    box = window.panels.basis.editor("functions_x")
+    box.selectAll()
+    qtbot.keyClicks(box, "99")
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+    assert window.history.settings.functions_x == 64
+
+
+def test_steps_of_one_setting_in_a_row_are_one_to_undo(window: MainWindow, qtbot) -> None:
+    box = window.panels.basis.editor("functions_x")
+    for _ in range(3):
+        qtbot.keyClick(box, Qt.Key.Key_Down)
+    assert window.history.settings.functions_x == 5
+    window.history.stack.undo()
+    assert window.history.settings.functions_x == 8
+
+
+def test_a_locked_range_stays_and_an_undone_one_follows_again(window: MainWindow, until) -> None:
+    heatmap = window.heatmaps["xx"]
+    heatmap.lock.click()
+    locked = window.history.settings.range_xx
+    assert locked > 0
+    window.history.change("More", -1, load_case="point", force=0.9)
+    until(lambda: np.nanmax(np.abs(window.session.estimate.curvature[0])) > 1.5 * locked)
+    until(lambda: heatmap.bar.limits == (-locked, locked))
+    window.history.stack.undo()
+    window.history.stack.undo()
+    assert not heatmap.lock.isChecked()
+
+
+def test_a_wrong_belief_about_the_edge_costs(window: MainWindow, until) -> None:
+    window.history.change("Still", -1, load_case="centre", noise_kind="none")
+    until(lambda: window.session.estimate.error_rms < 2e-5)
+    window.history.change("Belief", -1, fit_edge="clamped")
+    until(lambda: window.session.estimate.error_rms > 1e-3)
+    window.history.change("Truth", -1, edge="clamped")
+    until(lambda: window.session.status.sensor.edge == "clamped")
+    until(lambda: window.session.estimate and window.session.estimate.error_rms < 2e-5)
+
+
+def test_the_colours_of_the_skin_can_be_locked_and_undone(window: MainWindow, until) -> None:
+    scale = window.display.scale
+    until(lambda: scale.bar.limits == (0.0, 5.0))
+    scale.lock.click()
+    assert window.history.settings.range_displacement == pytest.approx(5e-3)
+    window.history.change("More", -1, load_case="point", force=0.9)
+    until(lambda: window.session.estimate.surface.max() > 0.02)
+    until(lambda: window.display.ranges.deepest() > 5)
+    assert scale.bar.limits == (0.0, 5.0)
+    window.history.stack.undo()
+    window.history.stack.undo()
+    assert scale.lock.text() == "Lock"
+    window.history.change("Colour", -1, colour_by="xy")
+    until(lambda: scale.bar.limits[0] < 0)
+    scale.lock.click()
+    assert window.heatmaps["xy"].lock.isChecked()
+
+
+def test_every_button_and_editor_explains_itself(window: MainWindow) -> None:
+    kinds = (QAbstractSpinBox, QComboBox, QAbstractButton)
+    for panel in window.panels.all():
+        for kind in kinds:
+            for widget in panel.findChildren(kind):
+                assert widget.toolTip(), (panel.title(), widget.objectName())
+
+
+@pytest.mark.parametrize("shape", ["flat", "cylinder"])
+def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
+    window: MainWindow, qtbot, shape: str
+) -> None:
+    window.wishes.wish("shape", shape)
+    window.history.change("All", -1, load_case="two-points", side_x=0.03, x=0.02, region="skin")
+    obeyed = set()
+    window.actions_by_name["dock-compare"].trigger()
+    for page in range(window.panels.count() + 1):
+        if page < window.panels.count():
+            window.panels.setCurrentIndex(page)
+        else:
+            window.actions_by_name["dock-design"].trigger()
+        for form in window.findChildren(Form):
+            for editor in form.editors():
+                if not editor.isVisible():
+                    continue
+                was, index = window.history.settings, window.history.stack.index()
+                key = Qt.Key.Key_Space if isinstance(editor, QCheckBox) else Qt.Key.Key_Down
+                editor.setFocus()
+                if isinstance(editor, QLineEdit):
+                    qtbot.keyClicks(editor, "1")
+                    key = Qt.Key.Key_Return
+                qtbot.keyClick(editor, key)
+                if window.history.settings == was:
+                    qtbot.keyClick(editor, Qt.Key.Key_Up)
+                now = window.history.settings
+                assert now != was, editor.objectName()
+                assert window.history.stack.index() == index + 1
+                window.history.stack.undo()
+                assert window.history.settings == was
+                window.history.stack.redo()
+                assert window.history.settings == now
+                window.history.stack.undo()
+                obeyed.add(editor.objectName())
+    asked = {f.name for f in fields(Settings) if "ask" in f.metadata}
+    hidden = {"rim_radius", "size", "size_y", "design_base_radius", "design_rim_radius"}
+    hidden |= {"base_radius"} if shape == "flat" else set()
+    assert asked - obeyed == hidden

@@ -1,0 +1,45 @@
+"""Work beside a dialog, which ends however it goes."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from kappaskin import Refusal
+from kappaskin_app.working import WorkDialog, with_ending
+
+
+class Failing:
+    """Work that fails whenever it is looked at."""
+
+    def __init__(self, why: Exception) -> None:
+        self.why, self.looks, self.closed = why, 0, False
+
+    def poll(self) -> Sequence[object]:
+        self.looks += 1
+        raise self.why
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.mark.fails_inside
+@pytest.mark.parametrize("why", [Refusal("the disk is full"), OSError("the disk is full")])
+def test_work_that_fails_is_ended_once_and_told(qtbot, why: Exception) -> None:
+    work = Failing(why)
+    dialog = WorkDialog("Work", "Begin", lambda: work, str)
+    qtbot.addWidget(dialog)
+    dialog.begin_button.click()
+    qtbot.waitUntil(lambda: not dialog.busy, timeout=2000)
+    qtbot.wait(250)  # two more looks
+    assert (work.looks, work.closed, dialog.words.text()) == (1, True, "the disk is full")
+
+
+def test_only_a_file_chosen_by_its_whole_name_is_written_over(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    assert with_ending(str(tmp_path / "mine"), ".toml") == file
+    file.touch()
+    assert with_ending(str(file), ".toml") == file
+    for name in ("mine", "mine.v2"):
+        with pytest.raises(Refusal, match=r"mine\.toml is there already"):
+            with_ending(str(tmp_path / name), ".toml")
