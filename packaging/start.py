@@ -1,8 +1,9 @@
 """A fresh machine, set up, and one task run on it: the app, every check or some, or benchmarks.
 
-    python3 packaging/start.py                     opens the app on the simulated fingertip
+    python3 packaging/start.py                     opens the app on a simulated skin
     python3 packaging/start.py app [ARGUMENTS]     opens the app, e.g. app --source sim:
     python3 packaging/start.py test [ARGUMENTS]    runs every check; ARGUMENTS go to pytest
+    python3 packaging/start.py lint                runs those that read, and run nothing
     python3 packaging/start.py fast [ARGUMENTS]    runs what of the library's tests takes a minute
     python3 packaging/start.py cover [ARGUMENTS]   tells which lines of the library no test runs
     python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history tells how it went
@@ -43,16 +44,16 @@ STAMP = VENV / "kappaskin-stamp"
 REFUSED = 2
 PATIENCE = 10.0  # s that a process is given to start or to end
 
-CHECKS = (
+READING = (
     ("ruff", "check"),
     ("ruff", "format", "--check"),
     ("basedpyright",),
     ("lint-imports",),
-    # Each process has a display of its own; -n0 among ARGUMENTS makes it one for all, on ours.
-    # One that crashes ends the run: what it had in hand would be waited for without end.
-    # Three of them, for windows and lines wait for half of their time.
-    ("pytest", "-n3", "--max-worker-restart=0"),
 )
+# Each process has a display of its own; -n0 among ARGUMENTS makes it one for all, on ours.
+# One that crashes ends the run: what it had in hand would be waited for without end.
+# Three of them: fewer leave the cores idle, more gain nothing.
+TESTS = ("pytest", "-n3", "--max-worker-restart=0")
 LIBRARY = "tests/core"
 # Benchmark files are named so that plain pytest passes them by.
 BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")
@@ -106,17 +107,32 @@ def app(arguments: list[str], shown: dict[str, str]) -> int:
 def test(arguments: list[str], shown: dict[str, str]) -> int:
     """Run every check, whatever the others say; the exit code is the first failure's."""
     have_compiler()
+    command = [tool("python"), __file__, "lint"]
+    with tempfile.TemporaryFile("w+") as said, started(command, shown, said) as reading:
+        say(shlex.join([*TESTS, *arguments]))
+        tested = run([tool(TESTS[0]), *TESTS[1:], *arguments], shown, cwd=ROOT)
+        read = reading.wait()
+        said.seek(0)
+        print(said.read(), end="", flush=True)
+    if tested:
+        say(f"Failed: pytest (exit code {tested})")
+    elif not read:
+        say(f"All {len(READING) + 1} checks passed")
+    return read or tested
+
+
+def lint(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run the checks that only read the code, whatever the others say."""
+    if arguments:
+        raise Stop(f"expected nothing after lint, got {shlex.join(arguments)}")
     failures: list[tuple[str, int]] = []
-    for name, *options in CHECKS:
-        extra = arguments if name == "pytest" else []
-        say(shlex.join([name, *options, *extra]))
-        if code := run([tool(name), *options, *extra], shown, cwd=ROOT):
-            failures.append((" ".join([name, *options]), code))
+    for command in READING:
+        say(shlex.join(command))
+        if code := run([tool(command[0]), *command[1:]], shown, cwd=ROOT):
+            failures.append((shlex.join(command), code))
     if failures:
         say("Failed: " + ", ".join(f"{check} (exit code {code})" for check, code in failures))
-        return failures[0][1]
-    say(f"All {len(CHECKS)} checks passed")
-    return 0
+    return failures[0][1] if failures else 0
 
 
 def fast(arguments: list[str], shown: dict[str, str]) -> int:
@@ -164,7 +180,8 @@ def mutate(arguments: list[str], shown: dict[str, str]) -> int:
 
 
 TASKS = {
-    task.__name__: task for task in (app, test, fast, cover, bench, fuzz, mutate, core, bundle)
+    task.__name__: task
+    for task in (app, test, lint, fast, cover, bench, fuzz, mutate, core, bundle)
 }
 
 
@@ -277,15 +294,27 @@ def run(
     output: IO[str] | None = None,
 ) -> int:
     """The command's exit code; where we are stopped meanwhile, so is it."""
+    with started(command, variables, output, cwd) as child:
+        code = child.wait()
+    return code if code >= 0 else 128 - code
+
+
+@contextlib.contextmanager
+def started(
+    command: list[str],
+    variables: dict[str, str],
+    output: IO[str] | None = None,
+    cwd: Path | None = None,
+) -> Iterator[subprocess.Popen[bytes]]:
+    """The process of a command; where we are stopped meanwhile, so is it."""
     both = subprocess.STDOUT if output else None
     with subprocess.Popen(command, env=variables, cwd=cwd, stdout=output, stderr=both) as child:
         try:
-            code = child.wait()
+            yield child
         except (KeyboardInterrupt, SystemExit) as reason:
             # After Ctrl+C the terminal has told the child already.
             end(child, ask=not isinstance(reason, KeyboardInterrupt))
             raise
-    return code if code >= 0 else 128 - code
 
 
 def quietly(command: list[str], variables: dict[str, str], mend: str) -> None:

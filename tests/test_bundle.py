@@ -72,8 +72,9 @@ def test_files_are_told_by_the_endings_that_the_app_gives_them():
 
 
 @pytest.mark.skipif(shutil.which("update-mime-database") is None, reason="not installed")
-def test_it_installs_for_one_user_from_a_folder_of_any_name(tmp_path):
-    bundle, home = tmp_path / "my bundle", tmp_path / "home"
+@pytest.mark.parametrize("name", ["my bundle", "R&D", "a|b", '100 % "$HOME" `ls`', r"a\b"])
+def test_it_installs_for_one_user_from_a_folder_of_any_name(name, tmp_path):
+    bundle, home = tmp_path / name, tmp_path / "my home"
     pytest.importorskip("PySide6")
     drawn = tmp_path / "kappaskin.png"
     BUILD["draw"](BUILD["ICON"], drawn)
@@ -84,7 +85,12 @@ def test_it_installs_for_one_user_from_a_folder_of_any_name(tmp_path):
 
     share = home / ".local" / "share"
     desktop = (share / "applications" / "kappaskin.desktop").read_text()
-    assert f'Exec="{bundle}/kappaskin" app %f' in desktop
+    (told,) = re.findall(r'^Exec="(.*)" app %f$', desktop, re.MULTILINE)
+    assert not re.search(r'(?<!\\)["`$]|(?<!%)%(?!%)', told)
+    # A text of a desktop entry, then what is quoted in a command, then its fields.
+    for escape in (r"\\(.)", r"\\(.)", "%(%)"):
+        told = re.sub(escape, r"\1", told)
+    assert told == f"{bundle}/kappaskin"
     assert "*.scene.toml" in (share / "mime" / "globs").read_text()
     assert (share / "icons/hicolor/256x256/apps/kappaskin.png").read_bytes() == drawn.read_bytes()
 

@@ -27,11 +27,12 @@ def test_every_room_named_is_there_and_is_named_once(whose: str) -> None:
     assert len(set(told)) == len(told)
 
 
-def test_every_room_of_the_core_is_named() -> None:
-    modules = {file.stem for file in PACKAGES["core"].glob("[!_]*.py")}
-    folders = {f"{file.parent.name}/" for file in PACKAGES["core"].glob("*/__init__.py")}
+@pytest.mark.parametrize("whose", PACKAGES)
+def test_every_room_is_named(whose: str) -> None:
+    modules = {file.stem for file in PACKAGES[whose].glob("[!_]*.py")}
+    folders = {f"{file.parent.name}/" for file in PACKAGES[whose].glob("*/__init__.py")}
 
-    assert set(rooms_told("core")) >= modules | folders
+    assert set(rooms_told(whose)) >= modules | folders
 
 
 def test_every_file_named_is_there() -> None:

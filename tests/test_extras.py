@@ -99,7 +99,9 @@ def test_without_any_extra_the_library_works_and_says_what_installs_what_is_aske
 
 
 def test_a_plain_run_imports_nothing_optional(tmp_path):
-    code = "from kappaskin.cli import main\nmain(['tables'])\nprint(*sys.modules, sep='\\n')"
+    code = (
+        "from kappaskin.cli import main\nmain(['tables'])\nmain([])\nprint(*sys.modules, sep='\\n')"
+    )
 
     loaded = without(set(), code, tmp_path).splitlines()
 

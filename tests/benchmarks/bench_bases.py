@@ -43,7 +43,7 @@ def estimator(patch, edge="hinged"):
 
 @pytest.mark.parametrize("edge", ["hinged", "clamped"])
 @pytest.mark.parametrize("name", SKINS)
-def test_64_modes_are_ready_within_2_seconds(name, edge, figure) -> None:
+def test_64_modes_are_ready_within_2_seconds(name, edge, figure, ratio) -> None:
     taken = list[float]()
     for _ in range(5):
         plate_modes.cache_clear()
@@ -56,7 +56,7 @@ def test_64_modes_are_ready_within_2_seconds(name, edge, figure) -> None:
         f"64 functions of a {edge} {name}, with the fit and the surface: made in "
         f"{min(taken) * 1e3:.0f} ms"
     )
-    assert min(taken) < 2
+    ratio(f"64 functions of a {edge} {name}, of the 2 s allowed", min(taken) / 2, at_most=1)
 
 
 def estimate(patch, layout):

@@ -48,7 +48,7 @@ def test_a_frame_is_fifty_times_faster_than_lstsq_and_summation(medians, figure,
         f"lstsq and summation ({slow * 1e6:.0f} us)"
     )
     ratio("lstsq and summation, against counts to a surface", slow / fast, at_least=50)
-    assert fast < 60e-6
+    ratio("counts to a surface, of the 60 us allowed", fast / 60e-6, at_most=1)
 
 
 def test_a_whole_estimate_is_four_times_faster_than_lstsq_and_summation(

@@ -56,7 +56,7 @@ def words(told: dict[str, float]) -> str:
 
 @pytest.mark.parametrize("kind", ["read", "dead", "deaf"])
 def test_messages_are_sent_soon_whoever_receives_them(
-    play, figure, seconds, receiver, kind
+    play, figure, ratio, seconds, receiver, kind
 ) -> None:
     port = play("--rate", 1000)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as nobody, socket.socket() as found:
@@ -74,10 +74,14 @@ def test_messages_are_sent_soon_whoever_receives_them(
     if kind != "read":
         alone = published(port, seconds, targets[0])
         figure(f"  without it: {words(alone)}")
-        assert told["whole"] < 2 * alone["whole"] + 1.0
+        ratio(
+            f"latency beside a {kind} receiver, of twice that without it and 1 ms",
+            told["whole"] / (2 * alone["whole"] + 1.0),
+            at_most=1,
+        )
 
 
-def test_without_a_window_messages_are_sent_sooner(play, figure, seconds, receiver) -> None:
+def test_without_a_window_messages_are_sent_sooner(play, figure, ratio, seconds, receiver) -> None:
     with Engine() as engine:
         engine.connect(play("--rate", 1000))
         engine.publish([f"udp://127.0.0.1:{receiver}"])
@@ -85,4 +89,4 @@ def test_without_a_window_messages_are_sent_sooner(play, figure, seconds, receiv
         latency = engine.status().publishing.latency
     parts = {name: 1e3 * getattr(latency, name) for name in ("whole", "wait", "compute", "send")}
     figure(f"publishing without a window: 99 % within {parts['whole']:.2f} ms, {parts}")
-    assert parts["whole"] < 50
+    ratio("latency without a window, of the 50 ms allowed", parts["whole"] / 50, at_most=1)

@@ -40,11 +40,11 @@ def test_holding_what_was_left_out_adds_less_than_20_us_to_300_channels(
         f"holding adds {holding * 1e6:.1f} us to a frame of {len(part.channels)} of 300 channels; "
         f"its estimate takes {of_part / of_whole:.2f} of that of all ({of_whole * 1e6:.0f} us)"
     )
-    assert holding < 20e-6
+    ratio("holding a frame's readings, of the 20 us allowed", holding / 20e-6, at_most=1)
     ratio("estimate of a part of the skin, against all of it", of_part / of_whole, at_most=1.2)
 
 
-def test_a_new_set_of_missing_readings_costs_what_holding_spares(medians, figure) -> None:
+def test_a_new_set_of_missing_readings_costs_what_holding_spares(medians, figure, ratio) -> None:
     simulator, pipeline = Simulator(SCENE), Pipeline(SENSOR, Setup(hold=0))
     whole, rng = simulator.frame(0, time.monotonic), np.random.default_rng(0)
 
@@ -62,7 +62,7 @@ def test_a_new_set_of_missing_readings_costs_what_holding_spares(medians, figure
         f"({all_there * 1e6:.0f} us): "
         + ", ".join(f"{n} missing {t / all_there:.0f}" for n, t in zip(counts, taken, strict=True))
     )
-    assert max(taken) < 0.1
+    ratio("a new set of missing readings, of the 100 ms allowed", max(taken) / 0.1, at_most=1)
 
 
 def test_choosing_the_next_scan_costs_little_beside_the_estimate(medians, figure, ratio) -> None:

@@ -1,6 +1,7 @@
-"""Benchmarks: each figure is a ratio to a named baseline of the same run, printed at the end.
+"""Benchmarks: each figure is a ratio to a named baseline of the same run, or to what is allowed.
 
-The ratios are kept in history.jsonl, a line each; `start.py bench --history` tells how they went.
+They are printed at the end and kept in history.jsonl, a line each; `start.py bench --history`
+tells how they went.
 """
 
 import json
