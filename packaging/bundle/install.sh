@@ -6,12 +6,16 @@ here=$(cd "$(dirname "$0")" && pwd)
 data=${XDG_DATA_HOME:-$HOME/.local/share}
 mkdir -p "$data"
 cp -R "$here/share/." "$data"
-sed -i "s|^Exec=kappaskin|Exec=\"$here/kappaskin\"|" "$data/applications/kappaskin.desktop"
-for update in "update-mime-database $data/mime" "update-desktop-database $data/applications"; do
-    if command -v "${update%% *}" >/dev/null; then
-        $update
+# As a command of a desktop entry has it, and then as sed does.
+told=$(printf '%s' "$here" | sed 's/\\/\\\\\\\\/g; s/["`$]/\\\\&/g; s/%/%%/g' | sed 's/[&|\\]/\\&/g')
+sed -i "s|^Exec=kappaskin|Exec=\"$told/kappaskin\"|" "$data/applications/kappaskin.desktop"
+update() {
+    if command -v "$1" >/dev/null; then
+        "$1" "$2"
     else
-        echo "${update%% *} is not here: a desktop may not know the files (Debian: desktop-file-utils)"
+        echo "$1 is not here: a desktop may not know the files (Debian: desktop-file-utils)"
     fi
-done
+}
+update update-mime-database "$data/mime"
+update update-desktop-database "$data/applications"
 echo "Kappaskin is installed for $(id -un): open it from the menu, or a recording by a double click"

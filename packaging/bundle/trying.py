@@ -42,6 +42,7 @@ class Trial:
     def run_all(self) -> None:
         self._measure()
         self.expect("--version")
+        self.expect("--help")  # which loads every command, by its name
         told = json.loads(self.expect("doctor", "--json") or "{}")
         if None in told.get("packages", {"": None}).values() or told["missing"]:
             self.failures.append(f"doctor: {told}")
