@@ -89,6 +89,17 @@ def window(opened: Callable[..., MainWindow], until: Wait) -> MainWindow:
 
 
 @pytest.fixture
+def points_at(qtbot) -> Callable[[QWidget, QPoint], None]:
+    """Moves the mouse, no button down, to a place of a widget, also where it was last seen."""
+
+    def move(widget: QWidget, place: QPoint) -> None:
+        qtbot.mouseMove(widget, QPoint(2, 2))  # Qt tells nobody of a move to where it stood
+        qtbot.mouseMove(widget, place)
+
+    return move
+
+
+@pytest.fixture
 def colours_in() -> Callable[[MainWindow, QWidget], int]:
     """How many different colours the window's picture has where a widget is."""
 

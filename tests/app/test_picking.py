@@ -84,7 +84,9 @@ def centre_estimate():
     return pipeline.sensor, pipeline(Simulator(scene).frame(100, lambda: 1.0))
 
 
-def test_a_curve_is_pointed_at_where_it_is_drawn_and_broken_where_nothing_is(qapp, qtbot) -> None:
+def test_a_curve_is_pointed_at_where_it_is_drawn_and_broken_where_nothing_is(
+    qapp, qtbot, points_at
+) -> None:
     plot, told = CurvePlot("Curvature", "1/m", True, "tip"), []
     plot.resize(400, 200)
     plot.show()
@@ -96,17 +98,19 @@ def test_a_curve_is_pointed_at_where_it_is_drawn_and_broken_where_nothing_is(qap
     plot.show_curves(x, [Curve("3", 0, low, 3), Curve("9", 1, high, 9)], (-10, 0), "s")
     colours = {plot.grab().toImage().pixelColor(120, y).name() for y in range(20, 180)}
     assert len(colours) > 2
-    qtbot.mouseMove(plot, QPoint(120, 195 - plot.fontMetrics().height()))
+    points_at(plot, QPoint(120, 195 - plot.fontMetrics().height()))
     qtbot.waitUntil(lambda: told[-1:] == [3])
-    qtbot.mouseMove(plot, QPoint(225, 100))
+    points_at(plot, QPoint(225, 100))
     qtbot.waitUntil(lambda: told[-1:] == [-1])
     plot.close()
 
 
-def test_pointing_at_an_element_marks_it_in_every_view(window: MainWindow, until, qtbot) -> None:
+def test_pointing_at_an_element_marks_it_in_every_view(
+    window: MainWindow, until, points_at
+) -> None:
     seen = []
     window.display.pointed.connect(seen.append)
-    qtbot.mouseMove(window.membrane.plotter, pixel_of(window, 42))
+    points_at(window.membrane.plotter, pixel_of(window, 42))
     until(lambda: seen[-1:] == [42])
     assert all(marks.actor.visibility for marks in window.membrane.pointed)
     until(lambda: "at (25, 45) mm" in window.heatmaps["yy"].value.text())

@@ -1,16 +1,15 @@
 """Where on the skin the mouse points, and where it clicks: what is dragged turns the camera."""
 
-import time
-
-from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent
 from pyvistaqt import QtInteractor
 
+from kappaskin_app.guard import guarded
 from kappaskin_app.views.drawn import NO_SKIN
 from kappaskin_app.views.sight import Sight
 
 _STILL = 4.0  # px that the mouse may move while it clicks
-_LOOKS = 0.03  # s between two looks at where it points
+_LOOKS = 30  # ms between two looks at where it points
 
 
 class Pointing(QObject):
@@ -26,12 +25,15 @@ class Pointing(QObject):
         super().__init__(plotter)
         self.skin, self._sight = NO_SKIN, Sight(plotter)
         self._pressed_at: QPointF | None = None
-        self._next_look = 0.0
+        self._moved_to: QPointF | None = None
+        self._looked = QTimer(self, interval=_LOOKS, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._looked.timeout.connect(guarded(self._look))
         plotter.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind, left = event.type(), Qt.MouseButton.LeftButton
         if kind == QEvent.Type.Leave:
+            self._moved_to = None
             self.moved.emit(None)
         if isinstance(event, QMouseEvent):
             at = event.position()
@@ -40,7 +42,9 @@ class Pointing(QObject):
             elif kind == QEvent.Type.MouseButtonRelease:
                 self._release(at)
             elif kind == QEvent.Type.MouseMove and not event.buttons():
-                self._look(at)
+                self._moved_to = at
+                if not self._looked.isActive():
+                    self._look()
         return False
 
     def _release(self, at: QPointF) -> None:
@@ -51,8 +55,9 @@ class Pointing(QObject):
         if place is not None:
             self.clicked.emit(*place.tolist())
 
-    def _look(self, at: QPointF) -> None:
-        now = time.monotonic()
-        if now >= self._next_look:
-            self._next_look = now + _LOOKS
+    def _look(self) -> None:
+        """Tell where the mouse is, unless it was told: also where it stops right after a look."""
+        at, self._moved_to = self._moved_to, None
+        if at is not None:
+            self._looked.start()
             self.moved.emit(self.skin.hit(*self._sight.line(at)))
