@@ -1,5 +1,6 @@
 """Estimates, taken cylinder by cylinder, to a calibration that a person may use, save or load."""
 
+import math
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin import (
+    OVERTAKEN,
     CalibrationReport,
     Estimate,
     Procedure,
@@ -227,12 +229,12 @@ class Calibrating(QObject):
         nominal = plain and estimate.generation == status.generation
         if kept is None or not nominal or estimate.host_time < self._begun:
             return
-        if kept and estimate.device_time < kept[-1].device_time:
+        after = estimate.device_time - kept[-1].device_time if kept else math.inf
+        if after < -OVERTAKEN:
             self.cancel("The device's clock went back: it restarted. Begin anew.")
             return
         self._heard = estimate.host_time
-        often = self._wanted() / _MOST_FRAMES
-        if not kept or estimate.device_time - kept[-1].device_time >= often:
+        if after >= self._wanted() / _MOST_FRAMES:  # one that was overtaken is left out
             kept.append(estimate)
         if self._heard - self._begun >= self._wanted() and len(kept) >= _FEWEST_FRAMES:
             self._take(kept)

@@ -75,6 +75,7 @@ if TYPE_CHECKING:
     from kappaskin.fit import estimator_for as estimator_for
     from kappaskin.fit import singular_values as singular_values
     from kappaskin.frames import COMPONENTS as COMPONENTS
+    from kappaskin.frames import OVERTAKEN as OVERTAKEN
     from kappaskin.frames import Estimate as Estimate
     from kappaskin.frames import Event as Event
     from kappaskin.frames import Frame as Frame
@@ -212,7 +213,7 @@ else:
             "METHODS WHY AsPrinted Bayes Direct Estimator Fast FiniteSlope Fit LeastSquares Robust "
             "Tracking estimator_for singular_values"
         ),
-        "frames": "COMPONENTS Estimate Event Frame LocalGeometry Touch Truth",
+        "frames": "COMPONENTS OVERTAKEN Estimate Event Frame LocalGeometry Touch Truth",
         "geometry": "local_geometry",
         "health": "Finding Health Monitor",
         "intrinsic": "ForceTorqueSensor IntrinsicContact IntrinsicTouch Wrench",

@@ -205,6 +205,17 @@ def test_another_device_or_none_ends_the_procedure(
     assert bench.laid[-1] is None
 
 
+def test_a_reading_that_was_overtaken_is_left_out_and_costs_no_step(bench: Bench) -> None:
+    calibrating = bench.calibrating
+    calibrating.begin(THREE, 0.2)
+    calibrating.take()
+    bench.read(20)
+    bench.read(1, ago=0.05)
+    bench.read(40)
+    assert calibrating.procedure is not None
+    assert [taken.step.number for taken in calibrating.procedure.taken] == [1]
+
+
 @pytest.mark.parametrize("before", [0, 5])
 def test_a_device_that_restarts_ends_the_procedure(bench: Bench, before: int) -> None:
     calibrating = bench.calibrating
