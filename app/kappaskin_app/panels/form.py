@@ -1,6 +1,7 @@
 """Editors for settings, made from what `settings` says of each."""
 
 import math
+import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
@@ -29,6 +30,7 @@ from kappaskin_app.panels.several import SeveralButton
 from kappaskin_app.settings import Choice, Range, Settings, Several, Switch, Text, ask_of
 
 _AT_FIRST = Settings()
+_BEGUN = re.compile(r"[+-]?\d*\.?(\d*|\d+e[+-]?)", re.IGNORECASE)  # what may become a number
 _LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
 
 
@@ -94,7 +96,7 @@ def _typing(box: QSpinBox | QDoubleSpinBox, text: str) -> QValidator.State:
     try:
         value = float(text)
     except ValueError:
-        begun = text.strip() in ("", "-", ".", "-.")
+        begun = _BEGUN.fullmatch(text.strip())
         return QValidator.State.Intermediate if begun else QValidator.State.Invalid
     inside = box.minimum() <= value <= box.maximum()
     return QValidator.State.Acceptable if inside else QValidator.State.Intermediate
