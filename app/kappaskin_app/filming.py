@@ -66,7 +66,11 @@ class Filming(QObject):
             ffmpeg_log_level="error",
             output_params=said,
         )
-        film.send(None)  # until it waits for the first
+        try:
+            film.send(None)  # until it waits for the first
+        except (OSError, RuntimeError) as error:
+            self._part.unlink(missing_ok=True)
+            raise Refusal(f"expected FFmpeg to make a film, got: {error!s:.200}") from error
         self._film = film
         self.pictures, self._began = 0, time.monotonic()
         self._timer.start()

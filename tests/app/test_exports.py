@@ -123,6 +123,16 @@ def test_without_ffmpeg_the_line_that_installs_it_is_told(window, named, monkeyp
     assert not list(tmp_path.iterdir())
 
 
+def test_where_ffmpeg_cannot_be_started_nothing_is_left(window, named, monkeypatch, tmp_path):
+    named(tmp_path / "films" / "out.mp4")
+    (tmp_path / "films").mkdir()
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "nowhere"))
+    window.actions_by_name["film"].trigger()
+    assert "expected FFmpeg" in window.statusBar().currentMessage()
+    assert not list((tmp_path / "films").iterdir())
+    assert not window.exports.filming.running
+
+
 def test_a_film_ends_whole_with_the_window(window, until, named, tmp_path) -> None:
     named(tmp_path / "out.mp4")
     window.actions_by_name["film"].trigger()
