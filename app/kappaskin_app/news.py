@@ -25,6 +25,7 @@ class News(QObject):
         super().__init__(window)
         self._window = window
         self._next_bargain = self._next_words = 0.0
+        self._look: tuple[str, float] | None = None
         self._set = (
             *(window.panels, window.staging, window.display),
             *(window.stability, window.compare, window.design),
@@ -39,6 +40,11 @@ class News(QObject):
     def follow_settings(self, settings: Settings) -> None:
         for each in self._set:
             each.show_settings(settings)
+        if (look := (settings.theme, settings.letters)) != self._look:
+            self._look = look
+            self._show_look(settings)
+
+    def _show_look(self, settings: Settings) -> None:
         theme = THEMES[settings.theme]
         application = QApplication.instance()
         if isinstance(application, QApplication):
