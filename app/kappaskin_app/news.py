@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Status
 from kappaskin_app.presenting import NAMED
 from kappaskin_app.settings import Settings
-from kappaskin_app.theme import THEMES, letters, palette
+from kappaskin_app.theme import THEMES, bar_palette, letters, palette
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow
@@ -49,6 +49,7 @@ class News(QObject):
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.setPalette(palette(theme))
+            application.setPalette(bar_palette(theme), "QScrollBar")
             if (font := letters(settings.letters)) != application.font():
                 application.setFont(font)
         for each in self._themed:

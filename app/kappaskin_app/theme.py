@@ -100,6 +100,15 @@ def palette(theme: Theme) -> QPalette:
     return made
 
 
+def bar_palette(theme: Theme) -> QPalette:
+    """That of scroll bars: on a dark ground Fusion's handle is darker than what it slides in."""
+    made = palette(theme)
+    if QColor(theme.base).lightness() < 128:
+        made.setColor(QPalette.ColorRole.Button, QColor(theme.off))
+        made.setColor(QPalette.ColorRole.Base, QColor(theme.window))
+    return made
+
+
 def letters(percent: float) -> QFont:
     """The system's font, at so many percent of its size."""
     font = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont)

@@ -3,6 +3,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PySide6.QtWidgets import QApplication, QScrollBar
 
 from kappaskin_app.theme import (
     DARK_INK,
@@ -13,6 +14,7 @@ from kappaskin_app.theme import (
     SERIES,
     THEMES,
     Theme,
+    bar_palette,
 )
 from kappaskin_app.views.badge import GAP, LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, colour_of
 
@@ -128,3 +130,17 @@ def test_what_is_chosen_and_links_stand_out(theme: Theme) -> None:
     assert contrast(theme.base, theme.accent) >= 4.5
     assert contrast(theme.accent, theme.base) >= 4.5
     assert contrast(theme.accent, theme.window) >= 4.5
+
+
+@pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
+def test_the_handle_of_a_scroll_bar_is_lighter_than_its_groove(
+    qapp: QApplication, theme: Theme
+) -> None:
+    qapp.setStyle("Fusion")
+    bar = QScrollBar()
+    bar.resize(16, 300)
+    bar.setRange(0, 100)
+    bar.setPageStep(50)
+    bar.setPalette(bar_palette(theme))
+    seen = bar.grab().toImage()
+    assert seen.pixelColor(8, 60).lightness() > seen.pixelColor(8, 250).lightness() + 10
