@@ -1,6 +1,6 @@
 """Widgets one below the other, as the docks beside the skin hold them, or beside each other."""
 
-from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QDockWidget,
@@ -53,6 +53,10 @@ class _Scrolled(QScrollArea):
         bar = self.verticalScrollBar().sizeHint().width()
         if (inside := self.widget()) is not None:
             self.setMinimumWidth(inside.minimumSizeHint().width() + bar)
+
+    def sizeHint(self) -> QSize:
+        # No higher than it has to be: a dock that scrolls too would make room for all of it.
+        return QSize(super().sizeHint().width(), self.minimumSizeHint().height())
 
     def showEvent(self, event: QShowEvent) -> None:
         self.widen()  # what is hidden learns of other letters only now

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QImage
-from PySide6.QtWidgets import QDockWidget, QMenu, QPushButton
+from PySide6.QtWidgets import QDockWidget, QMenu, QPushButton, QScrollArea
 
 from kappaskin_app.actions import plain
 from kappaskin_app.views.line import Line
@@ -25,6 +25,19 @@ def test_nothing_is_cut_off_at_1280_by_800(window: MainWindow) -> None:
     for button in window.findChildren(QPushButton):
         if button.isVisible():
             assert button.width() >= button.sizeHint().width()
+
+
+def test_every_dock_below_has_room_for_all_that_is_in_it(window: MainWindow, qtbot) -> None:
+    scrolled = {}
+    for name in ("cost", "stability", "scene", "health", "numbers", "log", "compare", "design"):
+        window.docks.reveal(name)
+        qtbot.wait(150)
+        area = window.docks[name].findChild(QScrollArea)
+        if area.verticalScrollBar().maximum() or area.horizontalScrollBar().maximum():
+            scrolled[name] = area.viewport().size().toTuple()
+        window.docks[name].hide()
+    assert (window.width(), window.height()) == (1280, 800)
+    assert scrolled == {}
 
 
 def test_a_line_too_long_for_its_place_begins_its_tooltip(qapp) -> None:

@@ -81,9 +81,8 @@ class ComparePanel(QWidget):
         around.setContentsMargins(8, 4, 8, 6)
         around.setSpacing(10)
         around.addWidget(scrolled(self.form))
-        self.maps["a"].bar.hide()  # it is that of B beside it
         for view in self.maps.values():
-            around.addWidget(view, 2 if view.bar.isHidden() else 3)
+            around.addWidget(view, 3)
         around.addWidget(self.table, 3)
         self._empty()
 

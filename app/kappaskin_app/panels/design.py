@@ -131,8 +131,7 @@ class DesignPanel(QWidget):
         around.setContentsMargins(8, 4, 8, 6)
         around.setSpacing(10)
         around.addWidget(scrolled(self.form))
-        self.predicted.bar.hide()  # it is that of the other beside it
-        around.addWidget(self.predicted, 2)
+        around.addWidget(self.predicted, 3)
         around.addWidget(self.simulated, 3)
         right.addWidget(self.words)
         right.addWidget(self.along, 1)
