@@ -196,6 +196,25 @@ def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost
     listener.close()
 
 
+def test_a_listener_that_is_late_has_all_of_it_before_the_port_is_closed() -> None:
+    device = PseudoDevice(replace(SCENE, rate=20.0))
+    listener = Listener(device.port)
+    stop = threading.Event()
+    thread = threading.Thread(target=device.serve, args=(stop.is_set,))
+    thread.start()
+    wait_for(lambda: device.spent >= 3)
+    stop.set()
+    thread.join(2.0)
+    closing = threading.Thread(target=device.close)
+    closing.start()
+    time.sleep(0.6)
+    messages = listener.reads(device.spent)
+    closing.join()
+    listener.close()
+    assert len(messages) == device.spent
+    assert device.unsent == 0
+
+
 def test_the_bytes_carry_the_simulation_unchanged() -> None:
     device = PseudoDevice(replace(SCENE, seed=5))
     with serving(device):

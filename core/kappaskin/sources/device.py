@@ -1,8 +1,10 @@
 """The simulator behind the wire format on a pseudo-terminal: the other end of the line."""
 
+import fcntl
 import os
 import select
 import struct
+import termios
 import time
 import tty
 from collections import deque
@@ -30,7 +32,8 @@ from kappaskin.sources.wire import (
 )
 
 _OUTBOX = 2**19  # bytes held before a frame goes unsent: more than a second of a full scan
-_LINGER = 0.3  # s
+_LINGER = 0.3  # s without anything unread before the port is closed
+_PATIENCE = 2.0  # s at most that what is unread is waited for
 _AT_ONCE = 32  # frames that are due, as after standing still, before it listens again
 _INTRODUCTION = 0.5  # s between two information messages
 
@@ -231,10 +234,20 @@ class PseudoDevice:
         return struct.pack("<I", asked)
 
     def close(self) -> None:
-        """Close the port, after a moment for a listener to take what it was sent."""
+        """Close the port, once a listener has taken what it was sent, or will not."""
         if not self._hung_up():
-            time.sleep(_LINGER)  # what is unread when the last holder closes is thrown away
+            self._linger()
         os.close(self._master)
+
+    def _linger(self) -> None:
+        """Wait: what is unread when the last holder closes is thrown away."""
+        slave = os.open(self.port, os.O_RDWR | os.O_NOCTTY)
+        read = begun = time.monotonic()
+        while (now := time.monotonic()) < min(read + _LINGER, begun + _PATIENCE):
+            if any(fcntl.ioctl(slave, termios.FIONREAD, bytes(4))):
+                read = now
+            time.sleep(0.01)
+        os.close(slave)
 
 
 def _numbers(form: str, arguments: bytes) -> tuple[int, ...]:
