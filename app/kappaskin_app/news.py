@@ -49,7 +49,10 @@ class News(QObject):
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.setPalette(palette(theme))
-            application.setPalette(bar_palette(theme), "QScrollBar")
+            application.setPalette(
+                bar_palette(theme),
+                "QScrollBar",  # pyright: ignore[reportArgumentType]
+            )
             if (font := letters(settings.letters)) != application.font():
                 application.setFont(font)
         for each in self._themed:

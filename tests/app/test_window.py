@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QImage
-from PySide6.QtWidgets import QDockWidget, QMenu, QPushButton, QScrollArea
+from PySide6.QtWidgets import QDockWidget, QMenu, QPushButton, QScrollArea, QScrollBar
 
 from kappaskin_app.actions import plain
+from kappaskin_app.theme import THEMES, bar_palette
 from kappaskin_app.views.line import Line
 from kappaskin_app.window import MainWindow
 
@@ -56,6 +57,8 @@ def test_both_themes_draw(window: MainWindow, until, colours_in, theme: str) -> 
     until(lambda: len(window.membrane.ages) > drawn + 3)
     # On a busy machine the skin may be grey for a moment, as nothing new came.
     until(lambda: colours_in(window, window.membrane) > 500)
+    bar = window.panels.findChild(QScrollBar).palette().button()
+    assert bar.color() == bar_palette(THEMES[theme]).button().color()
 
 
 def test_a_picture_is_saved(window: MainWindow, tmp_path: Path) -> None:
