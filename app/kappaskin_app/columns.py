@@ -48,11 +48,14 @@ class _Scrolled(QScrollArea):
         super().__init__(widgetResizable=True)  # pyright: ignore[reportCallIssue]
         self._letters = -1.0
 
+    @property
+    def _needed(self) -> int:
+        bar, inside = self.verticalScrollBar().sizeHint().width(), self.widget()
+        return 0 if inside is None else inside.minimumSizeHint().width() + bar
+
     def widen(self) -> None:
         self._letters = self.font().pointSizeF()
-        bar = self.verticalScrollBar().sizeHint().width()
-        if (inside := self.widget()) is not None:
-            self.setMinimumWidth(inside.minimumSizeHint().width() + bar)
+        self.setMinimumWidth(self._needed)
 
     def sizeHint(self) -> QSize:
         # No higher than it has to be: a dock that scrolls too would make room for all of it.
@@ -63,9 +66,10 @@ class _Scrolled(QScrollArea):
         super().showEvent(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        laid_out = event.type() == QEvent.Type.LayoutRequest
-        if laid_out and self._letters != self.font().pointSizeF():
-            self.widen()
+        if event.type() == QEvent.Type.LayoutRequest and (
+            self._letters != self.font().pointSizeF() or self._needed > self.minimumWidth()
+        ):
+            self.widen()  # with other letters, or what is wider than all that was shown
         return super().eventFilter(watched, event)
 
 

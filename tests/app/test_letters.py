@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QLabel,
+    QScrollArea,
     QTableWidget,
     QWidget,
 )
@@ -143,3 +144,17 @@ def test_how_long_the_sides_of_the_skin_are_is_read_whole(large: MainWindow) -> 
         assert across[1] > across[0]
         assert at + across[0] >= 0, label.input
         assert at + across[1] <= wide, label.input
+
+
+def test_a_step_of_a_calibration_is_not_wider_than_its_page(large: MainWindow) -> None:
+    large.panels.show_calibration()
+    panel = large.panels.calibrate
+    page = panel.parentWidget()
+    while not isinstance(page, QScrollArea):
+        page = page.parentWidget()
+    for phase in (panel.steps, panel.outcome, panel.start):
+        for each in (panel.start, panel.steps, panel.outcome):
+            each.setVisible(each is phase)
+        _settle()
+        assert page.minimumWidth() >= page.widget().minimumSizeHint().width()
+    large.panels.setCurrentIndex(0)

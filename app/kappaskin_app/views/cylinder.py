@@ -11,6 +11,8 @@ from kappaskin_app.theme import LIGHT, Theme
 
 _POINTS = 61  # of the skin's line
 _MOST_WRAPPED = math.pi  # rad: the rest of a long skin hangs down straight
+_HIGH = 102  # px of the drawings without the words above and below them
+_LONGEST = "outer face down"
 _THICK = 5.0  # px, of each face
 _BENDS = {"x": (1.0, 0.0), "y": (0.0, 1.0), "diagonal": (math.sqrt(0.5), math.sqrt(0.5))}
 
@@ -29,10 +31,11 @@ class CylinderView(QWidget):
         )
 
     def sizeHint(self) -> QSize:
-        return QSize(280, 132)
+        return QSize(280, _HIGH + 2 * self.fontMetrics().height())
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(220, 132)
+        high, wide = self.sizeHint().height(), self.fontMetrics().horizontalAdvance(_LONGEST)
+        return QSize(max(220, high + wide + 16), high)
 
     def show_step(self, step: Step, patch: Patch) -> None:
         if step is not self._step or patch is not self._patch:
@@ -51,12 +54,15 @@ class CylinderView(QWidget):
         height = float(self.height())
         above = QRectF(self.width() - height + 4, 4, height - 8, height - 8)
         self._paint_side(painter, QRectF(2, 2, above.left() - 14, height - 4), self._step)
-        self._paint_above(painter, above.adjusted(12, 4, -4, -12), self._step)
+        metrics = painter.fontMetrics()
+        beside, below = metrics.horizontalAdvance("y") + 5, metrics.height() - 3
+        self._paint_above(painter, above.adjusted(beside, 4, -4, -below), self._step)
 
     # From the side.
 
     def _paint_side(self, painter: QPainter, area: QRectF, step: Step) -> None:
         theme = self._theme
+        high = painter.fontMetrics().height()
         painter.save()
         painter.setClipRect(area)
         along_x, along_y = _BENDS[step.along]
@@ -65,7 +71,7 @@ class CylinderView(QWidget):
             self._patch.b / along_y if along_y > 1e-9 else math.inf,
         )
         per_mm = 0.62 * area.width() / length
-        top = QPointF(area.center().x(), area.top() + 30)
+        top = QPointF(area.center().x(), area.top() + high + 15)
         if step.flat:
             ground = QRectF(area.left(), top.y() + _THICK, area.width(), area.height())
             painter.fillRect(ground, QColor(theme.line))
@@ -88,7 +94,7 @@ class CylinderView(QWidget):
         painter.drawText(area, Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignHCenter, words)
         painter.setPen(QColor(theme.text))
         size = "table" if step.flat else f"{1e3 * step.radius:g} mm"
-        at = QRectF(area.left(), area.bottom() - 34, area.width(), 30)
+        at = QRectF(area.left(), area.bottom() - 2 * high - 4, area.width(), 2 * high)
         painter.drawText(at, Qt.AlignmentFlag.AlignCenter, size)
         painter.restore()
 
@@ -105,8 +111,10 @@ class CylinderView(QWidget):
         painter.drawRect(skin)
         flags = Qt.AlignmentFlag.AlignCenter
         painter.setPen(QColor(theme.faint))
-        painter.drawText(QRectF(skin.left(), skin.bottom() + 1, width, 14), flags, "x")
-        painter.drawText(QRectF(skin.left() - 14, skin.top(), 13, height), flags, "y")
+        line, wide = painter.fontMetrics().height(), painter.fontMetrics().horizontalAdvance("y")
+        painter.drawText(QRectF(skin.left(), skin.bottom() + 1, width, line), flags, "x")
+        y_at = QRectF(skin.left() - wide - 4, skin.top(), wide + 2, height)
+        painter.drawText(y_at, flags, "y")
         if step.flat:
             painter.drawText(skin, flags, "flat")
             return

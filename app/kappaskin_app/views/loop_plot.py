@@ -13,7 +13,10 @@ from kappaskin_app.theme import LIGHT, Theme
 
 Array = NDArray[np.float64]
 
-_LEFT, _BOTTOM, _TOP, _RIGHT = 34.0, 32.0, 8.0, 10.0
+_TOP, _RIGHT = 8.0, 10.0
+_HIGH = 158  # px of the plot without the words below it
+_APART = 6.0  # px between two numbers
+_AXES = "read (up) on applied, 1/m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +49,11 @@ class LoopPlot(QWidget):
         )
 
     def sizeHint(self) -> QSize:
-        return QSize(280, 190)
+        return QSize(280, _HIGH + 2 * self.fontMetrics().height())
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(220, 190)
+        wide = self.fontMetrics().horizontalAdvance(_AXES) + 4
+        return QSize(max(220, wide), self.sizeHint().height())
 
     def show_loop(self, loop: Loop) -> None:
         self._loop = loop
@@ -63,15 +67,19 @@ class LoopPlot(QWidget):
         loop, theme = self._loop, self._theme
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        area = QRectF(self.rect()).adjusted(_LEFT, _TOP, -_RIGHT, -_BOTTOM)
-        painter.fillRect(area, QColor(theme.base))
         if loop is None or not np.isfinite(loop.read).any():
+            area = self._area(0.0)
+            painter.fillRect(area, QColor(theme.base))
             painter.setPen(QColor(theme.faint))
             painter.drawText(area, Qt.AlignmentFlag.AlignCenter, "No readings")
             return
         most = 1.08 * max(
             float(np.abs(loop.applied).max()), float(np.nanmax(np.abs(loop.read))), 1e-9
         )
+        ticks = _ticks(most)
+        widest = max(map(self.fontMetrics().horizontalAdvance, ticks.values()))
+        area = self._area(widest)
+        painter.fillRect(area, QColor(theme.base))
 
         def at(x: float, y: float) -> QPointF:
             return QPointF(
@@ -79,7 +87,7 @@ class LoopPlot(QWidget):
                 area.center().y() - y / most * area.height() / 2,
             )
 
-        self._paint_axes(painter, area, most)
+        self._paint_axes(painter, area, most, ticks, widest)
         painter.setClipRect(area.adjusted(-4, -4, 4, 4))
         if math.isfinite(loop.gain):
             painter.setPen(QPen(QColor(theme.faint), 1.5, Qt.PenStyle.DashLine))
@@ -96,25 +104,44 @@ class LoopPlot(QWidget):
             painter.setBrush(QColor(theme.base) if loop.back[k] else accent)
             painter.drawEllipse(points[k], 2.6, 2.6)
 
-    def _paint_axes(self, painter: QPainter, area: QRectF, most: float) -> None:
+    def _area(self, widest: float) -> QRectF:
+        """Where the loop is drawn, beside numbers that are so many px wide."""
+        below = 2 * self.fontMetrics().height() + 2
+        return QRectF(self.rect()).adjusted(widest + 6, _TOP, -_RIGHT, -below)
+
+    def _paint_axes(
+        self, painter: QPainter, area: QRectF, most: float, ticks: dict[float, str], widest: float
+    ) -> None:
         theme, flags = self._theme, Qt.AlignmentFlag
+        line = painter.fontMetrics().height()
         painter.setPen(QPen(QColor(theme.line), 1))
         painter.drawRect(area)
-        step = _round(most)
-        for value in np.arange(-math.floor(most / step), math.floor(most / step) + 1) * step:
+        step = _round(most) / most / 2
+        # Every so many of them, so that no two lie over each other.
+        beside = math.ceil((widest + _APART) / (step * area.width()))
+        above = math.ceil(line / (step * area.height()))
+        for number, (value, words) in enumerate(ticks.items(), -(len(ticks) // 2)):
             x = area.center().x() + value / most * area.width() / 2
             y = area.center().y() - value / most * area.height() / 2
             painter.setPen(QPen(QColor(theme.line), 1))
             painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
             painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
             painter.setPen(QColor(theme.faint))
-            words = f"{value:g}".replace("-", "\N{MINUS SIGN}")
-            painter.drawText(
-                QRectF(0, y - 8, _LEFT - 4, 16), flags.AlignRight | flags.AlignVCenter, words
-            )
-            painter.drawText(QRectF(x - 24, area.bottom() + 1, 48, 14), flags.AlignCenter, words)
-        below = QRectF(0, self.height() - 17, self.width(), 16)
-        painter.drawText(below, flags.AlignCenter, "read (up) on applied, 1/m")
+            if not number % above:
+                box = QRectF(0, y - line / 2, area.left() - 4, line)
+                painter.drawText(box, flags.AlignRight | flags.AlignVCenter, words)
+            if not number % beside:
+                box = QRectF(x - widest, area.bottom() + 1, 2 * widest, line)
+                painter.drawText(box, flags.AlignCenter, words)
+        below = QRectF(0, self.height() - line - 1, self.width(), line)
+        painter.drawText(below, flags.AlignCenter, _AXES)
+
+
+def _ticks(most: float) -> dict[float, str]:
+    """Round values on both sides of zero up to `most`, and how they are written."""
+    step = _round(most)
+    values = (np.arange(-math.floor(most / step), math.floor(most / step) + 1) * step).tolist()
+    return {value: f"{value:g}".replace("-", "\N{MINUS SIGN}") for value in values}
 
 
 def _round(most: float) -> float:

@@ -11,7 +11,8 @@ from kappaskin_app.theme import LIGHT, Theme
 
 Array = NDArray[np.float64]
 
-_TITLE = 17  # px above each map
+_HIGH = 91  # px of each map
+_WIDEST = "xx: 100 pass"  # of the titles, more or less
 _GAP = 8
 _TIP = "Which channels passed. Click one, or use the arrow keys, to see its readings below."
 _SHARE = 0.86  # of the distance between elements that a square fills
@@ -39,10 +40,11 @@ class PassMap(QWidget):
         self.setAccessibleName("Channels that passed")
 
     def sizeHint(self) -> QSize:
-        return QSize(280, 108)
+        return QSize(280, _HIGH + self._title)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(220, 108)
+        wide = 3 * self.fontMetrics().horizontalAdvance(_WIDEST) + 2 * _GAP
+        return QSize(wide, _HIGH + self._title)
 
     def show_channels(
         self, layout: SensorLayout, failures: dict[int, str], tips: list[str]
@@ -60,17 +62,22 @@ class PassMap(QWidget):
         self._theme = theme
         self.update()
 
+    @property
+    def _title(self) -> int:
+        """The px above each map."""
+        return self.fontMetrics().height() + 2
+
     def _squares(self, component: int) -> list[QRectF]:
         """Where each element is drawn in the map of a component."""
         layout = self._layout
         if layout is None:
             return []
         width = (self.width() - 2 * _GAP) / 3
-        height = self.height() - _TITLE - 2
+        height = self.height() - self._title - 2
         a, b = layout.patch.a, layout.patch.b
         scale = min((width - 2) / a, height / b)
         left = component * (width + _GAP) + (width - scale * a) / 2
-        bottom = _TITLE + (height + scale * b) / 2
+        bottom = self._title + (height + scale * b) / 2
         side = max(_SHARE * self._spacing * scale, 2.0)
         return [
             QRectF(left + x * scale - side / 2, bottom - y * scale - side / 2, side, side)
@@ -85,7 +92,7 @@ class PassMap(QWidget):
         width, elements = (self.width() - 2 * _GAP) / 3, len(layout)
         for c, name in enumerate(COMPONENTS):
             painter.setPen(QColor(theme.text))
-            title = QRectF(c * (width + _GAP), 0, width, _TITLE - 2)
+            title = QRectF(c * (width + _GAP), 0, width, self._title - 2)
             failed = sum(1 for channel in self._failures if channel // elements == c)
             passed = f"{name}: {elements - failed} pass" if failed else f"{name}: all pass"
             painter.drawText(title, Qt.AlignmentFlag.AlignCenter, passed)

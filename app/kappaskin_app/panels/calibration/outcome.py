@@ -8,6 +8,7 @@ from kappaskin_app.calibrating import Result
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import (
     ELLIPSIS,
+    Heading,
     button,
     in_a_row,
     named,
@@ -25,11 +26,7 @@ class Outcome(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.passed = text_label()
-        font = self.passed.font()
-        font.setPointSizeF(1.3 * font.pointSizeF())
-        font.setBold(True)
-        self.passed.setFont(font)
+        self.passed = Heading(1.3)
         self.errors = text_label(
             tip="Root mean square of what is left of the cylinders' curvature; widest difference "
             "between the way there and the way back. Both first with the line of each gage pair "

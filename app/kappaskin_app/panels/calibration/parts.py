@@ -1,9 +1,16 @@
 """What the pages of a calibration have in common: words, numbers and small widgets."""
 
 import numpy as np
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QDoubleSpinBox,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QWidget,
+)
 
 from kappaskin import COMPONENTS, Calibration
 
@@ -41,6 +48,26 @@ def text_label(text: str = "", tip: str = "") -> QLabel:
     label = QLabel(text, wordWrap=True)  # pyright: ignore[reportCallIssue]
     label.setToolTip(tip)
     return label
+
+
+class Heading(QLabel):
+    """A label in bold letters, so many `times` as large as those of now."""
+
+    def __init__(self, times: float) -> None:
+        super().__init__(wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self._times = times
+        self._enlarge()
+
+    def _enlarge(self) -> None:
+        font = QApplication.font()
+        font.setPointSizeF(self._times * font.pointSizeF())
+        font.setBold(True)
+        self.setFont(font)
+
+    def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ApplicationFontChange:
+            self._enlarge()
+        return super().event(event)
 
 
 class _PushedByEnter(QPushButton):

@@ -9,6 +9,7 @@ from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.panels.calibration.parts import (
     ELLIPSIS,
     EQUATION_8,
+    Heading,
     button,
     in_a_row,
     number,
@@ -33,11 +34,7 @@ class Steps(QWidget):
         self.bar = QProgressBar(textVisible=False)  # pyright: ignore[reportCallIssue]
         self.bar.setFixedHeight(8)
         self.bar.setToolTip("Steps that are done, and how far this one is.")
-        self.what = text_label()
-        font = self.what.font()
-        font.setPointSizeF(1.5 * font.pointSizeF())
-        font.setBold(True)
-        self.what.setFont(font)
+        self.what = Heading(1.5)
         self.how = text_label()
         self.drawing = CylinderView()
         self.take = button(

@@ -1,0 +1,82 @@
+"""What a calibration draws, in letters twice as large: nothing of what is written is cut."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QApplication, QWidget
+
+from kappaskin import Patch, SensorLayout, schedule
+from kappaskin_app.panels.calibration.parts import Heading
+from kappaskin_app.theme import letters
+from kappaskin_app.views.cylinder import CylinderView
+from kappaskin_app.views.loop_plot import Loop, LoopPlot
+from kappaskin_app.views.pass_map import PassMap
+
+
+@pytest.fixture
+def large(qapp: QApplication) -> Iterator[QApplication]:
+    before = qapp.font()
+    qapp.setFont(letters(200))
+    yield qapp
+    qapp.setFont(before)
+
+
+def inked(view: QWidget) -> np.ndarray:
+    """Which px (height, width) are not the ground, of a `view` as small as it may be."""
+    view.resize(view.minimumSizeHint())
+    image = view.grab().toImage()
+    ground = QColor(view.palette().window().color()).rgb()
+    wide, high = range(image.width()), range(image.height())
+    return np.array([[image.pixel(x, y) != ground for x in wide] for y in high])
+
+
+def test_numbers_beside_a_loop_are_whole(large: QApplication, qtbot) -> None:
+    plot = LoopPlot()
+    qtbot.addWidget(plot)
+    applied = np.array([0.0, 50.0, 100.0, 50.0])
+    back, begins = np.array([0, 0, 0, 1], bool), np.array([1, 0, 0, 0], bool)
+
+    plot.show_loop(Loop(applied, applied, back, begins, 1.0, 0.0))
+
+    ink = inked(plot)
+    assert not ink[:, :2].any()
+    assert ink[:, 2:40].any()
+    assert not ink[-2:].any()
+
+
+def test_titles_above_passed_channels_are_whole(large: QApplication, qtbot) -> None:
+    passed = PassMap()
+    qtbot.addWidget(passed)
+
+    passed.show_channels(SensorLayout.regular(Patch(0.1, 0.1), 10, 10), {3: "dead"}, [""] * 300)
+
+    ink = inked(passed)
+    high = passed.fontMetrics().height()
+    assert not ink[0].any()
+    assert ink[:high].any()
+    between = np.flatnonzero(~ink[:high].any(axis=0))
+    thirds = np.linspace(0, ink.shape[1], 4)[1:-1]
+    assert all(np.abs(between - third).min() < 5 for third in thirds)
+
+
+def test_what_is_written_beside_a_cylinder_is_whole(large: QApplication, qtbot) -> None:
+    view = CylinderView()
+    qtbot.addWidget(view)
+    bent = next(step for step in schedule((0.02, 0.05, 0.1)) if not step.flat)
+
+    view.show_step(bent, Patch(0.1, 0.1))
+
+    ink = inked(view)
+    assert not ink[:, :4].any()
+    assert not ink[-2:].any()
+
+
+def test_a_heading_grows_with_the_other_letters(large: QApplication, qtbot) -> None:
+    heading = Heading(1.5)
+    qtbot.addWidget(heading)
+    for percent in (100, 200):
+        large.setFont(letters(percent))
+        large.processEvents()
+        assert heading.font().pointSizeF() == 1.5 * letters(percent).pointSizeF()
