@@ -22,6 +22,14 @@ def round_up(value: float) -> float:
     return next(m * power for m in (1, 1.5, 2, 3, 5, 7, 10) if m * power >= value * (1 - 1e-12))
 
 
+def in_digits(value: float, span: float) -> str:
+    """A number of a scale, with the digits that tell it from another a hundredth of `span` off."""
+    if not span > 0:
+        return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+    rounded = round(value, max(0, 2 - math.floor(math.log10(span)))) + 0.0  # no minus before a zero
+    return f"{rounded:g}".replace("-", "\N{MINUS SIGN}")
+
+
 class SteadyRange:
     """Follows the largest value shown; a locked range is whatever it was locked to."""
 

@@ -1,6 +1,7 @@
 """Curves of many readings: drawn by what is seen of them, and no reading is lost."""
 
 import numpy as np
+import pytest
 from PySide6.QtGui import QColor
 
 from kappaskin_app.theme import SERIES
@@ -37,3 +38,19 @@ def test_a_curve_of_few_readings_goes_through_each() -> None:
     x = np.linspace(46.3, 142.0, 50)
 
     assert as_seen(x, np.sin(x))[1].tolist() == np.sin(x).tolist()
+
+
+@pytest.mark.parametrize("most", [1.5e-3, 1.5e3])
+def test_numbers_beside_a_curve_are_whole(most: float, qtbot) -> None:
+    plot = CurvePlot("Curvature", "1/m", True, "tip")
+    qtbot.addWidget(plot)
+    plot.resize(350, 180)
+
+    plot.show_curves(np.array([0.0, 1.0]), [Curve("", 0, np.array([0.0, most]))], (0.0, 1.0), "s")
+
+    image, line = plot.grab().toImage(), plot.fontMetrics().height()
+    ground = plot.palette().window().color()
+    lowest = [
+        image.pixelColor(x, y) == ground for x in (0, 1) for y in range(line + 4, image.height())
+    ]
+    assert all(lowest)

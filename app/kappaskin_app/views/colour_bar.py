@@ -5,6 +5,7 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
+from kappaskin_app.scale import in_digits
 from kappaskin_app.shades import Tint
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
 from kappaskin_app.views.lettering import read_from_afar
@@ -39,7 +40,15 @@ class ColourBar(QWidget):
         """Have room for numbers and legend in the letters of now."""
         wide = self.fontMetrics().horizontalAdvance
         legend = max((_SWATCH + wide(words) for _, words in self.legend), default=0)
-        self.setFixedWidth(max(_COLOURS + wide(_WIDEST), 8 + legend) + _GAP)
+        numbers = max(map(wide, (_WIDEST, *self._numbers.values())))
+        self.setFixedWidth(max(_COLOURS + numbers, 8 + legend) + _GAP)
+
+    @property
+    def _numbers(self) -> dict[float, str]:
+        """What is written at which shares of the scale."""
+        low, high = self.limits
+        span = (high - low) / 2
+        return {share: in_digits(low + share * (high - low), span) for share in (0.0, 0.5, 1.0)}
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -89,10 +98,10 @@ class ColourBar(QWidget):
         image = QImage(ramp.tobytes(), 1, 256, 3, QImage.Format.Format_RGB888)
         painter.drawImage(bar, image)
         painter.drawText(QPointF(2, painter.fontMetrics().ascent()), self._tint.unit)
-        low, high = self.limits
-        for share in (0.0, 0.5, 1.0) if bar.height() >= 3 * line else (0.0, 1.0):
+        for share, text in self._numbers.items():
+            if share == 0.5 and bar.height() < 3 * line:
+                continue
             y = bar.bottom() - share * bar.height()
-            text = f"{low + share * (high - low):.3g}".replace("-", "\N{MINUS SIGN}")
             top = min(max(y - line / 2, bar.top()), bar.bottom() - line)
             painter.drawText(QPointF(bar.right() + 4, top + painter.fontMetrics().ascent()), text)
 

@@ -10,7 +10,7 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin_app.scale import round_up
+from kappaskin_app.scale import in_digits, round_up
 from kappaskin_app.theme import DARK, LIGHT, SERIES, Theme
 
 Array = NDArray[np.float64]
@@ -87,7 +87,13 @@ class CurvePlot(QWidget):
 
     @property
     def _left(self) -> float:
-        return self.fontMetrics().horizontalAdvance(_WIDEST) + 8.0
+        return max(map(self.fontMetrics().horizontalAdvance, (_WIDEST, *self._ends))) + 8.0
+
+    @property
+    def _ends(self) -> tuple[str, str]:
+        """The numbers at the upper and the lower end."""
+        high, low = self._limit, -self._limit if self._signed else 0.0
+        return in_digits(high, high), in_digits(low, high)
 
     @property
     def _area(self) -> QRectF:
@@ -146,20 +152,19 @@ class CurvePlot(QWidget):
 
     def _paint_words(self, painter: QPainter, area: QRectF) -> None:
         theme, flags, line = self._theme, Qt.AlignmentFlag, painter.fontMetrics().height()
-        high, low = self._limit, -self._limit if self._signed else 0.0
         painter.setPen(QPen(QColor(theme.line), 1))
         painter.drawRect(area)
         middle = area.center().y()
         painter.drawLine(QPointF(area.left(), middle), QPointF(area.right(), middle))
         painter.setPen(QColor(theme.faint))
-        for value, top in ((high, area.top()), (low, area.bottom() - line)) if self.curves else ():
-            words = f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+        tops = area.top(), area.bottom() - line
+        for words, top in zip(self._ends, tops, strict=True) if self.curves else ():
             box = QRectF(0, top, area.left() - 4, line)
             painter.drawText(box, flags.AlignRight | flags.AlignVCenter, words)
         below = QRectF(area.left(), area.bottom() + 2, area.width(), line)
         ends = ((self._span[0], flags.AlignLeft), (self._span[1], flags.AlignRight))
         for value, side in ends if self.curves else ():
-            words = f"{value:.3g} {self._x_unit}".replace("-", "\N{MINUS SIGN}")
+            words = f"{in_digits(value, self._span[1] - self._span[0])} {self._x_unit}"
             painter.drawText(below, side | flags.AlignVCenter, words)
         painter.setPen(QColor(theme.text))
         head = f"{self._title}, {self._unit}"
