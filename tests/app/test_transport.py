@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QEvent, QPoint, Qt
+from PySide6.QtGui import QHelpEvent, QTextDocument
+from PySide6.QtWidgets import QApplication, QToolTip
 
 from kappaskin import Event, Replay
 from kappaskin_app.theme import DARK, LIGHT
@@ -164,3 +166,18 @@ def test_an_empty_recording_has_a_handle_that_stays(row: Transport, qtbot) -> No
     row.show_recording(empty, ())
     qtbot.keyClick(row.course, KEYS.Key_End)
     assert row.asked == [("seek", 0.0)]
+
+
+def test_a_note_is_read_as_it_was_written(row: Transport, qtbot) -> None:
+    row.show_recording(REPLAY, (Event(2.0, "note", "from <b> to <i> & back"),))
+    at = place(row, 2.0)
+
+    QApplication.sendEvent(
+        row.course, QHelpEvent(QEvent.Type.ToolTip, at, row.course.mapToGlobal(at))
+    )
+
+    shown = QTextDocument()
+    shown.setHtml(QToolTip.text())
+    assert shown.toPlainText() == "0:02.000  note: from <b> to <i> & back"
+    QToolTip.hideText()
+    qtbot.waitUntil(lambda: not QToolTip.isVisible())

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from datetime import datetime
+from html import escape
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QHelpEvent, QPainter, QPen
@@ -53,7 +54,9 @@ class Landmarks(Course):
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
-            QToolTip.showText(event.globalPos(), self.tip_at(event.pos().x()), self)
+            tip = escape(self.tip_at(event.pos().x()))  # a note may have anything in it
+            written = f"<p style='white-space: pre-wrap'>{tip}</p>"
+            QToolTip.showText(event.globalPos(), written, self)
             return True
         return super().event(event)
 
