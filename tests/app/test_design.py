@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import load_scene, prospect, write_scene
@@ -15,6 +16,8 @@ from kappaskin_app.panels.design import DesignForm, _meant, _place
 from kappaskin_app.settings import Designed, Range, Settings, ask_of
 from kappaskin_app.simulation import with_consequences
 from kappaskin_app.skins import SHAPES
+from kappaskin_app.theme import DARK, SEQUENTIAL
+from kappaskin_app.views.surface_map import SurfaceMap
 from kappaskin_app.window import MainWindow
 
 RANGES = [n for n in Designed.__dataclass_fields__ if isinstance(ask_of(n), Range)]
@@ -120,3 +123,18 @@ def test_placing_takes_a_while_and_can_be_ended(window: MainWindow, until):
     designing.cancel()
     assert not designing.predicting
     assert "Cancelled" in designing.refusal
+
+
+def test_what_lies_beside_a_round_skin_has_the_colour_of_the_window(qtbot) -> None:
+    view = SurfaceMap("Predicted", "mm", "tip")
+    qtbot.addWidget(view)
+    view.resize(200, 200)
+    values = np.ones((20, 20))
+    values[-1, 0] = np.nan
+    view.show_surface(values, (0.0, 2.0), SEQUENTIAL, np.full(2, np.nan), (1.0, 1.0))
+
+    view.show_theme(DARK)
+
+    image = view.map.grab().toImage()
+    corner = view.map.area().topLeft().toPoint() + QPoint(2, 2)
+    assert image.pixelColor(corner) == QColor(DARK.window)

@@ -104,7 +104,10 @@ class SurfaceMap(QWidget):
         bold.setBold(True)
         self.title.setFont(bold)
         self.map, self.bar, self._unit, self._theme = _Map(), ColourBar(), unit, LIGHT
-        self.bar.show_scale(SEQUENTIAL, (0.0, 1.0), unit)
+        self._tint = Tint(SEQUENTIAL, (0.0, 1.0), unit)
+        self.bar.show_tint(self._tint)
+        self._values: Array | None = None
+        self._sides, self._contact = (1.0, 1.0), np.full(2, np.nan)
         self.setAccessibleName(title)
         for widget in (self, self.words):
             widget.setToolTip(tip)
@@ -127,13 +130,18 @@ class SurfaceMap(QWidget):
         sides: tuple[float, float],
     ) -> None:
         """Show `values` (ny, nx) in the unit of the scale, NaN off the skin; None for nothing."""
+        self._values, self._contact, self._sides = values, contact, sides
+        self._tint = Tint(colours, limits, self._unit)
+        self.bar.show_tint(self._tint)
+        self._show()
+
+    def _show(self) -> None:
         rgb = None
-        if values is not None:
-            rgb = Tint(colours, limits, self._unit).rgb(values, self._theme.window)
-        self.map.show_map(rgb, contact, sides)
-        self.bar.show_scale(colours, limits, self._unit)
+        if self._values is not None:
+            rgb = self._tint.rgb(self._values, self._theme.window)
+        self.map.show_map(rgb, self._contact, self._sides)
 
     def show_theme(self, theme: Theme) -> None:
         self._theme = theme
         self.map.line = QColor(theme.line)
-        self.map.update()
+        self._show()
