@@ -63,8 +63,9 @@ class MapTesting(QObject):
             self._tell("")
 
     def back(self) -> None:
+        self.verdict = None
+        self.follow(self._status)  # who read the verdict may have another skin by now
         if self.test is not None:
-            self.verdict = None
             self.test.back()
             self._tell("")
 

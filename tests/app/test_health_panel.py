@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from kappaskin import WHY, Finding, Health, Patch, Phase, SensorLayout
+from kappaskin import WHY, Finding, Health, Patch, Phase, SensorLayout, Status, load_scene
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.shades import SHADES
@@ -162,3 +162,19 @@ def test_without_a_sensor_there_is_nothing_to_press(qapp) -> None:
 
     assert not testing.running
     assert testing.message.startswith("no sensor is connected")
+
+
+def test_going_back_after_a_verdict_asks_nothing_of_another_skin(qapp) -> None:
+    testing, asked = MapTesting(), []
+    sensor, other = (load_scene(name).sensor() for name in ("centre", "fingertip"))
+    testing.follow(Status(state="streaming", sensor=sensor, meetings=1))
+    testing.begin(False)
+    while testing.running:
+        testing.skip()
+    testing.asked.connect(asked.append)
+
+    testing.follow(Status(state="streaming", sensor=other, meetings=2))
+    testing.back()
+
+    assert set(asked) == {-1}
+    assert testing.message
