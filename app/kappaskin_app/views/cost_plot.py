@@ -19,7 +19,7 @@ _BESIDE = 28.0  # px left of the words of the legend
 _SIZE = 4.0  # px from a point's middle to its rim
 _NEAR = 10.0  # px from the mouse to the point that it means
 _APART = 10.0  # px between two written times
-_LONGEST = "0.05 mm"  # of the errors beside the axis
+_LONGEST = "0.005 mm"  # of the errors beside the axis
 _AXES = "RMS error (up), arithmetic in a frame"
 _ROWS = len(METHOD_SHORT) + 5  # of the legend
 
@@ -118,6 +118,7 @@ class CostPlot(QWidget):
 
     def leaveEvent(self, event: QEvent) -> None:
         self._under = None
+        self.unsetCursor()
         self.update()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
