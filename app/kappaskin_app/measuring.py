@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Estimate, distances
+from kappaskin import Estimate, Patch, distances
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.ruler import Ruler
 
@@ -14,7 +14,7 @@ Places = tuple[tuple[float, float], ...] | None
 _FIRST = "Measure: click a place on the skin; Esc ends"
 _SECOND = "Measure: click another place; Esc ends"
 
-
+_NEARER = 1 - 1e-9  # to the middle, so that a place on the rim is not beside it
 _ASKED = (_FIRST, _SECOND)  # by how many places there are
 
 
@@ -58,8 +58,10 @@ class Measuring(QObject):
 
     def have(self, places: Places) -> None:
         """Measure between these."""
-        was, self.places = self.on, places
-        self._skin = self._membrane.skin
+        was, self._skin = self.on, self._membrane.skin
+        if places and not _lie_on(self._skin.patch, places):
+            places = ()  # undo brought them back, and there is another skin by now
+        self.places = places
         self.ruler.ask(_ASKED[len(places)] if places is not None and len(places) < 2 else "")
         self._membrane.plotter.update()
         if was != self.on:
@@ -78,3 +80,9 @@ class Measuring(QObject):
         if len(places) == 2:
             found = distances(skin.patch, estimate.surface, *places)
         self.ruler.show(skin, places, 2 * self._membrane.lift, found)
+
+
+def _lie_on(patch: Patch, places: tuple[tuple[float, float], ...]) -> bool:
+    """Whether all `places` in m are on a patch, its rim included however they are rounded."""
+    middle = np.array([patch.a, patch.b]) / 2
+    return bool(patch.contains(middle + _NEARER * (np.array(places) - middle)).all())

@@ -241,6 +241,16 @@ def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
     assert not measuring.on
 
 
+def test_places_beside_the_skin_that_there_is_now_do_not_come_back(here: MainWindow) -> None:
+    measuring = here.display.measuring
+    measuring.have(((0.02, 0.03), (0.1, 0.1)))
+    assert len(measuring.places) == 2
+    measuring.have(((0.02, 0.03), (0.11, 0.1)))
+    assert measuring.places == ()
+    assert "click a place" in measuring.ruler.text.input
+    measuring.have(None)
+
+
 def test_the_element_that_was_picked_before_comes_back_and_then_its_dock_goes(
     here: MainWindow,
 ) -> None:
