@@ -70,6 +70,7 @@ class Measuring(QObject):
     def show(self, estimate: Estimate) -> None:
         """Measure on the skin as it is in `estimate`."""
         skin = self._membrane.skin
+        self.ruler.fit()  # into a picture that may have another size
         if not self.places:
             return
         if skin.patch != self._skin.patch:

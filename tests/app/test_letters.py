@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -15,6 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin import Distances
+from kappaskin_app.theme import grown
 from kappaskin_app.views.line import Line
 from kappaskin_app.views.readouts import Health
 from kappaskin_app.views.title import Title
@@ -158,3 +161,23 @@ def test_a_step_of_a_calibration_is_not_wider_than_its_page(large: MainWindow) -
         _settle()
         assert page.minimumWidth() >= page.widget().minimumSizeHint().width()
     large.panels.setCurrentIndex(0)
+
+
+def test_what_is_written_in_the_picture_is_read_whole(large: MainWindow) -> None:
+    membrane, ruler = large.membrane, large.display.measuring.ruler
+    wide, high = membrane.plotter.render_window.GetSize()
+    found = Distances(0.0849, 0.0851, -0.00212)
+    ruler.show(membrane.skin, np.array([(0.02, 0.02), (0.08, 0.08)]), 0.0, found)
+    membrane.show_caption("Colours: shape 64 of 64, no measurement")
+    membrane.alarm.show("LOST 12 s\n" + 6 * "no message came from the device; " + "end")
+    for text in (ruler.text, membrane.caption, membrane.alarm.actor):
+        across = [0, 0, 0, 0]
+        text.GetBoundingBox(membrane.plotter.renderer, across)
+        assert across[1] - across[0] < wide, text.input
+        assert across[3] - across[2] < high, text.input
+    assert membrane.alarm.actor.input.endswith("end")
+    assert membrane.alarm.actor.prop.font_size == grown(15)
+    assert "\N{MINUS SIGN}2.12 mm" in ruler.text.input
+    ruler.hide()
+    membrane.show_caption("")
+    membrane.alarm.show("")

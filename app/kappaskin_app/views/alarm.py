@@ -5,10 +5,12 @@ from typing import Any
 
 import pyvista as pv
 
-from kappaskin_app.theme import Theme
+from kappaskin_app.theme import Theme, grown
+from kappaskin_app.views.written import room_for
 
 _WIDTH = 54  # characters, at which what is said still fits beside the panels of a small window
-_LINES = 5
+_LINES = 5  # of such a width, and more of a lesser one
+_LETTERS = 15  # px
 
 
 class Alarm:
@@ -16,23 +18,30 @@ class Alarm:
 
     def __init__(self, plotter: Any) -> None:
         self._plotter, self.text = plotter, ""
-        self._actor: Any = pv.Text("")
-        self._actor.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-        self._actor.position = 0.015, 0.9
-        style = self._actor.prop
-        style.font_size, style.color, style.background_opacity = 15, "white", 0.9
+        self.actor: Any = pv.Text("")
+        self.actor.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
+        self.actor.position = 0.015, 0.9
+        style = self.actor.prop
+        style.color, style.background_opacity = "white", 0.9
         style.bold, style.justification_vertical = True, "top"
-        plotter.add_actor(self._actor, reset_camera=False, render=False)
+        plotter.add_actor(self.actor, reset_camera=False, render=False)
 
     def show(self, text: str) -> None:
         """Say `text`, its first line apart; or nothing."""
         if text == self.text:
             return
         self.text = text
-        head, _, rest = text.partition("\n")
-        lines = textwrap.wrap(rest, _WIDTH, max_lines=_LINES, placeholder=" ...")
-        self._actor.input = "\n".join([head, *lines]) if text else ""
+        self.fit()
         self._plotter.update()
 
+    def fit(self) -> None:
+        """Say it in the letters of now, in lines for which the picture of now has room."""
+        head, _, rest = self.text.partition("\n")
+        wide = min(room_for(self._plotter, _LETTERS), _WIDTH)
+        most = _LINES * _WIDTH // wide
+        lines = textwrap.wrap(rest, wide, max_lines=most, placeholder=" ...")
+        self.actor.prop.font_size = grown(_LETTERS)
+        self.actor.input = "\n".join([head, *lines]) if self.text else ""
+
     def show_theme(self, theme: Theme) -> None:
-        self._actor.prop.background_color = theme.bad
+        self.actor.prop.background_color = theme.bad

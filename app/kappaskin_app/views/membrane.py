@@ -16,7 +16,7 @@ from pyvistaqt import QtInteractor
 
 from kappaskin import Estimate, Load, Sensor
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme, grown
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm
 from kappaskin_app.views.box import WHOLE, Box, Shares
 from kappaskin_app.views.drag import LoadDrag
@@ -28,6 +28,7 @@ from kappaskin_app.views.pointing import Pointing
 from kappaskin_app.views.sides import Sides
 from kappaskin_app.views.surface import Surface
 from kappaskin_app.views.unlit import UNLIT, pixels
+from kappaskin_app.views.written import Written
 
 Array = NDArray[np.float64]
 
@@ -66,7 +67,7 @@ class MembraneView(QWidget):
         self.gaze = Gaze(self.plotter, self.sides)
         # After VTK has its new size.
         self._fitting = QTimer(self, singleShot=True, interval=0)  # pyright: ignore[reportCallIssue]
-        self._fitting.timeout.connect(guarded(self.gaze.fit))
+        self._fitting.timeout.connect(guarded(self._fit))
         self._box = Box()
         self.setMinimumSize(320, 160)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
@@ -104,10 +105,8 @@ class MembraneView(QWidget):
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
         self.sides = Sides(plotter)
-        self.caption: Any = pv.Text("")
-        self.caption.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-        self.caption.position = 0.015, 0.94  # of the picture, from its lower left corner
-        plotter.add_actor(self.caption, reset_camera=False, render=False)
+        self._caption = Written(plotter, _LETTERS, 0.98, "top")
+        self.caption: Any = self._caption.text
         self.alarm = Alarm(plotter)
 
     def _make_lights(self) -> None:
@@ -209,6 +208,12 @@ class MembraneView(QWidget):
         super().resizeEvent(event)
         self._fitting.start()
 
+    def _fit(self) -> None:
+        """After picture or letters have another size: have all in it."""
+        self.gaze.fit()
+        self._caption.fit()
+        self.alarm.fit()
+
     # What changes with every estimate.
 
     def show_estimate(
@@ -280,8 +285,8 @@ class MembraneView(QWidget):
 
     def show_caption(self, text: str) -> None:
         """Say in the picture what else than what is measured colours the skin, or nothing."""
-        if text != self.caption.input:
-            self.caption.input = text
+        if text != self._caption.words:
+            self._caption.say(text)
             self.plotter.update()
 
     def show_colours(self, colours: Colours, ink: str) -> None:
@@ -311,10 +316,10 @@ class MembraneView(QWidget):
         self._theme = theme
         self.plotter.set_background(theme.scene, top=theme.scene_top)
         self.sides.show_colour(theme.text)
-        self.caption.prop.color, self.caption.prop.font_size = theme.text, grown(_LETTERS)
+        self._caption.show_colour(theme.text)
         self.alarm.show_theme(theme)
         self.surface.show_theme(theme)
-        self.gaze.fit()
+        self._fit()
         self.plotter.update()
 
     def close_plotter(self) -> None:

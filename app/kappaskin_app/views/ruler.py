@@ -7,9 +7,10 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from kappaskin import Distances
-from kappaskin_app.theme import WANTED, Theme, grown
+from kappaskin_app.theme import WANTED, Theme
 from kappaskin_app.views.drawn import DrawnSkin
 from kappaskin_app.views.unlit import UNLIT, pixels
+from kappaskin_app.views.written import Written
 
 Array = NDArray[np.float64]
 
@@ -33,20 +34,19 @@ class Ruler:
         self._ends_actor = plotter.add_mesh(
             self._ends, style="points", point_size=pixels(plotter, 11), color=WANTED, **UNLIT
         )
-        self.text: Any = pv.Text("")
-        self.text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-        self.text.position = 0.015, 0.03  # of the picture, from its lower left corner
-        plotter.add_actor(self.text, reset_camera=False, render=False)
+        self._words = Written(plotter, _LETTERS, 0.03)
+        self.text: Any = self._words.text
+        self.fit = self._words.fit
         self.hide()
 
     def hide(self) -> None:
         self.actor.visibility = self._ends_actor.visibility = False
-        self.text.input = ""
+        self._words.say("")
 
     def ask(self, words: str) -> None:
         """Say what is to be done; nothing is measured yet."""
         self.hide()
-        self.text.input = words
+        self._words.say(words)
 
     def show(self, skin: DrawnSkin, places: Array, lift: float, found: Distances | None) -> None:
         """Draw it between `places` (k, 2) in m, one or two, `lift` mm above the skin."""
@@ -57,10 +57,10 @@ class Ruler:
         self._ends_actor.visibility = True
         self.actor.visibility = found is not None
         if found is not None:
-            self.text.input = told(found)
+            self._words.say(told(found))
 
     def show_theme(self, theme: Theme) -> None:
-        self.text.prop.color, self.text.prop.font_size = theme.text, grown(_LETTERS)
+        self._words.show_colour(theme.text)
 
 
 def told(found: Distances) -> str:
