@@ -2,7 +2,8 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QMainWindow
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QApplication, QLabel, QMainWindow
 
 from kappaskin import Refusal
 from kappaskin_app.actions import WITHIN, Actions
@@ -10,6 +11,7 @@ from kappaskin_app.finder.sheet import CheatSheet
 from kappaskin_app.history import History
 from kappaskin_app.keytips import in_words
 from kappaskin_app.settings import Settings
+from kappaskin_app.theme import DARK, LIGHT, palette
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 
@@ -157,3 +159,14 @@ def test_a_tip_that_is_set_after_a_change_names_the_key_of_now(actions: Actions)
     assert late.toolTip() == "Ctrl+J"
     actions.take_keys({})
     assert (label.toolTip(), late.toolTip()) == ("Not now; later with Ctrl+T", "Ctrl+T")
+
+
+def test_menus_beside_shortcuts_have_the_ink_of_the_theme_of_now(
+    sheet: CheatSheet, qapp: QApplication
+) -> None:
+    before = qapp.palette()
+    for theme in (DARK, LIGHT):
+        qapp.setPalette(palette(theme))
+        qapp.processEvents()
+        assert sheet.list.topLevelItem(0).foreground(1).color() == QColor(theme.faint)
+    qapp.setPalette(before)

@@ -1,6 +1,6 @@
 """Every shortcut, to look up and to change."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import (
     QDialog,
@@ -86,6 +86,11 @@ class CheatSheet(QDialog):
         self.raise_()
         self.activateWindow()
         self.line.setFocus()
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() in (QEvent.Type.PaletteChange, QEvent.Type.FontChange) and self.isVisible():
+            self._list()  # its rows have colours and letters of before
 
     def chosen(self) -> str:
         """The name of the chosen action, or nothing."""
