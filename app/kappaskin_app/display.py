@@ -99,11 +99,12 @@ class Display(QObject):
     def limits_shown(self) -> dict[str, float]:
         """How far the colours of the skin and of each heatmap reach, by the setting of its range.
 
-        In SI units.
+        In SI units; of those alone that are seen.
         """
-        settings = self._settings
-        found = {name: self.heatmaps[name].limit for name in settings.maps}
-        found[settings.colour_by] = self.limit_shown()
+        settings, maps = self._settings, self.heatmaps
+        found = {name: maps[name].limit for name in settings.maps if maps[name].isVisible()}
+        if self._mode is None:
+            found[settings.colour_by] = self.limit_shown()
         return {f"range_{name}": limit for name, limit in found.items() if name != "health"}
 
     def show_mode(self, mode: Array | None, words: str = "") -> None:

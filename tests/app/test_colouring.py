@@ -161,6 +161,23 @@ def test_all_ranges_are_locked_in_one_step_and_freed_in_another(window: MainWind
     assert window.history.settings.range_displacement == 0
 
 
+def test_only_ranges_that_are_seen_are_locked(window: MainWindow, until) -> None:
+    window.docks["curvature"].hide()
+    window.display.show_mode(np.zeros(window.session.estimate.surface.shape), "A shape")
+    until(lambda: window.display.scale.bar.limits == (-1.0, 1.0))
+    lock = window.actions_by_name["lock-ranges"]
+
+    lock.trigger()
+
+    settings = window.history.settings
+    assert [settings.range_displacement, settings.range_xx, settings.range_yy] == [0, 0, 0]
+    window.display.show_mode(None)
+    until(lambda: window.display.scale.bar.limits != (-1.0, 1.0))
+    lock.trigger()
+    assert window.history.settings.range_displacement == pytest.approx(5e-3)
+    assert window.history.settings.range_xx == 0
+
+
 def test_a_difference_that_nobody_knows_is_said_not_drawn(window: MainWindow, until) -> None:
     unknown = np.full(window.session.estimate.surface.shape, np.nan)
     window.history.change("Colour", -1, colour_by="difference", colour_from="smooth")
