@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from PySide6.QtGui import QColor
 
+from kappaskin_app.shades import HEALTH
 from kappaskin_app.theme import DIVERGING
 from kappaskin_app.views.colour_bar import ColourBar
 
@@ -41,3 +43,16 @@ def test_a_long_number_is_whole(qtbot) -> None:
     image, ground = bar.grab().toImage(), bar.palette().window().color().rgb()
     column = [image.pixel(image.width() - 1, y) == ground for y in range(image.height())]
     assert np.all(column)
+
+
+def test_a_legend_of_kinds_is_whole(qtbot) -> None:
+    bar = ColourBar()
+    qtbot.addWidget(bar)
+    legend = tuple(("#ff0000", words) for words in HEALTH.kinds)
+
+    bar.show_tint(HEALTH, legend)
+
+    bar.resize(bar.minimumSizeHint())
+    image = bar.grab().toImage()
+    red = [image.pixelColor(8, y) == QColor("#ff0000") for y in range(image.height())]
+    assert np.count_nonzero(np.diff(red, prepend=False)) == 2 * len(legend)

@@ -29,7 +29,8 @@ class ColourBar(QWidget):
         self.widen()
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(_COLOURS, 3 * self.fontMetrics().height() + 10)
+        line = self.fontMetrics().height()
+        return QSize(_COLOURS, 3 * line + 10 if self.scaled else len(self.legend) * (line + 2))
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
@@ -75,6 +76,7 @@ class ColourBar(QWidget):
         ):
             self._tint, self.legend = tint, legend
             self.widen()
+            self.updateGeometry()
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
