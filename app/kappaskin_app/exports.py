@@ -19,6 +19,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.pictures import caption_of, chosen_file, save_view, write_png
 from kappaskin_app.session import Session
 from kappaskin_app.views.membrane import MembraneView
+from kappaskin_app.working import ended
 
 _MENU = "E&xport"
 _FILM = "Film (*.mp4)"
@@ -107,7 +108,7 @@ class Exports(QObject):
         file, _ = QFileDialog.getSaveFileName(self._window, "Film the skin", proposed, _FILM)
         if file:
             try:
-                self.filming.begin(Path(file).with_suffix(".mp4"), self.caption())
+                self.filming.begin(ended(file, ".mp4"), self.caption())
             except Refusal as refusal:
                 self.told.emit(str(refusal))
 

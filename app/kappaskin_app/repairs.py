@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 from kappaskin import Repaired, Repairing
 from kappaskin_app.guard import guarded
 from kappaskin_app.recordings import repaired
-from kappaskin_app.working import WorkDialog, beside, choosing, named, path_in
+from kappaskin_app.working import WorkDialog, beside, choosing, ended, named, path_in
 
 
 class RepairDialog(WorkDialog):
@@ -45,7 +45,7 @@ class RepairDialog(WorkDialog):
             self, "Save what is whole to", self.to.text(), "Recording (*.mcap)", "", option
         )
         if name:
-            self.to.setText(str(Path(name).with_suffix(".mcap")))
+            self.to.setText(str(ended(name, ".mcap")))
 
     def _allow(self) -> None:
         super()._allow()

@@ -17,7 +17,7 @@ from kappaskin import Estimate, Refusal, examine
 from kappaskin_app.guard import guarded
 from kappaskin_app.logbook import CRASHES, LOG
 from kappaskin_app.recordings import recordings_folder
-from kappaskin_app.working import WorkDialog, beside, choosing, named, path_in
+from kappaskin_app.working import WorkDialog, beside, choosing, ended, named, path_in
 
 _CONTENTS = (
     "Holds what went wrong (the log), what happened on the line, the settings, the versions of "
@@ -143,7 +143,7 @@ class ReportDialog(WorkDialog):
             self, "Save the report to", self.to.text(), "Report (*.zip)"
         )
         if name:
-            self.to.setText(str(Path(name).with_suffix(".zip")))
+            self.to.setText(str(ended(name, ".zip")))
 
     def _allow(self) -> None:
         super()._allow()

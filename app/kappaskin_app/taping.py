@@ -13,6 +13,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.recordings import proposed, recordings_folder, repairing, unfinished
 from kappaskin_app.repairs import RepairDialog
 from kappaskin_app.views.recording_mark import duration_of, size_of
+from kappaskin_app.working import ended
 
 FILES = "Recording (*.mcap)"
 _MENU = "&Recording"
@@ -83,7 +84,7 @@ class Taping(QObject):
         chosen, _ = QFileDialog.getSaveFileName(
             self._window, "Record to", str(path), FILES, "", option
         )
-        return Path(chosen).with_suffix(".mcap") if chosen else None
+        return ended(chosen, ".mcap") if chosen else None
 
     def begin(self, path: Path) -> None:
         """Record to `path`."""

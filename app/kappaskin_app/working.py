@@ -157,16 +157,19 @@ def path_in(line: QLineEdit) -> Path:
     return Path(line.text().strip())
 
 
+def ended(name: str, ending: str) -> Path:
+    """The file called `name`, with an `ending` if that lacks it: `force 0.5 N` has none."""
+    path = Path(name)
+    return path if path.suffix.lower() == ending else path.with_name(path.name + ending)
+
+
 def with_ending(name: str, ending: str) -> Path:
     """The file that a person chose by its `name`, with an `ending` if that lacks it.
 
     Refused where that is another one, which is there: nobody was asked whether to write over it.
     """
-    path = Path(name)
-    if path.suffix.lower() == ending:
-        return path
-    path = path.with_suffix(ending)
-    if path.exists():
+    path = ended(name, ending)
+    if path != Path(name) and path.exists():
         raise Refusal(f"{path} is there already: choose it by its whole name to write over it")
     return path
 
