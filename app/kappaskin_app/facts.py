@@ -42,8 +42,8 @@ def _row(
     read, left = estimate.curvature[number, element], estimate.residual[number, element]
     return (
         f"<b>{name}</b>",
-        f"{_number(read, '+.2f')} {_PM} {_number(estimate.noise, '.2f')}",
-        _number(left, "+.2f"),
+        f"{_number(read, '+z.2f')} {_PM} {_number(estimate.noise, '.2f')}",
+        _number(left, "+z.2f"),
         *_calibrated(status.setup.calibration, channel),
         str(_converted(sensor, channel)),
         "dead: the device says so" if sensor.layout.lacking[number, element] else health,
@@ -56,7 +56,7 @@ def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str
     c = calibration
     return (
         f"{_number(c.gain[channel], '.3f')} {_PM} {_number(c.gain_sd[channel], '.3f')}",
-        f"{_number(c.offset[channel], '+.2f')} {_PM} {_number(c.offset_sd[channel], '.2f')}",
+        f"{_number(c.offset[channel], '+z.2f')} {_PM} {_number(c.offset_sd[channel], '.2f')}",
     )
 
 

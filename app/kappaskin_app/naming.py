@@ -16,8 +16,8 @@ def curved(estimate: Estimate) -> str:
         return ""
     (one, other), (sd, other_sd) = geometry.principal, geometry.principal_sd
     words = (
-        f"skin there curves by {one:+.1f} \N{PLUS-MINUS SIGN} {sd:.1f} and "
-        f"{other:+.1f} \N{PLUS-MINUS SIGN} {other_sd:.1f} 1/m"
+        f"skin there curves by {one:+z.1f} \N{PLUS-MINUS SIGN} {sd:.1f} and "
+        f"{other:+z.1f} \N{PLUS-MINUS SIGN} {other_sd:.1f} 1/m"
     )
     return words.replace("-", "\N{MINUS SIGN}")
 

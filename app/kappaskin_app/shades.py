@@ -137,8 +137,8 @@ class Shade:
         """A value on the screen's scale, with its unit."""
         if self.name == "health":
             return HEALTH_WORDS[int(value)]
-        sign = "+" if self.signed else ""
-        return f"{value:{sign}{_DIGITS[self.unit]}} {self.unit}".replace("-", "\N{MINUS SIGN}")
+        sign = "+" if self.signed else "-"  # and z: no minus before a zero
+        return f"{value:{sign}z{_DIGITS[self.unit]}} {self.unit}".replace("-", "\N{MINUS SIGN}")
 
 
 _KAPPA, _SIGMA, _DELTA = ("\N{GREEK SMALL LETTER KAPPA}", "\u03c3", "\u0394")

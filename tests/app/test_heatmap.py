@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
@@ -92,3 +93,10 @@ def test_locking_asks_for_the_limit_shown_and_unlocking_for_none(qapp: QApplicat
     heatmap.show_lock(True)
     heatmap.lock.click()
     assert asked == [3.0, 0.0]
+
+
+@pytest.mark.parametrize("name", ["displacement", "xx"])
+def test_no_minus_stands_before_a_zero(name: str) -> None:
+    shade = SHADES[name]
+    assert shade.written(-1e-4) == shade.written(0.0)
+    assert "\N{MINUS SIGN}" in shade.written(-1.0)

@@ -20,6 +20,7 @@ def pixel_of(window: MainWindow, x: float, y: float) -> QPoint:
 def test_distances_are_told_with_their_units() -> None:
     text = told(Distances(0.0421, 0.0433, -0.00212))
     assert text == "straight 42.10 mm, along the skin 43.30 mm, height \N{MINUS SIGN}2.12 mm"
+    assert told(Distances(0.0421, 0.0421, -1e-6)).endswith("height +0.00 mm")
 
 
 def test_two_clicks_measure_a_third_begins_anew_and_escape_ends(

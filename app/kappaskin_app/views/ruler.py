@@ -65,7 +65,7 @@ class Ruler:
 
 def told(found: Distances) -> str:
     """The distances in words."""
-    higher = f"{1e3 * found.higher:+.2f}".replace("-", "\N{MINUS SIGN}")
+    higher = f"{1e3 * found.higher:+z.2f}".replace("-", "\N{MINUS SIGN}")
     return (
         f"straight {1e3 * found.straight:.2f} mm, along the skin {1e3 * found.along:.2f} mm, "
         f"height {higher} mm"
