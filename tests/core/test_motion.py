@@ -64,6 +64,14 @@ def test_a_smooth_step_begins_and_ends_without_speed_and_without_a_jerk() -> Non
     assert (s(0.0), s(1.0)) == pytest.approx((0, 1), abs=1e-12)
 
 
+@pytest.mark.parametrize("ease", EASES)
+def test_no_step_goes_beyond_its_end_by_rounding(ease: str) -> None:
+    late = 1 - 2.0**-53 * np.arange(5000)
+    assert max(EASES[ease](s) for s in late.tolist()) == 1
+    path = Path((Press(0.3, ease), Release(0.1, ease)))
+    assert min(path.at(n / 60).amount for n in range(600)) == 0
+
+
 @pytest.mark.parametrize("times", [1, 2, 5])
 def test_taps_press_so_many_times_and_rest_as_long_in_between(times: int) -> None:
     tap = Tap(2.0, times=times)

@@ -77,8 +77,9 @@ class Orbit:
 
 
 EASES: dict[str, Callable[[float], float]] = {
-    # Begins and ends at rest without a jerk: speed and acceleration are zero there.
-    "smooth": lambda s: s**3 * (10 + s * (6 * s - 15)),
+    # Begins and ends at rest without a jerk: speed and acceleration are zero there. Rounding alone
+    # would take it beyond its end, and what is lifted to less than no force.
+    "smooth": lambda s: min(s**3 * (10 + s * (6 * s - 15)), 1.0),
     "linear": lambda s: s,
 }
 """How a step goes from its beginning to its end, as shares of both; the usual one first."""
