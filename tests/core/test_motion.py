@@ -89,6 +89,9 @@ def test_taps_press_so_many_times_and_rest_as_long_in_between(times: int) -> Non
     for t in (-1.0, 0.0, 2.0, 3.0):
         assert tap.at(SOMEWHERE, t).amount == pytest.approx(0.0, abs=1e-15)
     assert tap.end(SOMEWHERE).amount == 0
+    path = Path((Hold(1.0), tap))
+    assert path.moments == [0.0, 1.0, pytest.approx(1.0 + 1.0 / (2 * times - 1)), 3.0]
+    assert path.at(path.moments[2]).amount == pytest.approx(1.0)
 
 
 PATH = Path((Press(0.5), Slide(1.0, by=(0.02, 0.0)), Turn(0.25, by=0.4), Hold(0.25), Release(1.0)))
@@ -130,7 +133,8 @@ def test_a_record_is_straight_between_its_times_and_begins_anew() -> None:
     )
 
     assert record.duration == 3.0
-    assert record.moments == [0.0, 1.0, 3.0]
+    assert record.moments == pytest.approx([0.0, 1.0, 3.0])
+    assert numbers(record.at(record.moments[-1])) == pytest.approx([0.03, 0.0, 0.5, 0])
     assert numbers(record.at(0.25)) == pytest.approx([0.0025, 0.005, 0.25, 0])
     assert numbers(record.at(2.0)) == pytest.approx([0.02, 0.01, 0.75, 0])
     assert numbers(record.at(3.25)) == pytest.approx(numbers(record.at(0.25)))

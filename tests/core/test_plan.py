@@ -8,9 +8,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import SCENES, GaussianNoise, Refusal, Simulator, load_scene
+from kappaskin import (
+    SCENES,
+    GaussianLoad,
+    GaussianNoise,
+    Patch,
+    Plate,
+    Presentation,
+    Refusal,
+    Scene,
+    SensorLayout,
+    Simulator,
+    load_scene,
+    schedule,
+)
 from kappaskin.effects import EFFECTS
 from kappaskin.scene import Choice, effects_of, kept_of, plan
+from kappaskin.scene.motion import Hold, Path, Press, Recorded, Release, Tap
 from kappaskin.scene.survey import survey
 
 pytestmark = pytest.mark.slow
@@ -52,6 +66,35 @@ def test_what_is_left_out_changes_no_reading_by_more_than_the_accuracy(name, acc
 
     assert change <= accuracy
     assert plan(auto).left_out <= accuracy
+
+
+SQUARE = Patch(0.1, 0.1)
+BARE = Scene("bare", Plate(SQUARE), SensorLayout.regular(SQUARE, 10, 10), choice=Choice(auto=True))
+LOAD = GaussianLoad(0.05, 0.05, 0.01, 2.0)
+RARE = {
+    "a press": Path((Hold(100.0), Press(0.05), Hold(1.0), Release(0.05))),
+    "a tap": Path((Hold(100.0), Tap(0.1))),
+    "taps": Path((Hold(100.0), Tap(0.5, times=3))),
+    "a record's end": Recorded(np.array([0.0, 100.0, 100.1]), np.eye(3)[[0, 0, 2]] * [0, 0, 1]),
+}
+
+
+@pytest.mark.parametrize("motion", RARE.values(), ids=RARE)
+def test_what_happens_within_a_moment_of_a_long_scene_is_planned_for(motion):
+    scene = BARE.touched_by(LOAD, motion=motion)
+    times = np.linspace(100, np.nextafter(motion.duration, 0), 200)
+
+    planned, whole = (readings(s, times) for s in (scene, replace(scene, choice=Choice())))
+
+    assert np.abs(planned - whole).max() < 0.01 * np.abs(whole).max()
+
+
+def test_the_smallest_cylinder_is_planned_for_however_long_another_is_held():
+    laid = Presentation(schedule(hold=5000.0), 1.0)
+    scene = BARE.laid_on(laid)
+
+    assert survey(scene).peak == max(np.abs(step.curvature).max() for step in laid.steps)
+    assert "saturation" in {effect.name for effect in kept_of(scene)}
 
 
 @READY

@@ -99,6 +99,10 @@ WRONG = {
         '{step="release", seconds=1}]\n',
         "a load on the patch",
     ),
+    "a load that taps beside the skin": (
+        TOUCH + 'path = [{step="slide", by=[0.2, 0], seconds=1}, {step="tap", seconds=1}]\n',
+        "a load on the patch",
+    ),
     "a step of no time": (
         TOUCH + 'path = [{step="press", seconds=0}]\n',
         "a step that takes 1e-06 to 1e.09 s, got 0 s",
@@ -306,6 +310,7 @@ RECORDS = {
     "a jump back": (b"time,dx,dy,amount\n0,0,0,0\n1,0,0,0\n0.5,0,0,0\n", "and rise"),
     "too hard": (b"time,dx,dy,amount\n0,0,0,0\n1,0,0,1e300\n", "amounts of 0 to 1000"),
     "off the skin": (b"time,dx,dy,amount\n0,0,0,0\n1,1,0,1\n2,0,0,0\n", "a load on the patch"),
+    "off the skin at last": (b"time,dx,dy,amount\n0,0,0,1\n1,1,0,1\n", "a load on the patch"),
     "too many": (
         b"time,dx,dy,amount\n" + b"".join(b"%d,0,0,1\n" % n for n in range(20001)),
         "at most 20000 poses",

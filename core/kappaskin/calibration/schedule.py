@@ -219,6 +219,12 @@ class Presentation:
         """Seconds until the last step is over."""
         return self._ends[-1]
 
+    @property
+    def middles(self) -> list[float]:
+        """The time in s in the middle of every step."""
+        ends = self._ends
+        return [(start + end) / 2 for start, end in zip([0.0, *ends], ends, strict=False)]
+
     def index(self, time: float) -> int:
         """Which step is presented at `time` in s, their number once all are over."""
         return bisect_right(self._ends, time + _ROUNDING)

@@ -44,7 +44,7 @@ class Motion(Protocol):
 
     @property
     def moments(self) -> list[float]:
-        """Times in s, from zero to `duration`, between which it is smooth."""
+        """Times in s, from zero to `duration`, at which it sets out, arrives or presses hardest."""
         ...
 
     def at(self, time: float) -> Pose:
@@ -97,6 +97,11 @@ class Step(ABC):
             raise Refusal(f"expected a step that takes {_SECONDS}, got {self.seconds:g} s")
         if self.ease not in EASES:
             raise Refusal(f"expected an ease among {', '.join(EASES)}, got {self.ease!r}")
+
+    @property
+    def moments(self) -> list[float]:
+        """Times in s after its beginning at which it presses hardest or is over."""
+        return [self.seconds]
 
     @abstractmethod
     def end(self, pose: Pose) -> Pose:
@@ -185,6 +190,10 @@ class Tap(Step):
         if not 1 <= self.times <= 1000:
             raise Refusal(f"expected 1 to 1000 taps, got {self.times}")
 
+    @property
+    def moments(self) -> list[float]:
+        return [self.seconds / (4 * self.times - 2), self.seconds]  # all taps are like the first
+
     def end(self, pose: Pose) -> Pose:
         return replace(pose, amount=0.0)
 
@@ -233,7 +242,9 @@ class Path:
 
     @property
     def moments(self) -> list[float]:
-        return [0.0, *self._ends]
+        began = [0.0, *self._ends]
+        each = zip(began, self.steps, strict=False)
+        return [0.0, *(start + time for start, step in each for time in step.moments)]
 
     def at(self, time: float) -> Pose:
         time %= self.duration
@@ -276,7 +287,7 @@ class Recorded:
 
     @property
     def moments(self) -> list[float]:
-        return self.times.tolist()
+        return [*self.times[:-1].tolist(), math.nextafter(self.duration, 0.0)]  # then it is anew
 
     def at(self, time: float) -> Pose:
         time %= self.duration

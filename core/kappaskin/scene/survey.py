@@ -8,7 +8,7 @@ from kappaskin.effects import Survey
 from kappaskin.scene.pressing import Pressing
 from kappaskin.scene.scene import Scene
 
-_MOMENTS = 48  # evenly over the scene, besides those at which a motion changes
+_MOMENTS = 48  # evenly over the scene, besides those of its motions and those halfway
 _LONGEST = 60.0  # s of a scene that nothing repeats in: what drifts has this long to do so
 _STEP = 1e-3  # s over which a rate is told
 
@@ -18,7 +18,10 @@ def moments_of(scene: Scene) -> list[float]:
     if not (scene.moves or scene.laid):
         return [0.0]
     evenly = np.arange(_MOMENTS) * scene.duration / _MOMENTS
-    return np.unique([*evenly, *scene.moments]).tolist()
+    each = [np.array(s.motion.moments) for s in scene.stimuli if s.motion]
+    fastest = [(moments[1:] + moments[:-1]) / 2 for moments in each]  # of what eases
+    laid = scene.laid.middles if scene.laid else []
+    return np.unique(np.concatenate([evenly, *each, *fastest, laid])).tolist()
 
 
 def time_to_watch(scene: Scene) -> float:
@@ -27,7 +30,7 @@ def time_to_watch(scene: Scene) -> float:
 
 
 def survey(scene: Scene) -> Survey:
-    """Look at `scene` at some fifty moments of one repetition."""
+    """Look at `scene` all over one repetition."""
     basis = scene.basis
     layout = replace(scene.layout, gage_length=0.0)
     times = np.array(moments_of(scene))
