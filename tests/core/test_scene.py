@@ -8,11 +8,13 @@ import pytest
 
 from kappaskin import (
     SCENES,
+    Disk,
     LineLoad,
     Orbit,
     Patch,
     Plate,
     PointLoad,
+    Polygon,
     Refusal,
     Scene,
     SensorLayout,
@@ -147,6 +149,26 @@ def test_a_load_off_the_skin_is_refused():
 def test_a_load_that_will_leave_the_skin_is_refused_at_once(x, y):
     with pytest.raises(Refusal, match=r"on the patch of 0\.1 x 0\.1 m"):
         scene(PointLoad(x, y), motion=Orbit(0.02, 4.0))
+
+
+L = Polygon([(0, 0), (0.1, 0), (0.1, 0.05), (0.05, 0.05), (0.05, 0.1), (0, 0.1)])
+
+
+@pytest.mark.parametrize(
+    ("patch", "load", "motion"),
+    [
+        (Disk(0.05), PointLoad(0.07, 0.07), Orbit(0.0225, 1.0)),
+        (L, PointLoad(0.08, 0.03), Path((Press(1), Slide(1, by=(-0.05, 0.05)), Release(1)))),
+    ],
+    ids=["by the rim of a disk", "over the inner corner of an L"],
+)
+def test_a_load_that_leaves_the_skin_in_between_is_refused_too(patch, load, motion):
+    there = Scene("there", Plate(patch), SensorLayout.regular(patch, 10, 10))
+    for time in motion.moments:
+        load.shifted(motion.at(time).dx, motion.at(time).dy).check(patch)
+
+    with pytest.raises(Refusal, match="expected a load on the"):
+        there.touched_by(load, motion=motion)
 
 
 @pytest.mark.parametrize(("radius", "period"), [(-0.1, 1.0), (0.1, 0.0), (math.nan, 1.0)])

@@ -11,6 +11,8 @@ from kappaskin.mechanics import Indentation, Load, Plate, Press, RigidObject
 from kappaskin.patch import Patch
 from kappaskin.scene.motion import Motion, Pose
 
+_PLACES = 48  # along a motion at which it is on a skin whose rim is round, or has inward corners
+
 
 @dataclass(frozen=True)
 class Indenter:
@@ -81,7 +83,7 @@ class Stimulus:
 
     def check(self, plate: Plate) -> None:
         """Refuse what does not touch `plate`, at rest or wherever it presses while it moves."""
-        poses = [self.motion.at(time) for time in self.motion.moments] if self.motion else []
+        poses = _poses(self.motion, plate.patch) if self.motion else []
         if isinstance(self.what, Indenter):
             for pose in (Pose(), *(pose for pose in poses if pose.amount)):
                 self.what.check(plate.patch, pose)
@@ -102,6 +104,14 @@ class Stimulus:
             return None
         pose = self.pose_at(time)
         return self._posed(self.what, pose) if pose.amount else None
+
+
+def _poses(motion: Motion, patch: Patch) -> list[Pose]:
+    """Those by which it shows whether `motion` leaves `patch`; a rectangle at its moments alone."""
+    times = np.array([*motion.moments, motion.duration])
+    parts = 1 if type(patch) is Patch else math.ceil(_PLACES / len(times))
+    each = np.interp(np.arange((len(times) - 1) * parts + 1) / parts, np.arange(len(times)), times)
+    return [motion.at(time) for time in each.tolist()]
 
 
 def contact_of(loads: tuple[Load, ...]) -> Array:
