@@ -188,7 +188,8 @@ def layouts(draw, patch: Patch) -> SensorLayout:
         layout = SensorLayout.scattered(patch, np.array(shares_of_sides) * (patch.a, patch.b))
     dead = draw(st.sets(st.integers(0, len(layout) - 1), max_size=len(layout) - 1))
     longest = float(patch.depth(layout.positions).min())
-    return replace(layout.without(dead), gage_length=draw(st.sampled_from([0.0, longest])))
+    lengths = [0.0, longest] if longest > 1e-6 else [0.0]  # not that of one on the rim
+    return replace(layout.without(dead), gage_length=draw(st.sampled_from(lengths)))
 
 
 @st.composite
@@ -370,6 +371,13 @@ def test_elements_a_hair_apart_are_written_without_a_grid_that_no_memory_holds()
     read = again(replace(BARE, layout=near))
 
     np.testing.assert_array_equal(read.layout.positions, near.positions)
+
+
+def test_an_element_beside_a_notch_is_written_by_its_place():
+    u = Polygon([(0, 0), (9, 0), (9, 9), (6, 9), (6, 3), (3, 3), (3, 9), (0, 9)])
+    scene = Scene("u", Plate(u), SensorLayout.scattered(u, [(4.0, 2.0)]))
+
+    assert again(scene).layout.positions.tolist() == [[4.0, 2.0]]
 
 
 def test_what_is_on_though_there_is_nothing_of_it_is_left_out():

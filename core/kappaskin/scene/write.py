@@ -112,9 +112,11 @@ def _grid(layout: SensorLayout) -> tuple[tuple[int, int], SensorLayout] | None:
     m, n = layout.shape or (_cells(places[:, 0], patch.a), _cells(places[:, 1], patch.b))
     if m * n > _MOST_CELLS:
         return None
-    made = SensorLayout.regular(patch, m, n)
-    same = made.shape == layout.shape and np.array_equal(made.positions, places)
-    return ((m, n), made) if same else None
+    with suppress(Refusal):  # of cells whose centres are all off a polygon
+        made = SensorLayout.regular(patch, m, n)
+        if made.shape == layout.shape and np.array_equal(made.positions, places):
+            return (m, n), made
+    return None
 
 
 def _cells(places: Array, side: float) -> int:
