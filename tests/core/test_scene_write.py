@@ -391,7 +391,10 @@ def test_numbers_of_any_kind_are_written_as_what_they_are():
     scene = PRESSED.touched_by(PointLoad(np.float64(0.05), 0.05, 1), motion=Orbit(0, 4))
 
     text = write_scene(replace(scene, rate=100, seed=np.int64(7)))
+    disk = Disk(np.float64(0.05))
+    round_ = write_scene(Scene("round", Plate(disk), SensorLayout.regular(disk, 4, 4)))
 
+    assert "rim_radius = 0.05 " in round_
     assert "rate = 100.0" in text
     assert "seed = 7" in text
     assert "x = 0.05\ny = 0.05\nforce = 1.0" in text

@@ -83,7 +83,7 @@ def _skin(scene: Scene) -> dict[str, Any]:
 def _patch(patch: Patch) -> dict[str, Any]:
     match patch:
         case Disk():
-            return {"shape": "disk", "rim_radius": patch.rim_radius}
+            return {"shape": "disk", "rim_radius": float(patch.rim_radius)}
         case Polygon():
             return {"shape": "polygon", "outline": [list(corner) for corner in patch.vertices]}
         case _:
