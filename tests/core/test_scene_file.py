@@ -13,6 +13,7 @@ from kappaskin.scene import Indenter, read_scene
 
 HEAD = "format = 1\n\n[skin]\nsize = [0.1, 0.1]\n"
 TOUCH = HEAD + '\n[[touch]]\nwhat = "gaussian"\nx = 0.05\ny = 0.05\nsd = 0.005\nforce = 0.2\n'
+STEP = '[[touch.path]]\nstep = "tap"\nseconds = 1\n'
 
 
 def read(text: str, folder: Path = Path()):
@@ -108,6 +109,10 @@ WRONG = {
         "a step that takes 1e-06 to 1e.09 s, got 0 s",
     ),
     "an unknown step": (TOUCH + 'path = [{step="pres", seconds=1}]\n', "line 12: .*'press'"),
+    "an unknown step of another touch": (
+        TOUCH + STEP + TOUCH.removeprefix(HEAD).lstrip() + STEP.replace("tap", "top"),
+        r"line 22: touch\[2\]\.path\[1\]\.step: expected one of .*'top'",
+    ),
     "a jump": (
         TOUCH + 'path = [{step="press", seconds=1}, {step="slide", by=[0.01, 0], seconds=1}]\n',
         "ends lifted or where it began",

@@ -30,6 +30,8 @@ class Lines:
             if header := _HEADER.match(line):
                 if header[1] == "[[":
                     counts[header[2]] = counts.get(header[2], -1) + 1
+                    for inner in [name for name in counts if name.startswith(f"{header[2]}.")]:
+                        del counts[inner]  # a new table has none yet
                 within = self._counted(_names(header[2]), counts)
                 self._lines[tuple(within)] = number
             elif key := _KEY.match(line):
