@@ -195,6 +195,10 @@ WRONG = {
     "a number beyond computing": (f"rate = {10**400}\n" + HEAD, "line 1: rate: expected a number"),
     "an endless number": ("seed = " + "9" * 5000 + "\n" + HEAD, "a mistake in it: .*digits"),
     "lists in lists": ("a = " + "[" * 9999 + "]" * 9999 + HEAD, "nested too deep"),
+    "a line of spaces": (
+        HEAD + "[elements]\npositions = [\n[" + " " * 9999 + "1, 2]]\n",
+        "line 5: elements: 1 of 1 elements lie outside",
+    ),
     "keys in keys": ("a" + ".a" * 99999 + " = 1\n" + HEAD, "nested too deep"),
     "many steps": (
         TOUCH + "path = [" + '{step="tap", seconds=1},' * 2000 + "]\n",

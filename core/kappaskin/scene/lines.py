@@ -2,7 +2,8 @@
 
 import re
 
-_HEADER = re.compile(r"\s*(\[\[?)\s*([\w.\-\"' ]+?)\s*\]\]?\s*(#.*)?$")
+# A name begins and ends with what is no space: else a line of spaces is tried in every way.
+_HEADER = re.compile(r"\s*(\[\[?)\s*([\w.\-\"']+(?: +[\w.\-\"']+)*)\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w\-"'.]+)\s*=""")
 
 Place = tuple[str | int, ...]
