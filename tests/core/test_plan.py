@@ -24,7 +24,7 @@ from kappaskin import (
 )
 from kappaskin.effects import EFFECTS
 from kappaskin.scene import Choice, effects_of, kept_of, plan
-from kappaskin.scene.motion import Hold, Path, Press, Recorded, Release, Tap
+from kappaskin.scene.motion import Hold, Orbit, Path, Press, Recorded, Release, Tap
 from kappaskin.scene.survey import survey
 
 pytestmark = pytest.mark.slow
@@ -87,6 +87,13 @@ def test_what_happens_within_a_moment_of_a_long_scene_is_planned_for(motion):
     planned, whole = (readings(s, times) for s in (scene, replace(scene, choice=Choice())))
 
     assert np.abs(planned - whole).max() < 0.01 * np.abs(whole).max()
+
+
+@pytest.mark.parametrize("motion", [Orbit(0.01, 1e-3), Tap(1.0, times=1000)], ids=str)
+def test_the_skew_of_what_comes_again_a_thousand_times_a_second_is_kept(motion):
+    motion = motion if isinstance(motion, Orbit) else Path((motion,))
+
+    assert "skew" in {effect.name for effect in kept_of(BARE.touched_by(LOAD, motion=motion))}
 
 
 def test_the_smallest_cylinder_is_planned_for_however_long_another_is_held():

@@ -10,7 +10,7 @@ from kappaskin.scene.scene import Scene
 
 _MOMENTS = 48  # evenly over the scene, besides those of its motions and those halfway
 _LONGEST = 60.0  # s of a scene that nothing repeats in: what drifts has this long to do so
-_STEP = 1e-3  # s over which a rate is told
+_STEP = 1e-3  # s over which a rate is told; less of a motion that is as fast
 
 
 def moments_of(scene: Scene) -> list[float]:
@@ -37,7 +37,8 @@ def survey(scene: Scene) -> Survey:
     M = layout.curvature_operator(basis)
     compliance = scene.plate.compliance(basis)
     pressing = Pressing(scene, scene.plate)
-    pairs = [(pressing(t), pressing(t + _STEP) if scene.moves else None) for t in times.tolist()]
+    step = min([_STEP, *(np.diff(s.motion.moments).min() / 4 for s in scene.stimuli if s.motion)])
+    pairs = [(pressing(t), pressing(t + step) if scene.moves else None) for t in times.tolist()]
     forces = np.array([now.force.ravel() for now, _ in pairs])
     later = np.array([(then or now).force.ravel() for now, then in pairs])
     c = compliance.after(forces)
@@ -56,7 +57,7 @@ def survey(scene: Scene) -> Survey:
         forces,
         c,
         curvature,
-        np.abs(compliance.after(later - forces) @ M.T).max(axis=0) / _STEP,
+        np.abs(compliance.after(later - forces) @ M.T).max(axis=0) / step,
         time_to_watch(scene),
         read_after,
     )
