@@ -590,6 +590,24 @@ def test_another_surface_goes_on_tracking_and_another_basis_starts_anew():
 # Refusals
 
 
+@pytest.mark.parametrize("sigma", [None, 0.05])
+def test_readings_that_see_nothing_of_the_modes_spoil_nothing(sigma):
+    x = np.linspace(0, 0.1, 6)  # on the rim, hinged modes do not bend
+    layout = SensorLayout.scattered(SQUARE, np.column_stack([np.tile(x, 6), np.repeat(x, 6)]))
+    track, seen = Tracking(FOURS, layout, sigma), layout.curvature_operator(FOURS)
+    c = 3e-3 * np.eye(16)[0]
+    K = (seen @ c + 0.05 * np.random.default_rng(0).normal(size=len(seen))).reshape(3, -1)
+    bent = K + 5.0 * (np.abs(seen).max(axis=1) < 1e-6).reshape(3, -1)
+    channels, fits = np.arange(K.size).reshape(K.shape), []
+    for number in range(4 * K.size):  # one after the other, the corner at x = y = 0 first
+        read, frame = channels == number % K.size, K if number < 3 * K.size else bent
+        times = np.where(read, 1e-4 * number, np.nan)
+        fits.append(track.follow(np.where(read, frame, np.nan), times))
+
+    np.testing.assert_allclose(fits[3 * K.size - 1].coefficients.ravel(), c, atol=0.05 * c[0])
+    assert np.isfinite([[fit.coefficients, fit.sd] for fit in (fits[0], fits[-1])]).all()
+
+
 def test_a_first_frame_without_a_reading_is_refused_plainly():
     with pytest.raises(RankDeficient, match="no readings are left"):
         Tracking(FOURS, SIXES)(np.full((3, 36), np.nan))

@@ -18,6 +18,7 @@ _MEMORY = 3000.0  # readings over which the noise is averaged
 _FEW = 30.0  # of them that still count when something new touches
 _BREAK = 8.0  # standard deviations of the chi-squared of readings that are something new
 _BARELY = 10.0  # of that chi-squared: a single reading is no proof
+_UNSEEN = 1e-3  # of a usual reading's signal
 _FAINT = 0.1  # of the noise: the least signal that is expected
 _USUAL, _USUAL_SD = math.log(100.0), 3.0  # of the signal's variance over the noise's, e-folds
 _RATIOS = np.exp(np.linspace(math.log(1e-4), math.log(1e14), 145))
@@ -45,15 +46,18 @@ class Level(Remembering):
         """Of the signal's variance over the noise's, what can be computed with."""
         return self.rounding**-1.5
 
-    def explain(self, A: Array, readings: Array) -> float:
+    def explain(self, A: Array, readings: Array, signal: float) -> float:
         """The amplitude in units of the noise that makes `readings` (R,) likeliest, with the noise.
 
         Readings A (R, F) of modes have the covariance variance (1 + amplitude^2 A A'), the variance
         being known as from `count` others (Student's t). An amplitude is expected of which the
-        signal is ten times the noise, give or take three e-folds of its square.
+        signal is ten times the noise, give or take three e-folds of its square; of readings that
+        see next to nothing of the modes, as on a rim that is held, one with that `signal`, which is
+        the variance of a usual reading for unit amplitude.
         """
         U, s, _ = np.linalg.svd(A.astype(float), full_matrices=False)
-        R, signal = len(readings), float(s @ s) / len(readings)
+        R, seen = len(readings), float(s @ s) / len(readings)
+        signal = seen if seen > _UNSEEN * signal else signal
         squares = _RATIOS[self._most >= _RATIOS] / signal
         within = (U.T @ readings) ** 2
         beyond = max(float(readings @ readings - within.sum()), 0.0)
@@ -71,9 +75,9 @@ class Level(Remembering):
         self.variance, self.count = float(total[best]) / (known + R), known
         return math.sqrt(squares[best])
 
-    def renew(self, A: Array, ahead: Array) -> float:
+    def renew(self, A: Array, ahead: Array, signal: float) -> float:
         """How much of something else `ahead` (R,) of A (R, F) tells, as an amplitude."""
-        extra = self.explain(A, ahead)
+        extra = self.explain(A, ahead, signal)
         self.amplitude = max(self.amplitude, extra)
         self.speed = max(self.speed, START)
         return extra

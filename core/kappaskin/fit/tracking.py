@@ -204,7 +204,7 @@ class Tracking(Estimator, Remembering):
         """Expect what the evidence of the first readings says."""
         told = (0.0, 0.0) if self.sigma is None else (1.0, math.inf)
         self._level = Level(*told, float(np.finfo(self.dtype).eps))
-        self._filter.expect(self._level.renew(A, readings), START)
+        self._filter.expect(self._level.renew(A, readings, self._signal), START)
 
     def _advance(self, time: float) -> None:
         level = cast("Level", self._level)
@@ -225,7 +225,7 @@ class Tracking(Estimator, Remembering):
         power = float(ahead @ learned.left)  # chi-squared, times the noise's variance
         if level.surprised(power, len(K)):
             filter_.mean, filter_.root = mean, root
-            filter_.expect(level.renew(A, ahead), level.speed)
+            filter_.expect(level.renew(A, ahead, self._signal), level.speed)
             learned = filter_.absorb(A, lag, readings)
             power = float(ahead @ learned.left)
         else:
