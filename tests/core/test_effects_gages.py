@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kappaskin import (
+    Disk,
     Fast,
     LeastSquares,
     Patch,
@@ -19,6 +20,7 @@ from kappaskin import (
     SineBasis,
     SourceError,
     Transduction,
+    basis_for,
 )
 from kappaskin.bases.basis import curvature_at
 from kappaskin.effects import FiniteSlope, Fluid, Foam, GageLength, Tension
@@ -122,6 +124,18 @@ def test_gages_may_end_on_the_rim_and_not_beyond(held_skin):
         Refusal, match=r"over the rim of the .*: element \d+ is .* m inside; .*at most"
     ):
         replace(layout, gage_length=layout.gage_length * 1.001)
+
+
+@pytest.mark.parametrize("edge", ["hinged", "clamped"])
+def test_gages_that_reach_over_a_round_rim_by_rounding_alone_read_numbers(edge):
+    disk = Disk(0.05)
+    layout = SensorLayout.regular(disk, 10, 10)  # whose outermost lie on the diagonals
+    longest = 2 * float(disk.depth(layout.positions).min())
+
+    typed = replace(layout, gage_length=float(f"{longest:.10g}"))
+
+    assert typed.gage_length > longest
+    assert np.isfinite(typed.curvature_operator(basis_for(disk, edge, 4, 4))).all()
 
 
 def test_ten_by_ten_gages_may_be_as_long_as_they_are_apart():

@@ -18,7 +18,7 @@ from kappaskin.patch import Disk
 
 Complex = NDArray[np.complex128]
 
-_ROUNDING = 1e-12  # of the radius: a point on the rim as computed may stand this far outside
+_ROUNDING = 1e-9  # of the radius: gages that end on the rim may stand this far outside
 _POISSON = 0.3  # of the plate whose hinged modes these are
 
 
