@@ -65,10 +65,13 @@ class SensorLayout:
         depth = self.patch.depth(self.positions)
         least = int(np.argmin(depth))
         if depth[least] * (1 + _ROUNDING) < L / 2:
+            longest = 2 * depth[least]
+            if float(f"{longest:.4g}") > longest * (1 + _ROUNDING):
+                longest *= 1 - 5e-4  # which is rounded down to no more than it was
             raise Refusal(
                 f"gages of {L:g} m reach over the rim of the {self.patch.name}: element {least} is "
                 f"{depth[least]:.4g} m inside; expected a gage length of at most "
-                f"{2 * depth[least]:.4g} m"
+                f"{longest:.4g} m"
             )
 
     @classmethod

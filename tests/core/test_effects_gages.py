@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -136,6 +137,19 @@ def test_gages_that_reach_over_a_round_rim_by_rounding_alone_read_numbers(edge):
 
     assert typed.gage_length > longest
     assert np.isfinite(typed.curvature_operator(basis_for(disk, edge, 4, 4))).all()
+
+
+@pytest.mark.parametrize("patch", [SQUARE, Patch(0.1, 0.07), Disk(0.05), Disk(0.03)])
+def test_gages_of_the_length_that_a_refusal_asks_for_are_taken(patch):
+    for m in range(3, 14):
+        layout = SensorLayout.regular(patch, m, m)
+        with pytest.raises(Refusal) as refused:
+            replace(layout, gage_length=0.1)
+        said = re.search(r"at most ([\d.e-]+) m", str(refused.value))
+        longest = 2 * float(patch.depth(layout.positions).min())
+
+        assert said is not None
+        assert replace(layout, gage_length=float(said[1])).gage_length > 0.998 * longest
 
 
 def test_ten_by_ten_gages_may_be_as_long_as_they_are_apart():
