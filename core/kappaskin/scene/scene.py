@@ -116,7 +116,7 @@ class Scene:
 
     @property
     def moments(self) -> list[float]:
-        """Times in s, up to `duration`, between which all motions are smooth."""
+        """Times in s, up to `duration`, at which a motion sets out, arrives or presses hardest."""
         each = (s.motion.moments for s in self.stimuli if s.motion)
         return sorted({time for moments in each for time in moments})
 
