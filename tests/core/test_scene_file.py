@@ -218,6 +218,12 @@ WRONG = {
         '{step="release", seconds=1}]\n',
         r"line 5: touch\[1\]: expected an object over .*\(0.25, 0.05\) m, which misses it",
     ),
+    "an object that leaves by little more than its radius": (
+        HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=0.05\ny=0.05\nforce=1\n'
+        'path = [{step="press", seconds=1}, {step="slide", by=[0.062, 0], seconds=1},'
+        '{step="release", seconds=1}]\n',
+        r"line 5: touch\[1\]: expected an object over .*\(0.112, 0.05\) m, which misses it",
+    ),
     "an object nowhere": (
         HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=nan\ny=0.05\nforce=1\n',
         r"line 5: touch\[1\]: expected a finite place",

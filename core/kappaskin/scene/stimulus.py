@@ -7,7 +7,7 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.mechanics import Indentation, Load, Plate, Press, RigidObject
+from kappaskin.mechanics import Indentation, Load, Placed, Plate, Press, RigidObject
 from kappaskin.patch import Patch
 from kappaskin.scene.motion import Motion, Pose
 
@@ -47,16 +47,28 @@ class Indenter:
         """Refuse an object that, standing as `pose` says, is beside the skin or all through it."""
         reach, x, y = math.hypot(*self.rigid.extent), self.x + pose.dx, self.y + pose.dy
         if not (-reach <= x <= patch.a + reach and -reach <= y <= patch.b + reach):
-            raise Refusal(
-                f"expected an object over the {patch.name}, got {self.rigid} at ({x:g}, {y:g}) m, "
-                "which misses it; positions are in metres from the corner x = y = 0"
-            )
+            raise self._missing(patch, pose)
         deepest = min(patch.a, patch.b)
         if (depth := (self.depth or 0.0) * pose.amount) > deepest:
             raise Refusal(
                 f"expected a depth of at most {deepest:g} m, the skin's shorter side, got "
                 f"{depth:g}; depths are in metres"
             )
+
+    def check_pressing(self, patch: Patch, pose: Pose) -> None:
+        """Refuse an object that is to press as `pose` says where nothing of the skin is below."""
+        self.check(patch, pose)
+        place = np.array([self.x + pose.dx, self.y + pose.dy])
+        over = patch.moves(place[None])[0]  # the usual, and quickly told
+        if not over and not Placed(self.rigid, place, self.turn + pose.turn).meets(patch):
+            raise self._missing(patch, pose)
+
+    def _missing(self, patch: Patch, pose: Pose) -> Refusal:
+        return Refusal(
+            f"expected an object over the {patch.name}, got {self.rigid} at "
+            f"({self.x + pose.dx:g}, {self.y + pose.dy:g}) m, which misses it; positions are in "
+            "metres from the corner x = y = 0"
+        )
 
     def into(self, press: Press, pose: Pose, after: Indentation | None) -> Indentation:
         """What it does to the skin when it stands as `pose` says; `after` starts the search."""
@@ -85,8 +97,10 @@ class Stimulus:
         """Refuse what does not touch `plate`, at rest or wherever it presses while it moves."""
         poses = _poses(self.motion, plate.patch) if self.motion else []
         if isinstance(self.what, Indenter):
-            for pose in (Pose(), *(pose for pose in poses if pose.amount)):
-                self.what.check(plate.patch, pose)
+            self.what.check(plate.patch, Pose())
+            for pose in poses if self.motion else [Pose()]:
+                if pose.amount:
+                    self.what.check_pressing(plate.patch, pose)
             return
         plate.check(self.what)
         for pose in poses:

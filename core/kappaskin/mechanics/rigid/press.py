@@ -21,6 +21,8 @@ from kappaskin.mechanics.rigid.objects import RigidObject
 from kappaskin.mechanics.rigid.settle import Bearing, Support, Underside, settle
 from kappaskin.patch import Patch
 
+_NODES = (64, 64)  # unless others are asked for
+
 
 def _turned(points: Array, angle: float) -> Array:
     c, s = math.cos(angle), math.sin(angle)
@@ -51,6 +53,12 @@ class Placed:
         beside = np.column_stack([away @ [up[2], 0.0, -up[0]], away[:, 1]])
         return self.object_.height(_turned(beside, -self.turn)) - away @ up, normals @ up
 
+    def meets(self, patch: Patch) -> bool:
+        """Whether any of the usual nodes of the skin, or of its keel on it, lies below it."""
+        cells = np.stack(np.meshgrid(*patch.cell_centres(*_NODES)), axis=-1).reshape(-1, 2)
+        height, slant = self.over(patch, np.vstack([cells[patch.moves(cells)], self.keel(patch)]))
+        return bool((np.isfinite(height) & (slant > 0)).any())
+
     def carried(self, points: Array, by: Indentation) -> Array:
         """Where `points` (P, 2) under the same object as it was `by` are now."""
         return _turned(points - by.position, self.turn - by.turn) + self.place
@@ -70,7 +78,7 @@ class Press:
         self,
         plate: Plate,
         basis: Basis,
-        nodes: tuple[int, int] = (64, 64),
+        nodes: tuple[int, int] = _NODES,
         layer: float | None = None,
     ) -> None:
         self._patch, self._shape = plate.patch, basis.shape
