@@ -403,6 +403,7 @@ def test_numbers_of_any_kind_are_written_as_what_they_are():
 
 HALF_DEAD = replace(BARE.layout, live=np.arange(48).reshape(3, 16) != 5)
 ODD_GRID = replace(BARE.layout, positions=BARE.layout.positions + 1e-3)
+LARGE = Patch(20.0, 20.0)
 RECORD = Recorded(np.array([0.0, 1.0]), np.zeros((2, 3)))
 PYRAMID = Mesh(
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 0.01,
@@ -432,6 +433,10 @@ UNSAID = {
         "the scene's own electronics",
     ),
     "a rate that cannot be": (replace(BARE, rate=1e6), "lower the rate"),
+    "20 m of skin": (
+        replace(BARE, plate=Plate(LARGE), layout=SensorLayout.regular(LARGE, 4, 4)),
+        "expected sides",
+    ),
 }
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from kappaskin.frames import Array
 from kappaskin.layout import SensorLayout
 from kappaskin.patch import Disk, Patch, Polygon
 from kappaskin.scene.plan import effects_of
-from kappaskin.scene.read import ELECTRONICS, ELSEWHERE, FORMAT, LOOPS
+from kappaskin.scene.read import ELECTRONICS, ELSEWHERE, FORMAT, LOOPS, read_scene
 from kappaskin.scene.said import said_of
 from kappaskin.scene.scene import Scene
 from kappaskin.scene.write_stimulus import TOUCH_UNITS, touch_of
@@ -39,7 +40,7 @@ def write_scene(scene: Scene) -> str:
     """The text of a file of `scene`, whose name is the file's.
 
     `on` of effects that there is nothing of asks for nothing, and is left out. What no file can
-    say is refused: objects and motions that came from files of their own, for one.
+    say is refused: objects and motions that came from files of their own, or 20 m of skin.
     """
     scene.sensor()  # as for a reader, a rate that cannot be kept is refused
     tables = [
@@ -52,7 +53,9 @@ def write_scene(scene: Scene) -> str:
         tables.append(table("[cylinders]", _cylinders(scene.laid, scene.plate.patch), _UNITS))
     tables += _effects(scene)
     tables += [table("[[touch]]", touch_of(each), TOUCH_UNITS) for each in scene.stimuli]
-    return "\n".join(tables)
+    text = "\n".join(tables)
+    read_scene(text, Path(f"{scene.name}.toml"))  # it refuses what is beyond the limits of a file
+    return text
 
 
 def _top(scene: Scene) -> dict[str, Any]:
