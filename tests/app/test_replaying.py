@@ -151,7 +151,8 @@ def test_scrubbing_ends_where_the_mouse_let_go(standing: MainWindow, qtbot, unti
 
 def test_it_ends_paused_and_plays_again_from_the_beginning(player: MainWindow, until) -> None:
     player.replaying.seek(2.3)
-    until(lambda: player.badge.state.endswith("paused"))
+    # It stands at its beginning too, until the settings recorded are in use.
+    until(lambda: player.badge.state.endswith("paused") and _at(player) > 0)
     assert _at(player) == player.session.status.replay.length
     player.actions_by_name["pause"].trigger()
     until(lambda: player.badge.state == "REPLAY" and _at(player) < 1.0)
