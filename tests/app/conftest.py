@@ -99,8 +99,14 @@ def points_at(qtbot) -> Callable[[QWidget, QPoint], None]:
     return move
 
 
+@pytest.fixture(scope="session")
+def colours_of() -> Callable[[np.ndarray], int]:
+    """How many different colours bytes (..., 3) are."""
+    return lambda rgb: len(np.unique(rgb @ np.array([2**16, 2**8, 1])))
+
+
 @pytest.fixture
-def colours_in() -> Callable[[MainWindow, QWidget], int]:
+def colours_in(colours_of: Callable[[np.ndarray], int]) -> Callable[[MainWindow, QWidget], int]:
     """How many different colours the window's picture has where a widget is."""
 
     def count(window: MainWindow, widget: QWidget) -> int:
@@ -108,6 +114,6 @@ def colours_in() -> Callable[[MainWindow, QWidget], int]:
         at = widget.mapTo(window, QPoint(0, 0))
         part = picture.copy(at.x(), at.y(), widget.width(), widget.height())
         rows = np.frombuffer(part.constBits(), np.uint8).reshape(part.height(), -1)
-        return len(np.unique(rows[:, : 3 * part.width()].reshape(-1, 3), axis=0))
+        return colours_of(rows[:, : 3 * part.width()].reshape(-1, 3))
 
     return count

@@ -24,10 +24,10 @@ def dots(image) -> np.ndarray:
     return rows.reshape(image.height(), image.width(), 4).copy()
 
 
-def test_every_ready_scene_has_a_picture_that_is_not_blank(reliefs):
+def test_every_ready_scene_has_a_picture_that_is_not_blank(reliefs, colours_of):
     for name, made in reliefs.items():
         light, dark = (picture(made, theme, SIZE, 1.0) for theme in (LIGHT, DARK))
-        assert len(np.unique(dots(light).reshape(-1, 4), axis=0)) > 300, name
+        assert colours_of(dots(light)[..., :3]) > 300, name
         assert (dots(light) != dots(dark)).any(axis=-1).mean() > 0.2, name
 
 
