@@ -39,12 +39,12 @@ def test_the_hand_that_means_a_point_is_not_there_after_the_mouse_left(
     plot: CostPlot, points_at, qtbot
 ) -> None:
     plot.show()
+    qtbot.waitExposed(plot)
     at = plot.place_of(plot.frontier.costs[0]).toPoint()
     points_at(plot, at)
-    assert plot.cursor().shape() == Qt.CursorShape.PointingHandCursor
+    qtbot.waitUntil(lambda: plot.cursor().shape() == Qt.CursorShape.PointingHandCursor)
 
     QApplication.sendEvent(plot, QEvent(QEvent.Type.Leave))
-    points_at(plot, plot.rect().bottomRight())
 
     assert plot.cursor().shape() == Qt.CursorShape.ArrowCursor
     plot.hide()
