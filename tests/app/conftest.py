@@ -47,11 +47,22 @@ Wait = Callable[[Callable[[], bool]], None]
 
 @pytest.fixture(scope="session")
 def until(qapp: QApplication) -> Wait:
-    """Let the window live until something holds; fail after a while."""
+    """Let the window live until something holds; fail after a while.
+
+    It does not hold while it asks of what is not there yet, such as the estimate.
+    """
 
     def wait(holds: Callable[[], bool], patience: float = 60.0) -> None:
+        def holds_now() -> bool:
+            try:
+                return holds()
+            except AttributeError as error:
+                if error.obj is not None:
+                    raise
+                return False
+
         end = time.monotonic() + patience
-        while not holds():
+        while not holds_now():
             assert time.monotonic() < end, "it never came to hold"
             qapp.processEvents()
             time.sleep(0.002)
