@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint
-from PySide6.QtGui import QImage, QSurface
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QImage, QMouseEvent, QSurface
 from PySide6.QtWidgets import QApplication, QWidget
 from pyvistaqt import QtInteractor
 from shiboken6 import getAllValidWrappers
@@ -99,13 +99,19 @@ def window(opened: Callable[..., MainWindow], until: Wait) -> MainWindow:
     return window
 
 
-@pytest.fixture
-def points_at(qtbot) -> Callable[[QWidget, QPoint], None]:
-    """Moves the mouse, no button down, to a place of a widget, also where it was last seen."""
+@pytest.fixture(scope="session")
+def points_at() -> Callable[[QWidget, QPoint], None]:
+    """Moves the mouse, no button down, to a place of a widget.
+
+    Not by way of the display: nobody is told of a move to where the mouse was last seen, nor, on
+    a busy machine, of one that another follows.
+    """
 
     def move(widget: QWidget, place: QPoint) -> None:
-        qtbot.mouseMove(widget, QPoint(2, 2))  # Qt tells nobody of a move to where it stood
-        qtbot.mouseMove(widget, place)
+        assert widget.hasMouseTracking(), "it would not be told"
+        none = Qt.MouseButton.NoButton, Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier
+        there = QPointF(place), QPointF(widget.mapToGlobal(place))
+        QApplication.sendEvent(widget, QMouseEvent(QEvent.Type.MouseMove, *there, *none))
 
     return move
 
