@@ -13,7 +13,8 @@ from kappaskin.studies.drills.rewrite import Says, Times, untold
 from kappaskin.studies.drills.stand import Stand
 
 _WITHIN = 1.0  # s
-_START = 20.0  # s until pings are answered, however busy the machine is
+_START = 20.0  # s until a device that has just begun answers
+_FOLLOWED = 5.0  # s: two pings are answered, one is lost, and the next after it is 3 s later
 _BACK = 2.0  # s after a port's return
 _BLOCKED = 0.3  # s that a read may take on a busy machine
 _GROWTH = 10 * 2**20  # bytes
@@ -186,20 +187,20 @@ def _device_clock(stand: Stand) -> Outcome:
     for ahead in (100.0, 50.0):
         stand.relay.rewrite = Times(ahead)
         stand.recover(_WITHIN)
-        followed.append(stand.until(lambda: _in_step(stand), _START))
+        followed.append(stand.until(lambda: _in_step(stand), _BACK))
     return stand.outcome((all(followed), "times do not follow the device's clock"))
 
 
 def _host_clock(stand: Stand) -> Outcome:
     """Set this machine's clock, forth and back."""
     stand.settle()
-    # Before an answer no clock is known.
+    # A ping unanswered at first is sent again after seconds; before an answer no clock is known.
     stand.until(lambda: stand.last and stand.last.taken_sd < math.inf, _START)
     followed: list[bool] = []
     for ahead in (30.0, 10.0):
         stand.clock = lambda ahead=ahead: time.monotonic() + ahead
         stand.recover(_WITHIN)
-        followed.append(stand.until(lambda: _in_step(stand), _START))
+        followed.append(stand.until(lambda: _in_step(stand), _FOLLOWED))
     trouble = stand.source.trouble
     return stand.outcome(
         (all(followed), "times do not follow this machine's clock"),
