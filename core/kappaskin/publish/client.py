@@ -110,12 +110,15 @@ class Client:
     def go_on(self) -> None:
         """Write what was left, and end what is over: called now and then."""
         now = time.monotonic()
-        with self._lock:
-            self._flush()
-            if not self._rest:
-                self._moved = now
-                self.ended = self.ended or self._last_shut
-            stuck = now - self._moved > STUCK or len(self._rest) > _REST
+        # The lock is taken for who lags behind alone: were this thread put to sleep with it, the
+        # one that computes would drop messages to a client that takes all of them.
+        if self._rest:
+            with self._lock:
+                self._flush()
+        if not self._rest:
+            self._moved = now
+            self.ended = self.ended or self._last_shut
+        stuck = now - self._moved > STUCK or len(self._rest) > _REST
         if self._protocol.state is State.CONNECTING and now - self._since > _PATIENCE:
             stuck = True
         self.ended = self.ended or stuck
