@@ -167,7 +167,7 @@ def test_one_for_whom_nobody_comes_ends_its_file_and_leaves_nothing(
 
 def test_one_that_does_not_record_ends_with_its_parent(abandoned, folder) -> None:
     engine_alone = abandoned(folder, None)
-    assert wait_for(lambda: engine_alone.gone, within=3.0)
+    assert wait_for(lambda: engine_alone.gone, within=10.0)  # where its patience is 20 s
     assert not folder.exists()
     assert not any(block.exists() for block in engine_alone.blocks)
 

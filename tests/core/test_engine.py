@@ -127,7 +127,8 @@ def test_frames_are_counted_and_timed(engine) -> None:
     def counted() -> Status | None:
         status = engine.status()
         as_asked = status.rate == pytest.approx(500, rel=0.4)  # the machine may be busy
-        return status if as_asked and status.accounting.span > 500 else None
+        fresh = min(status.last_frame, status.reported) > time.monotonic() - 0.5
+        return status if as_asked and fresh and status.accounting.span > 500 else None
 
     status = wait_for(counted)
 
@@ -135,8 +136,6 @@ def test_frames_are_counted_and_timed(engine) -> None:
     seen = status.accounting
     assert seen.span == seen.accepted + seen.lost
     assert 0.001 < status.reader_gap < 1.0
-    assert time.monotonic() - status.last_frame < 0.5
-    assert time.monotonic() - status.reported < 0.5
 
 
 def test_another_setup_is_swapped_in_whole(engine) -> None:
@@ -375,7 +374,7 @@ def test_an_engine_started_anew_scans_the_region_of_the_last_one(own_engine) -> 
     own_engine.scan(Region("elements", elements=(3, 4), share=0.2))
     assert own_engine.pid is not None
     os.kill(own_engine.pid, signal.SIGKILL)
-    state(own_engine, LOST, within=1.0)
+    state(own_engine, LOST)
 
     own_engine.connect("sim:")
 
@@ -412,7 +411,7 @@ def killed(engine: Engine) -> None:
     pid = engine.pid
     assert pid is not None
     os.kill(pid, signal.SIGKILL)
-    assert wait_for(lambda: not engine.alive, within=5.0)
+    assert wait_for(lambda: not engine.alive)
     engine.revive()
 
 
@@ -666,7 +665,7 @@ def test_a_tare_that_dies_with_its_engine_is_said_to(own_engine) -> None:
     assert wait_for(lambda: engine.status().tare.taking)
     assert engine.pid is not None
     os.kill(engine.pid, signal.SIGKILL)
-    state(engine, LOST, within=1.0)
+    state(engine, LOST)
 
     engine.revive()
 

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any
@@ -92,6 +92,15 @@ class Listener:
             except BlockingIOError:
                 time.sleep(0.001)
         return messages
+
+    def takes_in(self, kind: type[Message], messages: Sequence[Message] = ()) -> Message:
+        """The newest of a kind in `messages`, or the first to come."""
+        found = [message for message in messages if isinstance(message, kind)]
+        end = time.monotonic() + 30.0
+        while not found and time.monotonic() < end:
+            found = [m for m in self.reads(10**9, within=0.02) if isinstance(m, kind)]
+        assert found, f"no {kind.__name__} came"
+        return found[-1]
 
     def asks(self, operation: int, arguments: bytes = b"") -> tuple[Reply, list[Message]]:
         """The reply to a command, and what came with it."""
@@ -304,7 +313,7 @@ def test_it_speaks_a_version_that_both_know_or_refuses(asked: Listener) -> None:
 def test_it_stops_and_starts(asked: Listener) -> None:
     asked.asks(Operation.STOP)
     asked.reads(10**9, within=0.3)  # what was under way
-    assert not [m for m in asked.reads(10**9, within=0.3) if isinstance(m, Samples)]
+    assert wait_for(lambda: not any(isinstance(m, Samples) for m in asked.reads(10**9, 0.3)), 5.0)
     asked.asks(Operation.START)
     assert len(asked.takes(10)) >= 10
     assert asked.decoder.accounting().lost == 0
@@ -334,7 +343,7 @@ def test_it_goes_at_the_rate_asked_for_if_it_can(asked: Listener) -> None:
 def test_another_gain_is_told_at_once_and_changes_the_counts(asked: Listener) -> None:
     before = asked.takes(1)[-1].counts
     _, with_it = asked.asks(Operation.GAIN, struct.pack("<I", 50_000))
-    told = [m for m in [*with_it, *asked.reads(10**9, 0.1)] if isinstance(m, Information)][-1]
+    told = asked.takes_in(Information, with_it)
     assert json.loads(told.text)["amplifier"]["gain"] == 50
     after = asked.takes(1)[-1].counts
     assert np.abs(after).max() < 0.7 * np.abs(before).max()
@@ -344,8 +353,7 @@ def test_another_gain_is_told_at_once_and_changes_the_counts(asked: Listener) ->
 def test_it_introduces_itself_when_asked(asked: Listener) -> None:
     asked.takes(1)
     _, with_it = asked.asks(Operation.IDENTIFY)
-    came = [*with_it, *asked.reads(10**9, within=0.1)]
-    assert any(isinstance(message, Information) for message in came)
+    asked.takes_in(Information, with_it)
 
 
 def test_a_ping_is_answered_with_the_time_it_came(asked: Listener) -> None:

@@ -34,7 +34,7 @@ def free_port(family: int = socket.AF_INET) -> int:
 def receiver() -> Iterator[socket.socket]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
         made.bind(("127.0.0.1", 0))
-        made.settimeout(2)
+        made.settimeout(30)
         yield made
 
 
@@ -125,7 +125,7 @@ def test_a_receiver_over_ipv6_gets_them(message: Message) -> None:
             receiver.bind(("::1", 0))
         except OSError:
             pytest.skip("no IPv6 on this machine")
-        receiver.settimeout(2)
+        receiver.settimeout(30)
         sender = transport.opened(target_of(f"udp://[::1]:{receiver.getsockname()[1]}"))
         sender.send(message)
         assert receiver.recv(9999) == message.contact
@@ -135,7 +135,7 @@ def test_a_receiver_over_ipv6_gets_them(message: Message) -> None:
 def test_everybody_on_a_network_is_sent_to(message: Message) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("", 0))
-        receiver.settimeout(2)
+        receiver.settimeout(30)
         sender = transport.opened(target_of(f"udp://127.255.255.255:{receiver.getsockname()[1]}"))
         sender.send(message)
         assert receiver.recv(9999) == message.contact
@@ -153,7 +153,7 @@ def test_what_nobody_receives_is_counted_until_somebody_does(message: Message) -
     assert sender.receivers[0].trouble == "nobody receives there"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", port))
-        receiver.settimeout(2)
+        receiver.settimeout(30)
         sender.send(message)
         assert receiver.recv(9999) == message.contact
     sender.close()
@@ -231,7 +231,7 @@ def test_a_look_for_a_host_that_takes_long_holds_nothing_up_and_ends_in_a_refusa
     began = time.monotonic()
     publishing.ask(["udp://slow:1"])
     publishing.tell(STATE)
-    assert time.monotonic() - began < 0.5
+    assert time.monotonic() - began < 5.0  # where the look takes 10 s
     assert publishing.news.targets[0].opening
     now[0] = 6.0
     publishing.tell(STATE)

@@ -158,7 +158,7 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_not_written_is_counted(
     began = time.monotonic()
     for n in range(1000):
         file.put(m.LINES, n * 1e-3, LINE)
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < 5.0  # where waiting for the disk takes 10 s
     go.set()
     file.close()
     assert file.written.lost > 800
