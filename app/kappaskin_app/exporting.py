@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFileDialog, QLineEdit,
 
 from kappaskin import Exported, Exporting, Setup, Wanted
 from kappaskin_app.guard import guarded
-from kappaskin_app.working import WorkDialog, beside, choosing, named, path_in
+from kappaskin_app.working import WorkDialog, beside, choosing, ended, named, path_in, says_kind
 
 _LONGEST = 1e6  # s
 _RECORDINGS = "Recording (*.mcap)"
@@ -85,7 +85,7 @@ class ExportDialog(WorkDialog):
         name, kind = QFileDialog.getSaveFileName(self, "Export to", "", _FORMATS)
         if name:
             path, ending = Path(name), kind.rpartition("*")[2].rstrip(")")
-            self.to.setText(str(path if path.suffix else path.with_suffix(ending)))
+            self.to.setText(str(path if says_kind(path) else ended(name, ending)))
 
     @property
     def _at_once(self) -> bool:

@@ -11,7 +11,7 @@ from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin import Refusal, Status
-from kappaskin_app.working import with_ending
+from kappaskin_app.working import says_kind, with_ending
 
 _MARGIN, _TEXT = 8, 11  # px
 _MOST = 1000  # px of a caption
@@ -123,4 +123,4 @@ def chosen_file(parent: QWidget, title: str, flat: bool) -> Path | None:
     name, kind = QFileDialog.getSaveFileName(parent, f"Export {title}", "", kinds)
     if not name:
         return None
-    return Path(name) if Path(name).suffix else with_ending(name, kind[-5:-1])
+    return Path(name) if says_kind(Path(name)) else with_ending(name, kind[-5:-1])

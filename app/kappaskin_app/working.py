@@ -157,6 +157,11 @@ def path_in(line: QLineEdit) -> Path:
     return Path(line.text().strip())
 
 
+def says_kind(path: Path) -> bool:
+    """Whether a file's name ends in what could say its kind: `force 0.5 N` does not."""
+    return path.suffix[1:2].isalpha()
+
+
 def ended(name: str, ending: str) -> Path:
     """The file called `name`, with an `ending` if that lacks it: `force 0.5 N` has none."""
     path = Path(name)

@@ -42,10 +42,10 @@ def recording(window: MainWindow, until, tmp_path) -> Path:
 def test_a_png_is_what_was_seen_with_what_it_is(
     name: str, window, until, named, tmp_path, colours_of
 ) -> None:
-    named(tmp_path / "out", "Picture (*.png)")
+    named(tmp_path / "at 0.5 N", "Picture (*.png)")
     window.actions_by_name[f"picture-of-{name}"].trigger()
-    until(lambda: window.statusBar().currentMessage() == f"Saved {tmp_path / 'out.png'}")
-    with Image.open(tmp_path / "out.png") as image:
+    until(lambda: window.statusBar().currentMessage() == f"Saved {tmp_path / 'at 0.5 N.png'}")
+    with Image.open(tmp_path / "at 0.5 N.png") as image:
         assert image.info["Title"] == name
         assert "SIM-0001" in image.info["Description"]
         assert "8 x 8 functions, least-squares" in image.info["Description"]
@@ -217,15 +217,19 @@ def test_only_what_makes_sense_is_asked(name: str, span: bool, at: bool, window)
 def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
     qtbot, named, monkeypatch, tmp_path
 ) -> None:
-    dialog, asked, endings = ExportDialog(), list[str](), list[str]()
+    dialog, asked, names = ExportDialog(), list[str](), list[str]()
     qtbot.addWidget(dialog)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: asked.append(a[-1]) or ("", ""))
     dialog.choose_file.click()
     for kind in asked[0].split(";;"):
-        named(tmp_path / "out", kind)
+        named(tmp_path / "force 0.5 N", kind)
         dialog.choose_file.click()
-        endings.append(Path(dialog.to.text()).suffix)
-    assert endings == [".csv", ".npz", ".h5", ".vtp", ".pvd", ".stl"]
+        names.append(Path(dialog.to.text()).name)
+    endings = [".csv", ".npz", ".h5", ".vtp", ".pvd", ".stl"]
+    assert names == [f"force 0.5 N{ending}" for ending in endings]
+    named(tmp_path / "out.npz", "CSV (*.csv)")
+    dialog.choose_file.click()
+    assert dialog.to.text() == str(tmp_path / "out.npz")
 
 
 def test_what_is_refused_is_said_in_the_dialog(window, tmp_path) -> None:
