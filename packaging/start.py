@@ -10,7 +10,7 @@
     python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
     python3 packaging/start.py mutate ROOM [COUNT] changes touch, wire, fit or scene, for tests
     python3 packaging/start.py core [ARGUMENTS]    tests the library where no GUI is installed
-    python3 packaging/start.py bundle [--try]      makes a folder that needs no Python, tries it
+    python3 packaging/start.py bundle [--try]      makes the app one folder; --try only tries it
 
 Standard library only. A second start with nothing changed installs nothing.
 """

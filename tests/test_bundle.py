@@ -127,3 +127,14 @@ def test_what_is_left_out_is_imported_by_no_line_of_ours():
     for root in ("core", "app"):
         for file in (ROOT / root).rglob("*.py"):
             assert not code.search(file.read_text("utf-8")), file
+
+
+@pytest.mark.parametrize(("argument", "why"), [("--try", "leave out --try"), ("--tri", "or --try")])
+def test_what_cannot_be_tried_is_told(argument, why, tmp_path):
+    code = shutil.copytree(RECIPE, tmp_path / "packaging" / "bundle") / "build.py"
+
+    ran = subprocess.run([sys.executable, code, argument], capture_output=True, text=True)
+
+    assert ran.returncode == 2
+    assert why in ran.stderr
+    assert not (tmp_path / "dist").exists()

@@ -26,8 +26,14 @@ _ELF = b"\x7fELF\x02\x01"  # of 64 bits, little-endian
 
 
 def main(arguments: list[str]) -> int:
-    if "--try" not in arguments:
+    if arguments not in ([], ["--try"]):
+        print(f"expected nothing or --try, got {' '.join(arguments)}", file=sys.stderr)
+        return 2
+    if not arguments:
         build()
+    elif not BUNDLE.is_dir():
+        print(f"expected a bundle at {BUNDLE}, none is there: leave out --try", file=sys.stderr)
+        return 2
     from trying import tried
 
     return tried(BUNDLE)
