@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
+from typing import Protocol
 
 import psutil
 import pytest
@@ -64,7 +65,7 @@ def pytest_unconfigure() -> None:
     _display.close()
 
 
-_PATIENCE = 2.0  # s that what was told to end may take
+_PATIENCE = 30.0  # s that what was told to end may take, however busy the machine is
 
 _PARENT = """
 import sys, time
@@ -175,8 +176,32 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items.sort(key=lambda item: item.path not in long)
 
 
+class Written(Protocol):
+    """A recording that tells how it is doing, anew at each write."""
+
+    @property
+    def written(self) -> object: ...
+
+
 @pytest.fixture(scope="session")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written_out() -> Callable[[Written], None]:
+    """Waits until all that a recording was told is in its file: what follows is in a new chunk."""
+
+    def wait(recording: Written) -> None:
+        end = time.monotonic() + 30.0
+        for _ in range(2):  # the first may have begun before
+            last = recording.written
+            while recording.written is last:
+                assert time.monotonic() < end, "nothing is written"
+                time.sleep(0.005)
+
+    return wait
+
+
+@pytest.fixture(scope="session")
+def recording(
+    tmp_path_factory: pytest.TempPathFactory, written_out: Callable[[Written], None]
+) -> Path:
     """A recording of 2.5 s, 100 frames/s: a note at 0.5 s, 6 x 7 functions from 0.7 s on.
 
     Nothing came from 1 to 1.8 s.
@@ -212,7 +237,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     recorder.set_up(Pipeline(first.sensor, setups[-1]))
     play(first, 1.0)
     recorder.ended(now[0])
-    time.sleep(0.5)  # as long as it takes until what is there has gone to the file
+    written_out(recorder)
     now[0] += 0.8
     play(source(), 2.5)
     recorder.close()

@@ -8,7 +8,9 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import count, cycle
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TypeVar
 
 import numpy as np
@@ -29,6 +31,7 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.engine import Engine
+from kappaskin.ring import Ring
 from kappaskin.status import LOST, OFF, STREAMING, Status
 from kappaskin.tare_taking import TareNews
 
@@ -243,8 +246,8 @@ def test_between_two_skins_there_is_nothing_to_show(engine) -> None:
     engine.connect("sim:centre")
     next_estimate(engine)
     engine.set_up(Setup(18, 18))
-    patch, waited = Patch(0.04, 0.03, 0.0129), 0
-    for m in (20, 21):  # so many that making the pipeline takes a while
+    patch, waited, end = Patch(0.04, 0.03, 0.0129), 0, time.monotonic() + 30.0
+    for m in cycle((20, 21)):  # so many that making the pipeline takes a while
         layout = SensorLayout.regular(patch, m, 20)
         engine.play(Scene("arc", Plate(patch), layout, rate=100.0))
         for _ in range(300):
@@ -254,7 +257,9 @@ def test_between_two_skins_there_is_nothing_to_show(engine) -> None:
             if estimate is not None:
                 assert estimate.curvature.shape == (3, len(status.sensor.layout))
             time.sleep(0.002)
-    assert waited
+        if m == 21 and waited:  # this process may have slept meanwhile
+            break
+        assert time.monotonic() < end, "there was always something to show"
 
 
 def test_a_scene_that_is_refused_is_said_and_the_last_one_plays_on(engine) -> None:
@@ -384,7 +389,20 @@ def test_an_engine_started_anew_scans_the_region_of_the_last_one(own_engine) -> 
 # What it survives
 
 
-def test_killed_it_is_lost_and_connecting_starts_another(own_engine) -> None:
+@pytest.fixture
+def told(monkeypatch) -> list[Status]:
+    """What this process says in the place of one that died; another may have gone on since."""
+    said, write = list[Status](), Ring.write_status
+
+    def written(ring: Ring, status: Status) -> None:
+        said.append(status)
+        write(ring, status)
+
+    monkeypatch.setattr(Ring, "write_status", written)
+    return said
+
+
+def test_killed_it_is_lost_and_connecting_starts_another(own_engine, told) -> None:
     engine = own_engine
     engine.connect("sim:")
     before = next_estimate(engine)
@@ -398,7 +416,7 @@ def test_killed_it_is_lost_and_connecting_starts_another(own_engine) -> None:
 
     engine.set_up(Setup(6, 5, 20, 21))  # there is no process to hear it
     engine.connect("sim:line")
-    assert engine.status().state == OFF  # not yet what the dead one said of itself
+    assert told[-1].state == OFF  # not yet what the dead one said of itself
     after = next_estimate(engine, before.generation)
     assert engine.pid != pid
     assert after.coefficients.shape == (6, 5)
@@ -415,7 +433,7 @@ def killed(engine: Engine) -> None:
     engine.revive()
 
 
-def test_revived_it_goes_on_with_what_was_asked_for_last_and_says_so(own_engine) -> None:
+def test_revived_it_goes_on_with_what_was_asked_for_last_and_says_so(own_engine, told) -> None:
     engine = own_engine
     engine.connect("sim:circle")
     engine.play(load_scene("centre").touched_by(PointLoad(0.03, 0.06, 0.5)))
@@ -427,11 +445,12 @@ def test_revived_it_goes_on_with_what_was_asked_for_last_and_says_so(own_engine)
     before, pid = engine.status(), engine.pid
     assert before.happened == 0
 
+    died = time.monotonic()
     killed(engine)
+    start = time.monotonic()
 
-    status, start = engine.status(), time.monotonic()
-    assert (status.state, status.source) == (LOST, "sim:circle")
-    assert "was started again" in status.message
+    assert (told[-1].state, told[-1].source) == (LOST, "sim:circle")
+    assert "was started again" in told[-1].message
     after = next_estimate(engine, before.generation)
     print(f"back after {time.monotonic() - start:.2f} s")
     assert engine.pid != pid
@@ -440,14 +459,24 @@ def test_revived_it_goes_on_with_what_was_asked_for_last_and_says_so(own_engine)
         ("engine", "the engine process ended unexpectedly and was started again")
     ]
     assert (status.happened, status.message) == (1, "")
-    assert start - 1 < status.events[0].time < start
+    assert died < status.events[0].time < start
     assert after.coefficients.shape == (6, 5)
     assert wait_for(lambda: next_estimate(engine).true_contact.tolist() == [0.03, 0.06])
     assert wait_for(lambda: 0 < (scanned_of(engine) or 0) < 90)
     assert wait_for(lambda: engine.status().playing.speed == 0.0)
 
 
-def test_the_third_death_within_ten_seconds_is_the_last_until_it_is_connected(own_engine) -> None:
+def deaths_apart(monkeypatch, seconds: float) -> None:
+    """Let an engine be started anew each time so long after the last, by its own clock."""
+    times = (n * seconds for n in count(1))
+    clock = SimpleNamespace(monotonic=lambda: next(times))
+    monkeypatch.setattr("kappaskin.engine.time", clock)
+
+
+def test_the_third_death_within_ten_seconds_is_the_last_until_it_is_connected(
+    own_engine, monkeypatch
+) -> None:
+    deaths_apart(monkeypatch, 4.9)
     engine = own_engine
     for deaths in (1, 2):
         killed(engine)
@@ -470,12 +499,10 @@ def test_the_third_death_within_ten_seconds_is_the_last_until_it_is_connected(ow
 
 
 def test_deaths_far_apart_are_survived_each_time(own_engine, monkeypatch) -> None:
-    clock, later = time.monotonic, [0.0]
-    monkeypatch.setattr("kappaskin.engine.time.monotonic", lambda: clock() + later[0])
+    deaths_apart(monkeypatch, 5.1)
     for _ in range(4):
         killed(own_engine)
         assert own_engine.alive
-        later[0] += 5.1
 
 
 def test_interrupted_from_the_keyboard_it_goes_on(own_engine) -> None:
@@ -547,7 +574,7 @@ def test_an_engine_whose_parent_was_killed_ends_within_a_second(parent) -> None:
 
 def test_a_parent_that_ends_as_it_should_leaves_nothing_and_says_nothing(parent) -> None:
     process, pid, block = parent
-    _, errors = process.communicate("", timeout=10)
+    _, errors = process.communicate("", timeout=30)
     assert process.returncode == 0
     assert errors == ""
     assert gone(pid)
@@ -596,6 +623,8 @@ def test_nothing_of_the_last_device_is_shown_as_the_next_ones(own_engine) -> Non
 
 
 AT_REST = replace(load_scene("centre"), stimuli=())
+SLOW = replace(AT_REST, rate=4.0)
+"""The twenty frames of a tare take five seconds."""
 
 
 def tared(engine: Engine) -> TareNews:
@@ -647,7 +676,9 @@ def test_nothing_is_not_tared(engine: Engine) -> None:
 
 def test_a_tare_ends_with_the_connection(engine: Engine) -> None:
     engine.connect("sim:centre")
-    next_estimate(engine)
+    generation = next_estimate(engine).generation
+    engine.play(SLOW)
+    next_estimate(engine, generation)
     before = engine.status().tare.ended
 
     engine.tare()
@@ -660,7 +691,9 @@ def test_a_tare_ends_with_the_connection(engine: Engine) -> None:
 def test_a_tare_that_dies_with_its_engine_is_said_to(own_engine) -> None:
     engine = own_engine
     engine.connect("sim:centre")
-    next_estimate(engine)
+    generation = next_estimate(engine).generation
+    engine.play(SLOW)
+    next_estimate(engine, generation)
     engine.tare()
     assert wait_for(lambda: engine.status().tare.taking)
     assert engine.pid is not None

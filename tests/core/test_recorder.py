@@ -222,7 +222,7 @@ class serving:
 
     def __exit__(self, *_: object) -> None:
         self._stop.set()
-        self._thread.join(2.0)
+        self._thread.join(30.0)
         self._device.close()
 
 
@@ -364,7 +364,7 @@ def test_killed_at_any_moment_half_a_second_is_lost_at_most(tmp_path) -> None:
             engine.connect("sim:circle")
             streaming(engine)
             engine.record(path)
-            assert wait_for(lambda engine=engine: engine.status().recording.active)
+            assert wait_for(lambda engine=engine: engine.status().recording.messages > 50)
             time.sleep(recording_for)
             assert engine.pid is not None
             os.kill(engine.pid, signal.SIGKILL)
@@ -396,10 +396,10 @@ def test_one_whose_parent_is_gone_ends_its_file(tmp_path) -> None:
     with subprocess.Popen(command) as process:
         try:
             part = part_of(path)
-            assert wait_for(lambda: part.exists() and part.stat().st_size > 50_000, 20.0)
+            assert wait_for(lambda: part.exists() and part.stat().st_size > 50_000)
         finally:
             process.kill()
-    assert wait_for(path.exists, 5.0)
+    assert wait_for(path.exists)
     with Recording(path) as recording:
         assert recording.whole
 
@@ -460,10 +460,11 @@ def test_a_recording_goes_on_over_a_replay_of_which_it_has_nothing(
 
 def test_a_recording_is_a_source_like_any_other(recorded) -> None:
     with closing(open_source(f"replay:{recorded}")) as source:
-        end, frames = time.monotonic() + 10, []
+        end, frames = time.monotonic() + 60, []
         while time.monotonic() < end and (not frames or source.replay.at < source.length):
             frames += source.read(0.05)
-        frames += source.read(0.05)
+        while last := source.read(0.05):  # so many are given at once
+            frames += last
         accounting = source.accounting()
         assert source.sensor is not None
         assert source.sensor.simulated

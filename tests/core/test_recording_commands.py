@@ -33,13 +33,13 @@ def test_stopped_it_ends_its_file(tmp_path) -> None:
     command = [sys.executable, "-m", "kappaskin", "record", "sim:circle", str(path)]
     for number in (signal.SIGINT, signal.SIGTERM):
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            end = time.monotonic() + 20
+            end = time.monotonic() + 30
             while time.monotonic() < end:
                 if part_of(path).exists() and part_of(path).stat().st_size > 50_000:
                     break
                 time.sleep(0.02)
             process.send_signal(number)
-            told, _ = process.communicate(timeout=20)
+            told, _ = process.communicate(timeout=30)
             assert process.returncode == 0
         with Recording(path) as recording:
             assert recording.whole

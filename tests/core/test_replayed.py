@@ -1,7 +1,6 @@
 """Where a recording is played, and what comes when."""
 
 import json
-import time
 from contextlib import closing
 from dataclasses import replace
 
@@ -34,7 +33,7 @@ class Clock:
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def recorded(tmp_path_factory, written_out):
     """A thousand frames with a gap in their middle, and an event at either side of it."""
     path, clock = tmp_path_factory.mktemp("replayed") / "circle.mcap", Clock()
     source = SimulatedSource(load_scene("circle"), clock, clock.sleep)
@@ -47,11 +46,11 @@ def recorded(tmp_path_factory):
     while count < FRAMES:
         count += len(source.read(1.0))
         if count == FRAMES // 2 and not shift:
-            time.sleep(0.15)  # into another chunk
+            written_out(recorder)
             shift = GAP
             recorder.happened(Event(clock(), "note", "after"))
         elif count % 100 == 0:
-            time.sleep(0.12)
+            written_out(recorder)
     recorder.close()
     return path
 
@@ -98,12 +97,12 @@ def test_it_is_as_long_as_it_was_with_its_gap_and_events(source) -> None:
     assert (replay.at, replay.speed, replay.looped) == (0.0, 1.0, False)
 
 
-def test_a_word_about_the_clock_ends_no_gap(tmp_path, clock) -> None:
+def test_a_word_about_the_clock_ends_no_gap(tmp_path, clock, written_out) -> None:
     path = tmp_path / "gap.mcap"
     recorder = Recorder(path, 0.0)
     for when in (0.0, 0.1, 0.8, 1.5, 2.2, 2.25, 2.5, 2.6, 3.5):
         recorder.came(when, encode_information(0, 0.0, "{}"))
-        time.sleep(0.15)  # into another chunk
+        written_out(recorder)
     recorder.close()
     with closing(ReplayedSource(path, clock, clock.sleep)) as source:
         gaps = source.replay.gaps

@@ -136,7 +136,7 @@ def test_a_file_that_appears_meanwhile_stays(tmp_path) -> None:
 def test_a_file_that_is_taken_away_ends_the_recording(tmp_path) -> None:
     file = RecordingFile(tmp_path / "a.mcap")
     part_of(file.path).unlink()
-    end = time.monotonic() + 5
+    end = time.monotonic() + 30
     while file.written.active and time.monotonic() < end:
         time.sleep(0.01)
     assert "it was moved or removed" in file.written.trouble

@@ -2,7 +2,6 @@
 
 import os
 import struct
-import time
 
 import pytest
 import zstandard
@@ -21,22 +20,22 @@ from kappaskin.recording.writing import RecordingFile, part_of
 LINE = m.pack_line(0.0, False, bytes(600))
 
 
-def recorded(path, messages=200):
+def recorded(path, written_out, messages=200):
     """A recording of so many messages 1 ms after each other, with an event and a file."""
     file = RecordingFile(path)
     for n in range(messages):
         file.put(m.LINES, n * 1e-3, m.pack_line(n * 1e-3, False, bytes([n % 256]) * 600))
         if n % 50 == 25:
-            time.sleep(0.25)  # into chunks of their own
+            written_out(file)
     file.attach("scene.toml", "application/toml", b"a = 1")
     file.close()
     return file
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole(tmp_path_factory, written_out):
     path = tmp_path_factory.mktemp("recording") / "whole.mcap"
-    recorded(path)
+    recorded(path, written_out)
     return path
 
 
@@ -132,9 +131,9 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("later", [2, 10**12])
-def test_one_of_a_later_version_is_refused(later: int, tmp_path, monkeypatch) -> None:
+def test_one_of_a_later_version_is_refused(later, tmp_path, monkeypatch, written_out) -> None:
     monkeypatch.setattr(writing, "FORMAT", later)
-    recorded(tmp_path / "later.mcap", 3)
+    recorded(tmp_path / "later.mcap", written_out, 3)
     with pytest.raises(Refusal, match=r"format 1, got [12].*update this program"):
         Recording(tmp_path / "later.mcap")
 
