@@ -75,12 +75,13 @@ def _address(note: Path) -> str:
 class Waiting:
     """Waits until another process comes, and tells it what was `left`; `line` is the one to it.
 
-    An `OSError` where no note can be left in `folder`.
+    `told` is what it was told. An `OSError` where no note can be left in `folder`.
     """
 
     def __init__(self, folder: Path, left: Callable[[], Left]) -> None:
         self.line: Connection[Any, Any] | None = None
         self._left, self._over, key = left, threading.Event(), secrets.token_bytes(_KEY)
+        self.told = left()
         folder.mkdir(0o700, parents=True, exist_ok=True)
         self._note = folder / f"{secrets.token_hex(8)}.note"
         self._listener = Listener(_address(self._note), backlog=_QUEUE, authkey=key)
@@ -103,8 +104,9 @@ class Waiting:
             self._note.unlink(missing_ok=True)
             self._listener.close()
         if line is not None:
+            self.told = self._left()
             with suppress(OSError):  # it is gone again: whoever reads from it finds out
-                line.send(self._left())
+                line.send(self.told)
             self.line = line
 
     def end(self) -> None:

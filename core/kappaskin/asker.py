@@ -68,8 +68,8 @@ class Asker:
                 return self._end()
         if self._waiting.line is None:
             return ""
-        self._line, self._waiting = self._waiting.line, None
-        return f"the recording {self._left().lasted}"
+        self._line, told, self._waiting = self._waiting.line, self._waiting.told, None
+        return f"the recording {told.lasted}"
 
     def _begin_to_wait(self) -> str:
         self._since = time.monotonic()

@@ -96,7 +96,10 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
     file = tmp_path / "x.mcap"
     engine_alone = abandoned(folder, file)
     assert wait_for(lambda: list(folder.glob("*.note")))
+    part = part_of(file)
+    was = part.stat().st_size
     time.sleep(0.7)  # longer than an engine outlives its parent that nobody may adopt
+    assert wait_for(lambda: part.stat().st_size > was + 2**18)
 
     with Engine(orphans=folder) as engine:
         assert engine.adopted is not None
@@ -132,7 +135,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
     missing = sequences[-1] + 1 - len(sequences)
     assert lost <= missing <= lost_at_most
     died, came = told
-    assert ((died < contacts) & (contacts < came)).sum() > 50
+    assert ((died < contacts) & (contacts < came)).sum() > 10  # of as many as there was time for
 
 
 def test_adopted_it_is_revived_as_any_other_when_it_dies(abandoned, folder, tmp_path) -> None:
@@ -218,8 +221,10 @@ def test_a_request_that_breaks_off_is_no_request(asked_by) -> None:
 
 
 def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
-    asked_by, folder
+    asked_by, folder, monkeypatch
 ) -> None:
+    clock, later = time.monotonic, [0.0]
+    monkeypatch.setattr("kappaskin.asker.time.monotonic", lambda: clock() + later[0])
     line, asker = asked_by()
     line.send(Setup(5, 4))
     line.send(Connect("sim:line"))
@@ -231,7 +236,10 @@ def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
     assert orphan is not None
     assert orphan.left.asked == Asked(Setup(5, 4), source="sim:line", entrusted=b"mine")
     assert (orphan.left.rings, orphan.pid) == (("ring", "beside"), os.getpid())
-    assert "went on for 0 s" in wait_for(lambda: asker.look(recording=True))
+    later[0] = 100.0  # as where this process was put to sleep meanwhile
+    told = wait_for(lambda: asker.look(recording=True))
+    assert told == f"the recording {orphan.left.lasted}"
+    assert orphan.left.alone < 100.0
     orphan.line.send(Note("here"))
     assert asker.asked(1.0) == [Note("here")]
     orphan.close()
@@ -330,10 +338,10 @@ def test_who_has_not_the_key_is_told_nothing_and_another_may_come(
 ) -> None:
     (note,) = folder.glob("*.note")
     with Client(_address(note)) as stranger:
-        assert stranger.poll(5.0)
+        assert stranger.poll(30.0)
         stranger.recv_bytes()
         stranger.send_bytes(b"let me in")
-        assert stranger.poll(5.0)
+        assert stranger.poll(30.0)
         assert stranger.recv_bytes() == b"#FAILURE#"
         with pytest.raises(EOFError):
             stranger.recv_bytes()
