@@ -10,6 +10,7 @@ import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,10 +20,11 @@ import serial
 
 from kappaskin import Frame, Sensor, SourceError, load_scene
 from kappaskin.sources import SerialSource, information, open_source
+from kappaskin.sources import line as serial_line
 from kappaskin.sources.wire import encode_information, encode_samples
 
 pty = pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-fcntl, grp, termios, tty = map(pytest.importorskip, ("fcntl", "grp", "termios", "tty"))
+grp, tty = map(pytest.importorskip, ("grp", "tty"))
 lists_descriptors = pytest.mark.skipif(
     not Path("/proc/self/fd").exists(), reason="counts descriptors in /proc"
 )
@@ -57,14 +59,6 @@ class Line:
         while data:
             data = data[os.write(self._master, data[:2048]) :]
 
-    def wait_until_taken(self) -> None:
-        """Until the program has taken every byte: what it has not is gone with the line."""
-        slave = os.open(self.port, os.O_RDWR | os.O_NOCTTY)
-        while struct.unpack("i", fcntl.ioctl(slave, termios.FIONREAD, bytes(4)))[0]:
-            time.sleep(0.01)
-        os.close(slave)
-        time.sleep(0.05)
-
     def unplug(self) -> None:
         if self._master >= 0:
             os.close(self._master)
@@ -95,6 +89,7 @@ def opened() -> Iterator[Callable[[str], SerialSource]]:
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("kappaskin.sources.serial_line._PATIENCE", 0.15)
+    monkeypatch.setattr("kappaskin.sources.serial_line._DWELL", 60.0)  # at one baud rate
 
 
 def read(source: SerialSource, count: int, within: float = 15.0) -> list[Frame]:
@@ -104,6 +99,20 @@ def read(source: SerialSource, count: int, within: float = 15.0) -> list[Frame]:
     while len(frames) < count and time.monotonic() < end:
         frames += source.read(0.02)
     return frames
+
+
+def read_until(source: SerialSource, holds: Callable[[], bool]) -> list[Frame]:
+    """The frames that came until something held."""
+    frames, end = list[Frame](), time.monotonic() + 30.0
+    while not holds():
+        assert time.monotonic() < end, source.trouble
+        frames += source.read(0.02)
+    return frames
+
+
+def read_all(source: SerialSource, sent: bytes) -> list[Frame]:
+    """The frames of all the bytes that were sent since the source was opened."""
+    return read_until(source, lambda: source.accounting().bytes_in == len(sent))
 
 
 def read_to_trouble(source: SerialSource) -> tuple[list[Frame], str]:
@@ -166,7 +175,7 @@ def test_of_frames_that_wait_for_it_the_newest_are_kept_in_bounded_memory(
     monkeypatch.setattr("kappaskin.sources.serial_line._UNREAD", 10 * (300 + 64))
     source = opened(line.port)
     line.write(stream(0, 40))
-    assert read(source, 1, within=0.3) == []
+    assert read_all(source, stream(0, 40)) == []
     line.write(introduction(40))
     assert sequences(read(source, 10)) == list(range(30, 40))
 
@@ -184,9 +193,9 @@ def test_bytes_that_nobody_takes_are_thrown_away_beyond_a_bound_and_counted(
         assert time.monotonic() < end
         time.sleep(0.01)
 
-    frames = read(source, 101, within=0.3)
+    frames = read_all(source, sent)
     line.write(stream(101, 111))
-    frames += read(source, 10)
+    frames += read_all(source, sent + stream(101, 111))
 
     seen = source.accounting()
     assert seen.balanced
@@ -243,7 +252,7 @@ def test_a_loop_url_works_like_a_port(opened, monkeypatch) -> None:
 @pytest.fixture
 def server() -> Iterator[socket.socket]:
     with socket.create_server(("127.0.0.1", 0)) as made:
-        made.settimeout(5)
+        made.settimeout(30)
         yield made
 
 
@@ -270,14 +279,18 @@ def test_what_came_before_a_socket_closed_is_not_lost(server, opened) -> None:
 
 
 def test_a_silent_socket_keeps_nobody_waiting(server, opened) -> None:
-    source = opened(url_of(server))
-    with server.accept()[0]:
-        start = time.monotonic()
-        assert source.read(0.05) == []
-        assert time.monotonic() - start < 1
-        start = time.monotonic()
-        source.close()
-        assert time.monotonic() - start < 1
+    reads, closes = list[float](), list[float]()
+    for _ in range(3):  # each time, unless the machine is busy
+        source = opened(url_of(server))
+        with server.accept()[0]:
+            start = time.monotonic()
+            assert source.read(0.05) == []
+            reads.append(time.monotonic() - start)
+            start = time.monotonic()
+            source.close()
+            closes.append(time.monotonic() - start)
+    assert min(reads) < 1
+    assert min(closes) < 1
 
 
 # What goes wrong once it is open
@@ -291,18 +304,19 @@ def test_a_silent_device_is_given_up(line, opened, hasty) -> None:
     )
 
 
-def test_a_device_is_given_the_patience_that_is_promised(line, opened, monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.sources.serial_line._PATIENCE", 1.0)
-    source = opened(line.port)
-    start = time.monotonic()
-    _, why = read_to_trouble(source)
-    assert "silent for more than 1 s" in why
-    assert 0.9 < time.monotonic() - start < 2
+def test_a_device_is_given_the_patience_that_is_promised(line) -> None:
+    now = [100.0]
+    with closing(SerialSource(line.port, lambda: now[0])) as source:
+        for now[0], why in ((102.9, ""), (103.1, "silent for more than 3 s")):
+            assert source.read(0.0) == []
+            assert why in source.trouble
+            assert bool(source.trouble) == bool(why)
 
 
 def test_another_protocol_is_told_apart(line, opened, hasty) -> None:
     source = opened(line.port)
-    line.write(b"$GPGGA,123519,4807.038,N\r\n" * 10)
+    line.write(said := b"$GPGGA,123519,4807.038,N\r\n" * 10)
+    assert read_all(source, said) == []
     frames, why = read_to_trouble(source)
     assert frames == []
     assert "260 bytes came but no message of wire version 1" in why
@@ -313,7 +327,8 @@ def test_another_version_is_told_apart(line, opened, hasty) -> None:
     head = b"\x4b\xa7" + struct.pack("<BBIIQ", 7, 1, len(TEXT), 0, 0)
     body = head + struct.pack("<H", binascii.crc_hqx(head, 0)) + TEXT.encode()
     source = opened(line.port)
-    line.write(body + struct.pack("<I", zlib.crc32(body)))
+    line.write(said := body + struct.pack("<I", zlib.crc32(body)))
+    read_all(source, said)
     _, why = read_to_trouble(source)
     assert "speaks wire version 7, this program speaks 1; update the older" in why
 
@@ -321,6 +336,7 @@ def test_another_version_is_told_apart(line, opened, hasty) -> None:
 def test_a_device_that_never_says_what_it_is_is_given_up(line, opened, hasty) -> None:
     source = opened(line.port)
     line.write(stream(0, 5))
+    assert read_all(source, stream(0, 5)) == []
     _, why = read_to_trouble(source)
     assert "messages come, but for more than 0.15 s none said what the device is" in why
 
@@ -349,10 +365,21 @@ def test_a_channel_that_the_device_does_not_have_is_refused_after_the_frames_bef
     assert source.trouble == why  # until it says something else of itself
 
 
-def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened) -> None:
+def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened, monkeypatch) -> None:
+    taken, arriving = bytearray(), serial_line._arriving  # noqa: SLF001
+
+    def noted(port: serial.SerialBase) -> bytes:
+        data = arriving(port)
+        taken.extend(data)
+        return data
+
+    monkeypatch.setattr(serial_line, "_arriving", noted)
     source = opened(line.port)
-    line.write(introduction(0) + stream(1, 6))
-    line.wait_until_taken()
+    line.write(sent := introduction(0) + stream(1, 6))
+    end = time.monotonic() + 30.0
+    while len(taken) < len(sent):  # what the program has not taken is gone with the line
+        assert time.monotonic() < end
+        time.sleep(0.01)
     line.unplug()
 
     frames, why = read_to_trouble(source)
