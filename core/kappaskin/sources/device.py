@@ -132,12 +132,12 @@ class PseudoDevice:
                 self._send(message)
 
     def _send(self, message: bytes) -> None:
-        self.spent += 1
         if self._held + len(message) > _OUTBOX:
             self.unsent += 1
         else:
             self._outbox.append(message)
             self._held += len(message)
+        self.spent += 1  # last: of what is spent it is known whether it goes out
 
     def _flush(self) -> None:
         with suppress(OSError):  # full, or nobody listens any more: what stays is told as unsent
