@@ -59,6 +59,13 @@ def heard(receiver: socket.socket, kind: str, **wanted: object) -> dict[str, obj
     raise AssertionError(f"no {kind} with {wanted}")
 
 
+def until(holds: Callable[[], object]) -> None:
+    end = time.monotonic() + 30
+    while not holds():
+        assert time.monotonic() < end, "it never came to hold"
+        time.sleep(0.02)
+
+
 def target(engine: Engine, within: float = 30.0) -> Published:
     """How the first target is doing, once that is known of all."""
     end = time.monotonic() + within
@@ -81,13 +88,13 @@ def test_nothing_is_sent_before_it_is_asked_for_nor_after(engine, receiver, port
         receiver.recv(9999)
     assert engine.status().publishing.targets == ()
     engine.publish([f"udp://127.0.0.1:{port}"])
-    receiver.settimeout(10)
+    receiver.settimeout(30)
     told = heard(receiver, "contact", present=True)
     assert (told["source"], told["version"]) == ("sim", 1)
     assert told["x_m"] == pytest.approx(0.05, abs=1e-3)
     assert heard(receiver, "shape")["functions_x"] == 4
     engine.publish([])
-    time.sleep(0.5)
+    until(lambda: engine.status().publishing.targets == ())
     receiver.setblocking(False)
     with suppress(BlockingIOError):
         while receiver.recv(9999):
@@ -119,13 +126,15 @@ def test_status_tells_what_was_sent_and_how_late(engine, receiver, port) -> None
     engine.connect("sim:centre")
     engine.publish([f"udp://127.0.0.1:{port}"])
     heard(receiver, "contact")
-    time.sleep(1.5)
-    told, latency = target(engine), engine.status().publishing.latency
+
+    def as_promised() -> bool:
+        late = engine.status().publishing.latency
+        return target(engine).sent > 50 and 0 < late.send < late.whole < 1 and 0 <= late.wait < 1
+
+    until(as_promised)  # as it is without what a busy machine takes
+    told = target(engine)
     assert told.target == f"udp://127.0.0.1:{port}"
-    assert told.sent > 50
     assert (told.dropped, told.refusal) == (0, "")
-    assert 0 < latency.send < latency.whole < 1
-    assert 0 <= latency.wait < 1
 
 
 def test_a_target_that_is_none_is_refused_before_anything_changes(engine, receiver, port) -> None:
@@ -149,7 +158,9 @@ def test_a_host_that_is_not_known_and_a_port_in_use_are_told_and_the_rest_goes_o
         heard(receiver, "contact")
         target(engine)
         unknown, busy, fine = engine.status().publishing.targets
-    assert "nowhere.invalid is not known" in unknown.refusal
+    # The second, where a network takes long to tell that.
+    why = "nowhere.invalid is not known", "udp://nowhere.invalid:9870: it was not found out"
+    assert any(words in unknown.refusal for words in why)
     assert "cannot be listened on" in busy.refusal
     assert fine.refusal == ""
 
@@ -198,16 +209,32 @@ def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
             process.communicate(timeout=30)
 
 
+def taken(port: int) -> bool:
+    """Whether somebody listens to a UDP port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        try:
+            one.bind(("", port))
+        except OSError:
+            return True
+    return False
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 def test_publish_sends_what_listen_tells(start) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
         found.bind(("127.0.0.1", 0))
         port = found.getsockname()[1]
-    listening = start("listen", "--udp", port, "--seconds", 6)
-    publishing = start("publish", "sim:centre", "--udp", f"127.0.0.1:{port}", "--seconds", 3)
+    listening = start("listen", "--udp", port)
+    until(lambda: taken(port))
+    publishing, lines = start("publish", "sim:centre", "--udp", f"127.0.0.1:{port}"), list[str]()
+    until(lambda: lines.append(publishing.stdout.readline()) or "99 % within" in lines[-1])
+    publishing.terminate()
     said, _ = publishing.communicate(timeout=30)
+    said = "".join(lines) + said
     assert publishing.returncode == 0
     assert re.search(r"streaming +\d+ frames/s +udp://127.0.0.1:\d+: \d+ sent, \d+ dropped", said)
     assert "99 % within" in said
+    listening.terminate()
     told, _ = listening.communicate(timeout=30)
     assert listening.returncode == 0
     assert "status    streaming  Simulated skin" in told
@@ -249,7 +276,7 @@ def test_what_cannot_be_published_is_refused(run, words: list[str], reason: str)
 
 
 def test_publish_fails_where_there_is_nothing_to_send(run, port) -> None:
-    code, said, _ = run("publish", "/dev/nowhere", "--udp", f"127.0.0.1:{port}", "--seconds", 1)
+    code, said, _ = run("publish", "/dev/nowhere", "--udp", f"127.0.0.1:{port}", "--seconds", 3)
     assert code == 1
     assert "no such port" in said
 

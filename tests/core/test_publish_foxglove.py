@@ -8,7 +8,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -149,19 +150,27 @@ def test_a_client_of_another_protocol_is_refused(server) -> None:
 def test_every_channel_holds_what_its_schema_says(client, server, message) -> None:
     one = client(*TOPICS)
     schemas = {c["id"]: json.loads(c["schema"]) for c in one.first[1]["channels"]}
-    server.send(message)
-    server.tell(STATE)
+    contact, shape = json.loads(message.contact), json.loads(message.shape)
     told: dict[int, Told] = {}
-    while len(told) < len(TOPICS):
-        number, when, content = parsed(one.recv(PATIENCE))
-        told[number - 70] = content
-        assert abs(when - time.time()) < 10 or number - 70 == TOPICS["/log"]
+
+    def all_of_it() -> bool:
+        # Again where one was dropped: the server's own thread sends the skin meanwhile.
+        server.send(copy(message))
+        server.tell(STATE)
+        with suppress(TimeoutError):
+            while len(told) < len(TOPICS):
+                number, when, content = parsed(one.recv(0.5))
+                told[number - 70] = content
+                assert abs(when - time.time()) < 60 or number - 70 == TOPICS["/log"]
+        return len(told) == len(TOPICS)
+
+    until(all_of_it)
     for number, content in told.items():
         assert obeys(content, schemas[number]), content
         if content.get("kind"):
             assert content.keys() == schemas[number]["properties"].keys()
-    assert told[TOPICS["/contact"]] == json.loads(message.contact)
-    assert told[TOPICS["/shape"]] == json.loads(message.shape)
+    assert told[TOPICS["/contact"]] == contact
+    assert told[TOPICS["/shape"]] == shape
     assert told[TOPICS["/log"]]["message"] == "gap: 3 messages lost"
 
 
@@ -241,9 +250,9 @@ def test_a_client_that_floods_is_let_go(client, server) -> None:
     one = client()
 
     def flood() -> None:
-        for _ in range(200):
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
             one.send("x" * (PER_SECOND // 50))
-            time.sleep(0.001)
 
     with pytest.raises(ConnectionClosed):
         flood()
@@ -261,7 +270,7 @@ def test_garbage_in_place_of_a_handshake_ends_the_connection(server, data: bytes
     with socket.create_connection(place(server)) as one:
         one.sendall(data)
         one.shutdown(socket.SHUT_WR)
-        one.settimeout(5)
+        one.settimeout(PATIENCE)
         try:
             while one.recv(4096):
                 pass
@@ -273,7 +282,7 @@ def test_garbage_in_place_of_a_handshake_ends_the_connection(server, data: bytes
 def test_who_connects_and_says_nothing_is_let_go(server, monkeypatch) -> None:
     monkeypatch.setattr("kappaskin.publish.client._PATIENCE", 0.2)
     with socket.create_connection(place(server)) as one:
-        one.settimeout(5)
+        one.settimeout(PATIENCE)
         assert one.recv(10) == b""
     until(lambda: not server.receivers)
 
@@ -304,11 +313,11 @@ def deaf(server) -> Iterator[socket.socket]:
 
 
 def test_a_client_that_never_reads_holds_nobody_up(client, server, message, deaf) -> None:
-    hearing, slowest, heard = client("/shape", "/contact"), 0.0, 0
+    hearing, took, heard = client("/shape", "/contact"), list[float](), 0
     for _ in range(4000):
         began = time.perf_counter()
         server.send(message)
-        slowest = max(slowest, time.perf_counter() - began)
+        took.append(time.perf_counter() - began)
         while heard < server.receivers[1].sent:
             parsed(hearing.recv(PATIENCE))
             heard += 1
@@ -318,19 +327,21 @@ def test_a_client_that_never_reads_holds_nobody_up(client, server, message, deaf
     assert lost.dropped > 500
     assert lost.sent + lost.dropped == 4000
     assert lost.trouble == "too slow"
-    assert slowest < 0.5  # a wait for the deaf one would last for good
+    # Of 4000 more than 500 would have waited for it; a busy machine holds up a few.
+    assert np.percentile(took, 99) < 0.1
 
 
 def test_a_client_that_takes_nothing_for_long_is_let_go(server, message, deaf, monkeypatch) -> None:
     monkeypatch.setattr("kappaskin.publish.client.STUCK", 0.3)
-    end = time.monotonic() + 10
+    end = time.monotonic() + PATIENCE
     while server.receivers and time.monotonic() < end:
         server.send(message)
     assert not server.receivers
     assert server.counts[1] > 0
 
 
-def test_only_so_many_clients_are_served(server) -> None:
+def test_only_so_many_clients_are_served(server, monkeypatch) -> None:
+    monkeypatch.setattr("kappaskin.publish.client._PATIENCE", 2 * PATIENCE)  # they say nothing
     many = [socket.create_connection(place(server)) for _ in range(3 * MOST_CLIENTS)]
     until(lambda: len(server.receivers) == MOST_CLIENTS)
     closed = [one for one in many[MOST_CLIENTS:] if one.recv(1) == b""]
