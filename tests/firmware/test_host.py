@@ -124,7 +124,7 @@ class Running:
     def end(self) -> dict[str, int]:
         if self.ended is None:
             self.process.send_signal(signal.SIGTERM)
-            _, errors = self.process.communicate(timeout=10)
+            _, errors = self.process.communicate(timeout=30)
             # An address or undefined-behaviour report would stand before the last line.
             assert self.process.returncode == 0, errors
             self.ended = json.loads(errors)
@@ -253,7 +253,7 @@ def test_it_plays_the_counts_of_a_file_round_and_round(serve, tmp_path) -> None:
         frames = heard(line, 30)
 
     assert [said.counts for said in frames] == [counts[n % 7].tolist() for n in range(30)]
-    assert device.process.wait(5) == 0
+    assert device.process.wait(30) == 0
 
 
 def test_a_gain_changes_the_counts(serve, tmp_path) -> None:
@@ -309,19 +309,21 @@ def test_garbage_from_the_host_harms_nothing(line) -> None:
 
 
 def test_without_a_listener_it_spends_nothing_and_the_next_is_introduced(serve) -> None:
-    device = serve(rate=2000)
+    device, lines, busy = serve(rate=2000), list[Line](), list[float]()
     time.sleep(0.1)
-    with closing(Line(device.port)) as first:
-        heard(first, 5)
-    time.sleep(0.2)
-    with closing(Line(device.port)) as second:
-        heard(second, 5)
+    for _ in range(2):
+        opened = time.monotonic()
+        with closing(Line(device.port)) as line:
+            heard(line, 5)
+        lines.append(line)
+        busy.append(time.monotonic() - opened)  # in which it may have gone on unheard
+        time.sleep(0.2)
 
-    told = device.end()
+    told, (first, second) = device.end(), lines
     assert first.said[0].sequence == 0
     assert second.said[0].kind == INFORMATION
-    assert second.said[0].sequence - first.said[-1].sequence < 200
-    assert told["spent"] - second.said[-1].sequence < 200
+    assert second.said[0].sequence - first.said[-1].sequence < 200 + 2000 * busy[0]
+    assert told["spent"] - second.said[-1].sequence < 200 + 2000 * busy[1]
 
 
 def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost(serve) -> None:
@@ -341,17 +343,25 @@ def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost
     assert told["unsent"] >= lost
 
 
+def made(link: Path) -> int | None:
+    """When a link was made, in ns; None while there is none."""
+    try:
+        return link.lstat().st_mtime_ns
+    except OSError:
+        return None
+
+
 def test_it_is_unplugged_and_comes_back_under_its_link(serve, tmp_path) -> None:
     link = tmp_path / "port"
     device = serve(rate=500, pty_link=link, away=60)
     numbers = list[int]()
     for _ in range(4):
+        was = made(link)
         with closing(Line(str(link))) as line:
             heard(line, 5)
             device.process.send_signal(signal.SIGUSR1)
-            assert wait_for(lambda: not link.is_symlink())
+            assert wait_for(lambda was=was: made(link) not in (was, None))
             numbers += [said.sequence for said in line.said]
-        assert wait_for(link.is_symlink)
 
     told = device.end()
     assert told["unplugged"] == 4
@@ -361,8 +371,9 @@ def test_it_is_unplugged_and_comes_back_under_its_link(serve, tmp_path) -> None:
 
 
 def test_it_is_unplugged_again_and_again(serve, tmp_path) -> None:
-    device = serve(rate=500, pty_link=tmp_path / "port", unplug_every=30, away=20)
-    time.sleep(0.4)
+    link, seen = tmp_path / "port", set[int | None]()
+    device = serve(rate=500, pty_link=link, unplug_every=30, away=20)
+    wait_for(lambda: seen.add(made(link)) or len(seen - {None}) > 3)
 
     assert device.end()["unplugged"] > 2
 
@@ -372,11 +383,11 @@ def test_it_is_unplugged_again_and_again(serve, tmp_path) -> None:
 
 @pytest.mark.parametrize("options", [{"rate": 2000}, {"rate": 200, "grid": "64x64"}])
 def test_nothing_is_lost_at_the_rates_that_are_promised(compiled, options) -> None:
-    program, frames = compiled("kappaskin_host", *SOURCES), options["rate"] // 4
+    program, frames = compiled("kappaskin_host", *SOURCES), options["rate"] // 5
     device = started(program, **options, frames=frames)
     with closing(Line(device.port)) as line:
         assert len(heard(line, frames)) == frames
-    assert device.process.wait(5) == 0
+    assert device.process.wait(30) == 0
     assert device.end()["unsent"] == 0
 
 
@@ -422,7 +433,9 @@ def test_the_library_reads_it(serve) -> None:
     ],
 )
 def test_what_makes_no_sense_is_refused(program, words, expected) -> None:
-    told = subprocess.run([program, *words], capture_output=True, text=True, check=False, timeout=9)
+    told = subprocess.run(
+        [program, *words], capture_output=True, text=True, check=False, timeout=30
+    )
 
     assert told.returncode == 2
     assert expected in told.stderr
