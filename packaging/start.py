@@ -42,7 +42,7 @@ PICTURE = ROOT / "kappaskin-window.png"
 VENV, CORE_VENV = ROOT / ".venv", ROOT / ".venv-core"
 STAMP = VENV / "kappaskin-stamp"
 REFUSED = 2
-PATIENCE = 10.0  # s that a process is given to start or to end
+PATIENCE = 30.0  # s that a process is given to start or to end
 
 READING = (
     ("ruff", "check"),

@@ -331,23 +331,23 @@ def test_a_line_that_is_lost_in_the_middle_is_refused(monkeypatch) -> None:
 
 
 @contextmanager
-def serving(dwell: float, steps=STEPS) -> Iterator[str]:
+def serving(dwell: float, steps=STEPS) -> Iterator[PseudoDevice]:
     device = PseudoDevice(replace(SCENE, laid=Presentation(steps, dwell)))
     stop = threading.Event()
     thread = threading.Thread(target=device.serve, args=(stop.is_set,))
     thread.start()
     try:
-        yield device.port
+        yield device
     finally:
         stop.set()
-        thread.join(2.0)
+        thread.join(30.0)
         device.close()
 
 
 def test_a_device_on_the_line_is_calibrated_within_the_standard_errors(run, tmp_path) -> None:
     out = tmp_path / "s.toml"
-    with serving(dwell=0.05, steps=schedule()) as port:
-        code, printed, told = run("calibrate", port, "--out", out, "--dwell", 0.05)
+    with serving(dwell=0.05, steps=schedule()) as device:
+        code, printed, told = run("calibrate", device.port, "--out", out, "--dwell", 0.05)
     assert code == 0, told
     assert "300 of 300 channels passed" in printed
     found = from_toml(out)
@@ -373,11 +373,13 @@ def test_a_device_whose_line_is_lost_in_the_middle_leaves_no_file(run, tmp_path)
 
 
 def test_a_device_that_is_already_on_its_way_is_refused(run, tmp_path) -> None:
-    with serving(dwell=0.05) as port:
-        line = os.open(port, os.O_RDWR | os.O_NOCTTY)
-        time.sleep(0.3)
+    with serving(dwell=0.05) as device:
+        line, end = os.open(device.port, os.O_RDWR | os.O_NOCTTY), time.monotonic() + 30.0
+        while device.samples < 0.2 * SCENE.rate and time.monotonic() < end:
+            time.sleep(0.01)
         os.close(line)
-        found = run("calibrate", port, "--out", tmp_path / "s.toml", "--dwell", 0.05, *FAST[:2])
+        out = tmp_path / "s.toml"
+        found = run("calibrate", device.port, "--out", out, "--dwell", 0.05, *FAST[:2])
     refused(found, "step 1 was not seen: the device presents step.*start it anew", tmp_path)
 
 
@@ -389,9 +391,9 @@ def started(port: str, out: Path, **streams: Any) -> subprocess.Popen[str]:
 
 
 def test_closed_standard_input_is_refused_with_what_to_do(tmp_path) -> None:
-    with serving(dwell=1.0) as port:
-        process = started(port, tmp_path / "s.toml", stdin=subprocess.DEVNULL)
-        printed, told = process.communicate(timeout=30)
+    with serving(dwell=1.0) as device:
+        process = started(device.port, tmp_path / "s.toml", stdin=subprocess.DEVNULL)
+        printed, told = process.communicate(timeout=60)
     assert "1/103  Flat table" in told
     code = process.returncode
     refused(
@@ -402,8 +404,8 @@ def test_closed_standard_input_is_refused_with_what_to_do(tmp_path) -> None:
 
 
 def test_ctrl_c_stops_it_and_leaves_no_file(tmp_path) -> None:
-    with serving(dwell=1.0) as port:
-        process = started(port, tmp_path / "s.toml", stdin=subprocess.PIPE)
+    with serving(dwell=1.0) as device:
+        process = started(device.port, tmp_path / "s.toml", stdin=subprocess.PIPE)
         assert process.stderr is not None
         assert ADVICE in process.stderr.readline()
         time.sleep(0.2)

@@ -699,7 +699,7 @@ def test_the_engine_goes_over_to_a_calibration_and_keeps_it_from_other_devices(s
     with Engine(Setup(calibration=second.calibration)) as engine:
 
         def wait_for(told):
-            end = time.monotonic() + 10
+            end = time.monotonic() + 30
             while not told(status := engine.status()) and time.monotonic() < end:
                 time.sleep(0.02)
             return status

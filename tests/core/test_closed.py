@@ -61,7 +61,7 @@ def test_a_running_engine_listens_on_no_network(kind, request) -> None:
     source = "sim:" if kind == "simulated" else request.getfixturevalue("port")
     with Engine() as engine:
         engine.connect(source)
-        end = time.monotonic() + 10.0
+        end = time.monotonic() + 30.0
         while engine.status().source != source and time.monotonic() < end:
             time.sleep(0.02)
         time.sleep(0.3)

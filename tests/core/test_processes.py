@@ -47,7 +47,7 @@ def _waiting_for(ended: list[object]):
     """Computes until it is ended, telling nothing."""
 
     def compute() -> list[object]:
-        give_up = time.monotonic() + 5
+        give_up = time.monotonic() + 30
         while len(ended) < 2 and time.monotonic() < give_up:
             time.sleep(0.001)
         return []

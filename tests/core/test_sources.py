@@ -82,7 +82,7 @@ def source(request: pytest.FixtureRequest) -> Iterator[Source]:
 
 def frames_of(source: Source) -> list[Frame]:
     """The first frames that come, few."""
-    frames, patience = list[Frame](), time.monotonic() + 10.0
+    frames, patience = list[Frame](), time.monotonic() + 30.0
     while len(frames) < FRAMES:
         assert time.monotonic() < patience, "nothing comes"
         frames += source.read(0.02)
