@@ -25,10 +25,14 @@ TEXT = information.to_json(SCENE.sensor())
 
 
 @pytest.fixture(autouse=True)
-def hasty(monkeypatch):
-    monkeypatch.setattr("kappaskin.sources.serial_line._PATIENCE", 0.3)
-    monkeypatch.setattr("kappaskin.sources.diagnosis._SEARCH", 1.0)
+def soon(monkeypatch):
     monkeypatch.setattr("kappaskin.sources.diagnosis._LISTEN", 1.0)
+
+
+@pytest.fixture
+def hasty(monkeypatch):
+    monkeypatch.setattr("kappaskin.sources.serial_line._PATIENCE", 0.9)
+    monkeypatch.setattr("kappaskin.sources.diagnosis._SEARCH", 1.2)
 
 
 @pytest.fixture
@@ -81,7 +85,7 @@ def test_a_device_that_is_well_is_told_of_whole(served):
     assert found.said_rate == 100.0
     assert 0 < found.clock_sd < 0.1
     assert found.accounting.balanced
-    assert found.accounting.accepted > 50
+    assert found.accounting.accepted > 10  # of a hundred, where the machine does nothing else
     assert [event.kind for event in found.events] == ["met"]
 
 
@@ -94,7 +98,7 @@ def test_looking_twice_finds_the_same(served):
 @pytest.mark.parametrize(
     ("data", "why"),
     [
-        (lambda _: b"", "silent for more than 0.3 s"),
+        (lambda _: b"", "silent for more than 0.9 s"),
         (lambda _: b"$GPGGA,123519,4807.038,N\r\n", "no message of wire version 1"),
         (
             lambda n: b"\x4b\xa7\x07" + encode_information(n, 0.0, TEXT)[3:],
@@ -108,7 +112,7 @@ def test_looking_twice_finds_the_same(served):
     ],
     ids=["silent", "another protocol", "a spoilt header", "no readings", "half an information"],
 )
-def test_what_is_wrong_is_told(saying, data, why):
+def test_what_is_wrong_is_told(saying, data, why, hasty):
     found = diagnose(saying(data))
     assert why in found.why
 
