@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ import pytest
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 
-from kappaskin import SourceError, load_scene
+from kappaskin import Frame, SourceError, load_scene
 from kappaskin.cli import main
 from kappaskin.sources import information
 from kappaskin.sources.tuning import BAUD_RATES
@@ -76,7 +77,7 @@ def test_a_frame_that_was_never_sent_so_is_found(stand) -> None:
         return data
 
     stand.relay.spoil = other
-    stand.run(0.3)
+    stand.until(lambda: stand.wrong > 10, 30.0)
     outcome = stand.outcome()
     assert outcome.wrong > 10
     assert f"{outcome.wrong} wrong frames were accepted" in judged(outcome, math.inf)
@@ -101,6 +102,21 @@ def test_a_line_that_does_not_recover_is_found(stand) -> None:
         "did not recover within 0.1 s; not at all"
     ]
     assert judged(Outcome(recovered=2.0), 1.0) == ["did not recover within 1 s; not for 2.00 s"]
+
+
+def test_reads_that_take_long_again_and_again_are_found_and_one_is_not(stand, monkeypatch) -> None:
+    stand.settle()
+    read, naps = stand.source.read, [0.5]
+
+    def slow(timeout: float) -> list[Frame]:
+        if naps:
+            time.sleep(naps.pop())
+        return read(timeout)
+
+    monkeypatch.setattr(stand.source, "read", slow)
+    assert stand.longest_read(0.6) < 0.5
+    naps.extend(3 * [0.5])
+    assert stand.longest_read(0.6) >= 0.5
 
 
 def test_what_leaks_is_found() -> None:

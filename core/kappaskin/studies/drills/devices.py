@@ -72,11 +72,10 @@ def _deaf(stand: Stand) -> Outcome:
         while os.write(line, _NOBODY):
             pass
     except BlockingIOError:
-        stand.slowest = 0.0
+        pass
     finally:
         os.close(line)
-    stand.run(10.0 if stand.long else 1.5)
-    slowest = stand.slowest
+    slowest = stand.longest_read(10.0 if stand.long else 1.5)
     stand.relay.ignore()
     stand.heal()
     stand.recover(_WITHIN)

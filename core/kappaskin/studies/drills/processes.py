@@ -20,8 +20,8 @@ _START = 20.0  # s that a process may take until it computes
 _NOTICED = 1.0  # s
 _RESTARTED = 10.0  # s for a new process to compute, on a busy machine
 _WITHIN = 1.0  # s
-_DRAINED = 5.0  # s
-_SAME = 3  # reports in a row
+_DRAINED = 20.0  # s
+_SAME = 5  # reports in a row
 _MEMORY = "/dev/shm"
 _PARENT = "kappaskin.studies.drills.parent"
 

@@ -61,9 +61,7 @@ def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> Outcome
         path = Path(folder) / "drill.mcap"
         with closing(_Listener(path, stand.clock(), disk)) as recorder:
             stand.source.record(recorder)
-            stand.slowest = 0.0
-            stand.run(10.0 if stand.long else 2.0)
-            slowest = stand.slowest
+            slowest = stand.longest_read(10.0 if stand.long else 2.0)
             stand.recover(_WITHIN)
             stand.source.record(None)
         claims = _claims(path, recorder.written, recorder.told, full)
