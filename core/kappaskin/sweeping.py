@@ -79,7 +79,7 @@ class Listener:
         begun = time.monotonic()
         while not found:
             found = self._read()
-            if time.monotonic() - begun > _SILENCE:
+            if not found and time.monotonic() - begun > _SILENCE:
                 raise Refusal(f"no frame came for {_SILENCE:g} s; is the device still sending?")
         if self._source.sensor is not self.sensor:
             raise Refusal("another device answered in the middle; begin anew with this one")

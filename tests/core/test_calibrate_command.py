@@ -298,6 +298,15 @@ def test_a_device_that_falls_silent_is_refused(monkeypatch) -> None:
     assert rig.closed
 
 
+def test_a_frame_that_came_while_this_process_stood_still_is_no_silence(monkeypatch) -> None:
+    monkeypatch.setattr("kappaskin.sweeping._SILENCE", 0.05)
+    rig = Rig()
+    take, naps = rig.read, [0.1]
+    rig.read = lambda timeout: time.sleep(naps.pop() if naps else 0.0) or take(timeout)
+    guided(rig, monkeypatch)
+    assert len(rig.asked) == 55
+
+
 def test_another_device_in_the_middle_is_refused(monkeypatch) -> None:
     rig = Rig()
     ask = rig.ask

@@ -489,8 +489,7 @@ def test_a_plot_of_nothing_is_refused(tmp_path) -> None:
 def test_a_process_of_its_own_tells_the_same_errors_one_by_one() -> None:
     settings = EIGHT, replace(EIGHT, elements=(6, 6)), replace(EIGHT, functions=(4, 4))
     with Measuring(CENTRE, settings) as measuring:
-        assert measuring.poll() == []  # nobody waits
-        found = list(measuring.wait())
+        found = [*measuring.poll(), *measuring.wait()]
         assert measuring.done
         assert measuring.poll() == []
     assert [cost.setting for cost in found] == list(settings)
