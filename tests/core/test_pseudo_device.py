@@ -295,6 +295,23 @@ def test_a_second_listener_is_introduced_and_served() -> None:
     assert source.accounting().bytes_discarded == 0
 
 
+def test_what_one_listener_leaves_unread_is_not_the_nexts() -> None:
+    device = PseudoDevice(SCENE)
+    with serving(device):
+        first = os.open(device.port, os.O_RDWR | os.O_NOCTTY)
+        assert len(os.read(first, 100)) <= 100  # of its introduction
+        os.close(first)
+        stands_still(device)
+
+        second = Listener(device.port)
+        second.takes_in(Information)
+        assert second.takes(3)
+        second.close()
+
+    seen = second.decoder.accounting()
+    assert (seen.bytes_discarded, seen.lost) == (0, 0)
+
+
 def test_the_first_commands_of_a_second_host_are_no_repetitions_of_the_firsts() -> None:
     device = PseudoDevice(SCENE)
     with serving(device):

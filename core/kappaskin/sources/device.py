@@ -83,11 +83,20 @@ class PseudoDevice:
             self.unsent += len(self._outbox)
             self._outbox.clear()
             self._held = self._sent = 0
+            if self._hung_up():
+                self._clear_unread()
 
     def _hung_up(self) -> bool:
         poll = select.poll()
         poll.register(self._master, select.POLLOUT)
         return any(event & select.POLLHUP for _, event in poll.poll(0))
+
+    def _clear_unread(self) -> None:
+        """Throw away what the last listener left: the next one is greeted first."""
+        with suppress(OSError):
+            slave = os.open(self.port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+            termios.tcflush(slave, termios.TCIFLUSH)
+            os.close(slave)
 
     def _now(self) -> float:
         """Device time in s, which stands still while nobody listens."""
