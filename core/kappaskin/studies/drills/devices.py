@@ -48,6 +48,8 @@ def _flood(stand: Stand) -> Outcome:
     stand.relay.rewrite = lambda message: [message] * 10
     stand.run(20.0 if stand.long else 1.5)
     stand.heal()
+    # It is over once it has passed the line, for which a busy machine takes its time.
+    stand.until(lambda: stand.relay.empty, _START)
     stand.recover(_WITHIN)
     return stand.outcome()
 
