@@ -1,5 +1,7 @@
 """The engine's status to the state that the badge shows: what is true now, the gravest first."""
 
+import math
+
 from kappaskin import Replay, Status
 from kappaskin_app.views.badge import LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, is_now
 
@@ -24,9 +26,9 @@ def state_of(status: Status, computed: float | None, now: float, paused: bool) -
     saturated = any(finding.kind == "saturated" for finding in status.health.findings)
     if status.replay is not None:
         return _replayed(status.replay, saturated)
-    last = max(status.last_frame, computed or 0.0)
+    last = max(status.last_frame, -math.inf if computed is None else computed)
     if status.sensor is None or now - last > _STALE_AFTER:
-        return WAITING if status.computing else STALE
+        return WAITING if status.computing or last == -math.inf else STALE
     word = SIM if status.sensor.simulated else LIVE
     return is_now(word, saturated=saturated, paused=paused)
 

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import pytest
@@ -32,6 +33,12 @@ def test_what_makes_readings_old_wins_over_all_else(
 ) -> None:
     status = replace(STREAMING, **{**truths, **news})
     assert state_of(status, NOW - 0.7, NOW, paused=True) == expected
+
+
+def test_before_the_first_reading_nothing_that_is_shown_is_old() -> None:
+    status = replace(STREAMING, last_frame=-math.inf)
+    assert state_of(status, None, NOW, paused=False) == "WAITING"
+    assert state_of(status, NOW - 0.6, NOW, paused=False) == "STALE"
 
 
 @pytest.mark.parametrize(
