@@ -302,7 +302,7 @@ class Replaying(QObject):
         if replay is not None and self._begins and not status.computing:
             self.seek(0.0)
         if replay is not None and self._sought is not None:
-            passed = time.monotonic() - self._sought_at
+            passed = status.reported - self._sought_at  # by what the engine told, however slow
             there = 0 <= replay.at - self._sought <= passed * self._pace + 1e-6
             if there or passed > _ARRIVES:
                 self._sought = None

@@ -310,7 +310,8 @@ class Session(QObject):
             if self.status.meetings != was.meetings:
                 self.estimate = None  # what the last sensor showed is not this one's
                 self._set_up()
-            if self._sought == self.status.playing.at or now > self._sought_at + _ARRIVES:
+            told = self.status.reported > self._sought_at + _ARRIVES
+            if told or self._sought == self.status.playing.at:
                 self._sought = None
             self.reported.emit(self.status)
         estimate = self.engine.latest(self.status)

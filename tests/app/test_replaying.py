@@ -1,6 +1,7 @@
 """The window on a recording: what it shows, obeys, and leaves behind."""
 
 import os
+import signal
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -171,6 +172,19 @@ def test_events_are_jumped_to(standing: MainWindow, until) -> None:
         standing.actions_by_name[f"replay-{name}"].trigger()
         assert standing.replaying.time == pytest.approx(at, abs=0.02)
         until(lambda: _at(standing) == standing.replaying.time)
+
+
+def test_where_it_is_to_go_is_told_until_a_slow_engine_is_there(
+    standing: MainWindow, until, qtbot
+) -> None:
+    pid = standing.session.engine.pid
+    os.kill(pid, signal.SIGSTOP)
+    standing.actions_by_name["replay-next"].trigger()
+    qtbot.wait(700)
+    standing.actions_by_name["replay-next"].trigger()
+    assert standing.replaying.time == pytest.approx(0.7, abs=0.02)
+    os.kill(pid, signal.SIGCONT)
+    until(lambda: _at(standing) == pytest.approx(0.7, abs=0.02))
 
 
 def test_speeds_are_asked_for_by_keys(standing: MainWindow, until) -> None:

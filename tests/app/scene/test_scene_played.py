@@ -31,6 +31,20 @@ def test_the_timeline_stops_seeks_and_goes_on(window, panel, until, qtbot) -> No
     until(lambda: window.session.status.playing.speed == 1)
 
 
+def test_the_time_to_go_to_is_told_until_a_slow_engine_is_there(
+    window, panel, until, qtbot
+) -> None:
+    panel.gallery.chosen.emit("tapping")
+    until(lambda: plays(window, "tapping"))
+    window.session.run(False)
+    os.kill(window.session.engine.pid, signal.SIGSTOP)
+    window.timeline.sought.emit(0.05)
+    qtbot.wait(600)
+    assert window.session.time == 0.05
+    os.kill(window.session.engine.pid, signal.SIGCONT)
+    until(lambda: window.session.status.playing.at == 0.05)
+
+
 def test_where_nothing_moves_there_is_no_timeline(window, panel, until) -> None:
     panel.gallery.chosen.emit("fingertip")
     until(lambda: plays(window, "fingertip"))
