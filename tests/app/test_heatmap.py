@@ -64,16 +64,15 @@ def test_scattered_elements_are_drawn_where_they_are(qapp: QApplication) -> None
 
 
 def test_the_element_under_the_mouse_is_told_and_its_value_written(
-    qapp: QApplication, qtbot, points_at
+    qapp: QApplication, until, points_at
 ) -> None:
     layout = SensorLayout.regular(Patch(0.08, 0.08), 4, 4)
     heatmap, told = _heatmap(layout), []
     heatmap.show()
-    qtbot.waitExposed(heatmap)
     heatmap.pointed.connect(told.append)
     area = heatmap.cells.area_of_patch()
     points_at(heatmap.cells, heatmap.cells.pixel_of(area, *layout.positions[6]).toPoint())
-    qtbot.waitUntil(lambda: told[-1:] == [6])
+    until(lambda: told[-1:] == [6])
     heatmap.show_element(6)
     values = np.full(16, np.nan)
     values[6] = -1.25

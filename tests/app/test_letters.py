@@ -23,7 +23,7 @@ from kappaskin_app.views.readouts import Health
 from kappaskin_app.views.title import Title
 from kappaskin_app.window import MainWindow
 
-_PATIENCE = 3.0  # s until what was said a moment ago has the room it asks for
+_PATIENCE = 30.0  # s until what was said a moment ago has the room it asks for
 _THREADS = {"stability": "singular-values_0", "design": "design_0", "scene": "gallery_0"}
 
 

@@ -78,7 +78,7 @@ def test_shift_and_drag_presses_and_leaves_the_place(pad, qtbot) -> None:
     assert again == pytest.approx(1.0)
 
 
-def test_the_wheel_presses_in_one_hold_and_lets_go_by_itself(pad, qtbot) -> None:
+def test_the_wheel_presses_in_one_hold_and_lets_go_by_itself(pad, until) -> None:
     for _ in range(3):
         notch(pad, 1)
     notch(pad, -1)
@@ -86,10 +86,10 @@ def test_the_wheel_presses_in_one_hold_and_lets_go_by_itself(pad, qtbot) -> None
     times = [said[1] for said in pad.said[1:]]
     assert times == [*sorted(times[:3]), pytest.approx(times[1])]
     assert times[0] > 1
-    qtbot.waitUntil(lambda: pad.said[-1] == ("released",), timeout=2000)
+    until(lambda: pad.said[-1] == ("released",))
 
 
-def test_keys_move_and_press(pad, qtbot) -> None:
+def test_keys_move_and_press(pad, qtbot, until) -> None:
     for key in (Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Down, Qt.Key.Key_PageUp):
         qtbot.keyClick(pad, key)
     names = [said[0] for said in pad.said]
@@ -97,7 +97,7 @@ def test_keys_move_and_press(pad, qtbot) -> None:
     assert pad.said[2][1:] == pytest.approx((0.052, 0.05))
     assert pad.said[3][1:] == pytest.approx((0.052, 0.049))
     assert pad.said[4][1] > 1
-    qtbot.waitUntil(lambda: pad.said[-1] == ("released",), timeout=2000)
+    until(lambda: pad.said[-1] == ("released",))
 
 
 def test_escape_gives_up_what_is_held_and_else_is_anothers(pad, qtbot) -> None:

@@ -77,7 +77,7 @@ def test_an_address_is_wished_once_it_is_typed(panel: PublishPanel, qtbot) -> No
     assert wishes[-1] == ("udp_to", "robot:9870")
 
 
-def test_what_comes_of_it_is_in_sight_of_who_asked(qtbot) -> None:
+def test_what_comes_of_it_is_in_sight_of_who_asked(qtbot, until) -> None:
     panel, other = PublishPanel(), QLineEdit()
     page = scrolled(other, QLabel("\n" * 40), panel)
     qtbot.addWidget(page)
@@ -89,7 +89,7 @@ def test_what_comes_of_it_is_in_sight_of_who_asked(qtbot) -> None:
     def grown_after(asked: QWidget) -> int:
         told(panel)
         asked.setFocus()
-        qtbot.waitUntil(asked.hasFocus)
+        until(asked.hasFocus)
         qtbot.wait(50)
         bar.setValue(bar.maximum())
         told(panel, FINE, SERVED)
@@ -104,7 +104,7 @@ def test_what_comes_of_it_is_in_sight_of_who_asked(qtbot) -> None:
 def test_the_window_publishes_when_asked_and_undo_ends_it(window, until) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(5)
+        receiver.settimeout(30)
         panel = window.panels.publish
         window.wishes.wish("udp_to", f"127.0.0.1:{receiver.getsockname()[1]}")
         assert window.session.status.publishing.targets == ()

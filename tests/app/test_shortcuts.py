@@ -70,17 +70,17 @@ def test_of_two_that_want_one_key_the_second_is_told_and_has_none(actions: Actio
 
 
 def test_a_shortcut_is_found_changed_and_reset_with_the_keyboard(
-    sheet: CheatSheet, actions: Actions, qtbot
+    sheet: CheatSheet, actions: Actions, qtbot, until
 ) -> None:
     qtbot.keyClicks(sheet.line, "them")
     assert _shown(sheet) == ["Ctrl+T"]
     qtbot.keyClick(sheet.line, Qt.Key.Key_Return)
     qtbot.keyClick(sheet.edit, Qt.Key.Key_J, CONTROL)
-    qtbot.waitUntil(lambda: _shown(sheet) == ["Ctrl+J *"])
+    until(lambda: _shown(sheet) == ["Ctrl+J *"])
     assert actions.key("theme") == "Ctrl+J"
     assert "Theme is Ctrl+J now." in sheet.message.text()
     qtbot.keyClick(sheet.edit, Qt.Key.Key_S, CONTROL)
-    qtbot.waitUntil(lambda: "Ctrl+S is the shortcut of Picture" in sheet.message.text())
+    until(lambda: "Ctrl+S is the shortcut of Picture" in sheet.message.text())
     assert sheet.edit.keySequence().toString() == "Ctrl+J"
     sheet.reset.click()
     assert actions.key("theme") == "Ctrl+T"
@@ -96,13 +96,13 @@ def test_all_are_reset_at_once(sheet: CheatSheet, actions: Actions) -> None:
 
 
 def test_a_changed_shortcut_and_all_that_were_reset_come_back(
-    sheet: CheatSheet, actions: Actions, qtbot
+    sheet: CheatSheet, actions: Actions, qtbot, until
 ) -> None:
     stack, told = sheet.history.stack, []
     sheet.changed.connect(lambda: told.append(actions.changed_keys()))
     qtbot.keyClicks(sheet.line, "theme")
     sheet.edit.setKeySequence("Ctrl+J")
-    qtbot.waitUntil(lambda: actions.key("theme") == "Ctrl+J")
+    until(lambda: actions.key("theme") == "Ctrl+J")
     assert stack.undoText() == "shortcut of Theme"
     sheet.reset_all.click()
     stack.undo()

@@ -168,7 +168,7 @@ def test_an_empty_recording_has_a_handle_that_stays(row: Transport, qtbot) -> No
     assert row.asked == [("seek", 0.0)]
 
 
-def test_a_note_is_read_as_it_was_written(row: Transport, qtbot) -> None:
+def test_a_note_is_read_as_it_was_written(row: Transport, until) -> None:
     row.show_recording(REPLAY, (Event(2.0, "note", "from <b> to <i> & back"),))
     at = place(row, 2.0)
 
@@ -180,4 +180,4 @@ def test_a_note_is_read_as_it_was_written(row: Transport, qtbot) -> None:
     shown.setHtml(QToolTip.text())
     assert shown.toPlainText() == "0:02.000  note: from <b> to <i> & back"
     QToolTip.hideText()
-    qtbot.waitUntil(lambda: not QToolTip.isVisible())
+    until(lambda: not QToolTip.isVisible())

@@ -25,12 +25,12 @@ class Failing:
 
 @pytest.mark.fails_inside
 @pytest.mark.parametrize("why", [Refusal("the disk is full"), OSError("the disk is full")])
-def test_work_that_fails_is_ended_once_and_told(qtbot, why: Exception) -> None:
+def test_work_that_fails_is_ended_once_and_told(qtbot, until, why: Exception) -> None:
     work = Failing(why)
     dialog = WorkDialog("Work", "Begin", lambda: work, str)
     qtbot.addWidget(dialog)
     dialog.begin_button.click()
-    qtbot.waitUntil(lambda: not dialog.busy, timeout=2000)
+    until(lambda: not dialog.busy)
     qtbot.wait(250)  # two more looks
     assert (work.looks, work.closed, dialog.words.text()) == (1, True, "the disk is full")
 

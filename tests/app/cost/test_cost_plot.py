@@ -36,16 +36,15 @@ def test_a_small_error_is_written_whole(plot: CostPlot) -> None:
 
 
 def test_the_hand_that_means_a_point_is_not_there_after_the_mouse_left(
-    plot: CostPlot, points_at, qtbot
+    plot: CostPlot, points_at, until
 ) -> None:
     plot.show()
-    qtbot.waitExposed(plot)
     at = plot.place_of(plot.frontier.costs[0]).toPoint()
     points_at(plot, at)
-    qtbot.waitUntil(lambda: plot.cursor().shape() == Qt.CursorShape.PointingHandCursor)
+    until(lambda: plot.cursor().shape() == Qt.CursorShape.PointingHandCursor)
 
     QApplication.sendEvent(plot, QEvent(QEvent.Type.Leave))
 
     assert plot.cursor().shape() == Qt.CursorShape.ArrowCursor
     plot.hide()
-    qtbot.waitUntil(lambda: not QToolTip.isVisible())
+    until(lambda: not QToolTip.isVisible())

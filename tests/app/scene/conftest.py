@@ -33,7 +33,7 @@ size = [0.1, 0.1]
 
 
 @pytest.fixture
-def shown(qapp: QApplication, qtbot: Any) -> Iterator[Callable[[str], SceneForm]]:
+def shown(qapp: QApplication, until: Any) -> Iterator[Callable[[str], SceneForm]]:
     """Shows a text in forms on the screen."""
     made: list[SceneForm] = []
 
@@ -44,7 +44,7 @@ def shown(qapp: QApplication, qtbot: Any) -> Iterator[Callable[[str], SceneForm]
         form.show_text(text)
         form.show()
         form.activateWindow()
-        qtbot.waitUntil(form.isActiveWindow)
+        until(form.isActiveWindow)
         return form
 
     yield shown

@@ -164,13 +164,13 @@ def test_the_wheel_changes_nothing_without_the_focus(
 
 
 def test_tab_goes_through_all_editors_in_their_order(
-    shown: Callable[[str], SceneForm], qtbot: Any
+    shown: Callable[[str], SceneForm], qtbot: Any, until: Any
 ) -> None:
     form = shown(TEXTS["tapping"])
     form.show_text(TEXTS["pencil"])
     form.show_text(TEXTS["two-contacts"])
     stops = [stop for box in form.boxes for stop in box.stops]
-    qtbot.waitUntil(lambda: all(stop.isVisible() for stop in stops))
+    until(lambda: all(stop.isVisible() for stop in stops))
     stops[0].setFocus()
     for stop in stops[1:]:
         qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
