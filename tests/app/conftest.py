@@ -1,5 +1,6 @@
 """A real window on a real (virtual) display, and nothing left behind it."""
 
+import math
 import os
 import sys
 import time
@@ -91,11 +92,12 @@ def opened(qapp: QApplication) -> Iterator[Callable[..., MainWindow]]:
 
 @pytest.fixture
 def window(opened: Callable[..., MainWindow], until: Wait) -> MainWindow:
-    """The window on the default simulation, once it has drawn an estimate."""
+    """The window on the default simulation, once it has the keyboard and draws what comes in."""
     window = opened("sim:")
-    until(lambda: window.badge.state == "SIM")
-    drawn = len(window.membrane.ages)
-    until(lambda: len(window.membrane.ages) > drawn + 1)
+    ages = window.membrane.ages
+    until(lambda: window.isActiveWindow() and any(math.isfinite(age) for _, age in ages))
+    drawn = len(ages)
+    until(lambda: window.badge.state == "SIM" and len(ages) > drawn + 1)
     return window
 
 

@@ -31,8 +31,9 @@ def folder() -> Iterator[Path]:
 
 
 def test_the_next_window_goes_on_as_the_last_one_was(
-    opened, abandoned, folder: Path, tmp_path: Path, until
+    opened, abandoned, folder: Path, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("kappaskin.adoption._ANSWER", 30.0)  # s, or a busy one passes for stuck
     alone = abandoned(folder, tmp_path / "press.mcap", entrusted=settings_text(BEFORE).encode())
     until(lambda: bool(list(folder.glob("*.note"))))
     window: MainWindow = opened("/dev/ttyABSENT7", Engine(orphans=folder))

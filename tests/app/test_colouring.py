@@ -137,9 +137,10 @@ def test_every_colour_is_drawn_smooth_and_per_element(window: MainWindow, until)
     for name in ALL:
         for how in ("smooth", "elements"):
             window.history.change("Colour", -1, colour_by=name, colour_from=how)
+            told = f"<b>{SHADES[name].symbol}</b>"
+            until(lambda told=told: window.display.scale.what.text() == told)
             drawn = len(window.membrane.ages)
             until(lambda drawn=drawn: len(window.membrane.ages) > drawn + 1)
-            assert window.display.scale.what.text() == f"<b>{SHADES[name].symbol}</b>"
     window.history.change("Colour", -1, colour_by="error_bar", colour_from="smooth")
     until(lambda: window.display.scale.bar.limits[1] > 0.005)
     assert window.membrane.caption.input == ""

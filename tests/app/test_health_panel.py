@@ -93,6 +93,7 @@ def test_the_element_to_press_is_framed(qapp) -> None:
 def failing(opened, until) -> MainWindow:
     window = opened("sim:failing-elements")
     until(lambda: len(window.membrane.ages) > 2 and window.session.status.health.count >= 6)
+    until(window.isActiveWindow)
     return window
 
 

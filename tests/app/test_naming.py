@@ -1,5 +1,6 @@
 """What touches the skin, in words, beside the picture."""
 
+import threading
 import time
 
 import pytest
@@ -40,10 +41,11 @@ def test_the_window_says_what_touches_the_skin(window, until):
 
 def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until, monkeypatch):
     until(lambda: "curves" in window.object.text())
-    made = naming.ObjectFinder
-    monkeypatch.setattr(naming, "ObjectFinder", lambda *of: time.sleep(2.5) or made(*of))
+    made, seen = naming.ObjectFinder, threading.Event()
+    monkeypatch.setattr(naming, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
     window.wishes.wish("shape", "cylinder")
     until(lambda: "computing what objects read like" in window.object.text())
+    seen.set()
     until(lambda: "curves" in window.object.text())
 
 

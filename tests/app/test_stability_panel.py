@@ -119,7 +119,7 @@ def test_what_the_sensor_refuses_is_shown_all_the_same(window: MainWindow, until
     until(lambda: "4 of 144" in panel.words.text())
     until(lambda: "determine 140 of the 144" in panel.refused.text())
     assert panel.refused.isVisible()
-    assert window.session.estimate.coefficients.shape != (12, 12)
+    until(lambda: window.session.estimate.coefficients.shape != (12, 12))
     assert panel.told.text() == DEMONSTRATIONS[3].told
     panel.buttons[4].click()
     until(lambda: window.session.estimate.coefficients.shape == (12, 12))

@@ -12,8 +12,12 @@ from kappaskin_app.window import MainWindow
 def test_the_table_has_what_the_picture_shows_and_can_be_copied(window: MainWindow, until) -> None:
     window.actions_by_name["dock-numbers"].trigger()
     numbers = window.numbers
-    until(lambda: numbers.elements.rowCount() == 100)
-    until(lambda: numbers.facts.rowCount() == 6 and numbers.facts.item(2, 1).text())
+
+    def there() -> bool:
+        counts = numbers.elements.rowCount(), numbers.facts.rowCount()
+        return counts == (100, 6) and bool(numbers.facts.item(2, 1).text())
+
+    until(there)
     numbers.copy.click()
     rows = list(csv.reader(QGuiApplication.clipboard().text().splitlines()))
     assert rows[0] == list(FACTS)

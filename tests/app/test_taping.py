@@ -105,7 +105,7 @@ def test_one_that_ends_by_itself_says_so_until_it_is_seen(
     assert "moved or removed" in window.panels.recording.message.text()
     assert _mark(window).isVisible()
     assert _mark(window).head == "REC ended"
-    assert window.badge.state == "SIM"  # what is live goes on
+    until(lambda: window.badge.state == "SIM")  # what is live goes on
     _mark(window).clicked.emit()
     until(lambda: not _mark(window).isVisible())
 
@@ -127,7 +127,7 @@ def test_a_place_that_cannot_be_written_to_is_refused(
 ) -> None:
     window.taping.begin(Path(place))
     until(lambda: "cannot be written" in window.panels.recording.message.text())
-    assert window.badge.state == "SIM"
+    until(lambda: window.badge.state == "SIM")
 
 
 def test_a_folder_that_cannot_be_made_is_told_and_another_asked_for(

@@ -12,10 +12,8 @@ from kappaskin_app.window import MainWindow
 
 def test_the_simulation_is_shown_as_a_simulation(window: MainWindow, until) -> None:
     until(lambda: window.badge.state == "SIM")
-    until(lambda: window.readouts.text("contact").endswith(" mm"))
-    assert window.readouts.text("rms").endswith(" mm")
-    until(lambda: window.readouts.text("age").endswith(" ms"))
-    assert window.readouts.text("force").endswith(" mN")
+    units = {"contact": " mm", "rms": " mm", "age": " ms", "force": " mN"}
+    until(lambda: all(window.readouts.text(name).endswith(unit) for name, unit in units.items()))
 
 
 def test_a_port_typed_is_the_port_meant(window: MainWindow, qtbot) -> None:

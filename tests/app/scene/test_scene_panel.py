@@ -24,7 +24,7 @@ def test_a_scene_of_the_gallery_plays_from_its_beginning_until_it_is_undone(
     until(lambda: plays(window, "fingertip"))
     until(lambda: window.session.status.sensor.layout.patch.strip)
     assert not window.panels.load.editor("load_case").isEnabled()
-    assert window.badge.text() == "SIM"
+    until(lambda: window.badge.text() == "SIM")
     window.history.stack.undo()
     until(lambda: plays(window, "circle"))
     until(lambda: not window.session.status.sensor.layout.patch.strip)

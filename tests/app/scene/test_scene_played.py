@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin import scene_file
+from kappaskin_app.touching import touches_at
 
 from .conftest import EDIT, EFFECTS_PAGE, plays
 
@@ -58,10 +59,9 @@ def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
     until(lambda: plays(window, "sphere"))
     window.session.run(False)
     window.session.seek(1.5)
-    until(lambda: len(window.membrane.drag.handles) == 1)
-    x, y = window.membrane.drag.handles[0].tolist()
-    scene = window.session.scene
-    drag = window.membrane.drag
+    scene, drag = window.session.scene, window.membrane.drag
+    x, y = touches_at(scene, 1.5)[0].load.centre().tolist()
+    until(lambda: drag.handles.tolist() == [[x, y]])
     drag.grabbed.emit(x, y)
     for step in range(1, 11):
         drag.dragged.emit(x + 1e-3 * step, y)
