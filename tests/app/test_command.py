@@ -41,7 +41,7 @@ def _lives(process: psutil.Process) -> bool:
 @pytest.mark.parametrize("pause", [0.0, 3.0], ids=["loading", "shown"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_closes_the_app_and_leaves_nothing(number: int, pause: float) -> None:
-    command = [sys.executable, "-m", "kappaskin", "app", "--seconds", "40"]
+    command = [sys.executable, "-m", "kappaskin", "app", "--seconds", "120"]
     app = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     parent = psutil.Process(app.pid)
     end = time.monotonic() + 30
@@ -50,7 +50,7 @@ def test_a_signal_closes_the_app_and_leaves_nothing(number: int, pause: float) -
     time.sleep(pause)
     children = parent.children(recursive=True)
     app.send_signal(number)
-    told = app.communicate(timeout=35)
+    told = app.communicate(timeout=100)
     assert (app.returncode, *told) == (0, "", "")
     end = time.monotonic() + 30
     while (left := [one for one in children if _lives(one)]) and time.monotonic() < end:
