@@ -104,7 +104,7 @@ def _killed(stand: Stand) -> Outcome:
         streaming, was = _streaming(stand, engine), engine.pid
         _kill(was, signal.SIGKILL)
         noticed = _pumped(stand, lambda: engine.status().state == LOST, _NOTICED)
-        engine.revive()
+        _pumped(stand, lambda: engine.revive() or engine.pid != was, _START)
         recovered = _recovery(stand, engine, _RESTARTED)
         told = any(event.kind == "engine" for event in engine.status().events)
         return _outcome(
