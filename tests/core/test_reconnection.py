@@ -219,6 +219,27 @@ def test_a_device_that_went_on_while_this_machine_slept_has_its_losses_counted(s
     assert (seen.lost, seen.restarts, seen.balanced) == (away - 11, 0, True)
 
 
+def test_a_message_that_waited_for_this_process_is_of_no_device_that_began_anew(plug, opened):
+    device, now = plug(), [100.0]
+    reader = Reader(opened(device, lambda: now[0]))
+    device.say(encode_information(0, 0.0, TEXT) + stream(1, 11))
+    reader.took(10)
+    pull(device, reader)
+    back = plug()
+
+    def heard():
+        now[0] += 0.1
+        return back.heard()
+
+    reader.until(heard)
+    away = 10 + round((now[0] - 100.0) / PERIOD)
+    now[0] += 5.0  # it came, and nobody had the time to look
+    back.say(encode_information(away, away * PERIOD, TEXT) + stream(away + 1, away + 6))
+    reader.took(away + 5)
+    assert reader.told("back").endswith(f" s: {away - 11} messages lost")
+    assert reader.source.accounting().restarts == 0
+
+
 def test_another_device_on_the_port_is_said_with_both_names(streaming, plug):
     device, reader = streaming
     sensor = reader.source.sensor

@@ -223,12 +223,13 @@ class SerialSource:
     def _went_on(self) -> bool:
         """Whether the device's clock went on while nobody listened.
 
-        One that shows more than has passed here went on too: this machine was asleep, or busy.
+        One that shows more than had passed here as the line was opened went on too: this machine
+        was asleep, or busy, then or since.
         """
-        arrived, first = self._pending[0]
         if self._last is None:
             return False
-        device, host = first.time - self._last[0], arrived - self._last[1]
+        device = self._pending[0][1].time - self._last[0]
+        host = self._opened - self._last[1]
         return device > 0 and device - host > -_APART - _DRIFT * host
 
     def _frames(self) -> list[Frame]:
