@@ -79,7 +79,7 @@ class PseudoDevice:
                 time.sleep(0.02)
                 continue
             self._stream(stopped)
-            self._flush()
+            self._empty()
             self.unsent += len(self._outbox)
             self._outbox.clear()
             self._held = self._sent = 0
@@ -157,6 +157,14 @@ class PseudoDevice:
                 if self._sent == len(message):
                     self._outbox.popleft()
                     self._sent = 0
+
+    def _empty(self) -> None:
+        """Send what is in the outbox, as long as somebody takes it."""
+        end = time.monotonic() + _PATIENCE
+        self._flush()
+        while self._outbox and not self._hung_up() and time.monotonic() < end:
+            select.select([], [self._master], [], 0.02)
+            self._flush()
 
     def _listen(self) -> None:
         """Do what the host asks for."""
