@@ -112,13 +112,13 @@ def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene
     panel.setCurrentIndex(EFFECTS_PAGE)
     window.session.run(False)
     window.session.seek(1.5)
-    until(lambda: len(window.membrane.drag.handles) == 1)
     scene, good = window.session.scene, window.history.settings.written.text
+    x, y = touches_at(scene, 1.5)[0].load.centre().tolist()
+    until(lambda: window.membrane.drag.handles.tolist() == [[x, y]])
     bad = good.replace("[skin]", "[skin")
     panel.editor.edited.emit(bad)
     until(lambda: panel.tabText(EDIT) == "&Edit (not played)")
     assert not panel.effects.table.isEnabled()
-    x, y = window.membrane.drag.handles[0].tolist()
     drag = window.membrane.drag
     drag.grabbed.emit(x, y)
     drag.dragged.emit(x + 0.01, y)
