@@ -78,6 +78,30 @@ def test_a_standing_recording_gives_its_frame_again_and_no_other(
     assert following.sequence == first.sequence + 1
 
 
+def test_a_step_is_a_step_where_the_frame_was_asked_for_again(source: ReplayedSource) -> None:
+    source.seek(0.4, 0.0)
+    (first,) = source.read(0.0)
+    source.again()
+    source.step(1)
+    assert [frame.sequence for frame in source.read(0.0)] == [first.sequence + 1]
+    assert not source.read(0.0)
+
+
+@pytest.mark.parametrize(
+    ("steps", "to"), [([1] * 5, 5), ([2, 3], 5), ([-1] * 5, -5), ([-2, 3], 1), ([-1, 1, -1], -1)]
+)
+def test_steps_asked_for_before_a_frame_is_given_are_added(
+    source: ReplayedSource, steps: list[int], to: int
+) -> None:
+    source.seek(0.4, 0.0)
+    (first,) = source.read(0.0)
+    for step in steps:
+        source.step(step)
+    assert source.read(0.0)[-1].sequence == first.sequence + to
+    source.step(1)
+    assert source.read(0.0)[-1].sequence == first.sequence + to + 1
+
+
 def test_one_that_plays_is_not_held_up_by_being_asked_again(
     source: ReplayedSource, clock: Clock
 ) -> None:

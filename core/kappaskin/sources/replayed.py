@@ -93,6 +93,7 @@ class ReplayedSource:
         self._events: list[Event] = []
         self._last: _Ready | None = None  # the frame given last
         self._steps, self._moves = 0, False  # frames to give at once, and go on from there
+        self._back = 0  # frames before the last one given, from which these are
         self._go_to(0.0)
 
     def _landmarks(self) -> tuple[tuple[tuple[float, float], ...], tuple[Event, ...]]:
@@ -162,11 +163,18 @@ class ReplayedSource:
             self._steps = 0 if self._speed else 1
 
     def step(self, frames: int) -> None:
-        """Stand still, so many `frames` further on, or if negative back."""
+        """Stand still, so many `frames` further on, or if negative back.
+
+        Those that were asked for the same way before, and were not given yet, are added.
+        """
+        ahead, back = (self._steps, self._back) if self._moves and self._steps else (0, 0)
         self.seek(None, 0.0)
-        if frames < 0:
-            self._go_back(-frames)
-        self._steps, self._moves = max(frames, 1), True
+        if self._ready and self._ready[0] is self._last:  # asked for again, and not given yet
+            self._ready.popleft()
+        self._back = back - frames if frames < 0 else 0
+        if self._back:
+            self._go_back(self._back)
+        self._steps, self._moves = 1 if self._back else ahead + max(frames, 1), True
 
     @property
     def stands(self) -> bool:
