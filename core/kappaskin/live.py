@@ -237,15 +237,16 @@ class Loop:
     def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:
         """Work out the newest frames, as many as there is time for."""
         within = (_FRESH,) if self._publishing.active else ()
-        late = len(frames) - self._pace.affordable(len(frames), *within)
+        source = self._source
+        stands = isinstance(source, ReplayedSource) and source.stands
+        least = min(len(frames), int(stands))  # or nobody would see what was asked for
+        late = len(frames) - max(self._pace.affordable(len(frames), *within), least)
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
         for frame in frames[:late]:
             pipeline.pass_over(frame)
             self._compared.pass_over(frame)
             self._arrivals.used(frame)
-        source = self._source
-        stands = isinstance(source, ReplayedSource) and source.stands
         began = time.monotonic()
         for frame in frames[late:]:
             begun = time.monotonic()
