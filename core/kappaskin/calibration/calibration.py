@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from kappaskin.effects import PrandtlIshlinskii, StandardLinearSolid
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.hysteresis import PrandtlIshlinskii, StandardLinearSolid
 from kappaskin.layout import SensorLayout
 from kappaskin.memory import Remembering
 from kappaskin.sensor import Sensor

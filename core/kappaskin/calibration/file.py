@@ -9,9 +9,9 @@ from typing import Any, cast
 import numpy as np
 
 from kappaskin.calibration.calibration import Calibration, digest
-from kappaskin.effects import PrandtlIshlinskii, StandardLinearSolid
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.hysteresis import PrandtlIshlinskii, StandardLinearSolid
 from kappaskin.sensor import Sensor
 from kappaskin.toml import table
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from kappaskin.effects import StandardLinearSolid
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.hysteresis import StandardLinearSolid
 
 _MOST_SHARE = 0.9
 _SETTLING = 0.01  # share of a hold, after the skin was bent, that is left out

@@ -14,9 +14,10 @@ from kappaskin.calibration.lines import Lines, lines
 from kappaskin.calibration.loops import identify, thresholds
 from kappaskin.calibration.procedure import Sweep
 from kappaskin.calibration.schedule import FACES, FEWEST_RADII, Step, check_strain, pairs
-from kappaskin.effects import PrandtlIshlinskii, Running, StandardLinearSolid
+from kappaskin.effects import Running
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Mask
+from kappaskin.hysteresis import PrandtlIshlinskii, StandardLinearSolid
 from kappaskin.sensor import Sensor
 
 _Part = TypeVar("_Part", Lines, PrandtlIshlinskii)

@@ -3,7 +3,6 @@
 from kappaskin.effects.converter import Quantisation as Quantisation
 from kappaskin.effects.converter import Saturation as Saturation
 from kappaskin.effects.creep import Creep as Creep
-from kappaskin.effects.creep import StandardLinearSolid as StandardLinearSolid
 from kappaskin.effects.cross_talk import CrossTalk as CrossTalk
 from kappaskin.effects.effect import NOTHING as NOTHING
 from kappaskin.effects.effect import Effect as Effect
@@ -22,7 +21,6 @@ from kappaskin.effects.hum import MainsHum as MainsHum
 from kappaskin.effects.hysteresis import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
 from kappaskin.effects.hysteresis import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS
 from kappaskin.effects.hysteresis import Hysteresis as Hysteresis
-from kappaskin.effects.hysteresis import PrandtlIshlinskii as PrandtlIshlinskii
 from kappaskin.effects.link import CorruptedFrames as CorruptedFrames
 from kappaskin.effects.link import DroppedFrames as DroppedFrames
 from kappaskin.effects.noise import GaussianNoise as GaussianNoise

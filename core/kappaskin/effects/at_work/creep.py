@@ -1,7 +1,7 @@
 """Creep at work."""
 
-from kappaskin.effects.creep import StandardLinearSolid
 from kappaskin.effects.effect import Running
+from kappaskin.hysteresis import StandardLinearSolid
 
 
 def creep(solid: StandardLinearSolid, shape: tuple[int, ...]) -> Running:

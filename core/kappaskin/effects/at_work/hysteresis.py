@@ -1,7 +1,7 @@
 """Hysteresis at work."""
 
 from kappaskin.effects.effect import Running
-from kappaskin.effects.hysteresis import PrandtlIshlinskii
+from kappaskin.hysteresis import PrandtlIshlinskii
 
 
 def hysteresis(loops: PrandtlIshlinskii, shape: tuple[int, ...]) -> Running:
