@@ -154,9 +154,9 @@ if TYPE_CHECKING:
     from kappaskin.setup_text import setups_of as setups_of
     from kappaskin.side import Computed as Computed
     from kappaskin.simulate import Simulator as Simulator
-    from kappaskin.sources import Replay as Replay
     from kappaskin.sources.ports import Port as Port
     from kappaskin.sources.ports import serial_ports as serial_ports
+    from kappaskin.sources.replayed import Replay as Replay
     from kappaskin.sources.scanning import LISTS as LISTS
     from kappaskin.spectrum import amplitudes as amplitudes
     from kappaskin.status import Status as Status
@@ -243,7 +243,7 @@ else:
         "setup_text": "said_of_setup setup_from setups_of",
         "side": "Computed",
         "simulate": "Simulator",
-        "sources": "Replay",
+        "sources.replayed": "Replay",
         "sources.ports": "Port serial_ports",
         "sources.scanning": "LISTS",
         "spectrum": "amplitudes",

@@ -9,7 +9,8 @@ from kappaskin.frames import Estimate, Event, Frame
 from kappaskin.recorder import Recorder
 from kappaskin.recording.writing import Written
 from kappaskin.side import Side
-from kappaskin.sources import ReplayedSource, SimulatedSource, Source
+from kappaskin.sources import SimulatedSource, Source
+from kappaskin.sources.replayed import ReplayedSource
 
 
 class Keeping:

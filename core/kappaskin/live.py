@@ -34,7 +34,8 @@ from kappaskin.ring import Ring
 from kappaskin.scene import FROM_THE_BEGINNING, Scene
 from kappaskin.sensor import Sensor
 from kappaskin.side import Computed, Side
-from kappaskin.sources import ReplayedSource, SimulatedSource, Source, open_source
+from kappaskin.sources import SimulatedSource, Source, open_source
+from kappaskin.sources.replayed import ReplayedSource
 from kappaskin.status import LOST, STREAMING, WAITING, Status
 from kappaskin.steer import Following, Steering, steered
 from kappaskin.tare_taking import TareTaking

@@ -15,8 +15,8 @@ from kappaskin.region import Region
 from kappaskin.scene import FROM_THE_BEGINNING, Playing
 from kappaskin.sensor import Sensor
 from kappaskin.side import Computed
-from kappaskin.sources import Replay
 from kappaskin.sources.accounting import Accounting
+from kappaskin.sources.replayed import Replay
 from kappaskin.tare_taking import TareNews
 from kappaskin.taring import Drift
 

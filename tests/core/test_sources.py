@@ -12,10 +12,11 @@ import pytest
 from kappaskin import Frame, load_scene
 from kappaskin.recorder import Recorder
 from kappaskin.recording.reading import Recording
-from kappaskin.sources import ReplayedSource, SerialSource, SimulatedSource, Source
+from kappaskin.sources import SerialSource, SimulatedSource, Source
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.information import to_json
 from kappaskin.sources.reenact import Reenactment
+from kappaskin.sources.replayed import ReplayedSource
 from kappaskin.sources.wire import Information, Samples, encode_information, encode_samples
 
 SCENE = replace(load_scene("circle"), rate=100.0)

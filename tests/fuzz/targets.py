@@ -38,8 +38,9 @@ from kappaskin.recorder import Recorder
 from kappaskin.recording.messages import TOPICS
 from kappaskin.recording.repair import repairing
 from kappaskin.scene import read_scene
-from kappaskin.sources import ReplayedSource, SimulatedSource, information
+from kappaskin.sources import SimulatedSource, information
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
+from kappaskin.sources.replayed import ReplayedSource
 from kappaskin.sources.wire import (
     Command,
     Kind,

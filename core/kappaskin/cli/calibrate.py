@@ -8,6 +8,7 @@ from kappaskin.calibration import calibrate as calibrated
 from kappaskin.calibration import check_place, save_calibration, summary
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
+from kappaskin.sources.replayed import ReplayedSource as ReplayedSource  # registers replay:
 from kappaskin.sweeping import take_sweep
 
 

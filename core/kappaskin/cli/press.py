@@ -5,6 +5,7 @@ import sys
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
 from kappaskin.map_testing import press_elements
+from kappaskin.sources.replayed import ReplayedSource as ReplayedSource  # registers replay:
 
 
 def press(

@@ -12,7 +12,7 @@ from kappaskin.engine import Engine
 from kappaskin.errors import Refusal
 from kappaskin.pipeline import Setup
 from kappaskin.sensor import Sensor
-from kappaskin.sources import REPLAY
+from kappaskin.sources.replayed import REPLAY
 from kappaskin.status import LOST, STREAMING, Status
 
 _LOOK = 0.05  # s

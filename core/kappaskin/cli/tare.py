@@ -12,6 +12,7 @@ from kappaskin.cli.common import Switch
 from kappaskin.errors import Refusal
 from kappaskin.sensor import Sensor
 from kappaskin.sources import Source, open_source
+from kappaskin.sources.replayed import ReplayedSource as ReplayedSource  # registers replay:
 from kappaskin.taring import Rest, Taring
 from kappaskin.touch import LoadSeeker
 

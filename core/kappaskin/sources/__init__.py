@@ -1,6 +1,6 @@
-"""Where frames come from: a simulation in this process, a recording, or bytes on a line."""
+"""Sources of frames: a simulation in this process, bytes on a line, and registered schemes."""
 
-from pathlib import Path
+from collections.abc import Callable
 from typing import Protocol
 
 from kappaskin.errors import SourceError
@@ -8,13 +8,11 @@ from kappaskin.frames import Event, Frame
 from kappaskin.scene import load_scene
 from kappaskin.sensor import Sensor
 from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.replayed import Replay as Replay
-from kappaskin.sources.replayed import ReplayedSource as ReplayedSource
 from kappaskin.sources.serial_line import SerialSource as SerialSource
 from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
 from kappaskin.sources.tape import Tape
 
-SIMULATION, REPLAY = "sim:", "replay:"
+SIMULATION = "sim:"
 
 
 class Source(Protocol):
@@ -54,12 +52,24 @@ class Source(Protocol):
     def close(self) -> None: ...
 
 
+_schemes: dict[str, Callable[[str], Source]] = {
+    SIMULATION: lambda name: SimulatedSource(load_scene(name)),
+}
+
+
+def register_scheme(scheme: str, opened: Callable[[str], Source]) -> None:
+    """Open names that begin with `scheme`, such as `replay:`, by `opened` with what follows it."""
+    _schemes[scheme] = opened
+
+
 def open_source(name: str) -> Source:
-    """The source called `name`: `sim:`, `sim:SCENE`, `replay:FILE`, or what pyserial opens."""
-    if name.startswith(SIMULATION):
-        return SimulatedSource(load_scene(name.removeprefix(SIMULATION)))
-    if name.startswith(REPLAY):
-        return ReplayedSource(Path(name.removeprefix(REPLAY)))
+    """The source called `name`: `sim:`, `sim:SCENE`, `replay:FILE`, or what pyserial opens.
+
+    `replay:` is registered by the room `recording`, as soon as that is imported.
+    """
+    for scheme, opened in _schemes.items():
+        if name.startswith(scheme):
+            return opened(name.removeprefix(scheme))
     if not name.strip():
         raise SourceError(
             "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"

@@ -15,10 +15,12 @@ from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import Message, Recording
 from kappaskin.sensor import Sensor
+from kappaskin.sources import register_scheme
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.reenact import Reenactment
 from kappaskin.sources.tape import Tape
 
+REPLAY = "replay:"
 FASTEST = 10.0
 """How many times as fast as it was a recording is played at most."""
 
@@ -295,3 +297,6 @@ class ReplayedSource:
 
     def close(self) -> None:
         self._recording.close()
+
+
+register_scheme(REPLAY, lambda name: ReplayedSource(Path(name)))
