@@ -43,7 +43,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # With the resource tracker: they stay, and are nobody's leak.
 if "forkserver" in multiprocessing.get_all_start_methods():
-    multiprocessing.set_forkserver_preload(["kappaskin.live"])
+    multiprocessing.set_forkserver_preload(["kappaskin.live.loop"])
     forkserver.ensure_running()
 else:
     resource_tracker.ensure_running()
@@ -71,7 +71,7 @@ _PARENT = """
 import sys, time
 from pathlib import Path
 from kappaskin import Setup
-from kappaskin.engine import Engine
+from kappaskin.live import Engine
 
 folder, file, patience, entrusted = sys.argv[1:]
 engine = Engine(Setup(6, 7), Path(folder), float(patience))
@@ -207,7 +207,7 @@ def recording(
     Nothing came from 1 to 1.8 s.
     """
     from kappaskin import Event, Pipeline, Setup, load_scene
-    from kappaskin.recorder import Recorder
+    from kappaskin.recording import Recorder
     from kappaskin.sources import SimulatedSource
 
     path, now = tmp_path_factory.mktemp("recordings") / "example.mcap", [time.monotonic()]

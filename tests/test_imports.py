@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import kappaskin
+import kappaskin.studies
 
 ROOMS = """
 import pkgutil, importlib, sys, kappaskin
@@ -39,9 +40,9 @@ def test_importing_the_library_loads_no_gui(code):
 @pytest.mark.parametrize(
     ("code", "rooms"),
     [
-        ("import kappaskin", set()),
-        ("from kappaskin import Refusal", {"errors"}),
-        ("from kappaskin import Patch", {"errors", "frames", "outline", "patch"}),
+        ("import kappaskin", {"_lazy"}),
+        ("from kappaskin import Refusal", {"_lazy", "errors"}),
+        ("from kappaskin import Patch", {"_lazy", "errors", "frames", "skin"}),
     ],
 )
 def test_a_name_of_the_library_loads_its_room_and_those_below_alone(code, rooms):
@@ -60,10 +61,11 @@ def test_a_command_that_is_typed_loads_what_it_needs_alone():
     assert "kappaskin.studies" not in loaded
 
 
-def test_every_exported_name_is_what_type_checkers_see():
+@pytest.mark.parametrize("face", [kappaskin, kappaskin.studies])
+def test_every_exported_name_is_what_type_checkers_see(face):
     [seen] = [
         node
-        for node in ast.parse(Path(kappaskin.__file__).read_text("utf-8")).body
+        for node in ast.parse(Path(face.__file__).read_text("utf-8")).body
         if isinstance(node, ast.If)
     ]
     typed = {
@@ -73,10 +75,10 @@ def test_every_exported_name_is_what_type_checkers_see():
         for alias in node.names
     }
 
-    exported = {(name, f"kappaskin.{room}") for name, room in kappaskin._ROOM.items()}  # noqa: SLF001
-
-    assert exported == typed
-    assert set(kappaskin.__all__) == {name for name, _ in typed} <= set(dir(kappaskin))
+    assert {(name, name) for name in face.__all__} == {(name, name) for name, _ in typed}
+    for name, module in typed:
+        assert getattr(face, name) is getattr(sys.modules[module], name)
+    assert set(face.__all__) <= set(dir(face))
 
 
 def test_every_exported_name_is_there_and_is_no_room():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMainWindow, QMenu
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.keytips import KeyTips
 from kappaskin_app.tips import tip_of

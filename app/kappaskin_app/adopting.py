@@ -3,7 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from kappaskin import Engine, Left, Refusal, Status
+from kappaskin.errors import Refusal
+from kappaskin.live import Engine, Left, Status
 from kappaskin_app.history import History
 from kappaskin_app.settings import Settings
 from kappaskin_app.settings_text import settings_in, settings_text

@@ -4,10 +4,15 @@ from collections.abc import Generator
 from contextlib import suppress
 from typing import Any, TypeAlias
 
-from kappaskin import Beside, Patch, Plate, Refusal, Scene
+from kappaskin._background import Beside
+from kappaskin.errors import Refusal
+from kappaskin.mechanics import Plate
+from kappaskin.scenes import Scene
+from kappaskin.skin import Patch
 from kappaskin_app.memo import Memo
 from kappaskin_app.pressing import tried
-from kappaskin_app.settings import Settings, Written
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.scene import Written
 from kappaskin_app.simulation import plate_of, played, scene_or_why
 
 _Slow: TypeAlias = Written | tuple[Plate, str]

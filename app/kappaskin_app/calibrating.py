@@ -12,21 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import (
-    OVERTAKEN,
+from kappaskin.calibration import (
     CalibrationReport,
-    Estimate,
     Procedure,
-    Refusal,
-    Sensor,
-    Status,
-    Step,
     Sweep,
     calibrate,
     load_calibration,
     save_calibration,
-    schedule,
 )
+from kappaskin.errors import Refusal
+from kappaskin.frames import OVERTAKEN, Estimate
+from kappaskin.live import Status
+from kappaskin.scenes import Step, schedule
+from kappaskin.sensing import Sensor
 from kappaskin_app.history import History
 
 Array = NDArray[np.float64]

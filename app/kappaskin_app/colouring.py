@@ -7,16 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import (
-    ErrorBars,
-    Estimate,
-    Estimator,
-    Quantities,
-    RankDeficient,
-    Status,
-    basis_for,
-    estimator_for,
-)
+from kappaskin.bases import basis_for
+from kappaskin.errors import RankDeficient
+from kappaskin.estimation import Estimator, estimator_for
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
+from kappaskin.pipeline import ErrorBars, Quantities
 from kappaskin_app.shades import SHADES
 
 Array = NDArray[np.float64]

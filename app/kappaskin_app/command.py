@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin import Refusal, lacking
+from kappaskin.errors import Refusal, lacking
 
 app = App(name="app", help_format="markdown")
 demo = App(name="demo", help_format="markdown")
@@ -109,7 +109,7 @@ def replay(file: Path, *, seconds: float | None = None, screenshot: Path | None 
     screenshot
         Save a picture of the window just before it closes by itself.
     """
-    from kappaskin import Recording
+    from kappaskin.recording import Recording
 
     with Recording(file):  # or refused here
         _open(f"replay:{file.absolute()}", seconds, screenshot)

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Computed, Estimate, Setup, Status
+from kappaskin.frames import Estimate
+from kappaskin.live import Computed, Status
+from kappaskin.pipeline import Setup
 from kappaskin_app.history import History
 from kappaskin_app.session import Session
 from kappaskin_app.settings import Settings

@@ -7,26 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import (
-    METHODS,
-    Cost,
-    Effects,
-    Estimate,
-    GaussianNoise,
-    Measuring,
-    Refusal,
-    Refused,
-    Scene,
-    Setting,
-    Status,
-    UniformNoise,
-    frontier,
-    settings_to_try,
-)
+from kappaskin.errors import Refusal
+from kappaskin.estimation import METHODS
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
+from kappaskin.scenes import GaussianNoise, Scene, UniformNoise
+from kappaskin.studies import Cost, Effects, Measuring, Refused, Setting, frontier, settings_to_try
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.history import History
 from kappaskin_app.session import Session
-from kappaskin_app.settings import METHOD_SHORT
+from kappaskin_app.settings.shown import METHOD_SHORT
 from kappaskin_app.simulation import elements_of, scene_of_sensor
 from kappaskin_app.wishes import Wishes
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin import ContactObject, Estimate, Touch
+from kappaskin.contact import ContactObject
+from kappaskin.frames import Estimate, Touch
 
 _95 = 1.96  # standard deviations that a 95 % interval reaches
 _ROUND = ("sphere", "cylinder")  # the kinds that have a radius

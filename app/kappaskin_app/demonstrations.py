@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from kappaskin_app.settings import Fit, SceneSettings, Settings
+from kappaskin_app.settings import SceneSettings, Settings
+from kappaskin_app.settings.shown import Fit
 from kappaskin_app.skins import SHAPES
 
 _PLAIN = {f.name: f.default for kind in (SceneSettings, Fit) for f in fields(kind)}

@@ -9,27 +9,19 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import (
-    Beside,
-    Check,
-    Design,
-    GaussianNoise,
-    Patch,
-    Plate,
-    Prospect,
-    Refusal,
-    Scene,
-    SensorLayout,
-    Status,
-    Transduction,
-    check,
-    edges_of,
-    prospect,
-    write_scene,
-)
+from kappaskin._background import Beside
+from kappaskin.bases import edges_of
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
+from kappaskin.mechanics import Plate
+from kappaskin.scenes import GaussianNoise, Scene, write_scene
+from kappaskin.sensing import SensorLayout, Transduction
+from kappaskin.skin import Patch
+from kappaskin.studies import Check, Design, Prospect, check, prospect
 from kappaskin_app.history import History
 from kappaskin_app.pressing import ready, reference_on
-from kappaskin_app.settings import Designed, Settings, part
+from kappaskin_app.settings import Settings, part
+from kappaskin_app.settings.designed import Designed
 from kappaskin_app.skins import SHAPES
 
 _CANCELLED = "Cancelled; another design is computed again."

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import COMPONENTS, WHY, Estimate, Status
+from kappaskin.estimation import WHY
+from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.live import Status
 from kappaskin_app.colouring import Colouring
 from kappaskin_app.maps import Maps
 from kappaskin_app.measuring import Measuring

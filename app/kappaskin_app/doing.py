@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Status
+from kappaskin.live import Status
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow

@@ -2,7 +2,7 @@
 
 import inspect
 
-from kappaskin import EFFECTS
+from kappaskin.scenes import EFFECTS
 
 _CALLED = {"dead": "Dead elements", "stuck": "Stuck elements", "intermittent": "Loose elements"}
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFileDialog, QLineEdit, QWidget
 
-from kappaskin import Exported, Exporting, Setup, Wanted
+from kappaskin.pipeline import Setup
+from kappaskin.recording import Exported, Exporting, Wanted
 from kappaskin_app.guard import guarded
 from kappaskin_app.working import WorkDialog, beside, choosing, ended, named, path_in, says_kind
 

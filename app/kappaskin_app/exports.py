@@ -11,7 +11,8 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import Refusal, Status
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
 from kappaskin_app.actions import WITHIN, Actions
 from kappaskin_app.exporting import ExportDialog
 from kappaskin_app.filming import Filming

@@ -4,7 +4,10 @@ import math
 
 import numpy as np
 
-from kappaskin import COMPONENTS, Calibration, Estimate, Sensor, Status
+from kappaskin.calibration import Calibration
+from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.live import Status
+from kappaskin.sensing import Sensor
 
 _PM, _DASH = "\N{PLUS-MINUS SIGN}", "\N{EN DASH}"
 _HEADS = ("", "reads [1/m]", "fit leaves [1/m]", "gain", "offset [1/m]", "channel", "health")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from kappaskin import Refusal, lacking
+from kappaskin.errors import Refusal, lacking
 from kappaskin_app.guard import guarded
 from kappaskin_app.views.membrane import MembraneView
 

@@ -15,7 +15,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Event, Status
+from kappaskin.frames import Event
+from kappaskin.live import Status
 
 _KEPT = 64
 _NOTHING = "Nothing yet. Here stands when a device came, went, lost messages or began anew."

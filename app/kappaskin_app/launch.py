@@ -16,12 +16,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin import load_beside
+from kappaskin._processes import load_beside
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
-    from kappaskin import Engine
+    from kappaskin.live import Engine
     from kappaskin_app.logbook import Logbook
     from kappaskin_app.recovering import Recovering
     from kappaskin_app.views.splash import Splash
@@ -96,7 +96,7 @@ def _application() -> "QApplication":
     from PySide6.QtGui import QIcon
     from PySide6.QtWidgets import QApplication
 
-    from kappaskin import Refusal
+    from kappaskin.errors import Refusal
 
     application = QApplication.instance() or QApplication(sys.argv[:1])
     if not isinstance(application, QApplication):
@@ -128,7 +128,7 @@ def _stand_behind() -> None:
 
 def _connected(source: str) -> "Engine":
     """An engine that reads `source`, or one that a window left that is gone."""
-    from kappaskin import Engine, orphans_folder
+    from kappaskin.live import Engine, orphans_folder
 
     engine = Engine(orphans=orphans_folder())
     if engine.adopted is None:
@@ -181,7 +181,7 @@ def launch(
         if kept is not None:
             kept.close()
     if saved == [False]:
-        from kappaskin import Refusal
+        from kappaskin.errors import Refusal
 
         raise Refusal(f"{screenshot}: the picture cannot be written; choose another place")
 

@@ -9,7 +9,7 @@ from kappaskin_app.actions import WITHIN, Actions
 from kappaskin_app.display import Display
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
-from kappaskin_app.settings import COLOURS
+from kappaskin_app.settings.shown import COLOURS
 from kappaskin_app.views.camera import DIRECTIONS
 from kappaskin_app.wishes import Wishes
 

@@ -2,15 +2,10 @@
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import (
-    Estimate,
-    Phase,
-    PressTest,
-    Refusal,
-    Status,
-    Verdict,
-    elements_to_press,
-)
+from kappaskin.calibration import Phase, PressTest, Verdict, elements_to_press
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
 
 _ENDED = "The test ended: the line was lost, or another skin answered. Begin anew."
 

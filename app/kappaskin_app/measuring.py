@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Estimate, Patch, distances
+from kappaskin.frames import Estimate
+from kappaskin.skin import Patch, distances
 from kappaskin_app.views.membrane import MembraneView
 from kappaskin_app.views.ruler import Ruler
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QGuiApplication
 
-from kappaskin import FIGURES, Refusal, data_folder
+from kappaskin.calibration import data_folder
+from kappaskin.errors import Refusal
+from kappaskin.studies import FIGURES
 from kappaskin_app.actions import Actions
 from kappaskin_app.figures import TITLES, FigureWindow
 from kappaskin_app.finder.finder import Finder
@@ -17,7 +19,7 @@ from kappaskin_app.finder.things import things_in
 from kappaskin_app.guard import guarded
 from kappaskin_app.presenting import SOUND_TIP, TIP
 from kappaskin_app.scripting import script_of
-from kappaskin_app.settings import COLOURS
+from kappaskin_app.settings.shown import COLOURS
 from kappaskin_app.undoing import Undoing
 
 if TYPE_CHECKING:

@@ -4,7 +4,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import NO_OBJECT, ContactObject, Estimate, ObjectFinder, Refusal, Status
+from kappaskin.contact import NO_OBJECT, ContactObject, ObjectFinder
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
 
 _LEARNING = "computing what objects read like on this skin\N{HORIZONTAL ELLIPSIS}"
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import Status
+from kappaskin.live import Status
 from kappaskin_app.presenting import NAMED
 from kappaskin_app.settings import Settings
 from kappaskin_app.theme import THEMES, bar_palette, letters, palette

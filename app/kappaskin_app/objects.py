@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from kappaskin import Indenter, Scene
+from kappaskin.scenes import Indenter, Scene
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QMenu
 
-from kappaskin import Refusal, Status
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.objects import may_choose
 from kappaskin_app.recordings import newest, recordings_folder

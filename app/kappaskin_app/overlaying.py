@@ -5,7 +5,10 @@ import time
 
 import numpy as np
 
-from kappaskin import ContactObject, Estimate, Indenter, Placed, placed
+from kappaskin.contact import ContactObject, placed
+from kappaskin.frames import Estimate
+from kappaskin.mechanics import Placed
+from kappaskin.scenes import Indenter
 from kappaskin_app.colouring import Colouring
 from kappaskin_app.scale import SteadyRange
 from kappaskin_app.session import Session

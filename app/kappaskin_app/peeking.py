@@ -5,7 +5,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.recorded import Recorded, recorded
 

@@ -5,7 +5,8 @@ import time
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Estimate, amplitudes
+from kappaskin.estimation import amplitudes
+from kappaskin.frames import Estimate
 from kappaskin_app.display import Display
 from kappaskin_app.facts import facts, title
 from kappaskin_app.guard import guarded

@@ -10,7 +10,8 @@ from PySide6.QtGui import QFont, QFontMetrics, QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import Refusal, Status
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
 from kappaskin_app.working import says_kind, with_ending
 
 _MARGIN, _TEXT = 8, 11  # px

@@ -8,7 +8,8 @@ from typing import Any
 from PySide6.QtCore import QObject, QSize, QTimer, Signal
 from PySide6.QtGui import QImage
 
-from kappaskin import Refusal, Scene, load_scene
+from kappaskin.errors import Refusal
+from kappaskin.scenes import Scene, load_scene
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import Theme
 from kappaskin_app.views.relief import Relief, relief

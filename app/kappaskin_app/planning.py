@@ -4,7 +4,11 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Beside, Refusal, Scene, Status, plan_told
+from kappaskin._background import Beside
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
+from kappaskin.scenes import Scene
+from kappaskin.studies import plan_told
 from kappaskin_app.session import Session
 
 

@@ -5,7 +5,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
-from kappaskin import Port, serial_ports
+from kappaskin.sources import Port, serial_ports
 from kappaskin_app.guard import guarded
 
 _EVERY = 1000  # ms between two looks

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from PySide6.QtCore import QByteArray, QObject, QRect, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
 
-from kappaskin import ContactObject, Estimate, Status
+from kappaskin.contact import ContactObject
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
 from kappaskin_app.cue import Cue, Found, cue_of
 from kappaskin_app.display import Display
 from kappaskin_app.drawn_once import drawn_once

@@ -7,27 +7,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import (
-    Basis,
+from kappaskin.bases import Basis, basis_for
+from kappaskin.errors import Refusal
+from kappaskin.mechanics import (
     Compliance,
     DiscLoad,
     GaussianLoad,
     LineLoad,
     Load,
-    Orbit,
-    Patch,
     Plate,
     PointLoad,
     RectangleLoad,
-    Refusal,
-    Scene,
-    SensorLayout,
-    Stimulus,
-    basis_for,
-    load_scene,
 )
+from kappaskin.scenes import Orbit, Scene, Stimulus, load_scene
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
 from kappaskin_app.memo import Memo
-from kappaskin_app.settings import FREE_CASES, LOAD_CASES, SPREAD_CASES, TWO_ENDED, Settings
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.load import FREE_CASES, LOAD_CASES, SPREAD_CASES, TWO_ENDED
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from kappaskin import Event, Recording, Refusal, Replay, Setup, setups_of
+from kappaskin.errors import Refusal
+from kappaskin.frames import Event
+from kappaskin.pipeline import Setup
+from kappaskin.recording import Recording, Replay, setups_of
 from kappaskin_app.recordings import repairing
 from kappaskin_app.views.landmarks import day, minutes
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import platformdirs
 
-from kappaskin import is_written
+from kappaskin.recording import is_written
 
 _OFFERED = 8  # recent ones
 _PART = ".part"

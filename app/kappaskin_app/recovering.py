@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import platformdirs
 from PySide6.QtCore import QLockFile, QObject
 
-from kappaskin import Refusal, Status
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.mishaps import REPORT_TIP
 from kappaskin_app.settings import Settings

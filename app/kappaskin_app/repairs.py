@@ -5,7 +5,7 @@ from pathlib import Path
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
-from kappaskin import Repaired, Repairing
+from kappaskin.recording import Repaired, Repairing
 from kappaskin_app.guard import guarded
 from kappaskin_app.recordings import repaired
 from kappaskin_app.working import WorkDialog, beside, choosing, ended, named, path_in

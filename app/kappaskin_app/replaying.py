@@ -7,7 +7,11 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import Damaged, Event, Refusal, Replay, Setup, Status
+from kappaskin.errors import Damaged, Refusal
+from kappaskin.frames import Event
+from kappaskin.live import Status
+from kappaskin.pipeline import Setup
+from kappaskin.recording import Replay
 from kappaskin_app.actions import Actions
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History

@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QLineEdit, QWidget
 
-from kappaskin import Estimate, Refusal, examine
+from kappaskin.cli.machine import examine
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate
 from kappaskin_app.guard import guarded
 from kappaskin_app.logbook import CRASHES, LOG
 from kappaskin_app.recordings import recordings_folder

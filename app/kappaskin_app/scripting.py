@@ -7,18 +7,14 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from kappaskin import (
-    SCENES,
-    Refusal,
-    Region,
-    Setup,
-    read_scene_text,
-    said_of_setup,
-    scene_file,
-    write_scene,
-)
+from kappaskin.errors import Refusal
+from kappaskin.estimation import Region
+from kappaskin.pipeline import Setup
+from kappaskin.recording import said_of_setup
+from kappaskin.scenes import SCENES, read_scene_text, scene_file, write_scene
 from kappaskin_app.session import RECORDED, Session
-from kappaskin_app.settings import Settings, Written
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.scene import Written
 from kappaskin_app.simulation import OWN, region_of
 
 _NAMES = ("Region", "Setup", "load_scene", "planned", "read_scene", "setup_from")

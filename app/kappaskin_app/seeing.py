@@ -7,7 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Basis, Refusal, Sensor, SensorLayout, Status, basis_for, singular_values
+from kappaskin.bases import Basis, basis_for
+from kappaskin.errors import Refusal
+from kappaskin.estimation import singular_values
+from kappaskin.live import Status
+from kappaskin.sensing import Sensor, SensorLayout
 from kappaskin_app.history import History
 
 Array = NDArray[np.float64]

@@ -7,29 +7,23 @@ from dataclasses import replace
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from kappaskin import (
-    LISTS,
-    Bargain,
-    Calibration,
-    Engine,
-    Estimate,
-    Left,
-    PointLoad,
-    Presentation,
-    Refusal,
-    Region,
-    Scene,
-    Sensor,
-    Setup,
-    Status,
-    Step,
-    Tare,
-    bargain,
-)
+from kappaskin.calibration import Calibration, Tare
+from kappaskin.errors import Refusal
+from kappaskin.estimation import Bargain, Region, bargain
+from kappaskin.frames import Estimate
+from kappaskin.live import Engine, Left, Status
+from kappaskin.mechanics import PointLoad
+from kappaskin.pipeline import Setup
+from kappaskin.scenes import Presentation, Scene, Step
+from kappaskin.sensing import Sensor
+from kappaskin.sources import LISTS
 from kappaskin_app.ahead import Ahead
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
-from kappaskin_app.settings import Scanning, SceneSettings, Sending, Settings, Written, part
+from kappaskin_app.settings import SceneSettings, Settings, part
+from kappaskin_app.settings.publishing import Sending
+from kappaskin_app.settings.scene import Written
+from kappaskin_app.settings.sensor import Scanning
 from kappaskin_app.simulation import named, played, region_of, scene_of
 from kappaskin_app.states import state_of
 

@@ -5,8 +5,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from kappaskin import Refusal
-from kappaskin_app.settings import Settings, Written
+from kappaskin.errors import Refusal
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.scene import Written
 
 VERSION = 1
 OF_SENSORS = ("calibration", "tare")

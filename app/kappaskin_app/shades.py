@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import QUANTITIES, WHY
+from kappaskin.estimation import WHY
+from kappaskin.pipeline import QUANTITIES
 from kappaskin_app.theme import (
     DARK_INK,
     DIVERGING,

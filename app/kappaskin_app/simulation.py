@@ -6,36 +6,39 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kappaskin import (
-    FIRST_GENERATION,
+from kappaskin.bases import edges_of
+from kappaskin.errors import Refusal
+from kappaskin.estimation import Region
+from kappaskin.mechanics import Load, Plate
+from kappaskin.scenes import (
     FIRST_GENERATION_LOOPS,
-    SECOND_GENERATION,
     SECOND_GENERATION_LOOPS,
     Creep,
     GaussianNoise,
     Hysteresis,
-    Load,
-    Patch,
-    Plate,
-    Refusal,
-    Region,
     Scene,
-    Sensor,
-    SensorLayout,
     Stimulus,
     Tolerance,
-    Transduction,
     UniformNoise,
-    edges_of,
     planned,
     read_scene,
     read_scene_text,
     scene_file,
     write_scene,
 )
+from kappaskin.sensing import (
+    FIRST_GENERATION,
+    SECOND_GENERATION,
+    Sensor,
+    SensorLayout,
+    Transduction,
+)
+from kappaskin.skin import Patch
 from kappaskin_app.memo import Memo
 from kappaskin_app.pressing import compliance_of, free_loads, ready, reference_on, whole_on
-from kappaskin_app.settings import FREE_CASES, READY_CASES, Settings, Written
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.load import FREE_CASES, READY_CASES
+from kappaskin_app.settings.scene import Written
 from kappaskin_app.skins import SHAPES
 
 _PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")

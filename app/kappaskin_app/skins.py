@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from kappaskin import Disk, Patch, Polygon
+from kappaskin.skin import Disk, Patch, Polygon
 
 _FINGERTIP = 0.0129  # m, the paper's
 

@@ -7,7 +7,9 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import SCENES, Refusal, Scene, Status, scene_file
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
+from kappaskin.scenes import SCENES, Scene, scene_file
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.panels.scene import ScenePanel

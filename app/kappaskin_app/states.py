@@ -2,7 +2,8 @@
 
 import math
 
-from kappaskin import Replay, Status
+from kappaskin.live import Status
+from kappaskin.recording import Replay
 from kappaskin_app.views.badge import LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, is_now
 
 _STALE_AFTER = 0.5  # s without a frame

@@ -5,7 +5,9 @@ import io
 import math
 from collections.abc import Sequence
 
-from kappaskin import COMPONENTS, WHY, Estimate, Sensor
+from kappaskin.estimation import WHY
+from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.sensing import Sensor
 
 FACTS = ("What", "Value", "95 % within", "Unit")
 ELEMENTS = ("Element", "x [mm]", "y [mm]", *(f"{name} [1/m]" for name in COMPONENTS), "Left out")

@@ -6,7 +6,8 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox, QWidget
 
-from kappaskin import LONGEST_NOTE, Engine, Left, Status, Written
+from kappaskin.live import LONGEST_NOTE, Engine, Left, Status
+from kappaskin.recording import Written
 from kappaskin_app.actions import Actions
 from kappaskin_app.adopting import words
 from kappaskin_app.guard import guarded

@@ -4,7 +4,10 @@ from datetime import datetime
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin import Engine, Refusal, Sensor, Status, Tare, Tares
+from kappaskin.calibration import Tare, Tares
+from kappaskin.errors import Refusal
+from kappaskin.live import Engine, Status
+from kappaskin.sensing import Sensor
 from kappaskin_app.history import History
 from kappaskin_app.session import RECORDED
 from kappaskin_app.settings import Settings

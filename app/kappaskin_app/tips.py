@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from kappaskin_app.settings import COLOURS, Settings, ask_of
+from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.settings.shown import COLOURS
 from kappaskin_app.shades import SHADES
 
 _TIPS: Mapping[str, str] = {

@@ -4,7 +4,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from kappaskin import Indenter, Load, PointLoad, Refusal, Scene, Stimulus
+from kappaskin.errors import Refusal
+from kappaskin.mechanics import Load, PointLoad
+from kappaskin.scenes import Indenter, Scene, Stimulus
 from kappaskin_app.pressing import yielding
 
 _DEEPEST = 0.2  # of the skin's shorter side

@@ -11,7 +11,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Engine, Tares, data_folder
+from kappaskin.calibration import Tares, data_folder
+from kappaskin.live import Engine
 from kappaskin_app.adopting import settings_left
 from kappaskin_app.beginning import Beginning
 from kappaskin_app.calibrating import Calibrating

@@ -6,14 +6,19 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from kappaskin import Load, Setting, Status
+from kappaskin.live import Status
+from kappaskin.mechanics import Load
+from kappaskin.studies import Setting
 from kappaskin_app.demonstrations import DEMONSTRATIONS, Demonstration
 from kappaskin_app.effects import called
 from kappaskin_app.history import History
 from kappaskin_app.pressing import dragged
-from kappaskin_app.scene_text import forced, instead, pressed, shifted
+from kappaskin_app.scene_text.changes import forced
+from kappaskin_app.scene_text.places import instead, pressed, shifted
 from kappaskin_app.session import Session
-from kappaskin_app.settings import Sending, Settings, Written
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.publishing import Sending
+from kappaskin_app.settings.scene import Written
 from kappaskin_app.simulation import (
     NO_ELEMENTS,
     OWN,

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 
 _POLL = 100  # ms

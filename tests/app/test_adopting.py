@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from kappaskin import Engine, Left, Setup, Status, Written
-from kappaskin.requests import Asked
+from kappaskin.live.requests import Asked
 from kappaskin_app.adopting import Entrusting, settings_left, words
 from kappaskin_app.history import History
 from kappaskin_app.settings import Settings
@@ -33,7 +33,7 @@ def folder() -> Iterator[Path]:
 def test_the_next_window_goes_on_as_the_last_one_was(
     opened, abandoned, folder: Path, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("kappaskin.adoption._ANSWER", 30.0)  # s, or a busy one passes for stuck
+    monkeypatch.setattr("kappaskin.live.resume._ANSWER", 30.0)  # s, or a busy one passes for stuck
     alone = abandoned(folder, tmp_path / "press.mcap", entrusted=settings_text(BEFORE).encode())
     until(lambda: bool(list(folder.glob("*.note"))))
     window: MainWindow = opened("/dev/ttyABSENT7", Engine(orphans=folder))

@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import WHY, Patch, SensorLayout
 from kappaskin_app.panels.several import SeveralButton
 from kappaskin_app.scale import Ranges
-from kappaskin_app.settings import COLOURS, Settings
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.shown import COLOURS
 from kappaskin_app.shades import HEALTH, HEALTH_COLOURS, SHADES
 from kappaskin_app.theme import SATURATED
 from kappaskin_app.views.element_cells import ElementCells

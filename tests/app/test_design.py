@@ -10,10 +10,12 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import load_scene, prospect, write_scene
-from kappaskin.scene import read_scene
+from kappaskin.scenes import read_scene
 from kappaskin_app.designing import design_of, scene_of
 from kappaskin_app.panels.design import DesignForm, _meant, _place
-from kappaskin_app.settings import Designed, Range, Settings, ask_of
+from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.settings.asks import Range
+from kappaskin_app.settings.designed import Designed
 from kappaskin_app.simulation import with_consequences
 from kappaskin_app.skins import SHAPES
 from kappaskin_app.theme import DARK, SEQUENTIAL

@@ -13,15 +13,7 @@ from kappaskin_app.docks import Docks
 from kappaskin_app.layouts.arranging import arrange, layout_of
 from kappaskin_app.layouts.keeping import clamped
 from kappaskin_app.layouts.kept import Kept, from_text, to_text
-from kappaskin_app.layouts.layout import (
-    AREAS,
-    BELOW,
-    DOCKS,
-    FLOATING,
-    READY,
-    Layout,
-    Place,
-)
+from kappaskin_app.layouts.layout import AREAS, BELOW, DOCKS, FLOATING, READY, Layout, Place
 from kappaskin_app.window import MainWindow
 
 SHARES = st.integers(50, 600).map(lambda share: share / 1000)

@@ -13,7 +13,7 @@ from PySide6.QtCore import QPoint, Qt
 from kappaskin import load_scene
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-from kappaskin.sources.device import PseudoDevice
+from kappaskin.sources import PseudoDevice
 
 SCENE = replace(load_scene("circle"), rate=50.0)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from kappaskin import Event, Recording
-from kappaskin.recorder import Recorder
+from kappaskin.recording import Recorder
 from kappaskin_app.repairs import RepairDialog
 from kappaskin_app.window import MainWindow
 

@@ -22,7 +22,8 @@ from kappaskin.calibration.calibration import fingerprint
 from kappaskin_app.history import History
 from kappaskin_app.scripting import script_of
 from kappaskin_app.session import Session
-from kappaskin_app.settings import Settings, Written
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.scene import Written
 from kappaskin_app.simulation import scene_of, with_consequences, written
 from kappaskin_app.window import MainWindow
 

@@ -7,7 +7,8 @@ from kappaskin import EDGES, Status
 from kappaskin_app.panels.compare import OtherForm
 from kappaskin_app.panels.design import DesignForm
 from kappaskin_app.panels.panels import Panels
-from kappaskin_app.settings import Choice, Range, SceneSettings, Settings, ask_of, part
+from kappaskin_app.settings import SceneSettings, Settings, ask_of, part
+from kappaskin_app.settings.asks import Choice, Range
 
 ASKED = [f.name for f in fields(Settings) if "ask" in f.metadata]
 

@@ -20,7 +20,8 @@ from kappaskin import (
     scene_file,
 )
 from kappaskin_app.pressing import dragged
-from kappaskin_app.settings import LOAD_CASES, SPREAD_CASES, Settings
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.load import LOAD_CASES, SPREAD_CASES
 from kappaskin_app.simulation import is_table_1, plate_of, scene_of, with_consequences, written
 from kappaskin_app.skins import SHAPES
 

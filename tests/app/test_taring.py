@@ -10,7 +10,7 @@ import pytest
 
 from kappaskin import Drift, Setup, Status, Tare, Tares, load_scene
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.tare_taking import TareNews
+from kappaskin.live.tare_taking import TareNews
 from kappaskin_app.history import History
 from kappaskin_app.panels.tare import TarePanel, drift_words, warmth
 from kappaskin_app.settings import Settings

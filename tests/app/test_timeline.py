@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 
 from kappaskin import Presentation, load_scene
-from kappaskin.scene.motion import Path, Press, Release
+from kappaskin.scenes.motion import Path, Press, Release
 from kappaskin_app.theme import DARK, LIGHT
 from kappaskin_app.views.timeline import Timeline
 from kappaskin_app.views.track import profile

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from kappaskin import SCENES, Port
-from kappaskin_app.settings import READY_CASES
+from kappaskin_app.settings.load import READY_CASES
 from kappaskin_app.window import MainWindow
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin.engine import Engine
+from kappaskin.live import Engine
 
 _PUBLISHING = Path(__file__).with_name("publishing.py")
 

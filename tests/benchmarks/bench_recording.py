@@ -6,11 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from kappaskin import Pipeline, Setup, load_scene
-from kappaskin.recorder import Recorder
-from kappaskin.recording.reading import Recording
-from kappaskin.recording.writing import Written
-from kappaskin.sources import SimulatedSource
-from kappaskin.sources.wire import encode_samples
+from kappaskin.recording import Recorder, Recording, Written
+from kappaskin.sources import SimulatedSource, encode_samples
 
 RATE = 1000.0  # frames/s
 FRAMES = 4000

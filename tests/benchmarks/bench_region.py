@@ -5,17 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kappaskin import (
-    SECOND_GENERATION,
-    Pipeline,
-    Region,
-    Scanner,
-    Setup,
-    Simulator,
-    load_scene,
-)
-from kappaskin.hold import Hold
-from kappaskin.intrinsic import ForceTorqueSensor, IntrinsicContact
+from kappaskin import SECOND_GENERATION, Pipeline, Region, Scanner, Setup, Simulator, load_scene
+from kappaskin.contact import ForceTorqueSensor, IntrinsicContact
+from kappaskin.pipeline.frame_assembly import Hold
 
 SCENE = replace(load_scene("centre"), transduction=SECOND_GENERATION, rate=160.0)
 SENSOR = SCENE.sensor()

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from kappaskin import SCENES, PointLoad, Simulator, load_scene
-from kappaskin.effects import EFFECTS
-from kappaskin.scene import Choice, kept_of
-from kappaskin.scene.plan import effects_of
+from kappaskin.scenes import EFFECTS, Choice, kept_of
+from kappaskin.scenes.plan import effects_of
 
 NONE = Choice(off=frozenset(EFFECTS))
 

@@ -7,9 +7,10 @@ import numpy as np
 import psutil
 
 from kappaskin import LeastSquares, Simulator, SineBasis, load_scene
-from kappaskin.reconstruct import reconstruct
-from kappaskin.studies.design import Folder, Task, processes, read_study, run, run_study
-from kappaskin.studies.design.task import version
+from kappaskin.pipeline import reconstruct
+from kappaskin.studies import Folder, processes, run_study
+from kappaskin.studies.design.study import read_study
+from kappaskin.studies.design.task import Task, run, version
 
 TEXT = """
 format = 1

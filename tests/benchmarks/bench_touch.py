@@ -16,8 +16,8 @@ from kappaskin import (
     SensorLayout,
     SineBasis,
 )
-from kappaskin.geometry import contact_geometry
-from kappaskin.touch.products import _Dense
+from kappaskin.contact import contact_geometry
+from kappaskin.contact.products import _Dense
 
 PATCH = Patch(0.1, 0.1)
 PLATE, LAYOUT = Plate(PATCH), SensorLayout.regular(PATCH, 10, 10)
@@ -85,8 +85,9 @@ def test_contact_and_geometry_take_a_tenth_of_scipys_contact(medians, figure, ra
 def by_whole_matrices(monkeypatch):
     """The same contact from M (300 x 225) and M'M, as on skins that are no grid of sines."""
     with monkeypatch.context() as patched:
-        patched.setattr("kappaskin.touch.point.loads_on", _Dense)
-        patched.setattr("kappaskin.touch.point.modal", lambda layout, basis, C, M: lambda K: K @ M)
+        patched.setattr("kappaskin.contact.point.loads_on", _Dense)
+        dense = lambda layout, basis, C, M: lambda K: K @ M  # noqa: E731
+        patched.setattr("kappaskin.contact.point.modal", dense)
         contact = PointContact(PLATE, LAYOUT)
         K, fit = next(frames())
         contact(K, fit)

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Engine
 from kappaskin_app.layouts.layout import BOTTOM, LEFT, RIGHT, Layout, Place
-from kappaskin_app.settings import COLOURS
+from kappaskin_app.settings.shown import COLOURS
 from kappaskin_app.window import MainWindow
 
 SETTLE = 3.0

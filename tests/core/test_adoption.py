@@ -16,13 +16,9 @@ import numpy as np
 import pytest
 
 from kappaskin import Region, Setup, load_scene
-from kappaskin.adoption import Left, Orphan, Waiting, _address, adopted
-from kappaskin.asker import Asker
-from kappaskin.engine import Engine
-from kappaskin.recording import messages as m
-from kappaskin.recording.reading import Recording
-from kappaskin.recording.writing import part_of
-from kappaskin.requests import (
+from kappaskin.live import Engine, Left
+from kappaskin.live.asker import Asker
+from kappaskin.live.requests import (
     Asked,
     Connect,
     Disconnect,
@@ -35,7 +31,11 @@ from kappaskin.requests import (
     Seek,
     Step,
 )
-from kappaskin.sources.reenact import Reenactment
+from kappaskin.live.resume import Orphan, Waiting, _address, adopted
+from kappaskin.recording import Recording
+from kappaskin.recording import messages as m
+from kappaskin.recording.recorded_frames import Reenactment
+from kappaskin.recording.writing import part_of
 
 pytestmark = pytest.mark.slow
 
@@ -224,7 +224,7 @@ def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
     asked_by, folder, monkeypatch
 ) -> None:
     clock, later = time.monotonic, [0.0]
-    monkeypatch.setattr("kappaskin.asker.time.monotonic", lambda: clock() + later[0])
+    monkeypatch.setattr("kappaskin.live.asker.time.monotonic", lambda: clock() + later[0])
     line, asker = asked_by()
     line.send(Setup(5, 4))
     line.send(Connect("sim:line"))
@@ -261,7 +261,7 @@ def test_nobody_is_waited_for_when_the_recording_ends_by_itself(asked_by, folder
 
 def test_nobody_is_waited_for_longer_than_may_be(asked_by, folder, monkeypatch) -> None:
     clock, later = time.monotonic, [0.0]
-    monkeypatch.setattr("kappaskin.asker.time.monotonic", lambda: clock() + later[0])
+    monkeypatch.setattr("kappaskin.live.asker.time.monotonic", lambda: clock() + later[0])
     line, asker = asked_by(patience=600.0)
     line.close()
     asker.asked(1.0)

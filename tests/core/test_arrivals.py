@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Frame
-from kappaskin.arrivals import Arrivals
+from kappaskin.live.timing import Arrivals
 
 
 def frames(*times):

@@ -19,15 +19,10 @@ from kappaskin import (
     basis_for,
     edges_of,
 )
-from kappaskin.bases import (
-    ORDERS,
-    ClampedBasis,
-    DiskBasis,
-    ElasticBasis,
-    PolygonBasis,
-    overlaps,
-)
-from kappaskin.bases.basis import curvature_at
+from kappaskin.bases import ORDERS, ElasticBasis, curvature_at, overlaps
+from kappaskin.bases.beam import ClampedBasis
+from kappaskin.bases.disk import DiskBasis
+from kappaskin.bases.polygon import PolygonBasis
 
 MIXED = [(2, 1), (1, 2), (2, 2)]
 

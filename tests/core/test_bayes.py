@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from kappaskin import (
-    Bayes,
-    LeastSquares,
-    Patch,
-    Refusal,
-    SensorLayout,
-    SineBasis,
-    load_scene,
-)
-from kappaskin.fit.prior import prior_root
+from kappaskin import Bayes, LeastSquares, Patch, Refusal, SensorLayout, SineBasis, load_scene
+from kappaskin.estimation.prior import prior_root
 
 pytestmark = pytest.mark.slow
 

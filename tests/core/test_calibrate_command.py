@@ -32,14 +32,15 @@ from kappaskin import (
     load_scene,
     schedule,
 )
-from kappaskin.calibration import summary
+from kappaskin.calibration import summary, take_sweep
 from kappaskin.calibration.file import from_toml
-from kappaskin.effects import ReadingEffect, Size, Survey
 from kappaskin.errors import SourceError
-from kappaskin.sweeping import take_sweep
+from kappaskin.scenes import ReadingEffect
+from kappaskin.scenes.effects.effect import Size
+from kappaskin.scenes.effects.survey import Survey
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-from kappaskin.sources.device import PseudoDevice
+from kappaskin.sources import PseudoDevice
 
 pytestmark = pytest.mark.slow
 
@@ -87,7 +88,7 @@ def test_json_tells_every_channel_and_nothing_else(run, tmp_path) -> None:
 
 def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> None:
     creeping = replace(SCENE, effects=(Creep(0.05, 2.0), *SCENE.effects[1:]))
-    monkeypatch.setattr("kappaskin.sweeping.load_scene", lambda name: creeping)
+    monkeypatch.setattr("kappaskin.calibration.sweeping.load_scene", lambda name: creeping)
     out = tmp_path / "s.toml"
     _, printed, told = run("calibrate", "sim:creeping", "--out", out, "--hold", "10", *FAST)
     assert "held for 10 s" in told
@@ -107,7 +108,7 @@ def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monke
             return lambda curvature, _: curvature * alive
 
     broken = replace(SCENE, effects=(Broken(), GaussianNoise(0.2)))
-    monkeypatch.setattr("kappaskin.sweeping.load_scene", lambda name: broken)
+    monkeypatch.setattr("kappaskin.calibration.sweeping.load_scene", lambda name: broken)
     out = tmp_path / "s.toml"
 
     code, printed, _ = run("calibrate", "sim:broken", "--out", out, *FAST)
@@ -208,7 +209,7 @@ class Rig:
 
 
 def guided(rig: Rig, monkeypatch, **options):
-    monkeypatch.setattr("kappaskin.sweeping.open_source", lambda _: rig)
+    monkeypatch.setattr("kappaskin.calibration.sweeping.open_source", lambda _: rig)
     options = {"seconds": 0.004} | options
     return take_sweep("a port", RADII, rig.ask, rig.told.append, **options)
 
@@ -289,7 +290,7 @@ def test_what_was_read_before_enter_does_not_count(monkeypatch) -> None:
 
 
 def test_a_device_that_falls_silent_is_refused(monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.sweeping._SILENCE", 0.05)
+    monkeypatch.setattr("kappaskin.calibration.sweeping._SILENCE", 0.05)
     rig = Rig()
     take = rig.read
     rig.read = lambda timeout: take(timeout) if len(rig.asked) < 5 else time.sleep(0.01) or []
@@ -299,7 +300,7 @@ def test_a_device_that_falls_silent_is_refused(monkeypatch) -> None:
 
 
 def test_a_frame_that_came_while_this_process_stood_still_is_no_silence(monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.sweeping._SILENCE", 0.05)
+    monkeypatch.setattr("kappaskin.calibration.sweeping._SILENCE", 0.05)
     rig = Rig()
     take, naps = rig.read, [0.1]
     rig.read = lambda timeout: time.sleep(naps.pop() if naps else 0.0) or take(timeout)

@@ -38,8 +38,9 @@ from kappaskin import (
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.calibration.lines import lines
 from kappaskin.calibration.loops import identify, thresholds
-from kappaskin.effects import ReadingEffect, Size
-from kappaskin.ring import Ring
+from kappaskin.live.ring import Ring
+from kappaskin.scenes import ReadingEffect
+from kappaskin.scenes.effects.effect import Size
 
 pytestmark = pytest.mark.slow
 

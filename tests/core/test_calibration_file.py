@@ -22,8 +22,9 @@ from kappaskin import (
     load_scene,
     save_calibration,
 )
+from kappaskin.calibration import to_toml
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.calibration.file import from_toml, to_toml
+from kappaskin.calibration.file import from_toml
 
 SENSOR = replace(
     load_scene("calibration").sensor(), layout=SensorLayout.regular(Patch(0.1, 0.1), 3, 2)
@@ -68,8 +69,8 @@ def edit(path, was, becomes):
 
 def sealed(path, **changes):
     """Rewrite the file with other values and the right hash: as a foreign program might."""
+    from kappaskin._toml import table
     from kappaskin.calibration.calibration import digest
-    from kappaskin.toml import table
 
     said = tomllib.loads(path.read_text())
     for name, value in changes.items():

@@ -14,7 +14,8 @@ import psutil
 import pytest
 
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
-from kappaskin.cli import REFUSED, app
+from kappaskin.cli import app
+from kappaskin.cli.common import REFUSED
 
 pytestmark = pytest.mark.slow
 

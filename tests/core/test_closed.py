@@ -15,10 +15,9 @@ import kappaskin
 import kappaskin_app
 import kappaskin_resources
 from kappaskin import load_scene
-from kappaskin.engine import Engine
-from kappaskin.sources import information
-from kappaskin.sources.decoder import Decoder
-from kappaskin.sources.wire import LONGEST, Kind, encode, encode_information, encode_samples
+from kappaskin.live import Engine
+from kappaskin.sources import Decoder, Kind, encode_information, encode_samples, information
+from kappaskin.sources.wire import LONGEST, encode
 
 pytestmark = pytest.mark.slow
 
@@ -104,7 +103,7 @@ def test_nothing_that_comes_from_elsewhere_is_run() -> None:
     }
     # The ring is shared memory of our own processes, that only this user may open.
     # In memory that this user alone may open, and after both sides have shown the same key.
-    assert found == {("ring.py", "pickle"), ("adoption.py", "pickle")}
+    assert found == {("ring.py", "pickle"), ("resume.py", "pickle")}
 
 
 @pytest.mark.parametrize(

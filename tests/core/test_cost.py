@@ -32,10 +32,10 @@ from kappaskin import (
     load_scene,
     settings_to_try,
 )
-from kappaskin.cli import FAILED, REFUSED
-from kappaskin.figures.cost import write_plot
-from kappaskin.scene import SCENES
-from kappaskin.studies.cost import Bench, costs_text, length_of, rows, verdict
+from kappaskin.cli.common import FAILED, REFUSED
+from kappaskin.scenes import SCENES
+from kappaskin.studies import costs_text, length_of, rows, verdict, write_plot
+from kappaskin.studies.cost.bench import Bench
 from kappaskin.studies.cost.choice import ALIKE
 from kappaskin.studies.tables import fingertip_scene, table_1
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from kappaskin import Creep, Refusal
-from kappaskin.hysteresis import StandardLinearSolid
+from kappaskin.sensing import StandardLinearSolid
 
 SHARE, TAU = 0.2, 3.0
 INTERVALS = st.lists(st.floats(0, 20), min_size=1, max_size=30)

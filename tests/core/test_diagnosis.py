@@ -9,14 +9,12 @@ from dataclasses import replace
 import pytest
 
 from kappaskin import load_scene
-from kappaskin.cli import FAILED, main
-from kappaskin.sources import information
-from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.diagnosis import diagnose
-from kappaskin.sources.wire import encode_information
+from kappaskin.cli import main
+from kappaskin.cli.common import FAILED
+from kappaskin.sources import Accounting, diagnose, encode_information, information
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-from kappaskin.sources.device import PseudoDevice
+from kappaskin.sources import PseudoDevice
 
 fcntl, pty, tty = map(pytest.importorskip, ("fcntl", "pty", "tty"))
 

@@ -8,7 +8,7 @@ import pytest
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
-from kappaskin import doctor
+from kappaskin.cli import machine as doctor
 from kappaskin.cli import main
 
 pytestmark = pytest.mark.slow  # the first that asks for the system's name runs uname

@@ -14,16 +14,15 @@ pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 
 from kappaskin import Frame, SourceError, load_scene
 from kappaskin.cli import main
-from kappaskin.sources import information
-from kappaskin.sources.tuning import BAUD_RATES
-from kappaskin.sources.wire import Fault, Information, Operation, Reply, Samples
-from kappaskin.studies.drills import DRILLS, drills, drills_text
+from kappaskin.sources import BAUD_RATES, Information, Operation, Reply, Samples, information
+from kappaskin.sources.wire import Fault
+from kappaskin.studies import drills_text, run_drills
 from kappaskin.studies.drills.devices import DRILLS as OF_DEVICES
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.held import Held
 from kappaskin.studies.drills.outcome import Outcome, judged
 from kappaskin.studies.drills.rewrite import Says, Times, untold
-from kappaskin.studies.drills.run import row_of
+from kappaskin.studies.drills.run import DRILLS, row_of
 from kappaskin.studies.drills.spoil import Cut, Flips, Garbage
 from kappaskin.studies.drills.stand import Device, Stand, opened
 from kappaskin.studies.drills.uart import heard
@@ -150,13 +149,13 @@ def test_a_drill_that_cannot_be_done_fails_with_the_reason(device) -> None:
 
 
 def test_the_command_prints_rows_and_fails_with_them(monkeypatch, capsys) -> None:
-    rows = [row | {"verdict": "failed"} for row in drills(chosen=())] or [
+    rows = [row | {"verdict": "failed"} for row in run_drills(chosen=())] or [
         {
             "drill": "bits", "sent": 5, "accepted": 4, "lost": 1, "discarded": 9, "wrong": 0,
             "recovered_s": None, "verdict": "failed", "reasons": ["why"],
         }
     ]  # fmt: skip
-    monkeypatch.setattr("kappaskin.studies.drills.drills", lambda *_: rows)
+    monkeypatch.setattr("kappaskin.studies.run_drills", lambda *_: rows)
     assert main(["drill"]) == 1
     assert "1 drills, 1 failed" in capsys.readouterr().out
     assert main(["drill", "--json"]) == 1

@@ -23,10 +23,10 @@ from kappaskin import (
     effect_costs,
     load_scene,
 )
-from kappaskin.cli import REFUSED
-from kappaskin.effects import CorruptedFrames, Creep, DroppedFrames, GaussianNoise, Temperature
-from kappaskin.scene import Choice, plan
-from kappaskin.studies.cost import effect_rows, effects_text, usual_setting
+from kappaskin.cli.common import REFUSED
+from kappaskin.scenes import Choice, CorruptedFrames, Creep, DroppedFrames, GaussianNoise, plan
+from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.studies import effect_rows, effects_text, usual_setting
 
 pytestmark = pytest.mark.slow
 

@@ -19,23 +19,15 @@ from kappaskin import (
     Transduction,
     UniformNoise,
 )
-from kappaskin.effects import (
-    EFFECTS,
-    CrossTalk,
-    FlickerNoise,
-    GageLength,
-    Hysteresis,
-    IntermittentElements,
-    MainsHum,
-    Quantisation,
-    ReadingEffect,
-    Saturation,
-    StrainLimit,
-    StuckElements,
-    Temperature,
-    Within,
-    parameters,
-)
+from kappaskin.scenes import EFFECTS, Hysteresis, ReadingEffect, Saturation, Within, parameters
+from kappaskin.scenes.effects.converter import Quantisation
+from kappaskin.scenes.effects.cross_talk import CrossTalk
+from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
+from kappaskin.scenes.effects.flicker import FlickerNoise
+from kappaskin.scenes.effects.gage_length import GageLength
+from kappaskin.scenes.effects.hum import MainsHum
+from kappaskin.scenes.effects.strain_limit import StrainLimit
+from kappaskin.scenes.effects.temperature import Temperature
 
 DRAWS = 200_000
 EFFECTS_AT_WORK = [

@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Refusal, SensorLayout
-from kappaskin.effects import (
-    EFFECTS,
-    CorruptedFrames,
-    DeadElements,
-    DroppedFrames,
-    IntermittentElements,
-    StuckElements,
-)
+from kappaskin.scenes import EFFECTS, CorruptedFrames, DeadElements, DroppedFrames
+from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
 
 P = 5
 FAILING = [DeadElements, StuckElements, IntermittentElements]

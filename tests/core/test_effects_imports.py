@@ -13,8 +13,8 @@ import sys
 import numpy as np
 import kappaskin
 from kappaskin import *
-from kappaskin.effects import *
-from kappaskin.effects import EFFECTS, parameters
+from kappaskin.scenes.effects import *
+from kappaskin.scenes.effects import EFFECTS, parameters
 
 patch = Patch(0.1, 0.1)
 plate, layout = Plate(patch, tension=5.0), SensorLayout.regular(patch, 4, 4)
@@ -40,7 +40,7 @@ assert len(every) == len(EFFECTS)
 plate, layout = every[0].of(plate), every[4].of(layout)
 
 def at_work():
-    room = "kappaskin.effects.at_work."
+    room = "kappaskin.scenes.effects.at_work."
     return sorted(name[len(room):] for name in sys.modules if name.startswith(room))
 
 print(*at_work())

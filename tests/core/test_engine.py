@@ -30,10 +30,10 @@ from kappaskin import (
     Stimulus,
     load_scene,
 )
-from kappaskin.engine import Engine
-from kappaskin.ring import Ring
-from kappaskin.status import LOST, OFF, STREAMING, Status
-from kappaskin.tare_taking import TareNews
+from kappaskin.live import LOST, STREAMING, Engine, Status
+from kappaskin.live.ring import Ring
+from kappaskin.live.status import OFF
+from kappaskin.live.tare_taking import TareNews
 
 pytestmark = pytest.mark.slow
 
@@ -470,7 +470,7 @@ def deaths_apart(monkeypatch, seconds: float) -> None:
     """Let an engine be started anew each time so long after the last, by its own clock."""
     times = (n * seconds for n in count(1))
     clock = SimpleNamespace(monotonic=lambda: next(times))
-    monkeypatch.setattr("kappaskin.engine.time", clock)
+    monkeypatch.setattr("kappaskin.live.engine.time", clock)
 
 
 def test_the_third_death_within_ten_seconds_is_the_last_until_it_is_connected(
@@ -518,7 +518,7 @@ def test_interrupted_from_the_keyboard_it_goes_on(own_engine) -> None:
 PARENT = """
 import sys, time
 from kappaskin import Region
-from kappaskin.engine import Engine
+from kappaskin.live import Engine
 
 class Slow(Region):
     def __setstate__(self, state):

@@ -33,16 +33,13 @@ from kappaskin import (
     basis_for,
     load_scene,
 )
-from kappaskin.bases.basis import curvature_at
+from kappaskin.bases import curvature_at
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.export import Exporting, Wanted
-from kappaskin.export.skin import Skin, Surface
-from kappaskin.export.writing import Exported, exported
-from kappaskin.recorder import Recorder
+from kappaskin.recording import Exported, Exporting, Recorder, Recording, Verdict, Wanted, verifying
+from kappaskin.recording.export.skin import Skin, Surface
+from kappaskin.recording.export.writing import exported
 from kappaskin.recording.messages import TOPICS
-from kappaskin.recording.reading import Recording
-from kappaskin.sources.simulated import SimulatedSource
-from kappaskin.verify import Verdict, verifying
+from kappaskin.sources import SimulatedSource
 
 pytestmark = pytest.mark.slow
 
@@ -545,7 +542,8 @@ def test_a_recording_that_breaks_off_is_exported_up_to_there(taps, tmp_path) -> 
 def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
     script = (
         "import resource, sys; from pathlib import Path; from kappaskin import Refusal\n"
-        "from kappaskin.export import Wanted; from kappaskin.export.writing import exported\n"
+        "from kappaskin.recording import Wanted\n"
+        "from kappaskin.recording.export.writing import exported\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))\n"
         "recording, *places = map(Path, sys.argv[1:])\n"
         "for to in places:\n"
@@ -606,7 +604,7 @@ def test_ctrl_c_while_it_begins_leaves_nothing(taps, tmp_path, monkeypatch) -> N
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("kappaskin.studies.beside.Beside.__init__", interrupted)
+    monkeypatch.setattr("kappaskin._background.Beside.__init__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         Exporting(Wanted(taps[0], tmp_path / "out.csv"))
     assert not list(tmp_path.iterdir())

@@ -164,7 +164,7 @@ def test_a_batch_is_answered_frame_by_frame(monkeypatch):
     K = readings(*setup, frames=(30,))
     K[::3, 0, 5] = np.nan
     fit = Fast(*setup)
-    monkeypatch.setattr("kappaskin.fit.fast._AT_ONCE", 7 * 3 * 90)
+    monkeypatch.setattr("kappaskin.estimation.fast._AT_ONCE", 7 * 3 * 90)
 
     batch = fit(K)
 

@@ -13,15 +13,9 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import RendererAgg
 
-from kappaskin import (
-    FIGURES,
-    SECOND_GENERATION,
-    Refusal,
-    load_scene,
-    write_figures,
-)
+from kappaskin import FIGURES, SECOND_GENERATION, Refusal, load_scene, write_figures
 from kappaskin.cli import main
-from kappaskin.figures import fig2, fig9, style
+from kappaskin.studies.figures import fig2, fig9, style
 from kappaskin.studies.initial_curvature import initial_curvature
 
 pytestmark = pytest.mark.slow

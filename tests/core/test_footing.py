@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, Plate, PointContact, PointLoad, SensorLayout, basis_for
-from kappaskin.touch.climb import Optimum
-from kappaskin.touch.contacts import EVEN, ROUND, arcs, ends, ring
-from kappaskin.touch.hypotheses import hypotheses
-from kappaskin.touch.inside import narrow
-from kappaskin.touch.skin import ElasticSkin
+from kappaskin.contact.elastic_skin import ElasticSkin
+from kappaskin.contact.hypotheses import hypotheses
+from kappaskin.contact.interior import narrow
+from kappaskin.contact.optimise import Optimum
+from kappaskin.contact.rigid_contacts import EVEN, ROUND, arcs, ends, ring
 
 SQUARE = Patch(0.1, 0.1)
 LAYOUT = SensorLayout.regular(SQUARE, 6, 6)

@@ -23,8 +23,8 @@ from kappaskin import (
     local_geometry,
 )
 from kappaskin.bases import ORDERS
-from kappaskin.fit.fit import DenseSpread
-from kappaskin.geometry import surface_geometry
+from kappaskin.contact import surface_geometry
+from kappaskin.estimation.fit import DenseSpread
 
 FLAT = Patch(0.1, 0.08)
 BENT = Patch(0.1, 0.08, 0.045)

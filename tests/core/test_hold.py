@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Frame, Pipeline, Refusal, Setup, Simulator, load_scene
-from kappaskin.hold import Hold
+from kappaskin.pipeline.frame_assembly import Hold
 
 P = 4
 EVERY = np.arange(3 * P)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS, Hysteresis, Refusal
-from kappaskin.hysteresis import PrandtlIshlinskii
+from kappaskin.sensing import PrandtlIshlinskii
 
 CURVATURES = st.lists(st.floats(-90, 90), min_size=1, max_size=40)
 

@@ -22,7 +22,8 @@ from kappaskin import (
     SourceError,
     Transduction,
 )
-from kappaskin.sources.information import UNSAID, from_json, to_json
+from kappaskin.sources import from_json, to_json
+from kappaskin.sources.information import UNSAID
 
 PATCH = Patch(0.1, 0.08)
 

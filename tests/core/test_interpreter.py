@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from kappaskin import load_scene
+from kappaskin.sources import Information, Interpreter, Reply, Samples, to_json
 from kappaskin.sources.clock import ClockMap
-from kappaskin.sources.information import to_json
-from kappaskin.sources.interpreter import Interpreter
-from kappaskin.sources.wire import Information, Reply, Samples
 
 SENSOR = load_scene("centre").sensor()
 TEXT = to_json(SENSOR)

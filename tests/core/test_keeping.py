@@ -13,12 +13,11 @@ import pytest
 
 from kappaskin import METHODS, SCENES, Calibration, Pipeline, Setup, load_scene
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.effects import SECOND_GENERATION_LOOPS, StuckElements
-from kappaskin.keeping import Keeping
-from kappaskin.recorder import Recorder
-from kappaskin.recording.reading import Recording
+from kappaskin.live.recorder import Keeping
+from kappaskin.recording import Recorder, Recording, verifying
+from kappaskin.scenes import SECOND_GENERATION_LOOPS
+from kappaskin.scenes.effects.failures import StuckElements
 from kappaskin.sources import SimulatedSource
-from kappaskin.verify import verifying
 
 NO_SIDE = SimpleNamespace(pipeline=None, left=None)
 

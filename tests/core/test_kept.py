@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin.bases.kept import kept
+from kappaskin.bases.cache import kept
 
 
 @pytest.fixture(autouse=True)

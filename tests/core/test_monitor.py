@@ -9,9 +9,15 @@ import pytest
 
 from kappaskin import SourceError, load_scene
 from kappaskin.cli import main
-from kappaskin.sources import information
-from kappaskin.sources.monitor import Monitor
-from kappaskin.sources.wire import Command, Fault, encode_information, encode_reply, encode_samples
+from kappaskin.sources import (
+    Command,
+    Monitor,
+    encode_information,
+    encode_reply,
+    encode_samples,
+    information,
+)
+from kappaskin.sources.wire import Fault
 
 tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
 

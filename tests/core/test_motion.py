@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 from kappaskin import Refusal
-from kappaskin.scene.motion import (
+from kappaskin.scenes import Orbit, Step
+from kappaskin.scenes.motion import (
     EASES,
     Hold,
-    Orbit,
     Path,
     Pose,
     Press,
     Recorded,
     Release,
     Slide,
-    Step,
     Tap,
     Turn,
 )

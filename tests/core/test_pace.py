@@ -2,7 +2,7 @@
 
 import pytest
 
-from kappaskin.pace import Pace
+from kappaskin.live.rate_limit import Pace
 
 
 class Played:

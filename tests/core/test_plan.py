@@ -22,10 +22,10 @@ from kappaskin import (
     load_scene,
     schedule,
 )
-from kappaskin.effects import EFFECTS
-from kappaskin.scene import Choice, effects_of, kept_of, plan
-from kappaskin.scene.motion import Hold, Orbit, Path, Press, Recorded, Release, Tap
-from kappaskin.scene.survey import survey
+from kappaskin.scenes import EFFECTS, Choice, Orbit, kept_of, plan
+from kappaskin.scenes.motion import Hold, Path, Press, Recorded, Release, Tap
+from kappaskin.scenes.plan import effects_of
+from kappaskin.scenes.survey import survey
 
 pytestmark = pytest.mark.slow
 
@@ -160,7 +160,7 @@ from kappaskin import Simulator, load_scene
 scene = load_scene("hot-room")
 scan = scene.sensor().scan()
 Simulator(scene).reading(scan, 0.0)
-room = "kappaskin.effects.at_work."
+room = "kappaskin.scenes.effects.at_work."
 print(sorted(name.removeprefix(room) for name in sys.modules if name.startswith(room)))
 """
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

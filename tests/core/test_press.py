@@ -16,7 +16,7 @@ from kappaskin import (
     elements_to_press,
     load_scene,
 )
-from kappaskin.press import Phase
+from kappaskin.calibration import Phase
 from kappaskin.sources import SimulatedSource
 
 pytestmark = pytest.mark.slow

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from kappaskin.processes import beginning_processes
-from kappaskin.studies import beside
+from kappaskin import _background as beside
+from kappaskin._processes import beginning_processes
 
 pytestmark = [
     pytest.mark.slow,

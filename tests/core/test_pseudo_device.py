@@ -17,25 +17,13 @@ import numpy as np
 import pytest
 
 from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
-from kappaskin.effects import CorruptedFrames, DroppedFrames
-from kappaskin.engine import Engine
-from kappaskin.scene import Orbit
-from kappaskin.sources import SerialSource
-from kappaskin.sources.decoder import Decoder
-from kappaskin.sources.wire import (
-    Fault,
-    Information,
-    Message,
-    Operation,
-    Reply,
-    Samples,
-    encode_command,
-    pack_runs,
-)
-from kappaskin.status import LOST, STREAMING, Status
+from kappaskin.live import LOST, STREAMING, Engine, Status
+from kappaskin.scenes import CorruptedFrames, DroppedFrames, Orbit
+from kappaskin.sources import Decoder, Information, Operation, Reply, Samples, SerialSource
+from kappaskin.sources.wire import Fault, Message, encode_command, pack_runs
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-from kappaskin.sources.device import PseudoDevice
+from kappaskin.sources import PseudoDevice
 
 pytestmark = pytest.mark.slow
 

@@ -18,11 +18,12 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from kappaskin import Event, Refusal, load_scene
-from kappaskin.publish import Message, State, foxglove
+from kappaskin.publish import State, foxglove
 from kappaskin.publish.channels import CHANNELS
 from kappaskin.publish.client import LARGEST, PER_SECOND, PROTOCOLS, Client
 from kappaskin.publish.cloud import NAMES, POINTS
 from kappaskin.publish.foxglove import MOST_CLIENTS, Foxglove
+from kappaskin.publish.message import Message
 from kappaskin.publish.target import opened, target_of
 
 pytestmark = pytest.mark.slow

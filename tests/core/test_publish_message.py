@@ -25,10 +25,10 @@ from kappaskin import (
     Setup,
     load_scene,
 )
-from kappaskin.geometry import surface_geometry
-from kappaskin.publish import channels, client, cloud, foxglove, message, publishing, target
+from kappaskin.contact import surface_geometry
+from kappaskin.publish import State, channels, client, cloud, foxglove, message, publishing, target
 from kappaskin.publish.contact import UNKNOWN
-from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SWITCHES, State, text_of
+from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SWITCHES, text_of
 
 GUIDE = (files("kappaskin_resources") / "publishing" / "messages.md").read_text("utf-8")
 PRESSED = load_scene("off-centre")

@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal, load_scene
-from kappaskin.publish import Message, Publishing, State, targets_of
+from kappaskin.publish import Listener, Publishing, State, targets_of
 from kappaskin.publish import udp as transport
-from kappaskin.publish.listening import Listener
+from kappaskin.publish.message import Message
 from kappaskin.publish.target import MOST_TARGETS, Target, opened, target_of
 from kappaskin.publish.udp import Udp
 

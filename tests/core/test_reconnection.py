@@ -17,13 +17,22 @@ import numpy as np
 import pytest
 
 from kappaskin import Pipeline, Port, Setup, SourceError, load_scene
-from kappaskin.keeping import Keeping
-from kappaskin.recording.reading import Recording
-from kappaskin.retrace import Retrace
-from kappaskin.sources import SerialSource, information, ports, serial_line
-from kappaskin.sources.decoder import FROM_HOST, Decoder
-from kappaskin.sources.tuning import BAUD_RATES
-from kappaskin.sources.wire import Operation, encode_information, encode_reply, encode_samples
+from kappaskin.live.recorder import Keeping
+from kappaskin.recording import Recording
+from kappaskin.recording.recompute import Retrace
+from kappaskin.sources import (
+    BAUD_RATES,
+    Decoder,
+    Operation,
+    SerialSource,
+    encode_information,
+    encode_reply,
+    encode_samples,
+    information,
+    ports,
+    serial_line,
+)
+from kappaskin.sources.decoder import FROM_HOST
 
 pytestmark = pytest.mark.slow
 

@@ -29,8 +29,8 @@ from kappaskin import (
     basis_for,
     load_scene,
 )
-from kappaskin.reconstruct import reconstruct
-from kappaskin.touch import KINDS
+from kappaskin.contact import KINDS
+from kappaskin.pipeline import reconstruct
 
 RNG = np.random.default_rng(7)
 A, B, P, T = 0.12, 0.09, 40, 5

@@ -20,18 +20,16 @@ from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from kappaskin import Calibration, Refusal, Region, Setup, load_scene, setup_from, write_scene
+from kappaskin._background import Beside
 from kappaskin.calibration import Tare
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.effects import SECOND_GENERATION_LOOPS, CorruptedFrames, Creep, DroppedFrames
-from kappaskin.engine import Engine
+from kappaskin.live import STREAMING, Engine, Status
+from kappaskin.recording import Recording, Verdict, decode, verifying
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import Layout, decode
-from kappaskin.recording.reading import Recording
+from kappaskin.recording.cdr import Layout
 from kappaskin.recording.writing import part_of
+from kappaskin.scenes import SECOND_GENERATION_LOOPS, CorruptedFrames, Creep, DroppedFrames
 from kappaskin.sources import open_source
-from kappaskin.status import STREAMING, Status
-from kappaskin.studies.beside import Beside
-from kappaskin.verify import Verdict, verifying
 
 pytestmark = pytest.mark.slow
 
@@ -184,7 +182,7 @@ def test_so_does_a_scene_that_becomes_another_skin(engine, tmp_path) -> None:
 @pytest.mark.parametrize("from_the_beginning", [True, False])
 def test_so_does_a_device_on_a_bad_line(from_the_beginning, engine, tmp_path) -> None:
     pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-    from kappaskin.sources.device import PseudoDevice
+    from kappaskin.sources import PseudoDevice
 
     path = tmp_path / "a.mcap"
     bad = (DroppedFrames(0.05), CorruptedFrames(0.05))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from kappaskin.cli import main
-from kappaskin.recording.reading import Recording
+from kappaskin.recording import Recording
 from kappaskin.recording.writing import part_of
 
 pytestmark = pytest.mark.slow

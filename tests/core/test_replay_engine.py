@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from kappaskin import LONGEST_NOTE, Engine, Recording, Refusal, Setup, Status, setups_of
-from kappaskin.recording.cdr import decode
+from kappaskin.recording import ReplayedSource, Verdict, decode, verifying
 from kappaskin.recording.messages import EVENTS, LOG
-from kappaskin.sources.replayed import ReplayedSource
-from kappaskin.verify import Verdict, verifying
 
 pytestmark = pytest.mark.slow
 

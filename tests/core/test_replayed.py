@@ -8,13 +8,9 @@ import numpy as np
 import pytest
 
 from kappaskin import Event, Frame, Refusal, SensorLayout, load_scene
-from kappaskin.recorder import Recorder
+from kappaskin.recording import Recorder, Recording, ReplayedSource
 from kappaskin.recording import messages as m
-from kappaskin.recording.reading import Recording
-from kappaskin.sources import SimulatedSource
-from kappaskin.sources.information import to_json
-from kappaskin.sources.replayed import ReplayedSource
-from kappaskin.sources.wire import encode_information, encode_samples
+from kappaskin.sources import SimulatedSource, encode_information, encode_samples, to_json
 
 RATE, FRAMES, GAP = 500.0, 1000, 1.25
 FIRST, LAST = 0, FRAMES - 1

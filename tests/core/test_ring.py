@@ -12,7 +12,7 @@ import pytest
 
 from kappaskin import Estimate, LocalGeometry, Pipeline, Refusal, Setup, Simulator, load_scene
 from kappaskin.frames import Array, Touch
-from kappaskin.ring import Ring, slot_type
+from kappaskin.live.ring import Ring, slot_type
 
 
 def pipeline_of(setup: Setup | None = None) -> Pipeline:
@@ -179,10 +179,10 @@ def test_an_estimate_too_large_for_two_slots_is_refused(writer) -> None:
 # Two processes
 
 WRITING = """
-import kappaskin.ring
-from kappaskin.ring import Ring
+import kappaskin.live.ring
+from kappaskin.live.ring import Ring
 
-kappaskin.ring._MOST_SLOTS = 2  # so that the writer overtakes the reader all the time
+kappaskin.live.ring._MOST_SLOTS = 2  # so that the writer overtakes the reader all the time
 ring = Ring.attach(name)
 ring.lay_out(1, slot)
 ring.write_status(statuses[0])
@@ -208,7 +208,7 @@ def all_of(number: float) -> Estimate:
 
 @pytest.mark.slow
 def test_another_process_never_shows_half_an_estimate_or_half_a_status(ring, monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.ring._MOST_SLOTS", 2)
+    monkeypatch.setattr("kappaskin.live.ring._MOST_SLOTS", 2)
     slot = slot_type(pipeline_of(Setup(8, 8, 129, 129)))
     context = multiprocessing.get_context("spawn")
     given = {

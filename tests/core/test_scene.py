@@ -21,9 +21,10 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.scene import TABLE_1_NOISE, Pressing, contact_of, moments_of, scaled_to
-from kappaskin.scene.limits import check_elements
-from kappaskin.scene.motion import Path, Press, Release, Slide
+from kappaskin.scenes import TABLE_1_NOISE, Pressing, moments_of, scaled_to
+from kappaskin.scenes.limits import check_elements
+from kappaskin.scenes.motion import Path, Press, Release, Slide
+from kappaskin.scenes.stimulus import contact_of
 
 PATCH = Patch(0.1, 0.1)
 

@@ -41,22 +41,19 @@ from kappaskin import (
     schedule,
     write_scene,
 )
-from kappaskin.effects import (
-    EFFECTS,
-    CorruptedFrames,
-    CrossTalk,
-    FlickerNoise,
-    Foam,
-    IntermittentElements,
-    MainsHum,
-    StrainLimit,
-    StuckElements,
-    Temperature,
-)
 from kappaskin.mechanics import Block, Cylinder, HeightMap, Mesh, Punch, Sphere, Wedge
-from kappaskin.scene import LINEAR, Choice, Indenter, effects_of, kept_of, plan
-from kappaskin.scene.motion import Hold, Press, Recorded, Release, Slide, Tap, Turn
-from kappaskin.scene.motion import Path as Way
+from kappaskin.scenes import EFFECTS, Choice, CorruptedFrames, Indenter, kept_of, plan
+from kappaskin.scenes.choice import LINEAR
+from kappaskin.scenes.effects.cross_talk import CrossTalk
+from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
+from kappaskin.scenes.effects.flicker import FlickerNoise
+from kappaskin.scenes.effects.hum import MainsHum
+from kappaskin.scenes.effects.skin import Foam
+from kappaskin.scenes.effects.strain_limit import StrainLimit
+from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes.motion import Hold, Press, Recorded, Release, Slide, Tap, Turn
+from kappaskin.scenes.motion import Path as Way
+from kappaskin.scenes.plan import effects_of
 from kappaskin.sources import information
 
 SQUARE = Patch(0.1, 0.1)

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from kappaskin import Refusal, Setup
-from kappaskin.setup_text import said_of_setup, setup_from
+from kappaskin.recording import said_of_setup
+from kappaskin.recording.setup_text import setup_from
 
 SETUP = Setup(6, 7, method="bayes", edge="clamped", hold=0.25)
 SAID = json.loads(said_of_setup(SETUP)[0])

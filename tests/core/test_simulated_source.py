@@ -29,11 +29,10 @@ from kappaskin import (
     Transduction,
     load_scene,
 )
-from kappaskin.effects import CorruptedFrames, DroppedFrames
 from kappaskin.mechanics import Sphere
-from kappaskin.recorder import Recorder
+from kappaskin.recording import Recorder, Recording
 from kappaskin.recording.messages import LINES
-from kappaskin.recording.reading import Recording
+from kappaskin.scenes import CorruptedFrames, DroppedFrames
 from kappaskin.sources import SimulatedSource, open_source
 from kappaskin.sources.wire import pack_runs, unpack_runs
 

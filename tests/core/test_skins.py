@@ -14,7 +14,7 @@ FUNCTIONS = 8  # along each side, of the skin that is touched; 6 of the shape fi
 @pytest.fixture(autouse=True)
 def few_functions(monkeypatch):
     """Polygons with the functions a contact is usually sought with take seconds to make."""
-    monkeypatch.setattr("kappaskin.touch.point._FUNCTIONS", FUNCTIONS)
+    monkeypatch.setattr("kappaskin.contact.point._FUNCTIONS", FUNCTIONS)
 
 
 @cache

@@ -10,14 +10,19 @@ import numpy as np
 import pytest
 
 from kappaskin import Frame, load_scene
-from kappaskin.recorder import Recorder
-from kappaskin.recording.reading import Recording
-from kappaskin.sources import SerialSource, SimulatedSource, Source
-from kappaskin.sources.decoder import Decoder
-from kappaskin.sources.information import to_json
-from kappaskin.sources.reenact import Reenactment
-from kappaskin.sources.replayed import ReplayedSource
-from kappaskin.sources.wire import Information, Samples, encode_information, encode_samples
+from kappaskin.recording import Recorder, Recording, ReplayedSource
+from kappaskin.recording.recorded_frames import Reenactment
+from kappaskin.sources import (
+    Decoder,
+    Information,
+    Samples,
+    SerialSource,
+    SimulatedSource,
+    Source,
+    encode_information,
+    encode_samples,
+    to_json,
+)
 
 SCENE = replace(load_scene("circle"), rate=100.0)
 SENSOR = SCENE.sensor()

@@ -23,8 +23,8 @@ from kappaskin import (
     basis_for,
     singular_values,
 )
-from kappaskin.fit import METHODS
-from kappaskin.fit.fit import DenseSpread
+from kappaskin.estimation import METHODS
+from kappaskin.estimation.fit import DenseSpread
 from kappaskin.studies import stability as study
 from kappaskin.studies.stability.case import Kind
 from kappaskin.studies.stability.gallery import gallery
@@ -41,7 +41,7 @@ SEEK_LEAST_SQUARES = ("least-squares", "direct")
 
 @pytest.fixture(scope="module")
 def rows():
-    return study.stability()
+    return study.run_stability()
 
 
 def verdicts(rows, **wanted):
@@ -169,7 +169,7 @@ def test_the_hardest_cases_raise_no_warnings(rows, case):
 
 
 def test_the_command_prints_one_list_without_nan(rows, run, monkeypatch):
-    monkeypatch.setattr("kappaskin.cli.stability.measured_stability", lambda long, told: rows)
+    monkeypatch.setattr("kappaskin.cli.stability.run_stability", lambda long, told: rows)
 
     code, out, err = run("stability", "--json")
 
@@ -178,7 +178,7 @@ def test_the_command_prints_one_list_without_nan(rows, run, monkeypatch):
 
 
 def test_the_table_has_every_case_with_what_is_hard_about_it(rows, run, monkeypatch):
-    monkeypatch.setattr("kappaskin.cli.stability.measured_stability", lambda long, told: rows)
+    monkeypatch.setattr("kappaskin.cli.stability.run_stability", lambda long, told: rows)
 
     code, out, _ = run("stability")
 

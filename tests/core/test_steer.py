@@ -16,8 +16,8 @@ from kappaskin import (
     Setup,
     load_scene,
 )
+from kappaskin.live import steered
 from kappaskin.sources import SimulatedSource
-from kappaskin.steer import steered
 
 pytestmark = pytest.mark.slow
 

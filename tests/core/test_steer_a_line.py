@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from kappaskin import Plate, Refusal, Region, Scanner, load_scene
+from kappaskin.live import STREAMING, steered
 from kappaskin.sources import SerialSource, information
-from kappaskin.status import STREAMING
-from kappaskin.steer import steered
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-from kappaskin.engine import Engine
-from kappaskin.sources.device import PseudoDevice
+from kappaskin.live import Engine
+from kappaskin.sources import PseudoDevice
 
 pytestmark = pytest.mark.slow
 

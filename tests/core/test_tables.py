@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from kappaskin.errors import Refusal
-from kappaskin.studies.as_printed import misprints
-from kappaskin.studies.tables import DRAWS, fingertip_scene, table_1, table_2, tables
-from kappaskin.studies.text import misprints_text, tables_text
+from kappaskin.studies import misprints, misprints_text, paper_tables, tables_text
+from kappaskin.studies.tables import DRAWS, fingertip_scene, table_1, table_2
 
 CASES = ("centre", "off-centre", "line")
 CHECKED = {
@@ -363,10 +362,10 @@ def test_a_priors_rows_are_within_what_is_asked_and_tell_what_their_bands_cover(
 
 
 def test_a_table_that_a_method_refuses_says_why_and_both_are_an_error():
-    rows = tables("fast")
+    rows = paper_tables("fast")
 
     assert [row["table"] for row in rows] == [1] * 6 + [2]
     assert "expected a flat skin" in rows[-1]["refused"]
     assert "refused: expected a flat skin" in tables_text(rows)
     with pytest.raises(Refusal, match="140 of the 144"):
-        tables("least-squares", (12, 12))
+        paper_tables("least-squares", (12, 12))

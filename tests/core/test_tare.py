@@ -24,10 +24,11 @@ from kappaskin import (
     Tolerance,
     load_scene,
 )
+from kappaskin.calibration import DriftWatch, Rest, Taring
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.effects import FlickerNoise, Temperature
-from kappaskin.taring import DriftWatch, Rest, Taring
-from kappaskin.touch import LoadSeeker
+from kappaskin.contact import LoadSeeker
+from kappaskin.scenes.effects.flicker import FlickerNoise
+from kappaskin.scenes.effects.temperature import Temperature
 
 pytestmark = pytest.mark.slow
 

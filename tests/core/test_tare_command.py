@@ -11,7 +11,7 @@ from kappaskin import PointLoad, Scene, Tares, load_scene
 from kappaskin.cli import main
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-from kappaskin.sources.device import PseudoDevice
+from kappaskin.sources import PseudoDevice
 
 
 class RealScene(Scene):

@@ -22,9 +22,9 @@ from kappaskin import (
     Tracking,
     load_scene,
 )
-from kappaskin.fit.choosing import telling_most
-from kappaskin.fit.kalman import MovingModes
-from kappaskin.fit.prior import prior_root
+from kappaskin.estimation.choosing import telling_most
+from kappaskin.estimation.kalman import MovingModes
+from kappaskin.estimation.prior import prior_root
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
-from kappaskin.fit import Tracking
+from kappaskin.estimation import Tracking
 from kappaskin.frames import Array
 
 pytestmark = pytest.mark.slow

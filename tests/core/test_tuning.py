@@ -1,6 +1,7 @@
 """Which baud rate is tried next."""
 
-from kappaskin.sources.tuning import BAUD_RATES, Tuning
+from kappaskin.sources import BAUD_RATES
+from kappaskin.sources.tuning import Tuning
 
 
 def tried(tuning: Tuning, rate: int, count: int) -> list[int]:

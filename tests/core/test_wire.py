@@ -11,24 +11,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin.errors import Refusal
-from kappaskin.sources.accounting import Accounting, Sequence
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
-from kappaskin.sources.wire import (
-    LONGEST,
+from kappaskin.sources import (
+    Accounting,
     Command,
-    Fault,
+    Decoder,
     Information,
     Kind,
-    Message,
     Operation,
     Reply,
     Samples,
-    encode,
-    encode_command,
     encode_information,
     encode_reply,
     encode_samples,
 )
+from kappaskin.sources.accounting import Sequence
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
+from kappaskin.sources.wire import LONGEST, Fault, Message, encode, encode_command
 
 SEQUENCES = st.integers(0, 2**32 - 1)
 MICROSECONDS = st.integers(0, 2**53)

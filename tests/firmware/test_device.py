@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin.sources.information import from_json
+from kappaskin.sources import from_json
 
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[1] / "resources" / "kappaskin_resources" / "firmware"

@@ -26,32 +26,29 @@ from kappaskin import (
     Setup,
     load_scene,
 )
-from kappaskin.adoption import adopted
-from kappaskin.calibration import Tare, Tares
+from kappaskin.calibration import Tare, Tares, to_toml
 from kappaskin.calibration.calibration import digest, fingerprint
-from kappaskin.calibration.file import from_toml, to_toml
-from kappaskin.effects import SECOND_GENERATION_LOOPS, Creep
+from kappaskin.calibration.file import from_toml
+from kappaskin.live.resume import adopted
 from kappaskin.mechanics import HeightMap, Mesh
 from kappaskin.publish.channels import CHANNELS
 from kappaskin.publish.client import Client
-from kappaskin.recorder import Recorder
+from kappaskin.recording import Recorder, ReplayedSource, Verdict, repairing, verifying
 from kappaskin.recording.messages import TOPICS
-from kappaskin.recording.repair import repairing
-from kappaskin.scene import read_scene
-from kappaskin.sources import SimulatedSource, information
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, Decoder
-from kappaskin.sources.replayed import ReplayedSource
-from kappaskin.sources.wire import (
+from kappaskin.scenes import SECOND_GENERATION_LOOPS, Creep, read_scene
+from kappaskin.sources import (
     Command,
+    Decoder,
     Kind,
     Operation,
-    encode,
-    encode_command,
+    SimulatedSource,
     encode_information,
     encode_reply,
     encode_samples,
+    information,
 )
-from kappaskin.verify import Verdict, verifying
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
+from kappaskin.sources.wire import encode, encode_command
 from kappaskin_app.lessons.reading import READY, read_lesson
 
 Read = Callable[[bytes, Path], object]

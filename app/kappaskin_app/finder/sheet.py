@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 from kappaskin_app.actions import Actions, plain
 from kappaskin_app.finder.listing import Listing, clearable, row
 from kappaskin_app.finder.matching import best, score

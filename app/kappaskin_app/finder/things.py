@@ -9,13 +9,14 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QStandardItemModel
 from PySide6.QtWidgets import QComboBox, QDockWidget, QTabWidget, QWidget
 
-from kappaskin import scene_file
+from kappaskin.scenes import scene_file
 from kappaskin_app.actions import plain
 from kappaskin_app.columns import scroll_to
 from kappaskin_app.pages import pages
 from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.panel import Panel
-from kappaskin_app.settings import Choice, ask_of
+from kappaskin_app.settings import ask_of
+from kappaskin_app.settings.asks import Choice
 
 if TYPE_CHECKING:
     from kappaskin_app.window import MainWindow

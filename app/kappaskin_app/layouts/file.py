@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QLockFile
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 from kappaskin_app.layouts.kept import Kept, from_text, merged, to_text
 
 _LARGEST = 1_000_000  # bytes

@@ -7,9 +7,10 @@ from typing import Any, TypeVar
 
 import tomlkit
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 from kappaskin_app.layouts.layout import AREAS, FLOATING, LIVE, READY, Layout, Place
-from kappaskin_app.settings import Range, ask_of
+from kappaskin_app.settings import ask_of
+from kappaskin_app.settings.asks import Range
 from kappaskin_app.theme import THEMES
 
 FORMAT = 1

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 
 LONGEST = 200  # letters of an expression
 NUMBER, WORD, TRUTH = "a number", "a word", "yes or no"

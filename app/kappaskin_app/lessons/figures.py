@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kappaskin import Estimate, Status
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
 from kappaskin_app.lessons.expression import NUMBER, WORD
-from kappaskin_app.settings import Choice, Settings, Several, Text
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.asks import Choice, Several, Text
 
 if TYPE_CHECKING:
     from kappaskin_app.seeing import Spectrum

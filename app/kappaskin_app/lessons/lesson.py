@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from kappaskin import scene_file
+from kappaskin.scenes import scene_file
 from kappaskin_app.lessons.expression import Expression
-from kappaskin_app.settings import Fit, Scanning, SceneSettings, View
+from kappaskin_app.settings import SceneSettings
+from kappaskin_app.settings.sensor import Scanning
+from kappaskin_app.settings.shown import Fit, View
 from kappaskin_app.simulation import written
 from kappaskin_app.skins import SHAPES
 

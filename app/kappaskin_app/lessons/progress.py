@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 from kappaskin_app.lessons.expression import Figures
 from kappaskin_app.lessons.lesson import UNITS, Choice, Lesson, Number, Question, Task
 

@@ -9,19 +9,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from kappaskin import SCENES, Refusal
+from kappaskin.errors import Refusal
+from kappaskin.scenes import SCENES
 from kappaskin_app.lessons.expression import NUMBER, TRUTH, Expression, expression
 from kappaskin_app.lessons.figures import KINDS
-from kappaskin_app.lessons.lesson import (
-    UNITS,
-    Button,
-    Choice,
-    Lesson,
-    Number,
-    Question,
-    Step,
-    Task,
-)
+from kappaskin_app.lessons.lesson import UNITS, Button, Choice, Lesson, Number, Question, Step, Task
 from kappaskin_app.lessons.setting import SETTABLE, checked_setting
 
 _FOLDER = Path(str(files("kappaskin_resources"))) / "lessons"

@@ -3,20 +3,11 @@
 from dataclasses import fields
 from typing import Any
 
-from kappaskin import Refusal
-from kappaskin_app.settings import (
-    Ask,
-    Choice,
-    Fit,
-    Range,
-    Scanning,
-    SceneSettings,
-    Settings,
-    Several,
-    Switch,
-    View,
-    ask_of,
-)
+from kappaskin.errors import Refusal
+from kappaskin_app.settings import SceneSettings, Settings, ask_of
+from kappaskin_app.settings.asks import Ask, Choice, Range, Several, Switch
+from kappaskin_app.settings.sensor import Scanning
+from kappaskin_app.settings.shown import Fit, View
 
 _OWN = ("theme", "show_start")  # matters of taste
 _LISTS = ("dead_elements", "region_elements")

@@ -10,7 +10,8 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from kappaskin_app.lessons.progress import Progress
 from kappaskin_app.lessons.setting import SETTABLE
-from kappaskin_app.settings import Choice, Range, Settings, Several, Switch, ask_of
+from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.settings.asks import Choice, Range, Several, Switch
 from kappaskin_app.theme import LIGHT, palette
 
 _WIDTH, _MARGIN = 1000, 24  # px

@@ -10,7 +10,8 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import Estimate, Refusal
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
 from kappaskin_app.lessons.figures import Watch

@@ -2,10 +2,11 @@
 
 from PySide6.QtWidgets import QWidget
 
-from kappaskin import Status, edges_of
+from kappaskin.bases import edges_of
+from kappaskin.live import Status
 from kappaskin_app.panels.calibration.parts import sentence
 from kappaskin_app.panels.form import Form
-from kappaskin_app.settings import METHOD_SHORT
+from kappaskin_app.settings.shown import METHOD_SHORT
 
 
 def in_use(status: Status) -> str:

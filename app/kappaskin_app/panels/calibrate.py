@@ -5,7 +5,9 @@ from pathlib import Path
 from PySide6.QtCore import QSignalBlocker
 from PySide6.QtWidgets import QFileDialog, QPushButton, QWidget
 
-from kappaskin import Refusal, Status, radii_for
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
+from kappaskin.scenes import radii_for
 from kappaskin_app.calibrating import Calibrating, parsed_radii
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.outcome import Outcome

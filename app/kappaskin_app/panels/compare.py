@@ -13,14 +13,17 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Computed, Sensor, Status, edges_of
+from kappaskin.bases import edges_of
+from kappaskin.live import Computed, Status
+from kappaskin.sensing import Sensor
 from kappaskin_app.columns import scrolled
 from kappaskin_app.comparing import Comparing, Pair
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import button, number, sentence
 from kappaskin_app.panels.form import Form
 from kappaskin_app.scale import SteadyRange
-from kappaskin_app.settings import METHOD_SHORT, Settings
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Theme, grown
 from kappaskin_app.views.rows import fit_rows
 from kappaskin_app.views.surface_map import SurfaceMap

@@ -14,7 +14,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Calibration, Port, Sensor, Status
+from kappaskin.calibration import Calibration
+from kappaskin.live import Status
+from kappaskin.sensing import Sensor
+from kappaskin.sources import Port
 from kappaskin_app.panels.calibration.parts import said
 from kappaskin_app.panels.form import well_behaved
 from kappaskin_app.panels.panel import Panel

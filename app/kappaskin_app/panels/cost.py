@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Cost, Refused
+from kappaskin.studies import Cost, Refused
 from kappaskin_app.amounts import NONE, duration, length
 from kappaskin_app.costing import Costing, Frontier, gives, in_words
 from kappaskin_app.guard import guarded

@@ -11,14 +11,16 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Prospect
+from kappaskin.studies import Prospect
 from kappaskin_app.columns import row, scrolled
 from kappaskin_app.designing import Designing
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.panels.form import Form, well_behaved
 from kappaskin_app.scale import round_up
-from kappaskin_app.settings import Designed, Range, Settings, ask_of
+from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.settings.asks import Range
+from kappaskin_app.settings.designed import Designed
 from kappaskin_app.skins import SHAPES
 from kappaskin_app.theme import SEQUENTIAL, Theme
 from kappaskin_app.views.curve_plot import Curve, CurvePlot

@@ -15,10 +15,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import EFFECTS, Choice
+from kappaskin.scenes import EFFECTS, Choice
 from kappaskin_app.amounts import duration
 from kappaskin_app.effects import called, explained
-from kappaskin_app.scene_text import OFF, ON, PLANNED
+from kappaskin_app.scene_text.changes import OFF, ON, PLANNED
 from kappaskin_app.theme import LIGHT, Theme
 
 _COLUMNS = ("Effect", "Simulated", "Kept", "Size", "If left out", "Time", "Why")

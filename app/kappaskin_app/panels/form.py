@@ -27,7 +27,8 @@ from PySide6.QtWidgets import (
 from kappaskin_app.panels.keys import for_the_window
 from kappaskin_app.panels.panel import Panel
 from kappaskin_app.panels.several import SeveralButton
-from kappaskin_app.settings import Choice, Range, Settings, Several, Switch, Text, ask_of
+from kappaskin_app.settings import Settings, ask_of
+from kappaskin_app.settings.asks import Choice, Range, Several, Switch, Text
 
 _AT_FIRST = Settings()
 _BEGUN = re.compile(r"[+-]?\d*\.?(\d*|\d+e[+-]?)", re.IGNORECASE)  # what may become a number

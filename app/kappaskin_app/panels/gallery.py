@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import SCENES, Scene
+from kappaskin.scenes import SCENES, Scene
 from kappaskin_app.columns import scrolled
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import ELLIPSIS, button, in_a_row, text_label

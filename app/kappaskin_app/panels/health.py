@@ -12,7 +12,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Health, Status
+from kappaskin.health import Health
+from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.calibration.parts import sentence, text_label

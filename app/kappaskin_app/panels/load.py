@@ -2,16 +2,16 @@
 
 from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
-from kappaskin import Status
+from kappaskin.live import Status
 from kappaskin_app.panels.form import Form
-from kappaskin_app.settings import (
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.load import (
     FREE_CASES,
     LOAD_CASES,
     SIZES,
     SPREAD_CASES,
     TABLE_1_CASES,
     TWO_ENDED,
-    Settings,
 )
 from kappaskin_app.simulation import is_table_1
 

@@ -16,7 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Estimate, Sensor
+from kappaskin.frames import Estimate
+from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
 from kappaskin_app.table import ELEMENTS, FACTS, Rows, csv_of, elements_of, facts_of
 from kappaskin_app.views.rows import fit_rows

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Status
+from kappaskin.live import Status
 from kappaskin_app.about import PAGES, PANELS
 from kappaskin_app.columns import scroll_to
 from kappaskin_app.guard import guarded

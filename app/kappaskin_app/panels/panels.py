@@ -5,7 +5,7 @@ from typing import TypeVar
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QScrollArea, QTabWidget, QWidget
 
-from kappaskin import Status
+from kappaskin.live import Status
 from kappaskin_app.columns import scrolled
 from kappaskin_app.panels.basis import BasisPanel
 from kappaskin_app.panels.calibrate import CalibratePanel

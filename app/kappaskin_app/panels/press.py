@@ -2,7 +2,8 @@
 
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 
-from kappaskin import Phase, PressTest, Status
+from kappaskin.calibration import Phase, PressTest
+from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.calibration.parts import button, sentence, text_label

@@ -5,7 +5,8 @@ import time
 
 from PySide6.QtWidgets import QWidget
 
-from kappaskin import Published, Status
+from kappaskin.live import Status
+from kappaskin.publish import Published
 from kappaskin_app.panels.calibration.parts import ELLIPSIS, text_label
 from kappaskin_app.panels.form import Form
 

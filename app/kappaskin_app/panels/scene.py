@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QTabWidget, QVBoxL
 from kappaskin_app.panels.calibration.parts import button, text_label
 from kappaskin_app.panels.effects import EffectsPanel
 from kappaskin_app.panels.gallery import GalleryPanel
-from kappaskin_app.panels.scene_form import SceneForm
+from kappaskin_app.panels.scene_form.form import SceneForm
 from kappaskin_app.panels.scene_source import SceneText
 from kappaskin_app.theme import LIGHT, Theme
 

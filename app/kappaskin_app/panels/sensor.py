@@ -4,7 +4,9 @@ import math
 
 from PySide6.QtWidgets import QLabel, QWidget
 
-from kappaskin import Bargain, Sensor, Status
+from kappaskin.estimation import Bargain
+from kappaskin.live import Status
+from kappaskin.sensing import Sensor
 from kappaskin_app.panels.form import Form
 from kappaskin_app.panels.load import SimulationForm
 from kappaskin_app.settings import Settings

@@ -5,7 +5,9 @@ from contextlib import suppress
 
 from PySide6.QtWidgets import QLabel, QWidget
 
-from kappaskin import Refusal, Status, edges_of
+from kappaskin.bases import edges_of
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
 from kappaskin_app.panels.basis import in_use
 from kappaskin_app.panels.load import SimulationForm
 from kappaskin_app.settings import Settings

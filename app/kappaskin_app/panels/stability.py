@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Status
+from kappaskin.live import Status
 from kappaskin_app.demonstrations import DEMONSTRATIONS
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.basis import in_use

@@ -4,7 +4,9 @@ import math
 
 from PySide6.QtWidgets import QWidget
 
-from kappaskin import Refusal, Status, Tare
+from kappaskin.calibration import Tare
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import button, in_a_row, sentence, text_label
 from kappaskin_app.panels.panel import Panel

@@ -5,7 +5,7 @@ from typing import Any
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 
 
 def parsed(text: str) -> Any:

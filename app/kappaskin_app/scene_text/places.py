@@ -6,7 +6,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AbstractTable
 
-from kappaskin import Refusal
+from kappaskin.errors import Refusal
 from kappaskin_app.scene_text.parsing import parsed
 
 _SIDE = 0.1  # m of the skin that parts.toml has its places on

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
-from kappaskin import Calibration, Tare
+from kappaskin.calibration import Calibration, Tare
 from kappaskin_app.settings.asks import Ask as Ask
 from kappaskin_app.settings.asks import Choice as Choice
 from kappaskin_app.settings.asks import Range as Range

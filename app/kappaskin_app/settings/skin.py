@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from kappaskin import EDGES
+from kappaskin.bases import EDGES
 from kappaskin_app.settings.asks import MILLIMETRES, Choice, Range, Switch, asked
 from kappaskin_app.skins import SHAPES
 

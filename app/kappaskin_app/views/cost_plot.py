@@ -7,10 +7,10 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
-from kappaskin import Cost
+from kappaskin.studies import Cost
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.costing import Frontier, in_words
-from kappaskin_app.settings import METHOD_SHORT
+from kappaskin_app.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import LIGHT, SERIES, Theme
 from kappaskin_app.views.log_axis import LogAxis
 

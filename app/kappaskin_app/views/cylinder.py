@@ -6,7 +6,8 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin import Patch, Step
+from kappaskin.scenes import Step
+from kappaskin.skin import Patch
 from kappaskin_app.theme import LIGHT, Theme
 
 _POINTS = 61  # of the skin's line

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import Patch, between, onto_rim
+from kappaskin.skin import Patch, between, onto_rim
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

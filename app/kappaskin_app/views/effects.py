@@ -10,7 +10,7 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
-from kappaskin import EffectCost
+from kappaskin.studies import EffectCost
 from kappaskin_app.amounts import NONE, duration, length
 from kappaskin_app.effects import called
 from kappaskin_app.theme import LIGHT, Theme

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from kappaskin import COMPONENTS
+from kappaskin.frames import COMPONENTS
 from kappaskin_app.theme import Theme
 from kappaskin_app.views.curve_plot import Curve, CurvePlot
 

@@ -7,7 +7,7 @@ import pyvista as pv
 import scipy
 from numpy.typing import NDArray
 
-from kappaskin import SensorLayout
+from kappaskin.sensing import SensorLayout
 from kappaskin_app.theme import Colours
 
 _PIXELS = 384  # along each side, of cells that are no rectangles of a regular grid

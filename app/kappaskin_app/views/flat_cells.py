@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin import SensorLayout
+from kappaskin.sensing import SensorLayout
 from kappaskin_app.theme import DARK_INK, WANTED, Colours
 
 Indices = NDArray[np.intp]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import DiscLoad, GaussianLoad, LineLoad, Load, RectangleLoad
+from kappaskin.mechanics import DiscLoad, GaussianLoad, LineLoad, Load, RectangleLoad
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QToolBar
 
-from kappaskin import Written
+from kappaskin.recording import Written
 from kappaskin_app.views.badge import Badge
 from kappaskin_app.views.readouts import Readouts
 from kappaskin_app.views.recording_mark import RecordingMark

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from kappaskin import WHY, SensorLayout
+from kappaskin.estimation import WHY
+from kappaskin.sensing import SensorLayout
 from kappaskin_app.shades import SHADES, Tint
 from kappaskin_app.theme import Theme
 from kappaskin_app.views.colour_bar import ColourBar, LockButton

@@ -9,7 +9,8 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QHelpEvent, QPainter, QPen
 from PySide6.QtWidgets import QToolTip, QWidget
 
-from kappaskin import Event, Replay
+from kappaskin.frames import Event
+from kappaskin.recording import Replay
 from kappaskin_app.theme import SERIES
 from kappaskin_app.views.course import Course
 

@@ -7,7 +7,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from kappaskin import Load
+from kappaskin.mechanics import Load
 from kappaskin_app.views.drag import ARROW
 from kappaskin_app.views.drawn import DrawnSkin
 from kappaskin_app.views.footprint import footprint

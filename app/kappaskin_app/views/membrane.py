@@ -14,7 +14,9 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
-from kappaskin import Estimate, Load, Sensor
+from kappaskin.frames import Estimate
+from kappaskin.mechanics import Load
+from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
 from kappaskin_app.views.alarm import Alarm

@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin import SensorLayout
+from kappaskin.sensing import SensorLayout
 from kappaskin_app.shades import Tint
 from kappaskin_app.theme import DIVERGING, LIGHT, Theme
 

@@ -3,7 +3,8 @@
 import numpy as np
 from PySide6.QtWidgets import QLabel, QWidget
 
-from kappaskin import WHY, Estimate
+from kappaskin.estimation import WHY
+from kappaskin.frames import Estimate
 from kappaskin_app.theme import LIGHT, Theme
 
 _TIP = (

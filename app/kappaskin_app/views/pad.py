@@ -15,7 +15,7 @@ from PySide6.QtGui import (
     QWheelEvent,
 )
 
-from kappaskin import Disk, Patch, Polygon
+from kappaskin.skin import Disk, Patch, Polygon
 from kappaskin_app.cue import Cue
 from kappaskin_app.theme import SERIES
 from kappaskin_app.views.board import Board

@@ -6,7 +6,8 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QHelpEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
-from kappaskin import COMPONENTS, SensorLayout
+from kappaskin.frames import COMPONENTS
+from kappaskin.sensing import SensorLayout
 from kappaskin_app.theme import LIGHT, Theme
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import QFont, QFontInfo, QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QWidget
 
-from kappaskin import Estimate, Touch
+from kappaskin.frames import Estimate, Touch
 from kappaskin_app.theme import Theme
 from kappaskin_app.views.line import Line
 

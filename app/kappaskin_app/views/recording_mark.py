@@ -4,7 +4,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin import Written
+from kappaskin.recording import Written
 from kappaskin_app.theme import LIGHT, Theme
 
 _WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin import Indenter, Pressed, Pressing, Scene, Stimulus, moments_of
+from kappaskin.scenes import Indenter, Pressed, Pressing, Scene, Stimulus, moments_of
 from kappaskin_app.views.drawn import DrawnSkin, Indices
 from kappaskin_app.views.footprint import footprint
 

@@ -6,7 +6,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from kappaskin import Distances
+from kappaskin.skin import Distances
 from kappaskin_app.theme import WANTED, Theme
 from kappaskin_app.views.drawn import DrawnSkin
 from kappaskin_app.views.unlit import UNLIT, pixels

@@ -6,7 +6,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from kappaskin import Placed
+from kappaskin.mechanics import Placed
 from kappaskin_app.views.drawn import MM, DrawnSkin
 from kappaskin_app.views.unlit import UNLIT
 

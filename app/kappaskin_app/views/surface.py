@@ -6,7 +6,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from kappaskin import SensorLayout
+from kappaskin.sensing import SensorLayout
 from kappaskin_app.theme import Colours, Theme
 from kappaskin_app.views.drawn import DrawnSkin
 from kappaskin_app.views.element_cells import ElementCells

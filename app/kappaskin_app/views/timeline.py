@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from kappaskin import Scene
+from kappaskin.scenes import Scene
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.views.clock import Clock

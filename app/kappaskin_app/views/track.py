@@ -8,7 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
-from kappaskin import Scene
+from kappaskin.scenes import Scene
 from kappaskin_app.views.course import Course
 
 Array = NDArray[np.float64]

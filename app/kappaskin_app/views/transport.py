@@ -7,7 +7,8 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from kappaskin import Event, Replay
+from kappaskin.frames import Event
+from kappaskin.recording import Replay
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.form import ChoiceBox, well_behaved
 from kappaskin_app.theme import LIGHT, Theme

@@ -10,11 +10,11 @@ from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_arra
 from scipy.sparse.linalg import eigsh
 
 from kappaskin.bases.basis import ORDERS
-from kappaskin.bases.kept import kept
+from kappaskin.bases.cache import kept
 from kappaskin.bases.mesh import Mesh, meshed
 from kappaskin.bases.quintic import Quintics, chained, monomials, triangle_quadrature
 from kappaskin.frames import Array
-from kappaskin.outline import Outline
+from kappaskin.skin import Outline
 
 _SPACING = 1.1  # of the mean distance between the highest mode's nodes
 _FEWEST = 16  # modes that a mesh is made for

@@ -6,7 +6,7 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array
-from kappaskin.patch import Patch
+from kappaskin.skin import Patch
 
 Order = tuple[int, int]
 ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))

@@ -14,7 +14,7 @@ from kappaskin.bases.modes import ModeBasis
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.patch import Disk
+from kappaskin.skin import Disk
 
 Complex = NDArray[np.complex128]
 

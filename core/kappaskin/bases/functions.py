@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from kappaskin.frames import Array
-from kappaskin.patch import Patch
+from kappaskin.skin import Patch
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.outline import Outline, turn
+from kappaskin.skin import Outline, turn
 
 _INWARD = 1 / 256  # of the spacing, at corners that point inward: curvature is unbounded there
 _GROWTH = 1.0  # of the spacing per distance

@@ -11,7 +11,7 @@ from kappaskin.bases.basis import Order
 from kappaskin.bases.modes import ModeBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.patch import Polygon
+from kappaskin.skin import Polygon
 
 if TYPE_CHECKING:
     from kappaskin.bases.argyris import PlateModes

@@ -1,25 +1,30 @@
-"""Cylinders of known radius to gains, offsets, loops and creep, and what undoes them per frame."""
+"""Calibration: cylinders, tare, channel map."""
 
 from kappaskin.calibration.calibration import Calibration as Calibration
 from kappaskin.calibration.calibration import Corrector as Corrector
+from kappaskin.calibration.channel_map import Verdict as Verdict
+from kappaskin.calibration.file import calibration_in as calibration_in
 from kappaskin.calibration.file import check_place as check_place
 from kappaskin.calibration.file import load_calibration as load_calibration
 from kappaskin.calibration.file import save_calibration as save_calibration
-from kappaskin.calibration.lines import Lines as Lines
+from kappaskin.calibration.file import to_toml as to_toml
+from kappaskin.calibration.judge import Limits as Limits
+from kappaskin.calibration.map_testing import press_elements as press_elements
+from kappaskin.calibration.press_listener import Phase as Phase
+from kappaskin.calibration.press_procedure import PressTest as PressTest
+from kappaskin.calibration.press_procedure import elements_to_press as elements_to_press
 from kappaskin.calibration.procedure import Procedure as Procedure
 from kappaskin.calibration.procedure import Sweep as Sweep
-from kappaskin.calibration.procedure import Taken as Taken
 from kappaskin.calibration.report import CalibrationReport as CalibrationReport
-from kappaskin.calibration.report import Limits as Limits
 from kappaskin.calibration.report import calibrate as calibrate
-from kappaskin.calibration.schedule import ADVICE as ADVICE
-from kappaskin.calibration.schedule import RADII as RADII
-from kappaskin.calibration.schedule import Presentation as Presentation
-from kappaskin.calibration.schedule import Step as Step
-from kappaskin.calibration.schedule import radii_for as radii_for
-from kappaskin.calibration.schedule import schedule as schedule
 from kappaskin.calibration.summary import summary as summary
+from kappaskin.calibration.sweeping import take_sweep as take_sweep
 from kappaskin.calibration.tare import Tare as Tare
-from kappaskin.calibration.tares import Kept as Kept
 from kappaskin.calibration.tares import Tares as Tares
 from kappaskin.calibration.tares import data_folder as data_folder
+from kappaskin.calibration.tares import tare_in as tare_in
+from kappaskin.calibration.tares import tare_text as tare_text
+from kappaskin.calibration.taring import Drift as Drift
+from kappaskin.calibration.taring import DriftWatch as DriftWatch
+from kappaskin.calibration.taring import Rest as Rest
+from kappaskin.calibration.taring import Taring as Taring

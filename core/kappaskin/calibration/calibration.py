@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from kappaskin._state import Remembering
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.hysteresis import PrandtlIshlinskii, StandardLinearSolid
-from kappaskin.layout import SensorLayout
-from kappaskin.memory import Remembering
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import PrandtlIshlinskii, Sensor, SensorLayout, StandardLinearSolid
 
 _MOST_CHANNELS = 2**14  # whose numbers the engine can tell with every status
 _STEPS = 200  # towards the reading of a straight skin; a quarter of the rest or more goes in each

@@ -8,12 +8,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from kappaskin._toml import table
 from kappaskin.calibration.calibration import Calibration, digest
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.hysteresis import PrandtlIshlinskii, StandardLinearSolid
-from kappaskin.sensor import Sensor
-from kappaskin.toml import table
+from kappaskin.sensing import PrandtlIshlinskii, Sensor, StandardLinearSolid
 
 FORMAT = 1
 OLDEST = timedelta(days=180)

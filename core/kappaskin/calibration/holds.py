@@ -4,7 +4,7 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.hysteresis import StandardLinearSolid
+from kappaskin.sensing import StandardLinearSolid
 
 _MOST_SHARE = 0.9
 _SETTLING = 0.01  # share of a hold, after the skin was bent, that is left out

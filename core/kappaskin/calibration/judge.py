@@ -7,7 +7,7 @@ import numpy as np
 from kappaskin.calibration.lines import Lines
 from kappaskin.calibration.procedure import Sweep
 from kappaskin.frames import Array
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 
 DEAD = "dead, as the device itself says"
 

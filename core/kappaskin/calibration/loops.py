@@ -6,7 +6,7 @@ import numpy as np
 
 from kappaskin.calibration.lines import Lines
 from kappaskin.frames import Array, Mask
-from kappaskin.hysteresis import PrandtlIshlinskii
+from kappaskin.sensing import PrandtlIshlinskii
 
 _PLAYS = 10  # at most, up to half of the range
 _STEPS = 12  # of Gauss-Newton at most, in log a

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.calibration.schedule import Step, applied, check_readable, check_strain
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array
-from kappaskin.sensor import Sensor
+from kappaskin.scenes import Step, applied, check_readable, check_strain
+from kappaskin.sensing import Sensor
 
 _FEWEST_FRAMES = 2  # whose spread tells the noise
 _SETTLED = 1.0  # s at the end of a hold that count as its reading

@@ -13,12 +13,10 @@ from kappaskin.calibration.judge import DEAD, Limits, failures_of
 from kappaskin.calibration.lines import Lines, lines
 from kappaskin.calibration.loops import identify, thresholds
 from kappaskin.calibration.procedure import Sweep
-from kappaskin.calibration.schedule import FACES, FEWEST_RADII, Step, check_strain, pairs
-from kappaskin.effects import Running
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Mask
-from kappaskin.hysteresis import PrandtlIshlinskii, StandardLinearSolid
-from kappaskin.sensor import Sensor
+from kappaskin.scenes import FACES, FEWEST_RADII, Running, Step, check_strain, pairs
+from kappaskin.sensing import PrandtlIshlinskii, Sensor, StandardLinearSolid
 
 _Part = TypeVar("_Part", Lines, PrandtlIshlinskii)
 

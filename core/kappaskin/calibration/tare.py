@@ -10,7 +10,7 @@ import numpy as np
 from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 
 _MOST_CHANNELS = 2**16  # whose numbers the engine can tell with every status
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import platformdirs
 
+from kappaskin._toml import table
 from kappaskin.calibration.calibration import digest
 from kappaskin.calibration.tare import Tare
 from kappaskin.errors import Refusal
-from kappaskin.sensor import Sensor
-from kappaskin.toml import table
+from kappaskin.sensing import Sensor
 
 FORMAT = 1
 KEPT = 10

@@ -5,11 +5,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from kappaskin.calibration import calibrate as calibrated
-from kappaskin.calibration import check_place, save_calibration, summary
+from kappaskin.calibration import check_place, save_calibration, summary, take_sweep
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
-from kappaskin.sources.replayed import ReplayedSource as ReplayedSource  # registers replay:
-from kappaskin.sweeping import take_sweep
+from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
 
 def _millimetres(text: str) -> tuple[float, ...]:

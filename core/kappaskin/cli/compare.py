@@ -3,7 +3,7 @@
 from dataclasses import asdict
 
 from kappaskin.cli.common import Switch, print_json
-from kappaskin.studies.compare import compared, compared_text
+from kappaskin.studies import compared, compared_text
 
 
 def compare(*, json: Switch = False) -> None:

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from kappaskin.cli.common import FAILED, Pair, Switch, print_json
 from kappaskin.errors import Refusal
-from kappaskin.figures.cost import check_plot, write_plot
-from kappaskin.scene import Scene, load_scene
-from kappaskin.studies.cost import (
+from kappaskin.scenes import Scene, load_scene
+from kappaskin.studies import (
     Cost,
     Measuring,
     Refused,
+    check_plot,
     costs_text,
     effect_costs,
     effect_rows,
@@ -20,6 +20,7 @@ from kappaskin.studies.cost import (
     settings_to_try,
     usual_setting,
     verdict,
+    write_plot,
 )
 
 

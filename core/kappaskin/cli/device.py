@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from kappaskin.cli.common import stops
 from kappaskin.errors import Refusal
-from kappaskin.scene import load_scene
+from kappaskin.scenes import load_scene
 
 
 def device(scene: str = "", *, rate: float | None = None, dwell: float | None = None) -> None:
@@ -26,10 +26,8 @@ def device(scene: str = "", *, rate: float | None = None, dwell: float | None = 
     dwell
         Seconds on each cylinder, in the scene `calibration`; one when left out.
     """
-    try:
-        from kappaskin.sources.device import PseudoDevice
-    except ImportError as error:
-        raise Refusal("expected a system with pseudo-terminals (Linux, macOS)") from error
+    from kappaskin.sources import PseudoDevice
+
     played = load_scene(scene)
     if dwell is not None:
         if played.laid is None:

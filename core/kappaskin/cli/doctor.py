@@ -3,9 +3,8 @@
 import math
 
 from kappaskin.cli.common import FAILED, Switch, print_json
-from kappaskin.doctor import examine
-from kappaskin.sources.diagnosis import Diagnosis, diagnose
-from kappaskin.sources.ports import Port, permission_line
+from kappaskin.cli.machine import examine
+from kappaskin.sources import Diagnosis, Port, diagnose, permission_line
 
 
 def doctor(port: str = "", *, json: Switch = False) -> int:

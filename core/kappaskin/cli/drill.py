@@ -24,11 +24,13 @@ def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> in
         Do each for longer: 100 times unplugged, ten seconds of noise.
     """
     try:
-        from kappaskin.studies.drills import drills, drills_text
+        from kappaskin.studies import drills_text, run_drills
     except ImportError as error:
         raise Refusal("expected a system with pseudo-terminals (Linux, macOS)") from error
     told = sys.stderr.isatty()
-    rows = drills(source or None, long, lambda name: print(name, file=sys.stderr) if told else None)
+    rows = run_drills(
+        source or None, long, lambda name: print(name, file=sys.stderr) if told else None
+    )
     if json:
         print_json(rows)
     else:

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from kappaskin.cli.common import progress
 from kappaskin.errors import Refusal
-from kappaskin.export import Exported, Exporting, Wanted
+from kappaskin.recording import Exported, Exporting, Wanted
 
 
 def export(

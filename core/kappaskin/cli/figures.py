@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from kappaskin.cli.common import Switch, print_json
-from kappaskin.figures import FIGURES, write_figures
+from kappaskin.studies import FIGURES, write_figures
 
 
 def figures(

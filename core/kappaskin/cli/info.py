@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from kappaskin.cli.common import Switch, print_json
+from kappaskin.recording import Recording, decode
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import decode
-from kappaskin.recording.reading import Recording
-from kappaskin.sources.information import from_json
+from kappaskin.sources import from_json
 
 
 def info(file: Path, *, json: Switch = False) -> None:

@@ -4,7 +4,7 @@ import math
 import time
 
 from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
-from kappaskin.publish.listening import Listener
+from kappaskin.publish import Listener
 
 _READ = 0.1  # s
 

@@ -4,7 +4,7 @@ import math
 import time
 
 from kappaskin.cli.common import FAILED, Switch, check_time, stops
-from kappaskin.sources.monitor import Monitor
+from kappaskin.sources import Monitor
 
 _READ = 0.1  # s
 

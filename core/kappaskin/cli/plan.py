@@ -1,8 +1,8 @@
 """Which effects a scene calls for, and why."""
 
 from kappaskin.cli.common import Switch, print_json
-from kappaskin.scene import load_scene
-from kappaskin.studies.plan import plan_rows, plan_text
+from kappaskin.scenes import load_scene
+from kappaskin.studies import plan_rows, plan_text
 
 
 def plan(scene: str = "", *, json: Switch = False) -> None:

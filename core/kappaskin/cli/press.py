@@ -2,10 +2,10 @@
 
 import sys
 
+from kappaskin.calibration import press_elements
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
-from kappaskin.map_testing import press_elements
-from kappaskin.sources.replayed import ReplayedSource as ReplayedSource  # registers replay:
+from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
 
 def press(

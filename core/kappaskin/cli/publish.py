@@ -7,12 +7,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from kappaskin.cli.common import FAILED, check_time, stops
-from kappaskin.engine import Engine
 from kappaskin.errors import Refusal
+from kappaskin.live import Engine, Status
 from kappaskin.publish import Latency, Published, targets_of
-from kappaskin.scene import load_scene
+from kappaskin.scenes import load_scene
 from kappaskin.sources import SIMULATION
-from kappaskin.status import Status
 
 _EVERY = 1.0  # s between two lines
 _LOOK = 0.05  # s

@@ -4,8 +4,8 @@ import sys
 from pathlib import Path
 
 from kappaskin.cli.common import Pair, Switch, pair, save_arrays
-from kappaskin.fit import METHODS
-from kappaskin.reconstruct import reconstruct as reconstructed
+from kappaskin.estimation import METHODS
+from kappaskin.pipeline import reconstruct as reconstructed
 
 
 def reconstruct(

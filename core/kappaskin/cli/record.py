@@ -8,12 +8,11 @@ from pathlib import Path
 
 from kappaskin.calibration import Tares, data_folder
 from kappaskin.cli.common import FAILED, check_time, stops
-from kappaskin.engine import Engine
 from kappaskin.errors import Refusal
+from kappaskin.live import LOST, STREAMING, Engine, Status
 from kappaskin.pipeline import Setup
-from kappaskin.sensor import Sensor
-from kappaskin.sources.replayed import REPLAY
-from kappaskin.status import LOST, STREAMING, Status
+from kappaskin.recording import REPLAY
+from kappaskin.sensing import Sensor
 
 _LOOK = 0.05  # s
 _TELL = 1.0  # s

@@ -1,8 +1,7 @@
 """What scanning a region buys and costs."""
 
 from kappaskin.cli.common import Switch, print_json
-from kappaskin.studies.regions import regions as measured_regions
-from kappaskin.studies.text import regions_text
+from kappaskin.studies import regions_text, run_regions
 
 
 def regions(*, json: Switch = False) -> None:
@@ -15,7 +14,7 @@ def regions(*, json: Switch = False) -> None:
     json
         Print one JSON list of rows instead of a table.
     """
-    rows = measured_regions()
+    rows = run_regions()
     if json:
         print_json(rows)
     else:

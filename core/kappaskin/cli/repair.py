@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from kappaskin.cli.common import FAILED, progress
-from kappaskin.recording.repair import Repaired, repairing
+from kappaskin.recording import Repaired, repairing
 
 _NOTHING = 3
 

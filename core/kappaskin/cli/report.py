@@ -3,10 +3,7 @@
 from pathlib import Path
 
 from kappaskin.errors import Refusal
-from kappaskin.figures.study import draw_study
-from kappaskin.studies.design import Folder, known_of
-from kappaskin.studies.design.page import page_of
-from kappaskin.studies.design.table import table_csv
+from kappaskin.studies import Folder, draw_study, known_of, page_of, table_csv
 
 
 def report(folder: Path) -> None:

@@ -4,8 +4,8 @@ import sys
 from pathlib import Path
 
 from kappaskin.cli.common import Whole, save_arrays
-from kappaskin.scene import load_scene
-from kappaskin.studies.simulated import simulated
+from kappaskin.scenes import load_scene
+from kappaskin.studies import simulated_readings
 
 
 def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None) -> None:
@@ -28,6 +28,6 @@ def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = 
     out
         The file to write.
     """
-    found = simulated(load_scene(scene), frames, seed)
+    found = simulated_readings(load_scene(scene), frames, seed)
     save_arrays(out, found)
     print(f"{out}: {frames} frames", file=sys.stderr)

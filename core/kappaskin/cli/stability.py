@@ -3,8 +3,7 @@
 import sys
 
 from kappaskin.cli.common import Switch, print_json
-from kappaskin.studies.stability import stability as measured_stability
-from kappaskin.studies.stability import stability_text
+from kappaskin.studies import run_stability, stability_text
 
 
 def stability(
@@ -24,7 +23,7 @@ def stability(
         Run the longest cases too: a million frames, up to 512 functions a side.
     """
     told = sys.stderr.isatty()
-    rows = measured_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
+    rows = run_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
     if json:
         print_json(rows)
     else:

@@ -8,9 +8,7 @@ from pathlib import Path
 
 from kappaskin.cli.common import FAILED, Whole
 from kappaskin.errors import Refusal
-from kappaskin.studies.design import Folder, load_study, run_study
-from kappaskin.studies.design.table import table_text
-from kappaskin.studies.design.workers import Workers, cluster, processes
+from kappaskin.studies import Folder, Workers, cluster, load_study, processes, run_study, table_text
 
 _EVERY = 10.0  # s between two lines of progress in a log
 

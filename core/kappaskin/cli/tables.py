@@ -1,10 +1,8 @@
 """The paper's tables, computed."""
 
 from kappaskin.cli.common import Pair, Switch, pair, print_json
-from kappaskin.fit import METHODS
-from kappaskin.studies.as_printed import misprints
-from kappaskin.studies.tables import tables as computed_tables
-from kappaskin.studies.text import misprints_text, tables_text
+from kappaskin.estimation import METHODS
+from kappaskin.studies import misprints, misprints_text, paper_tables, tables_text
 
 
 def tables(
@@ -29,7 +27,7 @@ def tables(
     as_printed
         Instead, tell what the paper misprints, what that would give and why it is not meant.
     """
-    rows = misprints() if as_printed else computed_tables(method, pair(basis, "a basis"))
+    rows = misprints() if as_printed else paper_tables(method, pair(basis, "a basis"))
     if json:
         print_json(rows)
     else:

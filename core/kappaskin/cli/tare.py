@@ -7,14 +7,13 @@ from datetime import datetime
 
 import numpy as np
 
-from kappaskin.calibration import Tare, Tares, data_folder
+from kappaskin.calibration import Rest, Tare, Tares, Taring, data_folder
 from kappaskin.cli.common import Switch
+from kappaskin.contact import LoadSeeker
 from kappaskin.errors import Refusal
-from kappaskin.sensor import Sensor
+from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
+from kappaskin.sensing import Sensor
 from kappaskin.sources import Source, open_source
-from kappaskin.sources.replayed import ReplayedSource as ReplayedSource  # registers replay:
-from kappaskin.taring import Rest, Taring
-from kappaskin.touch import LoadSeeker
 
 _READ = 0.05  # s that one read may wait
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from kappaskin._background import Beside
 from kappaskin.cli.common import FAILED, progress
-from kappaskin.studies.beside import Beside
-from kappaskin.verify import Verdict, verifying
+from kappaskin.recording import Verdict, verifying
 
 
 def verify(file: Path) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from kappaskin.frames import Array, Mask
 from kappaskin.health.neighbours import Indices, Neighbours
 from kappaskin.health.window import Look
-from kappaskin.layout import SensorLayout
+from kappaskin.sensing import SensorLayout
 
 _KEPT = 128  # means, 16 a second
 _RECENT = 32  # of them are judged

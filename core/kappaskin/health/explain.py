@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.fit import WHY
+from kappaskin.estimation import WHY
 from kappaskin.frames import Array, Mask
 from kappaskin.health.contradiction import Contradiction, centred
 from kappaskin.health.neighbours import Indices

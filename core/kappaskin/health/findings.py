@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.fit import WHY
+from kappaskin.estimation import WHY
 from kappaskin.frames import COMPONENTS, Array
 
 _MOST = 256  # findings that are told one by one

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import RankDeficient
-from kappaskin.fit import Estimator, Fit
-from kappaskin.fit.fit import Spread
+from kappaskin.estimation import Estimator, Fit, Spread
 from kappaskin.frames import Array, Mask
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 
 Kinds = NDArray[np.uint8]
 

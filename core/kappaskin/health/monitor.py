@@ -20,7 +20,7 @@ from kappaskin.health.explain import (
 )
 from kappaskin.health.findings import Finding, findings
 from kappaskin.health.window import Look, Window
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 
 _FAR = 4.0  # standard deviations: a channel that is further off is accused
 _NEAR = 2.5  # the same: one that is nearer agrees with the others again

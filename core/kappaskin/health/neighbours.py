@@ -7,7 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin.frames import Array, Mask
-from kappaskin.layout import SensorLayout
+from kappaskin.sensing import SensorLayout
 
 _COUNT = 20  # elements around one, that tell of it: two rings of a grid without its corners
 _BESIDE = 8  # of them are next to it

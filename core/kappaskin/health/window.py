@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 
 from kappaskin.frames import Array, Frame
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 
 _LONG = 0.25  # s at least
 _AT_ONCE = 3000  # channels that are looked at so often; more as much less often

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.patch import Patch, Polygon
+from kappaskin.skin import Patch, Polygon
 
 
 class Load(Protocol):

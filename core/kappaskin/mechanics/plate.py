@@ -6,12 +6,11 @@ from functools import reduce
 
 import numpy as np
 
-from kappaskin.bases import Basis, ElasticBasis, SineBasis, overlaps
-from kappaskin.bases.basis import terms
+from kappaskin.bases import Basis, ElasticBasis, SineBasis, overlaps, terms
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
-from kappaskin.patch import Patch
+from kappaskin.skin import Patch
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import PointLoad, check_on
-from kappaskin.patch import Patch
+from kappaskin.skin import Patch
 
 _INSIDE = 1 - 1e-9  # of a load's size: one that touches an edge is on the patch, as computed
 

@@ -1,8 +1,7 @@
-"""What is estimated, sent to those who want it: datagrams of JSON, and Foxglove."""
+"""Estimates to other programs: UDP, Foxglove."""
 
-from kappaskin.publish.message import Message as Message
+from kappaskin.publish.listening import Listener as Listener
 from kappaskin.publish.message import State as State
-from kappaskin.publish.publisher import Publisher as Publisher
 from kappaskin.publish.publisher import Receiver as Receiver
 from kappaskin.publish.publishing import Latency as Latency
 from kappaskin.publish.publishing import Published as Published

@@ -2,7 +2,7 @@
 
 import math
 
-from kappaskin.fit import Fit
+from kappaskin.estimation import Fit
 from kappaskin.frames import Estimate
 
 UNKNOWN = math.pi / math.sqrt(12)

@@ -11,11 +11,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
-from kappaskin.fit import Fit
+from kappaskin.estimation import Fit
 from kappaskin.frames import Estimate, Event
 from kappaskin.pipeline import Pipeline
 from kappaskin.publish.contact import VALUES, contact_values
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 
 VERSION = 1
 """Of the format: another one where a key of this one says something else."""

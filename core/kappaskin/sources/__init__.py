@@ -1,77 +1,36 @@
-"""Sources of frames: a simulation in this process, bytes on a line, and registered schemes."""
+"""Sources of frames: simulation, serial line."""
 
-from collections.abc import Callable
-from typing import Protocol
-
-from kappaskin.errors import SourceError
-from kappaskin.frames import Event, Frame
-from kappaskin.scene import load_scene
-from kappaskin.sensor import Sensor
-from kappaskin.sources.accounting import Accounting
+from kappaskin.sources.accounting import Accounting as Accounting
+from kappaskin.sources.clock import Known as Known
+from kappaskin.sources.clock import RecordedClock as RecordedClock
+from kappaskin.sources.decoder import Decoder as Decoder
+from kappaskin.sources.device import PseudoDevice as PseudoDevice
+from kappaskin.sources.diagnosis import Diagnosis as Diagnosis
+from kappaskin.sources.diagnosis import diagnose as diagnose
+from kappaskin.sources.information import from_json as from_json
+from kappaskin.sources.information import to_json as to_json
+from kappaskin.sources.interpreter import Interpreter as Interpreter
+from kappaskin.sources.line import Line as Line
+from kappaskin.sources.monitor import Monitor as Monitor
+from kappaskin.sources.ports import Port as Port
+from kappaskin.sources.ports import permission_line as permission_line
+from kappaskin.sources.ports import serial_ports as serial_ports
+from kappaskin.sources.scanning import LISTS as LISTS
 from kappaskin.sources.serial_line import SerialSource as SerialSource
 from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
-from kappaskin.sources.tape import Tape
-
-SIMULATION = "sim:"
-
-
-class Source(Protocol):
-    """Yields frames; nothing after it can tell a simulated from a real one."""
-
-    @property
-    def sensor(self) -> Sensor | None:
-        """What the device says it is; None until it has said so."""
-        ...
-
-    def read(self, timeout: float) -> list[Frame]:
-        """The frames that came, after at most `timeout` s; a `Refusal` when there will be none."""
-        ...
-
-    @property
-    def trouble(self) -> str:
-        """Why no frames come at present, and what to do; empty when nothing is wrong."""
-        ...
-
-    @property
-    def temperature(self) -> float:
-        """The device's temperature in degrees Celsius, as it told last; NaN if it does not."""
-        ...
-
-    def record(self, tape: Tape | None) -> None:
-        """Tell `tape` from now on all that frames come from; nobody without one."""
-        ...
-
-    def events(self) -> list[Event]:
-        """What happened since this was last asked."""
-        ...
-
-    def accounting(self) -> Accounting:
-        """What became of every byte and every sequence number."""
-        ...
-
-    def close(self) -> None: ...
-
-
-_schemes: dict[str, Callable[[str], Source]] = {
-    SIMULATION: lambda name: SimulatedSource(load_scene(name)),
-}
-
-
-def register_scheme(scheme: str, opened: Callable[[str], Source]) -> None:
-    """Open names that begin with `scheme`, such as `replay:`, by `opened` with what follows it."""
-    _schemes[scheme] = opened
-
-
-def open_source(name: str) -> Source:
-    """The source called `name`: `sim:`, `sim:SCENE`, `replay:FILE`, or what pyserial opens.
-
-    `replay:` is registered by the room `recording`, as soon as that is imported.
-    """
-    for scheme, opened in _schemes.items():
-        if name.startswith(scheme):
-            return opened(name.removeprefix(scheme))
-    if not name.strip():
-        raise SourceError(
-            "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"
-        )
-    return SerialSource(name)
+from kappaskin.sources.source import SIMULATION as SIMULATION
+from kappaskin.sources.source import Source as Source
+from kappaskin.sources.source import open_source as open_source
+from kappaskin.sources.source import register_scheme as register_scheme
+from kappaskin.sources.tape import Tape as Tape
+from kappaskin.sources.tuning import BAUD_RATES as BAUD_RATES
+from kappaskin.sources.wire import Command as Command
+from kappaskin.sources.wire import FromDevice as FromDevice
+from kappaskin.sources.wire import Information as Information
+from kappaskin.sources.wire import Kind as Kind
+from kappaskin.sources.wire import Operation as Operation
+from kappaskin.sources.wire import Reply as Reply
+from kappaskin.sources.wire import Samples as Samples
+from kappaskin.sources.wire import encode_information as encode_information
+from kappaskin.sources.wire import encode_reply as encode_reply
+from kappaskin.sources.wire import encode_samples as encode_samples

@@ -1,21 +1,16 @@
 """The simulator behind the wire format on a pseudo-terminal: the other end of the line."""
 
-import fcntl
 import os
 import select
 import struct
-import termios
 import time
-import tty
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 
-from kappaskin.effects import CorruptedFrames, DroppedFrames
 from kappaskin.errors import Refusal
-from kappaskin.scene import Scene
-from kappaskin.simulate import Simulator
+from kappaskin.scenes import CorruptedFrames, DroppedFrames, Scene, Simulator
 from kappaskin.sources import information
 from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.wire import (
@@ -57,6 +52,10 @@ class PseudoDevice:
         self._scene, self._simulator, self._clock = scene, Simulator(scene), clock
         self._sensor = scene.sensor()
         self._information = information.to_json(self._sensor)
+        if not hasattr(os, "openpty"):
+            raise Refusal("expected a system with pseudo-terminals (Linux, macOS)")
+        import tty  # there is none on Windows
+
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self.port = os.ttyname(slave)
@@ -93,6 +92,8 @@ class PseudoDevice:
 
     def _clear_unread(self) -> None:
         """Throw away what the last listener left: the next one is greeted first."""
+        import termios
+
         with suppress(OSError):
             slave = os.open(self.port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
             termios.tcflush(slave, termios.TCIFLUSH)
@@ -258,6 +259,9 @@ class PseudoDevice:
 
     def _linger(self) -> None:
         """Wait: what is unread when the last holder closes is thrown away."""
+        import fcntl
+        import termios
+
         slave = os.open(self.port, os.O_RDWR | os.O_NOCTTY)
         read = begun = time.monotonic()
         while (now := time.monotonic()) < min(read + _LINGER, begun + _PATIENCE):

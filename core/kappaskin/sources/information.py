@@ -10,14 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.bases import check_edge
-from kappaskin.effects import Within
 from kappaskin.errors import Refusal, SourceError
-from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate
-from kappaskin.patch import Disk, Patch, Polygon
-from kappaskin.scene.limits import SKIN, check_sides
-from kappaskin.sensor import Sensor
-from kappaskin.transduction import Amplifier, Converter, HalfBridge, Multiplexer, Transduction
+from kappaskin.scenes import SKIN, Within, check_sides
+from kappaskin.sensing import (
+    Amplifier,
+    Converter,
+    HalfBridge,
+    Multiplexer,
+    Sensor,
+    SensorLayout,
+    Transduction,
+)
+from kappaskin.skin import Disk, Patch, Polygon
 
 
 def to_json(sensor: Sensor) -> str:

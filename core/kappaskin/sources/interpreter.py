@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Frame
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 from kappaskin.sources import information
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.wire import FromDevice, Information, Samples

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.region import Scanner
-from kappaskin.sensor import Sensor
+from kappaskin.estimation import Scanner
+from kappaskin.sensing import Sensor
 from kappaskin.sources.wire import MOST_RUNS, RATE_UNIT, Operation, Reply, pack_runs
 
 _ALL = pack_runs([])

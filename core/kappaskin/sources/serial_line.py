@@ -5,9 +5,9 @@ from collections import deque
 from collections.abc import Callable
 
 from kappaskin.errors import SourceError
+from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
-from kappaskin.region import Scanner
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.asking import Asking
 from kappaskin.sources.clock import ClockMap
@@ -20,14 +20,7 @@ from kappaskin.sources.tape import Tape
 from kappaskin.sources.taping import Taping
 from kappaskin.sources.telling import Telling
 from kappaskin.sources.tuning import Tuning
-from kappaskin.sources.wire import (
-    VERSION,
-    Command,
-    FromDevice,
-    Information,
-    Reply,
-    Samples,
-)
+from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
 _PATIENCE = 3.0  # s that a device may say nothing, or not what it is
 _DWELL = 0.8  # s of bytes that mean nothing, after which another baud rate is tried

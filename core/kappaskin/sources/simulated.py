@@ -7,14 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from kappaskin.contact import ForceTorqueSensor, Wrench
 from kappaskin.errors import Refusal
+from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
-from kappaskin.intrinsic import ForceTorqueSensor, Wrench
-from kappaskin.region import Scanner
-from kappaskin.scan import Scan
-from kappaskin.scene import FROM_THE_BEGINNING, Playing, Scene
-from kappaskin.sensor import Sensor
-from kappaskin.simulate import Simulator
+from kappaskin.scenes import FROM_THE_BEGINNING, Playing, Scene, Simulator
+from kappaskin.sensing import Scan, Sensor
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.clock import Known
 from kappaskin.sources.information import from_json, to_json

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from kappaskin.frames import Event
-from kappaskin.sensor import Sensor
+from kappaskin.sensing import Sensor
 from kappaskin.sources.accounting import Sequence
 
 _LONGEST = 500  # characters: a device may say anything of itself, and each status has 64 events

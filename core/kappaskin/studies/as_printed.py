@@ -11,7 +11,7 @@ import numpy as np
 from kappaskin.bases import SineBasis
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate
-from kappaskin.patch import Patch
+from kappaskin.skin import Patch
 from kappaskin.studies.tables import APPLIED, PAPER_1, RADIUS, fingertip_scene
 
 _U = APPLIED[0] / 1e3  # m, Table 2's first case

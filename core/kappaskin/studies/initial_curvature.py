@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from kappaskin.bases import Basis, SineBasis
-from kappaskin.effects import SECOND_GENERATION_LOOPS, ReadingEffect, Running
-from kappaskin.fit import LeastSquares
+from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
-from kappaskin.layout import SensorLayout
-from kappaskin.patch import Patch
+from kappaskin.scenes import SECOND_GENERATION_LOOPS, ReadingEffect, Running
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
 from kappaskin.studies.tables import RADIUS
 
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)

@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from kappaskin.effects import EFFECTS, ReadingEffect
 from kappaskin.frames import Array
-from kappaskin.scene import Choice, Plan, Scene, plan
-from kappaskin.simulate import Simulator
+from kappaskin.scenes import EFFECTS, Choice, Plan, ReadingEffect, Scene, Simulator, plan
 
 _TURNS, _FRAMES, _LEAST = 7, 40, 4  # turns, and frames of each: usually, and at least
 _TURN = 0.02  # s that the frames of one turn may take

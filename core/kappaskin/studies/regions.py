@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from kappaskin.errors import Refusal
+from kappaskin.estimation import ADAPTIVE, OFF, SKIN, TURNS, Region, bargain
 from kappaskin.frames import Array, Estimate
+from kappaskin.live import steered
 from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Pipeline, Setup
-from kappaskin.region import ADAPTIVE, OFF, SKIN, TURNS, Region, bargain
-from kappaskin.scene import TABLE_1_NOISE, Orbit, Scene, load_scene
+from kappaskin.scenes import TABLE_1_NOISE, Orbit, Scene, load_scene
+from kappaskin.sensing import SECOND_GENERATION
 from kappaskin.sources import SimulatedSource
-from kappaskin.steer import steered
-from kappaskin.transduction import SECOND_GENERATION
 
 PERIODS = (4.0, 1.0, 0.25)
 """Seconds per turn of the contact: 35, 138 and 553 mm/s on a circle of 22 mm."""
@@ -146,7 +146,7 @@ def measured(
     }
 
 
-def regions(seconds: float = 1.0) -> list[dict[str, Any]]:
+def run_regions(seconds: float = 1.0) -> list[dict[str, Any]]:
     """Contact and shape errors, RMS in mm, of full scans and of regions around the contact.
 
     Each row is a closed loop of `seconds`, on a skin that moves while a frame is read: `contact_mm`

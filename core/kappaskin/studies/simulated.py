@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
-from kappaskin.scene import Scene, plan
-from kappaskin.simulate import Simulator
+from kappaskin.scenes import Scene, Simulator, plan
 
 _MOST = 10_000_000  # readings: 80 MB for each array of them
 
 
-def simulated(scene: Scene, frames: int, seed: int | None = None) -> dict[str, NDArray[Any]]:
+def simulated_readings(
+    scene: Scene, frames: int, seed: int | None = None
+) -> dict[str, NDArray[Any]]:
     """Frames of `scene`: what `kappaskin simulate` writes, each array (T, ...).
 
     A frame that the link loses is NaN in `curvature` and -1 in `counts`, on all its channels.

@@ -8,15 +8,13 @@ import numpy as np
 import scipy
 
 from kappaskin.bases import basis_for
-from kappaskin.effects import UniformNoise
 from kappaskin.errors import Refusal
-from kappaskin.fit import METHODS, Estimator, Fit, estimator_for
+from kappaskin.estimation import METHODS, Estimator, Fit, estimator_for
 from kappaskin.frames import Array
-from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate, PointLoad
-from kappaskin.normal_curvature import NormalCurvature
-from kappaskin.patch import Patch
-from kappaskin.scene import Scene, Stimulus, load_scene, scaled_to
+from kappaskin.scenes import Scene, Stimulus, UniformNoise, load_scene, scaled_to
+from kappaskin.sensing import NormalCurvature, SensorLayout
+from kappaskin.skin import Patch
 
 DRAWS = 200
 RADIUS = 12.9e-3
@@ -195,7 +193,7 @@ def table_2(
     return rows
 
 
-def tables(
+def paper_tables(
     method: str = next(iter(METHODS)), functions: tuple[int, int] = (8, 8)
 ) -> list[dict[str, Any]]:
     """The rows of both tables; one that tells why, of a table that the method refuses."""

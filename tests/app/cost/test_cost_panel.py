@@ -10,7 +10,7 @@ from kappaskin import Cost, EffectCost, Refused, Setting
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.costing import in_words
 from kappaskin_app.effects import called
-from kappaskin_app.settings import METHOD_NAMES
+from kappaskin_app.settings.shown import METHOD_NAMES
 from kappaskin_app.views.cost_plot import CostPlot
 from kappaskin_app.window import MainWindow
 

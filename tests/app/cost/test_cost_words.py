@@ -7,7 +7,7 @@ import pytest
 from kappaskin import METHODS
 from kappaskin_app.amounts import duration, length
 from kappaskin_app.costing import Frontier
-from kappaskin_app.settings import METHOD_NAMES
+from kappaskin_app.settings.shown import METHOD_NAMES
 from kappaskin_app.views.log_axis import LogAxis
 
 

@@ -13,8 +13,8 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QToolButton
 
 from kappaskin import EFFECTS
-from kappaskin.scene import read_scene
-from kappaskin_app.panels.scene_form import SceneForm
+from kappaskin.scenes import read_scene
+from kappaskin_app.panels.scene_form.form import SceneForm
 from kappaskin_app.panels.scene_form.section import Offer, Section
 from kappaskin_app.panels.scene_form.sections import sections_of
 from kappaskin_app.scene_text import changes, parts

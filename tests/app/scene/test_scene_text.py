@@ -10,8 +10,11 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import SCENES, Refusal, load_scene, planned, read_scene, scene_file
 from kappaskin_app.history import History
-from kappaskin_app.scene_text import OFF, ON, PLANNED, changes, forced, shifted
-from kappaskin_app.settings import Settings, Written
+from kappaskin_app.scene_text import changes
+from kappaskin_app.scene_text.changes import OFF, ON, PLANNED, forced
+from kappaskin_app.scene_text.places import shifted
+from kappaskin_app.settings import Settings
+from kappaskin_app.settings.scene import Written
 from kappaskin_app.touching import Held, touches_at
 from kappaskin_app.wishes import Wishes
 

@@ -9,8 +9,9 @@ from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from kappaskin import Refusal
+from kappaskin.recording import decode
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import Layout, MessageType, decode, encode
+from kappaskin.recording.cdr import Layout, MessageType, encode
 
 INNER = MessageType("pkg/msg/Inner", "uint8 a\nfloat64 b")
 NESTED = MessageType(

@@ -9,10 +9,9 @@ import time
 import pytest
 
 from kappaskin import Refusal
+from kappaskin.recording import Recording, writing
 from kappaskin.recording import disk as disk_room
 from kappaskin.recording import messages as m
-from kappaskin.recording import writing
-from kappaskin.recording.reading import Recording
 from kappaskin.recording.writing import RecordingFile, part_of
 
 LINE = m.pack_line(0.0, False, bytes(600))

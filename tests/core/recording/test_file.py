@@ -11,10 +11,8 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from kappaskin import Damaged, Refusal, Wanted
+from kappaskin.recording import Recording, records, repairing, writing
 from kappaskin.recording import messages as m
-from kappaskin.recording import records, writing
-from kappaskin.recording.reading import Recording
-from kappaskin.recording.repair import repairing
 from kappaskin.recording.writing import RecordingFile, part_of
 
 LINE = m.pack_line(0.0, False, bytes(600))

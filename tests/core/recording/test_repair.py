@@ -11,9 +11,8 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from kappaskin import Refusal, Repairing
+from kappaskin.recording import Recording, Repaired, repairing
 from kappaskin.recording import messages as m
-from kappaskin.recording.reading import Recording
-from kappaskin.recording.repair import Repaired, repairing
 from kappaskin.recording.writing import part_of
 
 CHUNKS, EACH = 12, 40

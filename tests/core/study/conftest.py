@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin.studies.design import Study, read_study
+from kappaskin.studies.design.study import Study, read_study
 
 TEXT = """
 format = 1

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from kappaskin import PLACEMENTS, Refusal
-from kappaskin.studies.design import MEASURES, STUDIES, load_study
+from kappaskin.studies import load_study
 from kappaskin.studies.design.draws import KINDS, LogUniform, Normal, Some, Uniform, Whole
+from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.setup import Measuring, Placing, Reconstruction
-from kappaskin.studies.design.study import Stop
+from kappaskin.studies.design.study import STUDIES, Stop
 
 TWO = """
 [[vary]]

@@ -8,9 +8,10 @@ from html.parser import HTMLParser
 import pytest
 
 from kappaskin.cli.common import FAILED
-from kappaskin.studies.design import Folder, Mean, known_of
+from kappaskin.studies import Folder, known_of, table_text
+from kappaskin.studies.design.known import Mean
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.table import mean_text, table_text, value_text
+from kappaskin.studies.design.table import mean_text, value_text
 
 from .conftest import TEXT
 

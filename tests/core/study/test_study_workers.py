@@ -13,8 +13,8 @@ import psutil
 import pytest
 
 from kappaskin import Refusal
-from kappaskin.studies.design import Folder, cluster, processes, run, run_study
-from kappaskin.studies.design.task import Task, version
+from kappaskin.studies import Folder, cluster, processes, run_study
+from kappaskin.studies.design.task import Task, run, version
 from kappaskin.studies.design.workers import kind
 
 pytestmark = pytest.mark.slow

@@ -4,7 +4,9 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin import Calibration, Refusal, Status
+from kappaskin.calibration import Calibration
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
 from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.calibration.parts import (

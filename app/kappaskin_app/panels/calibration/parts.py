@@ -12,7 +12,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import COMPONENTS, Calibration
+from kappaskin.calibration import Calibration
+from kappaskin.frames import COMPONENTS
 
 FILES = "Calibration (*.toml)"
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"

@@ -2,7 +2,8 @@
 
 from PySide6.QtWidgets import QFormLayout, QLabel, QLineEdit, QVBoxLayout, QWidget
 
-from kappaskin import ADVICE, Refusal, schedule
+from kappaskin.errors import Refusal
+from kappaskin.scenes import ADVICE, schedule
 from kappaskin_app.calibrating import parsed_radii
 from kappaskin_app.panels.calibration.parts import button, seconds_box, text_label
 

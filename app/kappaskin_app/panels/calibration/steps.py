@@ -4,7 +4,9 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QVBoxLayout, QWidget
 
-from kappaskin import COMPONENTS, Procedure, Step
+from kappaskin.calibration import Procedure
+from kappaskin.frames import COMPONENTS
+from kappaskin.scenes import Step
 from kappaskin_app.calibrating import Calibrating
 from kappaskin_app.panels.calibration.parts import (
     ELLIPSIS,

@@ -6,8 +6,7 @@ import numpy as np
 from scipy.sparse.linalg import lsqr
 
 from kappaskin.bases import basis_for
-from kappaskin.fit import estimator_for
-from kappaskin.fit.estimator import column_lengths
+from kappaskin.estimation import column_lengths, estimator_for
 from kappaskin.frames import Array, Mask
 from kappaskin.studies.compare.way import Way
 from kappaskin.studies.tables import Case

@@ -9,10 +9,10 @@ import numpy as np
 
 from kappaskin.bases import SineBasis
 from kappaskin.frames import Array
-from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import GaussianLoad, Plate
-from kappaskin.patch import Patch
-from kappaskin.scene import Scene, load_scene
+from kappaskin.scenes import Scene, load_scene
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
 from kappaskin.studies.compare.elements import bent
 from kappaskin.studies.compare.slopes import integrated
 from kappaskin.studies.compare.solvers import iterated, lstsq, ours, pinv

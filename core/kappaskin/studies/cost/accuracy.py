@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kappaskin.errors import Refusal
-from kappaskin.scene import Scene
+from kappaskin.scenes import Scene
 from kappaskin.studies.cost.choice import cheapest
 from kappaskin.studies.cost.setting import ALL, Cost, Refused, own_elements
 from kappaskin.studies.cost.table import row

@@ -3,9 +3,9 @@
 from collections.abc import Generator, Iterable, Sequence
 from itertools import islice
 
+from kappaskin._background import Beside
 from kappaskin.errors import Refusal
-from kappaskin.scene import Scene
-from kappaskin.studies.beside import Beside
+from kappaskin.scenes import Scene
 from kappaskin.studies.cost.bench import Bench, costs
 from kappaskin.studies.cost.effects import EffectCost, effect_costs
 from kappaskin.studies.cost.setting import Cost, Refused, Setting

@@ -13,14 +13,11 @@ import numpy as np
 
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import Refusal
-from kappaskin.fit import Estimator, estimator_for
+from kappaskin.estimation import Estimator, estimator_for
 from kappaskin.frames import Array
-from kappaskin.layout import SensorLayout
-from kappaskin.patch import Patch
-from kappaskin.scan import Scan
-from kappaskin.scene import Pressed, Pressing, Scene, moments_of, planned
-from kappaskin.sensor import Sensor
-from kappaskin.simulate import Simulator
+from kappaskin.scenes import Pressed, Pressing, Scene, Simulator, moments_of, planned
+from kappaskin.sensing import Scan, Sensor, SensorLayout
+from kappaskin.skin import Patch
 from kappaskin.studies.cost.setting import SCANS, Cost, Refused, Setting
 
 SETTLING, DRAWS = 8, 40

@@ -5,20 +5,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kappaskin.bases import basis_for
-from kappaskin.effects import (
+from kappaskin.errors import Refusal
+from kappaskin.estimation import METHODS, estimator_for
+from kappaskin.frames import Array
+from kappaskin.scenes import (
     EFFECTS,
+    Choice,
     CorruptedFrames,
     DeadElements,
     DroppedFrames,
     Effect,
     Saturation,
+    Scene,
+    Simulator,
+    kept_of,
+    plan,
+    time_to_watch,
 )
-from kappaskin.errors import Refusal
-from kappaskin.fit import METHODS, estimator_for
-from kappaskin.frames import Array
-from kappaskin.layout import SensorLayout
-from kappaskin.scene import Choice, Scene, kept_of, plan, time_to_watch
-from kappaskin.simulate import Simulator
+from kappaskin.sensing import SensorLayout
 from kappaskin.studies.cost.bench import SETTLING, Bench, points_on, with_elements
 from kappaskin.studies.cost.setting import SCANS, Setting, own_elements
 from kappaskin.studies.plan import costs_of

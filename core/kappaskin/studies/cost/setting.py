@@ -8,10 +8,10 @@ from itertools import product
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.fit import METHODS
+from kappaskin.estimation import METHODS
 from kappaskin.frames import Array, Mask
-from kappaskin.layout import SensorLayout
-from kappaskin.scene import Scene
+from kappaskin.scenes import Scene
+from kappaskin.sensing import SensorLayout
 
 FUNCTIONS = (4, 6, 8, 12)
 """Functions along each side that are tried."""

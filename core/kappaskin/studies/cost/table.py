@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from kappaskin.scene import Scene
+from kappaskin.scenes import Scene
 from kappaskin.studies.cost.bench import DRAWS
 from kappaskin.studies.cost.choice import ALIKE, frontier
 from kappaskin.studies.cost.effects import FRAMES, EffectCost

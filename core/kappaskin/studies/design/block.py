@@ -8,17 +8,14 @@ from typing import cast
 import numpy as np
 
 from kappaskin.bases import Basis
-from kappaskin.effects import Hysteresis
+from kappaskin.contact import ContactObject, ObjectFinder, PointContact
 from kappaskin.errors import Refusal
-from kappaskin.fit import Estimator, Fit
-from kappaskin.fit.fit import in_time
+from kappaskin.estimation import Estimator, Fit, in_time
 from kappaskin.frames import Array, Touch, Truth
 from kappaskin.mechanics import Plate
-from kappaskin.scene import Scene, kept_of
-from kappaskin.simulate import Simulator
+from kappaskin.scenes import Hysteresis, Scene, Simulator, kept_of
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.setup import Setup
-from kappaskin.touch import ContactObject, ObjectFinder, PointContact
 
 
 @lru_cache(8)

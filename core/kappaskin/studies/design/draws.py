@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from kappaskin.errors import Refusal
-from kappaskin.scene.table import Table
+from kappaskin.scenes import Table
 
 
 class Distribution(Protocol):

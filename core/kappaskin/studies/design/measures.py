@@ -11,10 +11,9 @@ import numpy as np
 import scipy
 
 from kappaskin.errors import Refusal
-from kappaskin.fit import Estimator
+from kappaskin.estimation import Estimator, predicted_sd
 from kappaskin.frames import Array
-from kappaskin.placement import predicted_sd
-from kappaskin.scene import Indenter, Scene, kept_of
+from kappaskin.scenes import Indenter, Scene, kept_of
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.block import Block
 

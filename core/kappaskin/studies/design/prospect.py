@@ -7,12 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kappaskin.bases import basis_for
-from kappaskin.fit import Estimator, estimator_for
+from kappaskin.estimation import (
+    Estimator,
+    check_placement,
+    elements_placed,
+    estimator_for,
+    predicted_sd,
+)
 from kappaskin.frames import Array, Mask
-from kappaskin.patch import Patch
-from kappaskin.placement import check_placement, elements_placed, predicted_sd
-from kappaskin.scene import Scene
-from kappaskin.simulate import Simulator
+from kappaskin.scenes import Scene, Simulator
+from kappaskin.skin import Patch
 from kappaskin.studies.design.measures import noise_of
 from kappaskin.studies.design.setup import Placing
 

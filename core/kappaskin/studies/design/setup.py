@@ -9,11 +9,15 @@ from typing import Any
 
 from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
-from kappaskin.fit import METHODS, Estimator, estimator_for
-from kappaskin.placement import PLACEMENTS, check_placement, elements_placed
-from kappaskin.scene import Scene, scene_of
-from kappaskin.scene.lines import Lines
-from kappaskin.scene.table import Table
+from kappaskin.estimation import (
+    METHODS,
+    PLACEMENTS,
+    Estimator,
+    check_placement,
+    elements_placed,
+    estimator_for,
+)
+from kappaskin.scenes import Lines, Scene, Table, scene_of
 from kappaskin.studies.design.draws import Distribution, read_draw
 
 _NAME = "the study"

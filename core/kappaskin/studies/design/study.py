@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.scene import parsed, read_scene_text
-from kappaskin.scene.lines import Lines
-from kappaskin.scene.table import Table
+from kappaskin.scenes import Lines, Table, parsed, read_scene_text
 from kappaskin.studies.design.draws import Distribution
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.places import parts_of, with_values

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.scene.table import Table
+from kappaskin.scenes import Table
 
 _SPACING = {"even": np.linspace, "log": np.geomspace}
 

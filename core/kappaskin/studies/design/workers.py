@@ -10,9 +10,9 @@ from importlib import import_module
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
+from kappaskin._background import end_with_parent
+from kappaskin._processes import Context, beginning_processes
 from kappaskin.errors import Refusal, lacking
-from kappaskin.processes import Context, beginning_processes
-from kappaskin.studies.beside import end_with_parent
 from kappaskin.studies.design.task import Measured, Task, run, version
 
 _PATIENCE = 5.0  # s for a scheduler to answer, and for its first worker

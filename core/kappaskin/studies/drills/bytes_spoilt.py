@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
-from kappaskin.sources.tuning import BAUD_RATES
-from kappaskin.sources.wire import FromDevice
+from kappaskin.sources import BAUD_RATES, FromDevice
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.outcome import Outcome
 from kappaskin.studies.drills.relay import Spoil, clean

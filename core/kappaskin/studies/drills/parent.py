@@ -3,7 +3,7 @@
 import sys
 import time
 
-from kappaskin.engine import Engine
+from kappaskin.live import Engine
 
 if __name__ == "__main__":
     with Engine() as engine:

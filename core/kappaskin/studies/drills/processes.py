@@ -9,9 +9,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from kappaskin.engine import Engine
-from kappaskin.sources.accounting import Accounting
-from kappaskin.status import LOST, STREAMING
+from kappaskin.live import LOST, STREAMING, Engine
+from kappaskin.sources import Accounting
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.outcome import Outcome
 from kappaskin.studies.drills.stand import Stand

@@ -10,11 +10,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kappaskin.errors import Refusal
-from kappaskin.recorder import Recorder
+from kappaskin.recording import Disk, Recorder, Recording, Written
 from kappaskin.recording import messages as m
-from kappaskin.recording.disk import Disk
-from kappaskin.recording.reading import Recording
-from kappaskin.recording.writing import Written
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.outcome import Outcome
 from kappaskin.studies.drills.stand import Stand

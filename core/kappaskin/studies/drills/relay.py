@@ -8,12 +8,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from kappaskin.frames import Counts
-from kappaskin.sources.decoder import Decoder
-from kappaskin.sources.line import Line
-from kappaskin.sources.wire import (
+from kappaskin.sources import (
     Command,
+    Decoder,
     FromDevice,
     Information,
+    Line,
     Reply,
     Samples,
     encode_information,

@@ -4,7 +4,7 @@ import json
 import struct
 from dataclasses import dataclass
 
-from kappaskin.sources.wire import FromDevice, Information, Operation, Reply
+from kappaskin.sources import FromDevice, Information, Operation, Reply
 
 _ANSWER = struct.Struct("<Qh")  # as to a ping: when it came in us, how warm it is
 

@@ -21,7 +21,7 @@ DRILLS: tuple[Drill, ...] = (
 _SEED = 6
 
 
-def drills(
+def run_drills(
     source: str | None = None,
     long: bool = False,
     progress: Callable[[str], object] = lambda _: None,
@@ -42,7 +42,7 @@ def drills(
 
 
 def row_of(drill: Drill, device: Device, long: bool = False) -> dict[str, Any]:
-    """One drill, done and judged: a row as `drills` gives."""
+    """One drill, done and judged: a row as `run_drills` gives."""
     outcome, reasons, verdict = _done(drill, device, long)
     return {
         "drill": drill.name,

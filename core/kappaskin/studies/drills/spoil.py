@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.sources.wire import Kind
+from kappaskin.sources import Kind
 from kappaskin.studies.drills.uart import heard
 
 _BURST = 64  # bytes, the mean of a burst of garbage

@@ -16,8 +16,7 @@ import numpy as np
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
-from kappaskin.sources import SerialSource
-from kappaskin.sources.line import Line
+from kappaskin.sources import Line, SerialSource
 from kappaskin.studies.drills.outcome import NeedsSimulated, Outcome
 from kappaskin.studies.drills.relay import Relay, clean, unchanged
 

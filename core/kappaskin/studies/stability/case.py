@@ -13,8 +13,8 @@ import numpy as np
 
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.frames import Array
-from kappaskin.layout import SensorLayout
-from kappaskin.scene import TABLE_1_NOISE
+from kappaskin.scenes import TABLE_1_NOISE
+from kappaskin.sensing import SensorLayout
 
 FRAMES = 40
 """Frames of a case, each with its own noise: an error bar is judged by all of them."""

@@ -7,15 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from kappaskin.bases import CurvatureMap, SineBasis
-from kappaskin.fit import FiniteSlope
+from kappaskin.estimation import FiniteSlope
 from kappaskin.frames import COMPONENTS, Array
-from kappaskin.layout import SensorLayout
 from kappaskin.mechanics import Plate, PointLoad
-from kappaskin.patch import Patch
-from kappaskin.scene import TABLE_1_NOISE, scaled_to
+from kappaskin.scenes import TABLE_1_NOISE, scaled_to
+from kappaskin.sensing import SensorLayout, Transduction
+from kappaskin.skin import Patch
 from kappaskin.studies.stability.case import FRAMES, SEED, Case, Kind, case_of
 from kappaskin.studies.tables import RADIUS
-from kappaskin.transduction import Transduction
 
 _PATTERNS = 4  # of missing readings
 _SQUARE = Patch(0.1, 0.1)

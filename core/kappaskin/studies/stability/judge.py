@@ -26,8 +26,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
-from kappaskin.fit import Estimator, Fit
-from kappaskin.fit.fit import gathered
+from kappaskin.estimation import Estimator, Fit, gathered
 from kappaskin.frames import Array
 from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.reference import Reference

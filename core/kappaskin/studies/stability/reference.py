@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from kappaskin.fit import singular_values
-from kappaskin.fit.estimator import column_lengths
+from kappaskin.estimation import column_lengths, singular_values
 from kappaskin.frames import Array
 from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.precise import least_squares

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from kappaskin._processes import beginning_processes
 from kappaskin.errors import Refusal
-from kappaskin.fit import METHODS, Estimator
+from kappaskin.estimation import METHODS, Estimator
 from kappaskin.frames import Array
-from kappaskin.processes import beginning_processes
 from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.gallery import gallery
 from kappaskin.studies.stability.judge import Answer, answered, verdict
@@ -34,7 +34,7 @@ _PRINTED = "as-printed"
 _PRECISIONS = np.dtype(np.float64), np.dtype(np.float32)
 
 
-def stability(
+def run_stability(
     long: bool = False, progress: Callable[[str], object] = lambda _: None
 ) -> list[dict[str, Any]]:
     """One row for each case of the gallery, method that claims it, and precision.

@@ -1,0 +1,195 @@
+"""Which element answered to which press, to the map of the channels, in words and as a list."""
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.bases import basis_for
+from kappaskin.calibration.press_judge import ELSEWHERE, OK, Pressed
+from kappaskin.frames import COMPONENTS, Array
+from kappaskin.mechanics import PointLoad
+from kappaskin.sensing import Sensor, SensorLayout
+
+Indices = NDArray[np.intp]
+
+_CLEARLY = 0.5  # of the squares left: by so much another order of components explains more
+_FUNCTIONS = 15  # along each side, of the shape it makes
+_ORDERS = tuple(permutations(range(3)))
+_NAMED = 6  # of them one by one
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """Whether the map was `confirmed`, and what was found, in `words`.
+
+    `order` (3 P,) is the map that was found: `readings[order]` are those of the channels in their
+    right places. None where what was pressed does not tell one.
+    """
+
+    confirmed: bool
+    words: tuple[str, ...]
+    order: Indices | None
+
+    def __str__(self) -> str:
+        return "; ".join(self.words)
+
+
+def verdict_of(sensor: Sensor, done: tuple[Pressed, ...]) -> Verdict:
+    """What pressing some elements tells of the channel map."""
+    layout = sensor.layout
+    told = [pressed for pressed in done if pressed.verdict in (OK, ELSEWHERE)]
+    open_ = [str(pressed) for pressed in done if pressed.verdict not in (OK, ELSEWHERE)]
+    found = {p.asked: p.element for p in told if p.element is not None}
+    elements, words = _elements(layout, found)
+    if elements is None:
+        return Verdict(False, (*words, *_some(open_)), None)
+    orders, more = _components(sensor, told, elements)
+    words = [*words, *more]
+    order = np.concatenate([orders[c] * len(layout) + elements for c in range(3)])
+    if not words and told and not open_:
+        return Verdict(True, (f"the map is right: {_counted(told)} where pressed",), order)
+    if not told:
+        words = ["nothing is told of the map"]
+    elif not words:
+        words = [f"nothing wrong was found: {_counted(told)} where pressed"]
+    return Verdict(False, (*words, *_some(open_)), order if told else None)
+
+
+def _counted(told: list[Pressed]) -> str:
+    return "1 element answers" if len(told) == 1 else f"{len(told)} elements answer"
+
+
+def _some(words: list[str]) -> list[str]:
+    more = len(words) - _NAMED
+    return words[:_NAMED] + ([f"and {more} more"] if more > 0 else [])
+
+
+# Elements: which of them reads what is done to each.
+
+
+def _elements(layout: SensorLayout, found: dict[int, int]) -> tuple[Indices | None, list[str]]:
+    """The element that answers for each (P,), and what is wrong in words; None if that is open."""
+    every = np.arange(len(layout))
+    wrong = {asked: element for asked, element in found.items() if asked != element}
+    if not wrong:
+        return every, []
+    words = [f"element {q} answers in the place of element {p}" for p, q in wrong.items()]
+    closed = sorted(wrong) == sorted(wrong.values())
+    by_lines = None if closed and len(wrong) <= _NAMED else _by_lines(layout, found)
+    if by_lines is not None:
+        return by_lines
+    if closed:
+        return _permuted(every, wrong), _some(_fewest_words(wrong))
+    return None, [*_some(words), "no map is told by that: press every element"]
+
+
+def _permuted(every: Indices, moved: dict[int, int]) -> Indices:
+    order = every.copy()
+    order[list(moved)] = list(moved.values())
+    return order
+
+
+def _fewest_words(moved: dict[int, int], what: str = "element") -> list[str]:
+    """A permutation as its cycles."""
+    words, left = list[str](), dict(moved)
+    while left:
+        cycle = [next(iter(left))]
+        while (after := left.pop(cycle[-1])) != cycle[0]:
+            cycle.append(after)
+        if len(cycle) == 2:
+            words.append(f"{what}s {cycle[0]} and {cycle[1]} are swapped")
+        elif len(cycle) > 2:
+            told = ", ".join(f"{p} reads as {moved[p]}" for p in cycle)
+            words.append(f"{what}s are exchanged: {told}")
+    return words
+
+
+def _by_lines(layout: SensorLayout, found: dict[int, int]) -> tuple[Indices, list[str]] | None:
+    """The same where whole columns and rows are exchanged, mirrored or both for each other."""
+    if layout.shape is None:
+        return None
+    m, n = layout.shape
+    asked, element = (np.array(list(part)) for part in (found.keys(), found.values()))
+    for turned in (False, True) if m == n else (False,):
+        first, second = (element // m, element % m) if turned else (element % m, element // m)
+        columns, rows = _line_map(asked % m, first, m), _line_map(asked // m, second, n)
+        if columns is None or rows is None:
+            continue
+        p, q = np.arange(m * n) % m, np.arange(m * n) // m
+        to = rows[q] + m * columns[p] if turned else columns[p] + m * rows[q]
+        words = ["columns and rows are taken for each other"] if turned else []
+        return to, [*words, *_line_words("column", columns), *_line_words("row", rows)]
+    return None
+
+
+def _line_map(asked: Indices, answered: Indices, count: int) -> Indices | None:
+    """Which of `count` lines answers for each (count,), None where they are not all told."""
+    to = np.full(count, -1)
+    for line, other in zip(asked.tolist(), answered.tolist(), strict=True):
+        if to[line] not in (-1, other):
+            return None
+        to[line] = other
+    return to if sorted(to.tolist()) == list(range(count)) else None
+
+
+def _line_words(what: str, to: Indices) -> list[str]:
+    if (to == np.arange(len(to))[::-1]).all():
+        return [f"{what}s are mirrored"]
+    return _some(_fewest_words({p: q for p, q in enumerate(to.tolist()) if p != q}, what))
+
+
+# Components: which channel of an element reads what.
+
+
+def _components(
+    sensor: Sensor, told: list[Pressed], elements: Indices
+) -> tuple[NDArray[np.intp], list[str]]:
+    """Which component reads xx, yy and xy of each element (3, P), and what is wrong in words."""
+    P = len(sensor.layout)
+    right = np.repeat(np.arange(3)[:, None], P, axis=1)
+    if sensor.layout.patch.strip or not told:
+        return right, []
+    read = np.array([pressed.answer[:, elements] for pressed in told])  # (N, 3, P)
+    due = _due(sensor, [pressed.asked for pressed in told])
+    live = sensor.layout.live & sensor.layout.live[:, elements]
+    read, due = np.where(live, read, 0.0), np.where(live, due, 0.0)
+    cost = np.array([_left(read[:, list(order)], due) for order in _ORDERS])  # (6, P)
+    best = int(cost.sum(axis=1).argmin())
+    if cost[best].sum() < _CLEARLY * cost[0].sum():
+        return np.repeat(np.array(_ORDERS[best])[:, None], P, axis=1), [_order_words(best)]
+    each = cost.argmin(axis=0)
+    wrong = cost.min(axis=0) < _CLEARLY * cost[0]
+    wrong &= np.isin(np.arange(P), [pressed.asked for pressed in told])
+    for p in np.flatnonzero(wrong):
+        right[:, p] = _ORDERS[each[p]]
+    words = [f"{_order_words(int(each[p]))} of element {p}" for p in np.flatnonzero(wrong)]
+    return right, _some(words)
+
+
+def _order_words(number: int) -> str:
+    moved = {c: to for c, to in enumerate(_ORDERS[number]) if c != to}
+    names = [COMPONENTS[c] for c in moved]
+    if len(names) == 2:
+        return f"{names[0]} and {names[1]} are swapped"
+    told = ", ".join(f"{COMPONENTS[a]} reads as {COMPONENTS[b]}" for a, b in moved.items())
+    return f"components are exchanged: {told}"
+
+
+def _left(read: Array, due: Array) -> Array:
+    """Squares (P,) that are left of N presses `read` (N, 3, P) when they were `due`, scaled."""
+    share = np.sum(read * due, axis=(1, 2)) / np.sum(due**2, axis=(1, 2))
+    scale = np.sum(read**2, axis=(1, 2))  # each press counts alike
+    left = (read - share[:, None, None] * due) ** 2 / scale[:, None, None]
+    return np.sum(left, axis=(0, 1))
+
+
+def _due(sensor: Sensor, pressed: list[int]) -> Array:
+    """What a press of each element does to all, (N, 3, P) in 1/m, but for its force."""
+    layout, plate = sensor.layout, sensor.plate
+    basis = basis_for(layout.patch, sensor.edge, _FUNCTIONS, _FUNCTIONS)
+    compliance, M = plate.compliance(basis), layout.curvature_operator(basis)
+    loads = [PointLoad(x, y, 1.0) for x, y in layout.positions[pressed].tolist()]
+    c = [compliance(load.modal(basis)).ravel() for load in loads]
+    return (np.array(c) @ M.T).reshape(len(c), 3, -1)

@@ -1,0 +1,168 @@
+"""From the readings of a contact to the best sphere, edge and cylinder that may have made it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kappaskin.contact.elastic_skin import ElasticSkin
+from kappaskin.contact.interior import (
+    Hypothesis,
+    cylinder_of,
+    least_width,
+    middle,
+    narrow,
+    ring_pattern,
+    sphere_of,
+)
+from kappaskin.contact.optimise import Optimum, Prior, climb
+from kappaskin.contact.rigid_contacts import EVEN, ROUND, Contact, PointForces, arcs, ends, ring
+from kappaskin.frames import Array, Mask, Touch
+
+SHARE = 0.2
+"""Standard deviation, known beforehand, of how unequal the forces on two ends are."""
+_ANGLE = 0.9  # rad, of an axis that is not known
+
+_INEXACT = 0.02  # of a reading: that closely does a skin behave like a plate at best
+_START = 0.025  # of a side: as wide as it is at first
+_SHORT = 0.25  # of a side: an object as long may lie across what looks like its axis
+_WORSE = 1.25  # times the cost of a ring, that one a little further on never has
+_BETTER = 6.0  # chi-squared that another axis must gain
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypotheses:
+    """What may touch the skin, and the `noise` in 1/m that the best of them leaves."""
+
+    sphere: Hypothesis
+    edge: Hypothesis
+    cylinder: Hypothesis
+    noise: float
+    readings: int
+
+
+def hypotheses(
+    coarse: ElasticSkin,
+    skin: ElasticSkin,
+    readings: Array,
+    used: Mask,
+    noise: float,
+    touch: Touch,
+) -> Hypotheses:
+    """The best objects for `readings` (R,), zero where not `used`, around the contact `touch`.
+
+    First with few functions: a reading grows without bounds as a force comes close, and more of
+    them would keep a force on the side of an element where it started.
+    """
+    frame = _Frame(coarse, readings, used)
+    pair, forces = coarse.best_pair(touch.position, readings, used)
+    frame.trust(noise, _at(touch.position[None], np.array([touch.force])), _at(pair, forces))
+    sphere, edge = frame.sphere(touch), frame.edge(pair, forces)
+    cylinder = frame.cylinder(edge)
+    tried = (sphere, edge, cylinder)
+    noise *= frame.spread(tried)
+    frame = _Frame(skin, readings, used)
+    frame.trust(noise, *(o.contact(o.parameters) for o in tried))
+    sphere = frame.shaped(sphere)
+    edge = min((frame.edged(edge), frame.edged(cylinder)), key=_cost)
+    cylinder = frame.rounded(cylinder, edge)
+    if cylinder.cost > edge.cost:  # of which an edge is the narrowest
+        cylinder = min(cylinder, frame.rounded(frame.beside(edge), edge), key=_cost)
+    noise *= frame.spread((sphere, edge, cylinder))
+    return Hypotheses(
+        sphere_of(skin, sphere),
+        Hypothesis(edge),
+        cylinder_of(skin, cylinder),
+        noise,
+        int(used.sum()),
+    )
+
+
+def _cost(optimum: Optimum) -> float:
+    return optimum.cost
+
+
+def _at(points: Array, forces: Array) -> PointForces:
+    return PointForces(points, forces, np.zeros((0, len(forces), 2)), np.zeros((0, len(forces))))
+
+
+class _Frame:
+    """One frame's readings, each with the weight it deserves."""
+
+    def __init__(self, skin: ElasticSkin, readings: Array, used: Mask) -> None:
+        self.skin, self._readings, self._used = skin, readings, used
+        self._least, self._start = least_width(skin), (_START * skin.side) ** 2
+
+    def trust(self, noise: float, *forces: PointForces) -> None:
+        """Weigh readings by the noise and by what the functions leave out close to `forces`."""
+        left_out = np.max([self.skin.unresolved(f) for f in forces], axis=0)
+        inexact = (_INEXACT * self._readings) ** 2
+        self._weight = self._used / np.sqrt(noise**2 + left_out + inexact)
+
+    def spread(self, tried: tuple[Optimum, ...]) -> float:
+        """What the best of the optima leaves, in units of the noise they were weighed with."""
+        squares = min(optimum.squares for optimum in tried)
+        return math.sqrt(squares / (int(self._used.sum()) - 6))
+
+    def _climb(self, contact: Contact, start: Array, steps: int) -> Optimum:
+        """x, y, F; then angle, squared length and share, if there are ends; then q."""
+        n = len(start)
+        mean, sd = start.copy(), np.full(n, np.inf)
+        low, high = np.full(n, -np.inf), np.full(n, np.inf)
+        if n >= 6:
+            sd[3], sd[5], mean[5] = _ANGLE, SHARE, 0.0
+            low[4], low[5], high[5] = self._least, -0.49, 0.49
+        if n != 6:
+            low[-1] = self._least
+        prior = Prior(mean, sd, low, high)
+        return climb(self.skin, contact, start, prior, self._readings, self._weight, steps)
+
+    def again(self, optimum: Optimum, contact: Contact, parameters: int) -> Optimum:
+        """The optimum of `contact` near another's, as many of its `parameters` as it has."""
+        return self._climb(contact, optimum.parameters[:parameters], 4)
+
+    def sphere(self, touch: Touch) -> Optimum:
+        return self._climb(ring(ROUND), np.array([*touch.position, touch.force, self._start]), 4)
+
+    def edge(self, pair: Array, forces: Array) -> Optimum:
+        force, apart = float(forces.sum()), pair[0] - pair[1]
+        share = float(np.clip(forces[0] / force - 0.5, -0.4, 0.4))
+        angle = math.atan2(apart[1], apart[0])
+        start = [*(forces @ pair / force), force, angle, max(apart @ apart, self._least), share]
+        return self._climb(ends(0.0), np.array(start), 6)
+
+    def cylinder(self, edge: Optimum) -> Optimum:
+        """From the edge, or across it: a short cylinder's arcs may be longer than itself."""
+        along = self._climb(arcs(EVEN, 0.0), np.append(edge.parameters, self._start), 5)
+        length2 = edge.parameters[4]
+        if length2 > (_SHORT * self.skin.side) ** 2:
+            return along
+        turned = edge.parameters.copy()
+        turned[3:6] = turned[3] + math.pi / 2, max(0.3 * length2, self._start), 0.0
+        across = self._climb(arcs(EVEN, 0.0), np.append(turned, max(length2 / 4, self._start)), 5)
+        return across if across.cost < along.cost - _BETTER else along
+
+    def shaped(self, sphere: Optimum) -> Optimum:
+        """The sphere that presses where the skin's own bending lets it."""
+        sphere = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
+        for _ in range(2 if self.skin.patch.base_curvature else 1):  # further from a circle
+            again = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
+            if again.cost > _WORSE * sphere.cost:  # the pattern has tipped over to another
+                break
+            sphere = again
+        return sphere
+
+    def edged(self, near: Optimum) -> Optimum:
+        """The edge near another optimum that presses between its ends where it must."""
+        share = middle(self.skin, near)
+        edge = self.again(near, ends(share), 6)
+        return self.again(edge, ends(middle(self.skin, edge)), 6) if share else edge
+
+    def beside(self, edge: Optimum) -> Optimum:
+        """The cylinder next to an edge."""
+        return self._climb(arcs(EVEN, 0.0), np.append(edge.parameters, self._start / 10), 4)
+
+    def rounded(self, cylinder: Optimum, edge: Optimum) -> Optimum:
+        """The cylinder of one curvature at both ends that presses between them as an edge does."""
+        share = middle(self.skin, edge)
+        return self.again(cylinder, arcs(narrow(self.skin, cylinder, share), share), 7)

@@ -1,0 +1,208 @@
+"""From the readings of a contact to what kind of object presses on the skin, and how it curves."""
+
+import math
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+import scipy
+
+from kappaskin.contact.elastic_skin import ElasticSkin
+from kappaskin.contact.evidence import log_evidence
+from kappaskin.contact.hypotheses import Hypotheses, hypotheses
+from kappaskin.contact.interior import Hypothesis, Width
+from kappaskin.frames import Array, Touch
+from kappaskin.mechanics import Plate
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
+
+KINDS = ("plane", "cylinder", "sphere", "edge")
+"""What an object may be; each as likely beforehand as the others."""
+
+_COARSE = 15  # functions along each side, at first; of a disk or a polygon to the end
+_FINE, _FINE_MIXED = 40, 30  # and then: of waves that do not mix, and of those that do
+_WELL = 1.2  # times the residual of the fitted shape that an object may leave
+_ENOUGH = 20  # readings at least
+_INEXACT = 0.02  # of a curvature: what a ring or arcs leave out of a real contact
+_QUIET = 1e-4  # of the largest reading: no skin is quieter
+_SEEN = 2.6  # standard deviations: a width below is only an upper bound, or noise passes for one
+_SURE = 0.4  # probability below which no kind is named
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactObject:
+    """What touches the skin, as far as the readings of one frame tell.
+
+    `kind` is one of `KINDS`, or empty when they do not tell; `probability` has all of them, and is
+    empty without a contact. `position` (2,) in m and `force` in N have 95 % half widths. `radius`
+    in m with its 95 % interval `radius_95`: from 0 when only an upper bound is known, up to
+    infinity when it may be flat. `axis` is the angle in rad from x of a cylinder's axis or of an
+    edge, `length` its length in m, both with 95 % half widths. What does not apply is NaN. A flat
+    face on a flat skin touches at its rim alone and looks like the sphere or cylinder that touches
+    there; two points look like the edge that joins them.
+    """
+
+    kind: str
+    probability: dict[str, float]
+    position: Array
+    position_95: Array
+    force: float
+    force_95: float
+    radius: float
+    radius_95: tuple[float, float]
+    axis: float
+    axis_95: float
+    length: float
+    length_95: float
+
+    @property
+    def ranked(self) -> list[tuple[str, float]]:
+        """Kinds and their probabilities, the likeliest first."""
+        return sorted(self.probability.items(), key=lambda item: -item[1])
+
+    def describe(self) -> str:
+        """One line in millimetres and degrees, with the runner-up."""
+        if not self.probability:
+            return "nothing touches"
+        (likeliest, first), (second, chance) = self.ranked[:2]
+        if not self.kind and first >= _SURE:
+            return f"cannot tell: fits none of these objects, {likeliest} the least badly"
+        if not self.kind:
+            odds = f"{100 * first:.0f} % to {100 * chance:.0f} %"
+            return f"{likeliest} or {second}: cannot tell ({odds})"
+        parts = [self.kind]
+        if self.kind in ("cylinder", "sphere"):
+            parts.append(self._radius())
+        if self.kind in ("cylinder", "edge"):
+            parts.append(f"{1e3 * self.length:.0f} mm long, axis {math.degrees(self.axis):.0f} deg")
+        return f"{', '.join(parts)}; runner-up {second} {100 * chance:.0f} %"
+
+    def _radius(self) -> str:
+        low, high = (1e3 * radius for radius in self.radius_95)
+        if low == math.inf:
+            return "flat or hollow"
+        if high == math.inf:
+            return f"radius above {_digits(low)} mm" if low else "radius unknown"
+        if not low:
+            return f"radius below {_digits(high)} mm"
+        return f"radius {_digits(1e3 * self.radius)} mm ({_digits(low)} to {_digits(high)})"
+
+
+def _digits(value: float) -> str:
+    """Three digits, and whatever more a number from 1000 on has before the point."""
+    return f"{value:.3g}" if value < 999.5 else f"{value:.0f}"
+
+
+NO_OBJECT = ContactObject(
+    "",
+    {},
+    np.full(2, np.nan),
+    np.full(2, np.nan),
+    math.nan,
+    math.nan,
+    math.nan,
+    (math.nan, math.nan),
+    math.nan,
+    math.nan,
+    math.nan,
+    math.nan,
+)
+
+
+class ObjectFinder:
+    """What touches a skin: a plane, a cylinder, a sphere or an edge, by marginal likelihood.
+
+    To each kind belongs a small family of forces on the skin (`rigid_contacts`), fitted to the
+    readings by maximum likelihood. The kinds are weighed by Laplace's approximation of
+    their marginal likelihoods, the noise's size unknown. The object's curvature is that of the
+    skin between the forces. A few tens of milliseconds: for display, not for every frame. On a
+    skin bent to a radius of a few elements its probabilities promise too much: a dent there is
+    not much wider than what the functions resolve.
+    """
+
+    def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
+        patch = plate.patch
+        if type(patch) is not Patch:
+            fine = _COARSE
+        else:
+            fine = _FINE if edge == "hinged" and not patch.base_curvature else _FINE_MIXED
+        self._coarse = ElasticSkin(plate, layout, edge, _COARSE)
+        self._skin = self._coarse
+        if fine != _COARSE:
+            self._skin = ElasticSkin(plate, layout, edge, fine)
+        self._live = layout.live.ravel()
+
+    def __call__(self, curvature: Array, noise: float, touch: Touch) -> ContactObject:
+        """The object for `curvature` (3, P) in 1/m, NaN where missing, and the `touch` in it.
+
+        `noise` in 1/m is the standard deviation of a reading, as the fitted shape leaves it.
+        """
+        used = self._live & np.isfinite(curvature).ravel()
+        if not touch.present or used.sum() < _ENOUGH:
+            return NO_OBJECT
+        K = np.where(used, curvature.ravel(), 0.0)
+        noise = max(noise, _QUIET * float(np.abs(K).max()))
+        return _judged(
+            self._skin, hypotheses(self._coarse, self._skin, K, used, noise, touch), noise
+        )
+
+
+def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObject:
+    weights = log_evidence(skin, all_of)
+    most = max(weights.values())
+    total = sum(math.exp(weight - most) for weight in weights.values())
+    probability = {kind: math.exp(weights[kind] - most) / total for kind in KINDS}
+    kind = max(KINDS, key=probability.__getitem__)
+    found = {"sphere": all_of.sphere, "edge": all_of.edge}.get(kind, all_of.cylinder)
+    reach = float(scipy.special.stdtrit(all_of.readings - len(found.best.parameters), 0.975))
+    radius, radius_95 = _radius(cast("Width", found.width or all_of.cylinder.width), reach)
+    known = probability[kind] >= _SURE and all_of.noise <= _WELL * noise
+    known = known and not (kind == "plane" and math.isnan(radius))  # flattened, not just touched
+    return ContactObject(
+        kind if known else "",
+        probability,
+        found.best.parameters[:2],
+        reach * np.sqrt(np.diag(found.best.covariance)[:2]),
+        float(found.best.parameters[2]),
+        reach * math.sqrt(found.best.covariance[2, 2]),
+        radius,
+        radius_95,
+        *_axis(found, radius_95, reach),
+        *_length(found, reach),
+    )
+
+
+def _axis(found: Hypothesis, radius_95: tuple[float, float], reach: float) -> tuple[float, float]:
+    """Angle in rad and half width, as far as the noise and the radius leave it open."""
+    if len(found.best.parameters) < 6:
+        return math.nan, math.nan
+    off = reach * math.sqrt(found.best.covariance[3, 3])
+    if found.width is None:
+        return float(found.best.parameters[3]) % math.pi, off
+    low, high = (found.axis(min(radius, 1e3)) for radius in radius_95)
+    spread = abs(math.remainder(high - low, math.pi)) / 2
+    return (low + math.remainder(high - low, math.pi) / 2) % math.pi, math.hypot(off, spread)
+
+
+def _length(found: Hypothesis, reach: float) -> tuple[float, float]:
+    """Length in m and half width."""
+    if len(found.best.parameters) < 6:
+        return math.nan, math.nan
+    length = math.sqrt(found.best.parameters[4])
+    return length, reach * math.sqrt(found.best.covariance[4, 4]) / (2 * length)
+
+
+def _radius(width: Width, reach: float) -> tuple[float, tuple[float, float]]:
+    """The radius in m and its interval of `reach` standard deviations."""
+    low, high = width.q - reach * width.sd, max(width.q, 0.0) + reach * width.sd
+    flattest = width.curvature(high)
+    if width.q < _SEEN * width.sd or low <= 0:
+        return math.nan, (0.0, _inverse((1 - _INEXACT) * flattest))
+    best = width.curvature(width.q)
+    off = _INEXACT * best
+    up, down = math.hypot(width.curvature(low) - best, off), math.hypot(best - flattest, off)
+    return _inverse(best), (_inverse(best + up), _inverse(best - down))
+
+
+def _inverse(curvature: float) -> float:
+    return 1 / curvature if curvature > 0 else math.inf

@@ -1,0 +1,165 @@
+"""The shape of a skin that bends as a plate does: a prior where the readings do not decide."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from kappaskin.estimation.estimator import Estimator
+from kappaskin.estimation.fit import Fit
+from kappaskin.estimation.prior import prior_root
+from kappaskin.estimation.remembered import Remembered
+from kappaskin.frames import Array, Mask
+
+_LEAST, _MOST = -12.0, 60.0  # ln of signal over noise in power, of the best seen direction
+_GRID = np.linspace(_LEAST, _MOST, 145)
+_AWAY = 0.9  # the power of scale and noise in their density
+_NEWTON = 3  # steps from the best of them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosteriorSpread:
+    """Covariance B diag(v) B^T for unit noise: B (N, F), v (F,)."""
+
+    B: Array
+    v: Array
+
+    @property
+    def sd(self) -> Array:
+        return np.sqrt(self.B**2 @ self.v)
+
+    def of(self, rows: Array) -> Array:
+        left = rows @ self.B
+        return (left * self.v) @ left.swapaxes(-1, -2)
+
+    def sd_of(self, rows: Array) -> Array:
+        return np.sqrt((rows @ self.B) ** 2 @ self.v)
+
+
+# With c = tau L z and z ~ N(0, 1), the weighted readings are K = tau A z + noise, A = M L. By
+# A = U S V^T, y = U^T K has variances sigma^2 d_k, d_k = 1 + gamma s_k^2 with gamma = tau^2 /
+# sigma^2, and what is orthogonal to U has sigma^2. Of sigma^2 the most likely value for each gamma
+# is sigma^2 = (sum_k y_k^2 / d_k + rest) / R, so that one number is left to search:
+#     -2 ln p(K | gamma) = R ln sigma^2 + sum_k ln d_k,
+# or, where sigma is told and the readings are in units of it, sum_k y_k^2 / d_k + ln d_k. Where
+# noise hides the signal this may be least at tau = 0, and where there are more functions than
+# readings at sigma = 0, with error bars of nothing. A density that grows as a power of both keeps
+# it from there (doi:10.1007/s11336-013-9328-2): -2 p ln (tau sigma) = -p ln gamma - 2 p ln sigma^2
+# more. With p = 1, one function that is seen among others unseen would let tau run away.
+class Evidence:
+    """The prior's scale and the noise that make readings K = A z most likely, A (R, F)."""
+
+    def __init__(self, A: Array, told: bool, floor: float) -> None:
+        U, s, Vt = linalg.svd(A, full_matrices=len(A) < A.shape[1])
+        k = len(s)
+        self.U, self.V = U[:, :k], Vt.T
+        self.s2 = np.zeros(len(Vt))
+        self.s2[:k] = s**2
+        self._k, self._told = k, told
+        self._readings = max(len(A) - 2 * _AWAY, 1.0)  # less what the density of sigma takes
+        self._top = math.log(self.s2[0]) if s[0] > 0 else 0.0
+        self._floor = floor  # of the readings' own power: what their rounding leaves
+        d = 1 + np.exp(_GRID - self._top)[:, None] * self.s2[:k]
+        self._share, self._volume = 1 / d, np.log(d).sum(axis=1)
+
+    def __call__(self, K: Array) -> tuple[Array, Array, Array]:
+        """y (T, k), gamma (T,) and sigma (T,) for readings K (T, R)."""
+        y = K @ self.U
+        rest = K - y @ self.U.T
+        power = np.vecdot(K, K)
+        # Rounding looks like noise: below it there is none to be told.
+        left = np.maximum(np.vecdot(rest, rest), self._floor * power)
+        y2 = y**2
+        fit = y2 @ self._share.T + left[:, None]
+        cost = self._cost(fit, self._volume) - _AWAY * _GRID
+        best = np.argmin(cost, axis=1)
+        t = self._refined(_GRID[best], y2, left)
+        gamma = np.exp(t - self._top)
+        if self._told:
+            return y, gamma, np.ones(len(K))
+        fit = np.vecdot(y2, 1 / (1 + gamma[:, None] * self.s2[: self._k])) + left
+        return y, gamma, np.sqrt(fit / self._readings)
+
+    def _cost(self, fit: Array, volume: Array) -> Array:
+        if self._told:
+            return fit + volume
+        tiny = np.finfo(float).tiny
+        return self._readings * np.log(np.maximum(fit, tiny)) + volume
+
+    def _refined(self, t: Array, y2: Array, left: Array) -> Array:
+        """Newton's steps in t = ln(gamma s_0^2) from the best place on the grid."""
+        half = _GRID[1] - _GRID[0]
+        low, high = np.maximum(t - half, _LEAST), np.minimum(t + half, _MOST)
+        s2 = self.s2[: self._k]
+        for _ in range(_NEWTON):
+            g = np.exp(t - self._top)[:, None] * s2
+            q = g / (1 + g)  # the share of each direction that the readings decide
+            e = y2 / (1 + g)
+            fit = e.sum(axis=1) + left
+            # d fit / dt and d2 fit / dt2; d volume / dt = sum q, d2 = sum q (1 - q).
+            f1, f2 = -np.vecdot(e, q), np.vecdot(e, q * (2 * q - 1))
+            v1, v2 = q.sum(axis=1), (q * (1 - q)).sum(axis=1)
+            if self._told:
+                slope, bend = f1 + v1 - _AWAY, f2 + v2
+            else:
+                fit = np.maximum(fit, np.finfo(float).tiny)
+                R = self._readings
+                slope, bend = R * f1 / fit + v1 - _AWAY, R * (f2 / fit - (f1 / fit) ** 2) + v2
+            step = np.divide(-slope, bend, where=bend > 0, out=np.zeros_like(t))
+            t = np.clip(t + step, low, high)
+        return t
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solver:
+    """What depends on which readings are used: the evidence, and B = L V (N, F)."""
+
+    evidence: Evidence
+    B: Array
+
+
+class Bayes(Estimator):
+    """The most likely shape of a plate under a white load, given the readings.
+
+    The coefficients are Gaussian with the standard deviation of a plate's under a load that is
+    white in space, for sines proportional to 1/(i^2/a^2 + j^2/b^2)^2. Its scale, and the noise
+    unless `sigma` is given, are those that make the readings most likely (type II maximum
+    likelihood, doi:10.1162/neco.1992.4.3.415), of each frame by itself. What the readings do not
+    decide is left to the prior, with error bars that say so: no basis is too large.
+    """
+
+    has_prior = True
+
+    def _set_up(self) -> None:
+        self._root = prior_root(self.basis)
+        self._solvers = Remembered[_Solver]()
+        if self.readable.any():
+            self._solvers(self.readable, self._made)
+
+    def _made(self, used: Mask) -> _Solver:
+        A = self.weight[used, None] * (self.M[used] @ self._root)
+        told, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
+        evidence = Evidence(A, told, rounding**2)
+        return _Solver(evidence, self._root @ evidence.V)
+
+    def _fit(self, flat: Array, used: Mask) -> Fit:
+        if not used.any():
+            raise self.refusal(0, 0)
+        solver, frames = self._solvers(used, self._made), flat.shape[:-1]
+        evidence, B = solver.evidence, solver.B
+        y, gamma, sigma = evidence(np.atleast_2d(flat[..., used] * self.weight[used]))
+        d = 1 + gamma[:, None] * evidence.s2
+        k = y.shape[1]
+        z = y * (gamma[:, None] * np.sqrt(evidence.s2[:k]) / d[:, :k])
+        c = (z @ B[:, :k].T).astype(self.dtype)
+        spreads = [PosteriorSpread(B, v) for v in gamma[:, None] / d]
+        spent = (1 - 1 / d).sum(axis=1)
+        return Fit(
+            self,
+            flat.reshape(*frames, 3, len(self.layout)),
+            c.reshape(*frames, *self.basis.shape),
+            spreads if frames else spreads[0],
+            (int(used.sum()) - spent).reshape(frames),
+            sigma.reshape(frames),
+        )

@@ -1,0 +1,251 @@
+"""What every estimator takes and how it is asked: curvature to coefficients with error bars."""
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import ClassVar, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
+
+from kappaskin.bases import Basis, curvature_at
+from kappaskin.errors import RankDeficient, Refusal
+from kappaskin.estimation.fit import Fit, Spread, gathered
+from kappaskin.frames import Array, Mask
+from kappaskin.sensing import SensorLayout
+
+RIM_SD = 0.2e-3
+"""How far in m a rim that gives is expected to move, unless said otherwise."""
+
+# Powers of the largest number: the squares of readings over sigmas, added up, stay below it.
+_SAFE, _SAFE_SIGMA = 0.25, 0.2
+_UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
+
+
+def numbers(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Array:
+    """A copy of `values` in this `dtype`; raises a `Refusal` where they are no real numbers."""
+    if type(values) is np.ndarray and values.dtype == dtype:  # as in most frames: the fastest
+        return values.copy()
+    try:
+        given = np.asarray(values)
+    except ValueError as error:  # rows of different lengths
+        raise Refusal(f"expected {what} as an array of real numbers, got {error}") from error
+    # A masked array would lose its mask.
+    if given.dtype.kind not in "biuf" or hasattr(values, "filled"):
+        raise Refusal(
+            f"expected {what} as an array of real numbers, NaN where one is missing; got "
+            f"{type(values).__name__} of {given.dtype}"
+        )
+    with np.errstate(over="ignore"):  # to infinity, in float32
+        return given.astype(dtype)
+
+
+def column_lengths(A: Array) -> Array:
+    """Lengths (F,) of the columns of A (R, F); infinite where nothing but rounding is left."""
+    length = np.linalg.norm(A, axis=0)
+    length[length <= _UNSEEN * length.max(initial=0.0)] = np.inf
+    return length
+
+
+class Estimator(ABC):
+    """`fit = LeastSquares(basis, layout)`, factored once; `fit(curvature)` is a `Fit`.
+
+    `sigma`, a scalar or (3, P) in 1/m, is the standard deviation of each reading; without it all
+    readings weigh the same and their noise is estimated. An infinite sigma leaves a reading out.
+    `rim_sd` in m is how far a rim that gives is expected to move: the standard deviation of each
+    shape that no reading sees, by RMS along the rim. A frame is computed in `dtype`, which is
+    float64 or float32; the factorisation always in float64.
+    """
+
+    has_matrix: ClassVar = True
+    """Whether M is made, 3 P x Ni Nj numbers."""
+    has_prior: ClassVar = False
+    """Whether what the readings do not decide is left to a prior, so that no basis is too large."""
+    remembers: ClassVar = False
+    """Whether frames depend on earlier ones: each is to be followed once, in order."""
+
+    def __init__(
+        self,
+        basis: Basis,
+        layout: SensorLayout,
+        sigma: ArrayLike | None = None,
+        rim_sd: float = RIM_SD,
+        dtype: DTypeLike = np.float64,
+    ) -> None:
+        if not 0 <= rim_sd < np.inf:
+            raise Refusal(f"expected a rim_sd of at least zero in m, got {rim_sd}")
+        if np.dtype(dtype).name not in ("float64", "float32"):
+            raise Refusal(f"expected float64 or float32 to compute in, got {np.dtype(dtype)}")
+        self.basis, self.layout, self.rim_sd = basis, layout, rim_sd
+        # Typed as float64: what holds for one holds for the other.
+        self.dtype = cast("np.dtype[np.float64]", np.dtype(dtype))
+        unseen = np.empty((basis.size, 0)) if basis.unseen is None else basis.unseen
+        self.undecided = rim_sd * unseen
+        """Shapes (N, q) in m that no reading sees, each as far as it is expected to go."""
+        self._largest = float(np.finfo(self.dtype).max) ** _SAFE
+        self.sigma = None if sigma is None else numbers(sigma, "sigma")
+        """The standard deviations in 1/m that were told, one or (3, P); None if none were."""
+        self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
+        """What each reading (3 P,) is worth, 1 / sigma in m; 1 for all without a sigma."""
+        self.readable: Mask = layout.live.ravel() & (self.weight > 0)
+        """Which readings (3 P,) are used when they are there."""
+        self._all_readable = bool(self.readable.all())
+        self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
+        """How many numbers there are to tell: the coefficients less what the edges decide."""
+        self._set_up()
+
+    @abstractmethod
+    def _set_up(self) -> None:
+        """Make once what no frame changes; raises a `Refusal` when no shape can be told."""
+
+    def _weights(self, sigma: float | Array) -> Array:
+        sigma = np.asarray(sigma)
+        if sigma.shape not in ((), (3, len(self.layout))):
+            raise Refusal(
+                f"expected sigma to be one number or (3, {len(self.layout)}), got {sigma.shape}"
+            )
+        if not np.all(sigma > 0):
+            raise Refusal("expected every sigma above zero in 1/m, got zero, less or NaN")
+        known, most = sigma[sigma < np.inf], float(np.finfo(self.dtype).max) ** _SAFE_SIGMA
+        if np.any((known > most) | (known < 1 / most)):
+            raise Refusal(
+                f"expected every sigma from {1 / most:.1g} to {most:.1g} 1/m, or infinite, in "
+                f"{self.dtype}, got {known.min():g} to {known.max():g}"
+            )
+        return np.broadcast_to(1 / sigma, (3, len(self.layout))).reshape(-1)
+
+    @cached_property
+    def M(self) -> Array:
+        """The curvature operator (3 P, Ni Nj) (Eq. 2)."""
+        return self.layout.curvature_operator(self.basis)
+
+    @cached_property
+    def _M_T(self) -> Array:
+        return self.M.T.astype(self.dtype)
+
+    def predicted(self, coefficients: Array) -> Array:
+        """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
+        frames = coefficients.shape[:-2]
+        flat = coefficients.reshape(*frames, self.basis.size)
+        return np.dot(flat, self._M_T).reshape(*frames, 3, len(self.layout))
+
+    def _check_shape(self, K: Array) -> None:
+        if K.ndim not in (2, 3) or K.shape[-2:] != (3, len(self.layout)):
+            raise Refusal(
+                f"expected curvature of shape (3, {len(self.layout)}) or (T, 3, "
+                f"{len(self.layout)}), got {K.shape}"
+            )
+
+    def __call__(self, curvature: ArrayLike) -> Fit:
+        """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading.
+
+        So do readings that are too large to compute with, of 4e9 in float32 and 1e77 in float64.
+        """
+        K = numbers(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
+        self._check_shape(K)
+        flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
+        if self._all_readable and _squared(K.reshape(-1)) <= self._largest**2:
+            return self._fit(flat, self.readable)
+        used = (np.abs(flat) <= self._largest) & self.readable
+        flat[~used] = np.nan
+        if np.all(used == self.readable):
+            return self._fit(flat, self.readable)
+        if K.ndim == 2:
+            return self._fit(flat, used)
+        patterns, which = np.unique(used, axis=0, return_inverse=True)
+        which = which.ravel()
+        fits: list[Fit] = []
+        for number, pattern in enumerate(patterns):
+            try:
+                fits.append(self._fit(flat[which == number], pattern))
+            except RankDeficient as error:
+                first = int(np.argmax(which == number))
+                # An estimator inside this one counts the frames that it was given.
+                inner = error.__cause__
+                why = inner if isinstance(inner, RankDeficient) else error
+                raise RankDeficient(f"frame {first}: {why}") from why
+        return gathered(fits, np.argsort(np.argsort(which, kind="stable")))
+
+    def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
+        """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.
+
+        Both are NaN where nothing was read; `held` (3, P) has what is known of earlier frames too.
+        What remembers nothing itself fits that.
+        """
+        return self(held)
+
+    def at_rest(self, missing: Mask | None = None) -> Fit:
+        """The fit to a skin at rest, of which only the readings `missing` (3, P) are not there."""
+        return self(self._rest(missing))
+
+    def _rest(self, missing: Mask | None) -> Array:
+        rest = np.zeros((3, len(self.layout)))
+        return rest if missing is None else np.where(missing, np.nan, rest)
+
+    @abstractmethod
+    def _fit(self, flat: Array, used: Mask) -> Fit:
+        """Fit readings (3 P,) or (T, 3 P) of which those `used` (3 P,) are there, the rest NaN."""
+
+    def _answer(
+        self, flat: Array, c: Array, spread: Spread, spare: int, steps: ArrayLike = 0
+    ) -> Fit:
+        """The fit of `c` (..., N) or (..., Ni, Nj) to `flat` (..., 3 P), all of one `spread`."""
+        frames = flat.shape[:-1]
+        return Fit(
+            self,
+            flat.reshape(*frames, 3, len(self.layout)),
+            c.reshape(*frames, *self.basis.shape),
+            [spread] * frames[0] if frames else spread,
+            spare,
+            None if self.sigma is None else np.ones(frames),
+            steps,
+        )
+
+    def _moves_as_a_whole(self) -> bool:
+        """Whether the basis has a function that changes no curvature anywhere; only arcs may."""
+        patch, W = self.basis.patch, self.basis.free
+        if not (patch.strip and patch.base_curvature):
+            return False
+        x, y = patch.cell_centres(2 * self.basis.size + 1, 1)
+        bends = curvature_at(self.basis, np.column_stack([x, np.repeat(y, len(x))]))[0]
+        return bool(np.isinf(column_lengths(bends if W is None else bends @ W)).any())
+
+    def refusal(self, readings: int, rank: int) -> RankDeficient:
+        """Why `readings` of them, which determine `rank` coefficients, do not decide a shape."""
+        (Ni, Nj), N, layout = self.basis.shape, self.unknowns, self.layout
+        bound = "at most " if readings < N else ""
+        what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
+        what += f"of a {Ni} x {Nj} basis"
+        if readings == 0:
+            return RankDeficient(
+                f"{what}: no readings are left; check the connection and the dead elements"
+            )
+        channels = len(layout) if layout.patch.strip else 3 * len(layout)
+        missing = channels - readings
+        if self._moves_as_a_whole():
+            return RankDeficient(
+                f"{what}: a function moves the skin as a whole and bends it nowhere; hold the "
+                "edges so that it cannot (pin the ends of the arc)"
+            )
+        if layout.shape and not missing:
+            m, n = layout.shape
+            # Along each direction, mode m + q looks like m - q at the cell centres.
+            return RankDeficient(
+                f"{what}: functions beyond the elements look like lower ones; "
+                f"use at most {min(Ni, m)} x {min(Nj, n)} functions, or more elements, or a prior "
+                "(bayes)"
+            )
+        why = (
+            f"{missing} of {channels} readings are missing"
+            if missing
+            else ("the elements do not tell these functions apart")
+        )
+        return RankDeficient(
+            f"{what}: {why}; use a smaller basis (at most {rank} functions), more elements, or a "
+            "prior (bayes)"
+        )
+
+
+def _squared(a: Array) -> float:
+    """The sum of squares of `a`: of all that tells whether it is finite and small, the fastest."""
+    with np.errstate(over="ignore"):
+        return float(a.dot(a))

@@ -1,0 +1,324 @@
+"""Least squares on a regular grid in as much time as a few fast transforms, without a matrix."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigvalsh_tridiagonal
+
+from kappaskin.bases import Basis, SineBasis
+from kappaskin.errors import RankDeficient, Refusal
+from kappaskin.estimation.estimator import Estimator
+from kappaskin.estimation.fit import Fit
+from kappaskin.estimation.remembered import Remembered
+from kappaskin.estimation.transforms import Scaled, Transforms, cells_of
+from kappaskin.frames import Array, Mask
+from kappaskin.sensing import SensorLayout
+
+_STEPS = 1000  # at most; most sets of missing readings that decide a shape take 10 to 100
+_LOOK = 20  # steps after which to look whether a shape is hardly seen
+_SURE = 1e-6  # of its part in a random shape: what is left of one that was seen
+_ROUNDING = 10  # times the rounding of the readings is where transforms cannot tell what is left
+_AT_ONCE = 2**18  # readings transformed together: about what a cache holds
+_Number = TypeVar("_Number", bound=np.generic)
+_MISSING = 4096  # readings that may be missing when error bars are asked for
+
+
+def _parts(count: int, readings: int) -> list[slice]:
+    """`count` frames of so many `readings` in parts that are computed together; at least one."""
+    length = max(1, _AT_ONCE // readings)
+    return [slice(start, start + length) for start in range(0, max(count, 1), length)]
+
+
+def _joined(parts: list[NDArray[_Number]]) -> NDArray[_Number]:
+    """All frames of the parts; those of a single one are not copied."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _squares(a: Array, axes: int) -> Array:
+    """Sums of squares over the last `axes` of them."""
+    flat = a.reshape(*a.shape[:-axes], -1)
+    return np.vecdot(flat, flat)
+
+
+def _least_seen(A: Scaled, least: float) -> float:
+    """The least eigenvalue of A^T A: the share of some shape that is all the readings see of it.
+
+    Conjugate gradients on A^T A y = z for a random z, in which every shape has its part. They end
+    when no part of z is left, so that every eigenvalue has been met; those of their tridiagonal
+    matrix (Lanczos) tell the least one, from above. They end too when that is below `least`.
+    """
+    left = np.random.default_rng(0).normal(size=A.root.shape)
+    step, size = left, float(_squares(left, 2))
+    diagonal, beside, carried = list[float](), list[float](), 0.0
+    for number in range(1, _STEPS + 1):
+        seen = A.forward(step)
+        bend = float(_squares(seen, 3))
+        if bend <= least * float(_squares(step, 2)):
+            break
+        length = size / bend
+        left = left - length * A.back(seen)
+        before, size = size, float(_squares(left, 2))
+        diagonal.append(1 / length + carried)
+        ended = size <= _SURE**2  # each of the parts was about 1
+        if ended or number % _LOOK == 0:
+            share = _least_of(diagonal, beside)
+            if ended or share < least:
+                return share
+        ratio = size / before
+        beside.append(math.sqrt(ratio) / length)
+        carried = ratio / length
+        step = left + ratio * step
+    return 0.0
+
+
+def _least_of(diagonal: list[float], beside: list[float]) -> float:
+    """The least eigenvalue of a symmetric tridiagonal matrix."""
+    return float(eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=(0, 0))[0])
+
+
+def _conjugate_gradients(A: Scaled, K: Array) -> tuple[Array, NDArray[np.intp]] | None:
+    """The least-squares g (T, Nj, Ni) of A g = K (T, 3, n, m) and steps (T,); None without an end.
+
+    The residual is carried along in the place of `K` (CGLS), as accurate as A allows and not A^T A.
+    It ends where A^T (K - A g) is what rounding leaves of it.
+    """
+
+    def of_each(a: Array, like: Array) -> Array:
+        return np.expand_dims(a, tuple(range(1, like.ndim)))
+
+    left = K
+    g = np.zeros((len(K), *A.root.shape), K.dtype)
+    step = A.back(left)
+    slope = _squares(step, 2)
+    end = (_ROUNDING * np.finfo(K.dtype).eps) ** 2 * _squares(K, 3)
+    steps = np.zeros(len(K), np.intp)
+    while (going := slope > end).any():
+        if steps.max() == _STEPS:
+            return None
+        seen = A.forward(step)
+        length = np.divide(slope, _squares(seen, 3), where=going, out=np.zeros_like(slope))
+        g += of_each(length, g) * step
+        seen *= of_each(length, seen)
+        left -= seen
+        gradient = A.back(left)
+        before, slope = slope, np.where(going, _squares(gradient, 2), slope)
+        ratio = np.divide(slope, before, where=going, out=np.zeros_like(slope))
+        step = gradient + of_each(ratio, step) * step
+        steps += going
+    return g, steps
+
+
+class _GridSpread:
+    """The spread on a grid: D^-1, and what the readings add that weigh other than most.
+
+    With A0 orthonormal, for the weight w0 that most readings of a channel have, and B its rows
+    that have another weight w, A^T A = 1 - B^T E B with E = 1 - (w/w0)^2, 1 for a missing reading.
+    Its inverse is 1 + B^T X B with the small X = (1 - E B B^T)^-1 E (Woodbury).
+    """
+
+    def __init__(self, transforms: Transforms, weights: Array) -> None:
+        usual = [np.median(w[w > 0]) if w.any() else 0.0 for w in weights]
+        usual = np.array(usual).reshape(3, 1, 1)
+        root = 1 / np.sqrt(np.sum((usual * transforms.gain) ** 2, axis=0))
+        self._A = Scaled(transforms, usual, root)
+        share = np.divide(weights, usual, where=usual > 0, out=np.ones(weights.shape))
+        self._other = np.flatnonzero(share != 1)
+        self._E = 1 - share.ravel()[self._other] ** 2
+        self._whole = (3, *transforms.cells)
+        self._readings = int(np.prod(self._whole))
+
+    def _read(self, g: Array) -> Array:
+        """B g (R, k) for g (R, Nj, Ni)."""
+        return self._A.forward(g).reshape(len(g), self._readings)[:, self._other]
+
+    def _shape(self, K: Array) -> Array:
+        """B^T K (R, Nj, Ni) for K (R, k)."""
+        whole = np.zeros((len(K), self._readings))
+        whole[:, self._other] = K
+        return self._A.back(whole.reshape(len(K), *self._whole))
+
+    @cached_property
+    def _X(self) -> Array:
+        k = len(self._E)
+        if k > _MISSING:
+            raise Refusal(
+                f"expected at most {_MISSING} of {self._readings} readings to be missing or to "
+                f"weigh other than most when error bars are asked for, got {k}; ask for the "
+                "coefficients alone"
+            )
+        G, unit = np.empty((k, k)), np.eye(k)
+        for part in _parts(k, self._readings):
+            G[part] = self._read(self._shape(unit[part]))
+        return np.linalg.solve(np.eye(k) - self._E[:, None] * G, np.diag(self._E)).astype(float)
+
+    @property
+    def sd(self) -> Array:
+        return self._sd.copy()  # who asked may write on it
+
+    @cached_property
+    def _sd(self) -> Array:
+        X, variance = self._X, np.ones(self._A.root.shape)
+        for part in _parts(len(X), self._readings):
+            unit = np.eye(len(X))[part]
+            variance += np.sum(self._shape(unit) * self._shape(X[part]), axis=0)
+        return (self._A.root * np.sqrt(variance)).T.ravel()
+
+    def _seen(self, rows: Array) -> tuple[Array, Array]:
+        """`rows` (R, N) for the scaled unknowns, (R, N), and what B reads of them, (R, k)."""
+        Nj, Ni = self._A.root.shape
+        g = self._A.root * rows.reshape(-1, Ni, Nj).swapaxes(-1, -2)
+        read = np.empty((len(g), len(self._E)))
+        if len(self._E):
+            for part in _parts(len(g), self._readings):
+                read[part] = self._read(g[part])
+        return g.reshape(len(g), -1), read
+
+    def of(self, rows: Array) -> Array:
+        if rows.ndim > 2:
+            return np.stack([self.of(one) for one in rows])
+        g, read = self._seen(rows)
+        return g @ g.T + read @ self._X @ read.T
+
+    def sd_of(self, rows: Array) -> Array:
+        g, read = self._seen(rows)
+        variance: Array = np.vecdot(read @ self._X, read)
+        variance += np.vecdot(g, g)
+        return np.sqrt(variance)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solver:
+    """What is known of the readings `used`: c = D^-1 M^T `scale` K, or with `A` the start of it."""
+
+    count: int
+    scale: Array
+    inverse: Array
+    spread: _GridSpread
+    A: Scaled | None
+
+
+class Fast(Estimator):
+    """The least-squares shape of a flat skin with a regular grid of elements, in O(P log P).
+
+    At the centres of an m x n grid sines and cosines are orthogonal up to i = m and j = n, so that
+    D = M^T M is diagonal: three fast transforms and a division give the shape exactly. So it is
+    when whole channels are dead or weigh otherwise. For single dead elements, missing readings and
+    weights of their own, conjugate gradients in the unknowns D^1/2 c give it in the few steps that
+    `Fit.steps` tells. M is never made. Elements may come in any order (`cells_of`).
+
+    Raises `RankDeficient` when the readings do not decide the coefficients, or hardly.
+    """
+
+    has_matrix = False
+
+    def _set_up(self) -> None:
+        sines, layout = _sines(self.basis, self.layout), self.layout
+        m, n, self._cells = cells_of(layout)
+        if sines.Ni > m or sines.Nj > n:
+            raise Refusal(
+                f"expected at most {m} x {n} functions for the fast transforms of {layout}, got "
+                f"{sines.Ni} x {sines.Nj}; use fewer, or least-squares"
+            )
+        length = layout.gage_length
+        self._exact = Transforms(sines, m, n, gage_length=length)
+        exactly = self.dtype == np.float64
+        self._transforms = self._exact if exactly else Transforms(sines, m, n, self.dtype, length)
+        self._least = math.sqrt(np.finfo(self.dtype).eps)  # half of the digits are left
+        self._solvers = Remembered[_Solver]()
+        self._whole = self._made(self.readable)
+
+    def _on_grid(self, flat: Array) -> Array:
+        """Readings (T, 3 P) as (T, 3, n, m); zero where an element was left out."""
+        n, m = self._exact.cells
+        if self._cells is None:
+            return flat.reshape(-1, 3, n, m)
+        K = np.zeros((len(flat), 3, n * m), flat.dtype)
+        K[..., self._cells] = flat.reshape(-1, 3, len(self.layout))
+        return K.reshape(-1, 3, n, m)
+
+    def _made(self, used: Mask) -> _Solver:
+        count, gain = int(used.sum()), self._exact.gain
+        if count < self.unknowns:
+            raise self.refusal(count, count)
+        w = self._on_grid(np.where(used, self.weight, 0.0)[None])[0]
+        if even := bool(np.all(w == w[:, :1, :1])):
+            w = w[:, :1, :1].copy()
+        scale = _squares(w, 2) / w[0].size
+        D = np.einsum("c,cji,cji->ji", scale, gain, gain)
+        if not np.all(D > 0):
+            raise self.refusal(count, int(np.count_nonzero(D > 0)))
+        inverse, spread = (1 / D).astype(self.dtype), _GridSpread(self._exact, w)
+        if even:
+            return _Solver(count, scale, inverse, spread, None)
+        root = 1 / np.sqrt(D)
+        if _least_seen(Scaled(self._exact, w, root), self._least) < self._least:
+            raise self._hardly(count)
+        A = Scaled(self._transforms, w.astype(self.dtype), root.astype(self.dtype))
+        return _Solver(count, scale, inverse, spread, A)
+
+    def predicted(self, coefficients: Array) -> Array:
+        """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
+        (n, m), P, frames = self._exact.cells, len(self.layout), coefficients.shape[:-2]
+        c = coefficients.reshape(-1, *self.basis.shape).swapaxes(-1, -2)
+        K = _joined([self._transforms.readings(c[part]) for part in _parts(len(c), 3 * P)])
+        on_cells = K.reshape(*frames, 3, n * m)
+        return on_cells if self._cells is None else on_cells[..., self._cells]
+
+    def _solved(self, solver: _Solver, K: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Coefficients (T, Nj, Ni) and steps (T,) for readings K (T, 3, n, m)."""
+        A = solver.A
+        if A is None:
+            c = self._transforms.analysed(K, solver.scale)
+            c *= solver.inverse
+            return c, np.zeros(len(K), np.intp)
+        weighted = np.where(A.weights > 0, K, 0)
+        weighted *= A.weights
+        size = np.abs(weighted).max(axis=(1, 2, 3), keepdims=True)
+        size[size == 0] = 1  # squares of tiny or huge readings would leave the range of numbers
+        weighted /= size
+        found = _conjugate_gradients(A, weighted)
+        if found is None:
+            raise self._hardly(solver.count)
+        return A.root * found[0] * size[:, 0], found[1]
+
+    def _hardly(self, readings: int) -> RankDeficient:
+        (Ni, Nj), total = self.basis.shape, 3 * len(self.layout)
+        return RankDeficient(
+            f"{self.layout} with {readings} readings hardly determine some of the {self.unknowns} "
+            f"coefficients of a {Ni} x {Nj} basis: of some shape they see less than a share of "
+            f"{self._least:.1g}, as {total - readings} of {total} readings are missing; use a "
+            "smaller basis, more elements, least-squares, or a prior (bayes)"
+        )
+
+    def _fit(self, flat: Array, used: Mask) -> Fit:
+        whole, frames = used is self.readable, flat.shape[:-1]
+        solver = self._whole if whole else self._solvers(used, self._made)
+        every = flat.reshape(-1, flat.shape[-1])
+        parts = _parts(len(every), flat.shape[-1])
+        solved = [self._solved(solver, self._on_grid(every[part])) for part in parts]
+        c = _joined([c for c, _ in solved])
+        steps = _joined([steps for _, steps in solved])
+        spare = solver.count - self.unknowns
+        c = c.reshape(*frames, *solver.inverse.shape).swapaxes(-1, -2)
+        return self._answer(flat, c, solver.spread, spare, steps.reshape(frames))
+
+
+def _sines(basis: Basis, layout: SensorLayout) -> SineBasis:
+    """The sines of a flat skin that fast transforms are for; raises a `Refusal` for other ones."""
+    if not isinstance(basis, SineBasis):
+        raise Refusal(
+            f"expected sines (a hinged rectangle) for the fast transforms, got "
+            f"{type(basis).__name__}; use least-squares"
+        )
+    if basis.patch.base_curvature:
+        raise Refusal(
+            f"expected a flat skin for the fast transforms, got a {basis.patch.name}: on a bent "
+            "one functions are not orthogonal; use least-squares"
+        )
+    if basis.patch != layout.patch:
+        raise Refusal(f"the layout is on {layout.patch}, the basis on {basis.patch}; use one")
+    return basis

@@ -1,0 +1,233 @@
+"""What every estimator answers: the shape of a frame or of several, and how well it is known."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+
+if TYPE_CHECKING:
+    from kappaskin.estimation.estimator import Estimator
+
+_MOST = 10_000  # coefficients: their covariance takes 800 MB
+
+
+class Spread(Protocol):
+    """How far the N coefficients of a frame may be off, for unit noise."""
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations (N,) of the coefficients in m for noise of 1 1/m."""
+        ...
+
+    def of(self, rows: Array) -> Array:
+        """Covariance (..., R, R) of `rows` (..., R, N) times the coefficients."""
+        ...
+
+    def sd_of(self, rows: Array) -> Array:
+        """Standard deviations (R,) of `rows` (R, N) times the coefficients."""
+        ...
+
+
+class DenseSpread:
+    """The spread that a covariance (N, N) tells; it is made when first asked for."""
+
+    def __init__(self, make: Callable[[], Array]) -> None:
+        self._make = make
+
+    @cached_property
+    def covariance(self) -> Array:
+        return self._make()
+
+    @property
+    def sd(self) -> Array:
+        return _root(np.diag(self.covariance))
+
+    def of(self, rows: Array) -> Array:
+        return seen_through(rows, self.covariance)
+
+    def sd_of(self, rows: Array) -> Array:
+        return _root(np.vecdot(rows @ self.covariance, rows))
+
+
+def seen_through(rows: Array, covariance: Array) -> Array:
+    """The covariance (..., R, R) of `rows` (..., R, N) times what has this `covariance`."""
+    if rows.ndim == 2:
+        return rows.dot(covariance).dot(rows.T)  # of small ones in half the time
+    return rows @ covariance @ rows.mT
+
+
+def _root(variance: Array) -> Array:
+    """Standard deviations; NaN where rounding has left no variance."""
+    return np.sqrt(np.where(variance >= 0, variance, np.nan))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The shape that answers the readings best, of one frame or of T (leading axis).
+
+    `curvature` (..., 3, P) in 1/m is what it rests on, NaN where a reading is missing or was not
+    trusted; `coefficients` (..., Ni, Nj) in m; `spreads` says how far they may be off for unit
+    noise, of each frame when there are several; `spare` (...) how many readings there are beyond
+    those that the shape took. `told_noise` (...) is the noise in 1/m where the estimator knows it.
+    An iteration took `steps` (...); where it has not `converged` (...), the answer is that of
+    least squares. `suspect` (..., P) says which elements were left out and why, by their number in
+    `WHY`; None where none is ever suspected.
+    """
+
+    estimator: "Estimator"
+    curvature: Array
+    coefficients: Array
+    spreads: "Spread | Sequence[Spread]"
+    spare: ArrayLike
+    told_noise: Array | None = None
+    steps: ArrayLike = 0
+    converged: ArrayLike = True
+    suspect: "NDArray[np.uint8] | None" = None
+
+    @cached_property
+    def residual(self) -> Array:
+        """What the shape leaves of the readings, (..., 3, P) in 1/m; NaN where it rests on none."""
+        return self.curvature - self.estimator.predicted(self.coefficients)
+
+    @cached_property
+    def noise(self) -> Array:
+        """Standard deviation (...) of a reading in 1/m; 1 where the fit was told each one's sigma.
+
+        It is as the residual tells it, NaN when every reading was spent on a coefficient, or as
+        the estimator knows it.
+        """
+        if self.told_noise is not None:
+            return self.told_noise
+        left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
+        squares = np.vecdot(left, left)
+        if np.count_nonzero(squares != squares):  # NaN, told in a tenth of the time of any()
+            left = np.where(np.isnan(left), 0.0, left)
+            squares = np.vecdot(left, left)
+        if isinstance(self.spare, int) and self.spare > 0:  # as in most frames: the fastest
+            return np.sqrt(squares / self.spare)
+        return np.sqrt(squares / np.where(np.greater(self.spare, 0), self.spare, np.nan))
+
+    def _each(self, told: Callable[[Spread], Array], shape: tuple[int, ...]) -> Array:
+        """What is `told` of the spread, of this `shape`, for each frame when there are several."""
+        if not isinstance(self.spreads, Sequence):
+            return told(self.spreads).reshape(shape)
+        once = {id(spread): spread for spread in self.spreads}
+        known = {number: told(spread) for number, spread in once.items()}
+        frames = [known[id(spread)] for spread in self.spreads]
+        return np.reshape(frames, (len(frames), *shape))
+
+    @cached_property
+    def unit_sd(self) -> Array:
+        """Standard deviations (..., Ni, Nj) of the coefficients for unit noise."""
+        return self._each(lambda spread: spread.sd, self.estimator.basis.shape)
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations (..., Ni, Nj) of the coefficients in m."""
+        seen = self.noise[..., None, None] * self.unit_sd
+        undecided = np.linalg.norm(self.estimator.undecided, axis=1)
+        return np.hypot(seen, undecided.reshape(self.estimator.basis.shape))
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients in m^2; made on demand."""
+        if (N := self.estimator.basis.size) > _MOST:
+            raise Refusal(
+                f"expected at most {_MOST} coefficients whose covariance is made, got {N} x {N} "
+                "numbers; ask for the covariance_of what is wanted"
+            )
+        return self.covariance_of(np.eye(N))
+
+    def covariance_of(self, rows: Array) -> Array:
+        """Covariance (..., R, R) of `rows` (..., R, N) times the flattened coefficients.
+
+        With several frames `rows` are those of all of them, (R, N).
+        """
+        noise, spreads = self.noise, self.spreads
+        if isinstance(spreads, Sequence):
+            unit = self._each(lambda spread: spread.of(rows), (*rows.shape[:-1], rows.shape[-2]))
+            noise = noise.reshape(noise.shape + (1,) * (unit.ndim - noise.ndim))
+        else:
+            unit = spreads.of(rows)
+        seen = noise**2 * unit
+        if not self.estimator.undecided.size:
+            return seen
+        undecided = rows @ self.estimator.undecided
+        return seen + undecided @ undecided.swapaxes(-1, -2)
+
+    @cached_property
+    def _jets(self) -> dict[tuple[float, float], tuple[Array, Array]]:
+        return {}
+
+    def jet(self, x: float, y: float) -> tuple[Array, Array]:
+        """The shape of one frame at (x, y) in m: its derivatives (6,) in the order of `ORDERS`.
+
+        With their covariance (6, 6); the last place's are remembered.
+        """
+        if (x, y) not in self._jets:
+            rows = self.estimator.basis.jet(x, y)
+            self._jets.clear()
+            self._jets[x, y] = rows.dot(self.coefficients.ravel()), self.covariance_of(rows)
+        return self._jets[x, y]
+
+    def sd_of(self, rows: Array) -> Array:
+        """Standard deviations (..., R) of `rows` (R, N) times the flattened coefficients."""
+        seen = self.noise[..., None] * self._each(lambda spread: spread.sd_of(rows), (len(rows),))
+        return np.hypot(seen, np.linalg.norm(rows @ self.estimator.undecided, axis=-1))
+
+    def surface_sd(self, positions: Array) -> Array:
+        """Standard deviations (..., P) of the displacement in m at `positions` (P, 2)."""
+        return self.sd_of(self.estimator.basis.at(positions))
+
+
+def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
+    """One fit of T frames from the fits of groups of them."""
+
+    def joined(parts: list[Array]) -> Array:
+        return np.concatenate(parts)[order]
+
+    def of_each(name: str) -> Array:
+        return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
+
+    spreads: list[Spread] = []
+    for fit in fits:
+        own = fit.spreads
+        spreads.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
+    told = [fit.told_noise for fit in fits if fit.told_noise is not None]
+    suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
+    return Fit(
+        fits[0].estimator,
+        joined([fit.curvature for fit in fits]),
+        joined([fit.coefficients for fit in fits]),
+        [spreads[int(place)] for place in order],
+        of_each("spare"),
+        joined(told) if told else None,
+        of_each("steps"),
+        of_each("converged"),
+        np.concatenate(suspect)[order] if suspect else None,
+    )
+
+
+def in_time(fits: Sequence[Fit]) -> Fit:
+    """One fit of T frames from the fits of each of them."""
+
+    def alone(fit: Fit) -> Fit:
+        return replace(
+            fit,
+            curvature=fit.curvature[None],
+            coefficients=fit.coefficients[None],
+            spreads=[cast("Spread", fit.spreads)],
+            spare=np.reshape(fit.spare, (1,)),
+            told_noise=None if fit.told_noise is None else np.reshape(fit.told_noise, (1,)),
+            steps=np.reshape(fit.steps, (1,)),
+            converged=np.reshape(fit.converged, (1,)),
+            suspect=None if fit.suspect is None else fit.suspect[None],
+        )
+
+    return gathered([alone(fit) for fit in fits], np.arange(len(fits)))

@@ -1,0 +1,168 @@
+"""How many elements, and functions to tell, to where the elements are told most with.
+
+Readings with noise of variance s^2 leave the coefficients the covariance s^2 (M'M)^-1. A D-optimal
+placement makes the volume of that as small as can be, det M'M as large; an A-optimal one the mean
+variance of the displacement over the skin, trace (M'M)^-1 G with G the functions' mean products.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.bases import Basis
+from kappaskin.errors import Refusal
+from kappaskin.estimation.estimator import Estimator
+from kappaskin.estimation.fit import Spread
+from kappaskin.frames import Array, Mask
+from kappaskin.sensing import SensorLayout
+
+_SWEEPS = 20  # over all elements at most; most placements are done after three to eight
+_GAIN = 1e-6  # of a criterion: a smaller one is not worth an exchange
+_CROWD = 1.6  # the power that draws clustered elements to the middle
+_MOST_CANDIDATES = 10_000
+_RIDGE = 1e-9  # of what a reading tells on average, so that too few elements are no error
+
+Placement = Callable[[SensorLayout, Basis, float], SensorLayout]
+"""Elements, functions to tell and how far elements are apart in m at least, to as many elements."""
+
+
+def predicted_sd(estimator: Estimator, noise: float, positions: Array) -> Array:
+    """Standard deviation (P,) of the displacement in m at `positions` (P, 2) by `noise` in 1/m.
+
+    From the covariance alone: nothing is simulated. What the functions cannot make is not in it.
+    """
+    rows = estimator.basis.at(positions)
+    undecided = np.linalg.norm(rows @ estimator.undecided, axis=1)
+    spread = cast("Spread", estimator.at_rest().spreads)
+    return np.hypot(noise * spread.sd_of(rows), undecided)
+
+
+def _at(places: Array, layout: SensorLayout) -> SensorLayout:
+    """Elements like those of `layout` at `places` (P, 2) in m."""
+    return replace(SensorLayout.scattered(layout.patch, places), gage_length=layout.gage_length)
+
+
+def _as_they_are(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout:
+    return layout
+
+
+def _clustered(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout:
+    """The same elements, drawn towards the middle of the skin."""
+    half = np.array([layout.patch.a, layout.patch.b]) / 2
+    u = layout.positions / half - 1
+    return _at(half * (1 + np.sign(u) * np.abs(u) ** _CROWD), layout)
+
+
+def _telling_most(det: bool) -> Placement:
+    return lambda layout, basis, apart: _exchanged(layout, basis, apart, det)
+
+
+PLACEMENTS: dict[str, Placement] = {
+    "scene": _as_they_are,
+    "clustered": _clustered,
+    "D": _telling_most(det=True),
+    "A": _telling_most(det=False),
+}
+"""Ways to place as many elements as a scene has: where the scene has them, and others."""
+
+
+def check_placement(layout: SensorLayout, by: str) -> None:
+    """Refuse what no elements can be placed `by` on."""
+    if by != "scene" and layout.patch.strip:
+        raise Refusal("expected a skin with two sides to place elements on, got a strip")
+    if by != "scene" and not layout.live.all():
+        raise Refusal("expected live elements where they are placed anew, got dead ones among them")
+
+
+def elements_placed(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
+    """As many elements as `layout` has, placed `by` one of `PLACEMENTS` to tell `basis`."""
+    return PLACEMENTS[by](layout, basis, apart)
+
+
+def _candidates(layout: SensorLayout, apart: float) -> Array:
+    """Places (C, 2) on the skin at least `apart` in m from each other."""
+    patch = layout.patch
+    m, n = (math.floor(side / apart + 1e-9) for side in (patch.a, patch.b))
+    places = np.empty((0, 2))
+    if 0 < m * n <= _MOST_CANDIDATES:
+        places = SensorLayout.regular(patch, m, n).positions
+        places = places[patch.depth(places) >= layout.gage_length / 2]
+    if len(places) <= len(layout):
+        raise Refusal(
+            f"expected a distance apart that leaves more than {len(layout)} places on a tiling of "
+            f"at most {_MOST_CANDIDATES}, got {m} x {n} at {apart:g} m"
+        )
+    return places
+
+
+def _exchanged(layout: SensorLayout, basis: Basis, apart: float, det: bool) -> SensorLayout:
+    """The layout after every exchange of one element for a free place that gains (Fedorov's).
+
+    It starts from the free places nearest to the scene's elements, and takes the best exchange for
+    one element after the other, until none gains.
+    """
+    places = _candidates(layout, apart)
+    rows, products = _scaled(layout, basis, places)
+    chosen = _nearest(layout.positions, places)
+    free = np.ones(len(places), bool)
+    free[chosen] = False
+    for _ in range(_SWEEPS):
+        if not sum([_exchange(rows, products, chosen, free, n, det) for n in range(len(chosen))]):
+            break
+    return _at(places[np.sort(chosen)], layout)
+
+
+def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, Array]:
+    """What elements at `places` read of F functions, (C, 3, F), each of unit size over the places.
+
+    With their mean products over the skin (F, F), scaled alike.
+    """
+    W = np.eye(basis.size) if basis.free is None else basis.free
+    M = _at(places, layout).curvature_operator(basis) @ W
+    length = np.linalg.norm(M, axis=0) / math.sqrt(len(places))
+    points, weights = basis.quadrature()
+    shapes = basis.at(points) @ W / length
+    products = (weights[:, None] * shapes).T @ shapes / weights.sum()
+    return np.ascontiguousarray((M / length).reshape(3, len(places), -1).swapaxes(0, 1)), products
+
+
+def _nearest(positions: Array, places: Array) -> NDArray[np.intp]:
+    """The numbers (P,) of different `places` (C, 2), each the nearest one left to a position."""
+    left, chosen = np.ones(len(places), bool), list[int]()
+    for position in positions:
+        away = np.where(left, np.hypot(*(places - position).T), np.inf)
+        chosen.append(int(np.argmin(away)))
+        left[chosen[-1]] = False
+    return np.array(chosen, np.intp)
+
+
+def _exchange(
+    rows: Array, products: Array, chosen: NDArray[np.intp], free: Mask, n: int, det: bool
+) -> bool:
+    """Whether element `n` of those `chosen` is better off elsewhere; then it is moved there.
+
+    With M'M = A of the others and a place's rows r (3, F), det(A + r'r) = det(A) det(1 + r V r'),
+    V = A^-1, and trace((A + r'r)^-1 G) = trace(V G) - trace((1 + r V r')^-1 r V G V r').
+    """
+    others = rows[np.delete(chosen, n)].reshape(-1, rows.shape[2])
+    A = others.T @ others
+    V = np.linalg.inv(A + _RIDGE * len(chosen) * np.eye(len(A)))
+    here = np.append(np.flatnonzero(free), chosen[n])
+    r = rows[here]
+    rV = r @ V
+    S = np.eye(3) + rV @ r.swapaxes(1, 2)
+    if det:
+        told = np.linalg.slogdet(S)[1]
+    else:
+        shared = np.linalg.solve(S, rV @ products @ rV.swapaxes(1, 2))
+        told = np.trace(shared, axis1=1, axis2=2) / np.trace(V @ products)
+    best = int(np.argmax(told))
+    if not told[best] > told[-1] + _GAIN:
+        return False
+    free[chosen[n]], free[here[best]] = True, False
+    chosen[n] = here[best]
+    return True

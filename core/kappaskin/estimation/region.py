@@ -1,0 +1,233 @@
+"""A region of interest to the scans that read it, and to what they buy and cost."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from operator import index
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.bases import basis_for
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Mask
+from kappaskin.mechanics import PointLoad
+from kappaskin.sensing import Scan, Sensor
+
+OFF, ELEMENTS, SKIN, INTRINSIC = "off", "elements", "skin", "intrinsic"
+TURNS, ADAPTIVE = "turns", "adaptive"
+_AROUND = (ELEMENTS, SKIN, INTRINSIC, TURNS, ADAPTIVE)
+_FUNCTIONS = 15  # along each side, of the shape a point load makes: Table 1's definition
+_SINGULAR = 1e-6  # share of the best seen direction below which one is not seen at all
+
+
+@dataclass(frozen=True)
+class Region:
+    """Which elements every frame scans while the others take turns, or which channels it scans.
+
+    `around` is "off" (every frame scans everything), "elements" (those in `elements`), or "skin" or
+    "intrinsic": the elements within `radius` m of the contact that the skin itself, or a
+    force/torque sensor at the base of the fingertip, reports, and everything while there is none.
+    `share` of the other elements are scanned besides in each frame, so that each of them comes up
+    every 1 / share frames. With a share of 0 none do, until what is held of them has expired and
+    the readings left decide no shape; then everything is scanned once.
+
+    Or `around` is "turns": every frame scans a `share` of all channels, in turn; or "adaptive":
+    as many, those that tell most of the contact and the surface, as an estimator that knows it
+    chooses (`Tracking`); with any other they take turns.
+
+    `rate` is asked for, in frames/s; the scan may allow fewer.
+    """
+
+    around: str = OFF
+    elements: tuple[int, ...] = ()
+    radius: float = 0.025
+    share: float = 0.1
+    rate: float = 500.0
+
+    def __post_init__(self) -> None:
+        if self.around not in (OFF, *_AROUND):
+            raise Refusal(
+                f"expected a region around {', '.join(_AROUND[:-1])} or {_AROUND[-1]}, or {OFF}, "
+                f"got {self.around!r}"
+            )
+        for name in ("radius", "rate"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise Refusal(f"expected Region.{name} above zero, got {value}")
+        if not 0 <= self.share <= 1:
+            raise Refusal(f"expected Region.share between 0 and 1, got {self.share}")
+        if self.by_channel and not self.share:
+            raise Refusal(f"expected Region.share above zero for {self.around}, got 0")
+        if self.around == ELEMENTS and not self.elements:
+            raise Refusal("expected at least one element in the region, got none; choose some")
+
+    @property
+    def by_channel(self) -> bool:
+        """Whether frames scan a share of all channels."""
+        return self.around in (TURNS, ADAPTIVE)
+
+    def chosen(self, count: int) -> Mask:
+        """Which of `count` elements are in `elements`."""
+        try:
+            elements = [index(p) for p in self.elements]
+        except TypeError as error:
+            raise Refusal(f"expected elements as whole numbers, got {self.elements}") from error
+        if any(not 0 <= p < count for p in elements) or len(set(elements)) < len(elements):
+            raise Refusal(
+                f"expected elements from 0 to {count - 1}, each once, got {self.elements!s:.80}"
+            )
+        return np.isin(np.arange(count), elements)
+
+
+class Scanner:
+    """The scan of each next frame: the region, and the other elements in turn."""
+
+    def __init__(self, sensor: Sensor, region: Region) -> None:
+        self._sensor, self._region = sensor, region
+        self._all = sensor.scan()
+        self._inside = region.chosen(len(sensor.layout)) if region.around == ELEMENTS else None
+        self._turn = 0
+        self._live = np.flatnonzero(sensor.layout.live.ravel())
+        self._chosen: NDArray[np.intp] | None = None
+        if region.by_channel and not self._live.size:
+            raise Refusal(
+                f"expected channels to scan, got {sensor.layout}, all of them dead; scan everything"
+            )
+
+    @property
+    def rate(self) -> float:
+        """Frames/s asked for."""
+        return self._region.rate
+
+    @property
+    def inside(self) -> Mask | None:
+        """The elements (P,) that every frame scans; None while that is all of them."""
+        return self._inside
+
+    def follow(self, centre: Array) -> None:
+        """Scan around `centre` (2,) in m from the next frame on; everything if it is NaN.
+
+        The element nearest to it is always scanned, however small the radius.
+        """
+        self._inside = None
+        if np.isfinite(centre).all():
+            distance = np.hypot(*(self._sensor.layout.positions - centre).T)
+            self._inside = distance <= max(self._region.radius, float(distance.min()))
+
+    @property
+    def count(self) -> int:
+        """How many channels each frame scans where it scans a share of all of them."""
+        return _turn_of(self._region.share, len(self._live))
+
+    def choose(self, channels: NDArray[np.intp]) -> None:
+        """Scan these `channels` in the next frame."""
+        self._chosen = channels
+
+    def __call__(self) -> Scan:
+        """The next frame's scan; its channels run upwards."""
+        if self._region.by_channel:
+            chosen, self._chosen = self._chosen, None
+            return self._sensor.scan(self._next_channels() if chosen is None else chosen)
+        if self._inside is None:
+            return self._all
+        elements = self._inside.copy()
+        elements[self._in_turn()] = True
+        return self._sensor.scan(np.flatnonzero(np.tile(elements, 3)))
+
+    def _next_channels(self) -> NDArray[np.intp]:
+        next_ones = (self._turn + np.arange(self.count)) % len(self._live)
+        self._turn = int(next_ones[-1]) + 1
+        return np.sort(self._live[next_ones])
+
+    def _in_turn(self) -> NDArray[np.intp]:
+        """The next of the elements outside, from where the last frame stopped, round and round."""
+        outside = np.flatnonzero(~np.asarray(self._inside))
+        count = _turn_of(self._region.share, len(outside))
+        if not count:
+            return outside[:0]
+        first = np.searchsorted(outside, self._turn)
+        next_ones = outside[(first + np.arange(count)) % len(outside)]
+        self._turn = int(next_ones[-1]) + 1
+        return next_ones
+
+
+def _turn_of(share: float, outside: int) -> int:
+    """How many of `outside` elements take their turn in one frame."""
+    return math.ceil(share * outside - 1e-9)
+
+
+def contact_bound(
+    sensor: Sensor, contact: PointLoad, noise: float, weight: Array | None = None
+) -> Array:
+    """The Cramer-Rao bound (3,): standard deviations of x and y in m and of the force in N.
+
+    No unbiased estimate of a point load from one frame with Gaussian `noise` in 1/m is better: the
+    bound is the inverse of J'WJ / noise^2, with J the slopes of the readings in the three unknowns
+    and W the `weight` (P,) of each element, how often a frame reads it; 1 when left out. Infinite
+    where the readings do not decide.
+    """
+    layout = sensor.layout
+    across = 1 if layout.patch.strip else _FUNCTIONS
+    basis = basis_for(layout.patch, sensor.edge, _FUNCTIONS, across)
+    compliance = sensor.plate.compliance(basis)
+    by_force, by_x, by_y = (
+        compliance(f.reshape(basis.shape)).ravel() for f in basis.jet(contact.x, contact.y)[:3]
+    )
+    slopes = np.stack([contact.force * by_x, contact.force * by_y, by_force], axis=1)
+    weights = np.where(layout.live, 1.0 if weight is None else weight, 0.0)
+    J: Array = np.sqrt(weights).reshape(-1, 1) * (layout.curvature_operator(basis) @ slopes)
+    length = np.linalg.norm(J, axis=0)
+    seen = length > 0  # not y on a strip, nor where a contact of no force is
+    bound = np.full(3, np.inf)
+    if seen.any():
+        # Metres and newtons: scaled to unit length, then inverted.
+        _, s, Vt = np.linalg.svd(J[:, seen] / length[seen], full_matrices=False)
+        if s[-1] > _SINGULAR * s[0] and len(s) == seen.sum():
+            bound[seen] = noise * np.linalg.norm(Vt.T / s, axis=1) / length[seen]
+    return bound
+
+
+@dataclass(frozen=True, eq=False)
+class Bargain:
+    """What scanning a region buys, and what it costs.
+
+    `channels` in a frame, `scan_time` in s, `rate` in frames/s and `gain`, how many times that of
+    full scans it is. `bound` (3,) is what one frame tells of the contact at best, standard
+    deviations of x and y in m and of the force in N; `full_bound` (3,) with everything scanned.
+    """
+
+    channels: int
+    scan_time: float
+    rate: float
+    full_rate: float
+    bound: Array
+    full_bound: Array
+
+    @cached_property
+    def gain(self) -> float:
+        return self.rate / self.full_rate
+
+
+def bargain(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> Bargain:
+    """What `region` buys and costs while `contact` is where it looks, at `noise` in 1/m.
+
+    Rates are those that the scans allow. An element outside counts by how often it takes its turn.
+    """
+    scanner = Scanner(sensor, region)
+    if region.around in (SKIN, INTRINSIC):
+        scanner.follow(contact.centre())
+    scan, full = scanner(), sensor.scan()
+    inside = scanner.inside
+    weight = np.full(len(sensor.layout), region.share if region.by_channel else 1.0)
+    if inside is not None and not inside.all():
+        outside = int((~inside).sum())
+        weight[~inside] = _turn_of(region.share, outside) / outside
+    return Bargain(
+        len(scan.channels),
+        scan.duration,
+        scan.rate,
+        full.rate,
+        contact_bound(sensor, contact, noise, weight),
+        contact_bound(sensor, contact, noise),
+    )

@@ -1,4 +1,0 @@
-"""Figures for print: names to files, each drawn from a run of its own."""
-
-from kappaskin.figures.registry import FIGURES as FIGURES
-from kappaskin.figures.registry import write_figures as write_figures

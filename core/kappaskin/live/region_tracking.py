@@ -1,0 +1,91 @@
+"""A region of interest to a source that scans it: each contact moves what is scanned next."""
+
+from kappaskin.contact import IntrinsicContact
+from kappaskin.errors import Refusal
+from kappaskin.estimation import (
+    ADAPTIVE,
+    INTRINSIC,
+    OFF,
+    SKIN,
+    TURNS,
+    Estimator,
+    Region,
+    Scanner,
+    Tracking,
+)
+from kappaskin.frames import Touch
+from kappaskin.sensing import Sensor
+from kappaskin.sources import SerialSource, SimulatedSource, Source
+
+_NOT_ON_A_LINE = {
+    INTRINSIC: "a device on a line tells of no force/torque sensor at its base",
+    TURNS: "turns change the list with every frame, a device on a line is told 20 a second",
+    ADAPTIVE: "the list changes with every frame, a device on a line is told 20 a second",
+}
+
+
+class Steering:
+    """Lets `source` scan `region`.
+
+    Called with each contact that the skin reports, and the estimator that told its shape.
+    """
+
+    refusal = ""
+
+    def __init__(self, source: SimulatedSource, region: Region) -> None:
+        self._source, self._around = source, region.around
+        self._scanner = Scanner(source.sensor, region)
+        self._intrinsic = IntrinsicContact(source.sensor.layout.patch, source.base)
+        self._ahead = source.sensor.scan().interval * max(self._scanner.count, 1)
+        source.scan(self._scanner)
+
+    def __call__(self, touch: Touch, estimator: Estimator) -> None:
+        if self._around == SKIN:
+            self._scanner.follow(touch.position)
+        elif self._around == INTRINSIC:
+            self._scanner.follow(self._intrinsic(self._source.wrench()).position)
+        elif self._around == ADAPTIVE and isinstance(estimator, Tracking):
+            count = self._scanner.count
+            self._scanner.choose(estimator.choose(count, touch.position, self._ahead / 2))
+
+
+class Following:
+    """Lets the device on a line scan `region`, and asks it for another list as a contact moves.
+
+    Called like `Steering`; `refusal` says why the device does not, once that is known.
+    """
+
+    def __init__(self, source: SerialSource, sensor: Sensor, region: Region) -> None:
+        self._source, self._follows = source, region.around == SKIN
+        self._scanner = Scanner(sensor, region)
+        source.scan(self._scanner)
+
+    @property
+    def refusal(self) -> str:
+        return self._source.scan_refusal
+
+    def __call__(self, touch: Touch, estimator: Estimator) -> None:
+        if self._follows:
+            self._scanner.follow(touch.position)
+
+
+def steered(source: Source, region: Region) -> Steering | Following | None:
+    """What makes `source` scan `region`; None when that is off and everything is scanned.
+
+    Raises a `Refusal` when the source cannot or the region is not on its skin; it then goes on with
+    everything.
+    """
+    if isinstance(source, SimulatedSource):
+        source.scan(None)
+        return None if region.around == OFF else Steering(source, region)
+    if not isinstance(source, SerialSource) or source.sensor is None:
+        return None
+    source.scan(None)
+    if region.around == OFF:
+        return None
+    if region.around in _NOT_ON_A_LINE:
+        raise Refusal(
+            f"expected a region around elements or skin, got {region.around}: "
+            f"{_NOT_ON_A_LINE[region.around]}; choose another, or a simulated skin"
+        )
+    return Following(source, source.sensor, region)

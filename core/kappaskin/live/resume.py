@@ -1,0 +1,195 @@
+"""A live process that was left alone, and another process that comes for it.
+
+The one left alone listens where a note says, with a key that only this user can read. Nothing is
+unpickled before both sides have shown that they have it.
+"""
+
+import os
+import platform
+import secrets
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib import metadata
+from multiprocessing import AuthenticationError
+from multiprocessing.connection import (
+    Client,
+    Connection,
+    Listener,
+    answer_challenge,
+    deliver_challenge,
+)
+from pathlib import Path
+from pickle import UnpicklingError
+from typing import Any, cast
+
+import platformdirs
+
+from kappaskin.live.requests import Asked, Request
+
+_LARGEST = 4096  # bytes of a note
+_QUEUE = 16  # that may wait to be heard
+_KEY = 32  # bytes
+_ANSWER = 2.0  # s within which one that is alive answers
+_AGAIN = 0.1  # s after somebody who had no key
+_FOREIGN = (UnpicklingError, AttributeError, ImportError, IndexError, TypeError)
+"""What reading the answer of another version may raise."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a process that was left alone tells whoever comes for it.
+
+    What it was `asked` for, the `rings` that it writes to, its `pid`, and for how long in s it has
+    been `alone`.
+    """
+
+    asked: Asked
+    rings: tuple[str, str]
+    pid: int
+    alone: float
+
+    @property
+    def lasted(self) -> str:
+        """How long it went on, in words."""
+        minutes, seconds = divmod(round(self.alone), 60)
+        lasted = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
+        return f"went on for {lasted} after the last window ended"
+
+
+def orphans_folder() -> Path:
+    """Where processes of this user and machine that were left alone leave a note."""
+    state = platformdirs.user_state_path("kappaskin", appauthor=False)
+    return state / "left-alone" / platform.node()
+
+
+def _address(note: Path) -> str:
+    """Where the process listens that left a note."""
+    if os.name == "nt":
+        return rf"\\.\pipe\kappaskin-{note.stem}"
+    return str(note.with_suffix(".sock"))
+
+
+class Waiting:
+    """Waits until another process comes, and tells it what was `left`; `line` is the one to it.
+
+    `told` is what it was told. An `OSError` where no note can be left in `folder`.
+    """
+
+    def __init__(self, folder: Path, left: Callable[[], Left]) -> None:
+        self.line: Connection[Any, Any] | None = None
+        self._left, self._over, key = left, threading.Event(), secrets.token_bytes(_KEY)
+        self.told = left()
+        folder.mkdir(0o700, parents=True, exist_ok=True)
+        self._note = folder / f"{secrets.token_hex(8)}.note"
+        self._listener = Listener(_address(self._note), backlog=_QUEUE, authkey=key)
+        try:
+            _leave(self._note, key)
+        except OSError:
+            self._listener.close()
+            raise
+        self._thread = threading.Thread(target=self._wait, name="orphan", daemon=True)
+        self._thread.start()
+
+    def _wait(self) -> None:
+        line = None
+        while line is None and not self._over.is_set():
+            try:
+                line = cast("Connection[Any, Any]", self._listener.accept())
+            except (OSError, EOFError, AuthenticationError):
+                self._over.wait(_AGAIN)
+        with suppress(OSError):
+            self._note.unlink(missing_ok=True)
+            self._listener.close()
+        if line is not None:
+            self.told = self._left()
+            with suppress(OSError):  # it is gone again: whoever reads from it finds out
+                line.send(self.told)
+            self.line = line
+
+    def end(self) -> None:
+        """Let nobody come any more."""
+        self._over.set()
+        with suppress(OSError):
+            Client(_address(self._note)).close()  # to wake who listens
+        self._thread.join(_ANSWER)
+
+
+def _leave(note: Path, key: bytes) -> None:
+    """Write a note whole, that only this user can read."""
+    part = note.with_suffix(".part")
+    with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+        file.write(f"{metadata.version('kappaskin')} {key.hex()}")
+    os.replace(part, note)
+
+
+class Orphan:
+    """A live process that another one began, in the care of this one; used as a child is.
+
+    It lives as long as the `line` to it.
+    """
+
+    def __init__(self, line: "Connection[Request, Left]", left: Left) -> None:
+        self.line, self.left, self.pid = line, left, left.pid
+
+    def is_alive(self) -> bool:
+        return not self._over(0.0)
+
+    def join(self, timeout: float | None = None) -> None:
+        self._over(timeout)
+
+    def _over(self, timeout: float | None) -> bool:
+        """Whether it ended within `timeout` s: it says nothing more, so that is all to be read."""
+        try:
+            return self.line.poll(timeout)
+        except OSError:
+            return True
+
+    def kill(self) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+
+    def close(self) -> None:
+        self.line.close()
+
+
+def adopted(folder: Path) -> Orphan | None:
+    """A process that left a note in `folder`, None where there is none.
+
+    Notes of those that are gone are taken away.
+    """
+    found = (_reached(note) for note in sorted(folder.glob("*.note")))
+    return next((orphan for orphan in found if orphan is not None), None)
+
+
+def _reached(note: Path) -> Orphan | None:
+    """The process that left a `note`; None where it is gone, another came first, or it is stuck."""
+    try:
+        version, key = _read(note)
+        if version != metadata.version("kappaskin"):
+            return None
+        line = cast("Connection[Request, Left]", Client(_address(note)))
+    except (OSError, ValueError):
+        with suppress(OSError):
+            note.unlink(missing_ok=True)
+            note.with_suffix(".sock").unlink(missing_ok=True)
+        return None
+    try:
+        if line.poll(_ANSWER):
+            answer_challenge(line, key)
+            deliver_challenge(line, key)
+            if line.poll(_ANSWER):
+                return Orphan(line, line.recv())
+    except (OSError, EOFError, AuthenticationError, *_FOREIGN):
+        pass
+    line.close()
+    return None
+
+
+def _read(note: Path) -> tuple[str, bytes]:
+    """The version that left a note, and its key; a `ValueError` where it is none."""
+    with note.open("rb") as file:
+        version, key = file.read(_LARGEST).decode().split()
+    return version, bytes.fromhex(key)

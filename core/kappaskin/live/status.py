@@ -1,0 +1,113 @@
+"""How the live process is doing, as it tells the one that shows."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kappaskin.calibration import Drift
+from kappaskin.estimation import Region
+from kappaskin.frames import Event
+from kappaskin.health import Health
+from kappaskin.live.pipelines import Computed
+from kappaskin.live.tare_taking import TareNews
+from kappaskin.pipeline import Setup
+from kappaskin.publish import PublishNews, State
+from kappaskin.recording import Replay, Written
+from kappaskin.scenes import FROM_THE_BEGINNING, Playing
+from kappaskin.sensing import Sensor
+from kappaskin.sources import Accounting
+
+OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
+
+_EVENTS = 64  # last ones that are told
+
+
+@dataclass(frozen=True)
+class Status:
+    """How the engine is doing.
+
+    `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
+    `message` says why. `setup` is the one in use, `refusal` says why it is not the one asked for
+    last, and `computing` that another is on its way. `region` is scanned unless `region_refusal`
+    says why not. `meetings` counts the devices that said what they are, `skipped` the frames that
+    came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
+    of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
+    `playing` tells where a simulated scene is at a device time. `events` are the last of those that
+    `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
+    tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
+    tells which channels are not to be trusted, `publishing` where estimates are sent to,
+    `recording` what is being written, `replay` where in a recording the source is, None for any
+    other, and `beside` what else is computed of the same frames, None where nothing is.
+    """
+
+    state: str = OFF
+    source: str = ""
+    message: str = ""
+    refusal: str = ""
+    sensor: Sensor | None = None
+    meetings: int = 0
+    setup: Setup = field(default_factory=Setup)
+    computing: bool = False
+    region: Region = field(default_factory=Region)
+    region_refusal: str = ""
+    skipped: int = 0
+    generation: int = 0
+    slot: "np.dtype[np.void] | None" = None
+    accounting: Accounting = field(default_factory=Accounting)
+    rate: float = 0.0
+    reader_gap: float = math.nan
+    last_frame: float = -math.inf
+    reported: float = -math.inf
+    playing: Playing = FROM_THE_BEGINNING
+    events: tuple[Event, ...] = ()
+    happened: int = 0
+    temperature: float = math.nan
+    tare: TareNews = field(default_factory=TareNews)
+    drift: Drift | None = None
+    health: Health = field(default_factory=Health)
+    publishing: PublishNews = field(default_factory=PublishNews)
+    recording: Written = field(default_factory=Written)
+    replay: Replay | None = None
+    beside: Computed | None = None
+
+    def after(self, events: Sequence[Event]) -> "Status":
+        """The same status once `events` happened."""
+        last = (*self.events, *events)[-_EVENTS:]
+        return replace(self, events=last, happened=self.happened + len(events))
+
+    def without_source(self) -> "Status":
+        """The same where nothing is read."""
+        return replace(
+            self,
+            state=OFF,
+            source="",
+            message="",
+            sensor=None,
+            region_refusal="",
+            skipped=0,
+            accounting=Accounting(),
+            rate=0.0,
+            last_frame=-math.inf,
+            temperature=math.nan,
+            drift=None,
+            health=Health(),
+            replay=None,
+        )
+
+    @property
+    def kind(self) -> str:
+        """Where readings come from, as receivers are told; nothing without a sensor."""
+        if self.sensor is None:
+            return ""
+        if self.replay is not None:
+            return "replay"
+        return "sim" if self.sensor.simulated else "live"
+
+    def told_since(self, happened: int) -> State:
+        """What receivers are told, with what came after so many had `happened`."""
+        fresh = min(self.happened - happened, len(self.events))
+        events = self.events[len(self.events) - fresh :]
+        told = self.message, self.sensor, self.rate, self.last_frame
+        return State(self.state, self.kind, *told, events)

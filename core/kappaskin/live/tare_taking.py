@@ -1,0 +1,89 @@
+"""A tare taken while the engine streams: estimates go in, news of it come out."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from datetime import datetime
+
+from kappaskin.calibration import Tare, Taring
+from kappaskin.contact import LoadSeeker
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate
+from kappaskin.pipeline import Pipeline
+from kappaskin.sensing import Sensor
+from kappaskin.sources import Source
+
+
+@dataclass(frozen=True)
+class TareNews:
+    """Whether one is being taken, how many ended, and how the last: with a `tare`, or why not.
+
+    A `tare` that was taken is not in use before a setup has it.
+    """
+
+    taking: bool = False
+    ended: int = 0
+    tare: Tare | None = None
+    refusal: str = ""
+
+
+class TareTaking:
+    """Takes one tare at a time; it is worked out by the `worker`, beside the frames.
+
+    `news` goes on from what was told `before`, by an engine that may have died taking one.
+    """
+
+    def __init__(
+        self,
+        worker: Executor,
+        before: TareNews,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._worker, self._clock = worker, clock
+        self._taring: Taring | None = None
+        self._found: Future[Tare] | None = None
+        self.news = before
+        if before.taking:
+            self._end("the engine ended while it was taken; tare again")
+
+    def begin(self, sensor: Sensor | None) -> None:
+        """Take a tare of `sensor` from the frames that come from now on; None when none do."""
+        if sensor is None:
+            self._end("nothing streams: connect a sensor, then tare")
+            return
+        self._taring, self._found = Taring(sensor, self._clock()), None
+        self.news = TareNews(True, self.news.ended)
+
+    def receive(self, estimate: Estimate) -> None:
+        """Take in an estimate, while a tare is being taken."""
+        if self._taring is not None and self._found is None:
+            try:
+                self._taring.take(estimate.device_time, estimate.host_time, estimate.nominal)
+            except Refusal as refusal:
+                self._end(str(refusal))
+
+    def go_on(self, pipeline: Pipeline, source: Source) -> None:
+        """Work it out once there is enough, and tell what came of it."""
+        if self._found is not None and self._found.done():
+            try:
+                self._end("", self._found.result())
+            except Refusal as refusal:
+                self._end(str(refusal))
+        taring = self._taring
+        if taring is None or self._found is not None or not taring.done(self._clock()):
+            return
+        edge, temperature = pipeline.setup.edge, source.temperature
+        rest, now = pipeline.rest(), datetime.now().astimezone()
+        self._found = self._worker.submit(
+            lambda: taring.tare(LoadSeeker(taring.sensor, edge), rest, now, temperature)
+        )
+
+    def give_up(self, why: str) -> None:
+        """End the tare that is being taken, if one is."""
+        if self._taring is not None:
+            self._end(why)
+
+    def _end(self, refusal: str, tare: Tare | None = None) -> None:
+        self._taring, self._found = None, None
+        self.news = TareNews(False, self.news.ended + 1, tare, refusal)

@@ -1,0 +1,302 @@
+"""A frame of counts to an estimate of shape and contact; everything it can is computed once."""
+
+import math
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin._state import Memory, Remembering
+from kappaskin.bases import Basis, ValueMap, basis_for
+from kappaskin.calibration import Calibration, Corrector, DriftWatch, Rest, Tare
+from kappaskin.contact import NO_TOUCH, LoadSeeker, PointContact, contact_geometry
+from kappaskin.errors import RankDeficient
+from kappaskin.estimation import METHODS, RIM_SD, Fit, estimator_for
+from kappaskin.frames import Array, Estimate, Frame, Truth
+from kappaskin.health import LeftOut, leave_out
+from kappaskin.pipeline.frame_assembly import Hold
+from kappaskin.sensing import Sensor
+
+_LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undecided
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points.
+
+    `edge` says which functions; empty, those for the edge that the sensor says it has. `method` is
+    one of `METHODS`. A channel
+    that a frame leaves out keeps its last reading until that is `hold` s old. Readings are taken
+    from the zero of the `tare` and corrected by the `calibration`, both of which must be the
+    sensor's own. A rim that gives is expected to move by `rim_sd` in m.
+    """
+
+    Ni: int = 8
+    Nj: int = 8
+    nx: int = 65
+    ny: int = 65
+    edge: str = ""
+    method: str = next(iter(METHODS))
+    hold: float = 0.1
+    calibration: Calibration | None = None
+    tare: Tare | None = None
+    rim_sd: float = RIM_SD
+
+
+@dataclass(frozen=True)
+class _Past:
+    """What a pipeline remembers of earlier frames: where the loops are, and readings it holds.
+
+    `passed` are frames passed over that are still to be held.
+    """
+
+    correct: Corrector | None
+    hold: Hold
+    passed: list[Frame] = field(default_factory=list[Frame])
+
+
+class Pipeline:
+    """Counts to curvature, coefficients, surface and contact; `pipeline(frame)` is the estimate.
+
+    Raises `RankDeficient` when made for a basis that the sensor's readings do not decide. A frame
+    that lacks too many readings for it gives an estimate whose shape is NaN.
+    """
+
+    def __init__(
+        self,
+        sensor: Sensor,
+        setup: Setup,
+        generation: int = 0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
+        self.past = _Past(self._corrector(setup.calibration), Hold(sensor.channels, setup.hold))
+        self._zero = self._shift(setup.tare)
+        edge = setup.edge or sensor.edge
+        self.drift = None if setup.tare is None else DriftWatch(LoadSeeker(sensor, edge))
+        across = 1 if sensor.layout.patch.strip else setup.Nj
+        self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
+        layout, rim_sd = sensor.layout, setup.rim_sd
+        self.fit = estimator_for(setup.method, self.basis, layout, rim_sd=rim_sd)
+        self._read_at = sensor.scan().times  # of the first, the second ... channel of a scan
+        self._whole = self.fit.at_rest()
+        loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
+        self._loosest = math.inf if self.fit.has_prior else loosest
+        self._judged, self._decided = self._whole.spreads, True
+        self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
+        points = np.stack(np.meshgrid(self._x, self._y), axis=-1).reshape(-1, 2)
+        on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
+        self._skin = ... if on_skin.all() else on_skin
+        self._surface = self.basis.on_grid(self._x, self._y)
+        self._touch = PointContact(sensor.plate, sensor.layout, edge)
+        self.left_out = LeftOut.none(sensor, self._whole, self._ideal())
+        self._no_shape = np.full(self.basis.shape, np.nan)
+        self._unknown = np.full((setup.ny, setup.nx), np.nan)
+        self.fitted: Fit | None = None
+        """The fit that the last estimate rests on."""
+        self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
+
+    def _ideal(self) -> Fit:
+        """The fit to a skin at rest of which no channel is dead."""
+        layout = self.sensor.layout
+        if layout.lacking.any():
+            whole = replace(layout, live=layout.live | layout.lacking)
+            setup = self.setup
+            estimator = estimator_for(setup.method, self.basis, whole, rim_sd=setup.rim_sd)
+            return estimator.at_rest()
+        return self._whole
+
+    def _corrector(self, calibration: Calibration | None) -> Corrector | None:
+        if calibration is None:
+            return None
+        calibration.check(self.sensor)
+        return calibration.start()
+
+    def _shift(self, tare: Tare | None) -> Array | None:
+        """What is taken off the readings (C,) in 1/m, so that rest reads as it was calibrated."""
+        if tare is None:
+            return None
+        tare.check(self.sensor)
+        calibration = self.setup.calibration
+        if calibration is None:
+            return tare.offset
+        return tare.offset - np.nan_to_num(calibration.offset)
+
+    def curvature(self, frame: Frame) -> Array:
+        """Curvature (3, P) in 1/m; NaN where a channel is dead, unscanned, on a rail or failed.
+
+        With a calibration each frame is to be given once, in order: the loops have a memory.
+        """
+        return self._corrected(self.sensor.nominal(frame), frame.device_time)
+
+    def _corrected(self, flat: Array, time: float) -> Array:
+        if self._zero is not None:
+            flat = flat - self._zero
+        if self.past.correct is not None:
+            flat = self.past.correct(flat, time)
+        return flat.reshape(3, -1)
+
+    def rest(self) -> Rest:
+        """What a skin that lies straight now would read, as far as is known without a new tare.
+
+        By the tare in use, or the calibration; what its loops still hold comes on top of that.
+        """
+        correct, calibration, tare = self.past.correct, self.setup.calibration, self.setup.tare
+        zero = np.zeros(self.sensor.channels)
+        if tare is not None:
+            zero = tare.offset
+        elif calibration is not None:
+            zero = np.nan_to_num(calibration.offset)
+        return Rest(zero, 0 * zero if correct is None else correct.remanence(), tare)
+
+    def leave_out(self, kinds: NDArray[np.uint8], badness: Array) -> None:
+        """Fit from now on without the channels of any of these `kinds` (C,), as many as it can.
+
+        Numbers in `WHY`, 0 for a good channel; with the worst by `badness` (C,) goes the first.
+        """
+        self.left_out = leave_out(self.left_out, self.fit, kinds, badness, self._loosest)
+
+    def _followed(self, frame: Frame, curvature: Array, held: Array) -> Fit:
+        if not self.fit.remembers:
+            return self.fit(held)
+        times = np.full(curvature.size, np.nan)
+        times[frame.channels] = frame.device_time + self._read_at[: len(frame.channels)]
+        return self.fit.follow(curvature, times.reshape(curvature.shape), held)
+
+    def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
+        try:
+            fit = self._followed(frame, curvature, held)
+            if self._is_decided(fit):
+                return fit
+        except RankDeficient:
+            pass
+        unknown = np.full_like(held, np.nan)
+        return Fit(self.fit, unknown, self._no_shape, self._whole.spreads, 0, np.array(math.nan))
+
+    def _is_decided(self, fit: Fit) -> bool:
+        """Whether a shape's error bars are told; fits to the same channels mostly share them."""
+        if fit.spreads is not self._judged:
+            self._judged, norm = fit.spreads, np.linalg.norm(fit.unit_sd)
+            self._decided = bool(norm <= self._loosest)
+        return self._decided
+
+    def __call__(self, frame: Frame) -> Estimate:
+        nominal = self.sensor.nominal(frame)
+        scanned = self._corrected(nominal, frame.device_time)
+        self._catch_up(frame)
+        curvature, fresh = self.past.hold(frame, scanned)
+        out = self.left_out
+        began = time.perf_counter()
+        fit = self.fitted = self._fitted(frame, out(scanned), out(curvature))
+        fit_time = time.perf_counter() - began
+        surface = self._surface(fit.coefficients)
+        noise = float(fit.noise)
+        touch = self._touch(fit.curvature, fit) if math.isfinite(noise) else NO_TOUCH
+        if self.drift is not None:
+            self.drift.follow(frame.device_time, curvature, surface, noise)
+        return Estimate(
+            self.generation,
+            frame.sequence,
+            frame.device_time,
+            frame.host_time,
+            frame.taken,
+            frame.taken_sd,
+            self._clock(),
+            nominal.reshape(3, -1),
+            curvature,
+            fresh,
+            fit.residual,
+            fit.coefficients,
+            surface,
+            noise,
+            out.words(fit.suspect),
+            bool(fit.converged),
+            fit_time,
+            touch,
+            contact_geometry(fit, touch),
+            *self._compared(surface, fit.coefficients, frame.truth),
+        )
+
+    def go_on_from(self, before: "Pipeline") -> None:
+        """Take over what `before` remembers, if its readings are of the same sensor and kind."""
+        asked, was = self.setup, before.setup
+        if before.sensor is not self.sensor or asked.calibration != was.calibration:
+            return
+        if (asked.tare, asked.hold) != (was.tare, was.hold):
+            # Another zero does not undo how the skin was bent.
+            self.past = _Past(before.past.correct, self.past.hold)
+            return
+        self.past = before.past
+        if _estimating(self) == _estimating(before):
+            self.fit = before.fit
+
+    def remembered(self) -> Memory:
+        """What estimates depend on besides their frames, by name; also of frames passed over."""
+        for earlier in self.past.passed:
+            self.past.hold(earlier, self.curvature(earlier))
+        self.past.passed.clear()
+        found = self.past.hold.remembered("hold.")
+        if self.past.correct is not None:
+            found |= self.past.correct.remembered("correct.")
+        if isinstance(self.fit, Remembering):
+            found |= self.fit.remembered("fit.")
+        return found
+
+    def recall(self, memory: Memory) -> None:
+        """Go on from what another of the same sensor and setup `remembered`."""
+        self.past.hold.recall(memory, "hold.")
+        if self.past.correct is not None:
+            self.past.correct.recall(memory, "correct.")
+        if isinstance(self.fit, Remembering):
+            self.fit.recall(memory, "fit.")
+
+    def pass_over(self, frame: Frame) -> None:
+        """Remember the readings of a frame of which nobody waits for the estimate."""
+        if self.past.correct is None and not self.fit.remembers:
+            # Of those, what a later scan of every channel replaces need never be worked out.
+            if self.past.hold.is_whole(frame):
+                self.past.passed.clear()
+            self.past.passed.append(frame)
+            return
+        self._catch_up(frame)
+        curvature = self.curvature(frame)
+        held, _ = self.past.hold(frame, curvature)
+        if self.fit.remembers:
+            with suppress(RankDeficient):
+                out = self.left_out
+                self._followed(frame, out(curvature), out(held))
+
+    def _catch_up(self, frame: Frame) -> None:
+        """Remember the frames passed over, where `frame` does not replace all their readings."""
+        passed = self.past.passed
+        if passed and not self.past.hold.is_whole(frame):
+            for earlier in passed:
+                self.past.hold(earlier, self.curvature(earlier))
+        passed.clear()
+
+    def _compared(
+        self, surface: Array, coefficients: Array, truth: Truth | None
+    ) -> tuple[Array, Array, float, float]:
+        """True surface, true contact, error at the load and RMS; NaN without a truth."""
+        if truth is None:
+            return self._unknown, self._unknown[0, :2], math.nan, math.nan
+        key = truth.edge, *truth.coefficients.shape
+        if key not in self._truths:
+            basis = basis_for(self.basis.patch, *key)
+            self._truths[key] = basis, basis.on_grid(self._x, self._y)
+        basis, true_map = self._truths[key]
+        true_surface = true_map(truth.coefficients)
+        off = (surface - true_surface)[self._skin].ravel()
+        rms = math.sqrt(float(off.dot(off)) / off.size)
+        x, y = truth.contact.tolist()
+        at_load = self.basis.value(x, y, coefficients) - basis.value(x, y, truth.coefficients)
+        return true_surface, truth.contact, at_load, rms
+
+
+def _estimating(pipeline: Pipeline) -> tuple[object, ...]:
+    """What a setup says that the estimator depends on, besides the sensor."""
+    setup = pipeline.setup
+    return setup.method, pipeline.basis.shape, setup.edge or pipeline.sensor.edge, setup.rim_sd

@@ -1,0 +1,161 @@
+"""From an estimate to the numbers that colour a skin, point by point or element by element."""
+
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.bases import Basis, CurvatureMap
+from kappaskin.contact import FormMap
+from kappaskin.errors import Refusal
+from kappaskin.estimation import Estimator, Spread
+from kappaskin.frames import COMPONENTS, Array, Estimate
+from kappaskin.sensing import SensorLayout
+
+QUANTITIES = {
+    "displacement": "m",
+    **dict.fromkeys(COMPONENTS, "1/m"),
+    **dict.fromkeys(("first", "second", "mean"), "1/m"),
+    "gaussian": "1/m^2",
+    **dict.fromkeys((f"residual_{name}" for name in COMPONENTS), "1/m"),
+    "error_bar": "m",
+    "difference": "m",
+}
+"""Units by name. `xx`, `yy` and `xy` are changes of curvature. `first`, `second` (the principal
+curvatures, the larger one first), `mean` and `gaussian` are the skin's own, its bend at rest
+included. A residual is reading minus fit, `error_bar` the standard deviation of the displacement,
+`difference` the displacement less the true one."""
+
+_OF_FORM = ("first", "second", "mean", "gaussian")
+_AT_ONCE = 2**21  # values of functions that are worked out at once
+
+
+def of_form(name: str, form: Array) -> Array:
+    """A principal, the mean or the Gaussian curvature (...) of `form` (3, ...): xx, yy, xy."""
+    xx, yy, xy = form
+    if name == "gaussian":
+        return xx * yy - xy**2
+    mean = (xx + yy) / 2
+    if name == "mean":
+        return mean
+    half = np.hypot((xx - yy) / 2, xy)
+    return mean + half if name == "first" else mean - half
+
+
+class ErrorBars:
+    """How far off the shape that an `estimator` finds from `curvature` (3, P) in 1/m may be.
+
+    On the surface of `x` (nx,), `y` (ny,) in m. They hold for every frame that rests on the same
+    readings, NaN among `curvature` where one is missing, for its own noise.
+    """
+
+    def __init__(self, estimator: Estimator, curvature: Array, x: Array, y: Array) -> None:
+        self.basis, self._estimator = estimator.basis, estimator
+        self._spread = cast("Spread", estimator(curvature).spreads)
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        on = np.flatnonzero(self.basis.patch.contains(points))
+        self._unit, self._undecided = np.full((2, len(points)), np.nan)
+        step = max(_AT_ONCE // self.basis.size, 1)
+        for part in (on[n : n + step] for n in range(0, len(on), step)):
+            self._unit[part], self._undecided[part] = self._of(self.basis.at(points[part]))
+        self._shape = len(y), len(x)
+
+    def _of(self, rows: Array) -> tuple[Array, Array]:
+        """Standard deviations (R,) of `rows` (R, N): for unit noise, and of what is undecided."""
+        return self._spread.sd_of(rows), np.linalg.norm(rows @ self._estimator.undecided, axis=1)
+
+    def on_surface(self, noise: float) -> Array:
+        """Standard deviations (ny, nx) of the displacement in m; NaN off the skin."""
+        return np.hypot(noise * self._unit, self._undecided).reshape(self._shape)
+
+    def of_slopes(self, position: Array, noise: float) -> Array:
+        """Standard deviations (2,) of the slopes along x and y at `position` (2,) in m."""
+        unit, undecided = self._of(self.basis.jet(*position.tolist())[1:3])
+        return np.hypot(noise * unit, undecided)
+
+
+class Quantities:
+    """Numbers by their names in `QUANTITIES`, of estimates with a `basis` and one size of surface.
+
+    What one of them takes is made when it is first asked for. `error_bars` has to be given for
+    those, which are NaN until then.
+    """
+
+    def __init__(self, layout: SensorLayout, basis: Basis, nx: int, ny: int) -> None:
+        self.layout, self.basis = layout, basis
+        self.grid = layout.patch.grid(nx, ny)
+        self.error_bars: ErrorBars | None = None
+        self._changes: dict[str, CurvatureMap] = {}
+
+    @cached_property
+    def _form(self) -> FormMap:
+        return FormMap(self.basis, *self.grid)
+
+    @cached_property
+    def _at_elements(self) -> tuple[NDArray[np.intp], Array]:
+        """For each element the corners (P, 4) of its square of the grid, and their weights."""
+        x, y = self.grid
+        cell = np.array([x[1] - x[0], y[1] - y[0]])
+        place = self.layout.positions / cell
+        low = np.minimum(place.astype(np.intp), (len(x) - 2, len(y) - 2))
+        (p, q), (u, v) = low.T, (place - low).T
+        corners = (q * len(x) + p)[:, None] + (0, 1, len(x), len(x) + 1)
+        weights = np.stack([(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v], axis=-1)
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        on = np.flatnonzero(self.layout.patch.contains(points))
+        weights *= np.isin(corners, on)  # off the rim nothing is known
+        for element in np.flatnonzero(weights.sum(axis=1) <= 0):  # in a narrow corner of the rim
+            away = np.linalg.norm(points[on] - self.layout.positions[element], axis=1)
+            corners[element, 0], weights[element, 0] = on[np.argmin(away)], 1.0
+        return corners, weights / weights.sum(axis=1, keepdims=True)
+
+    def at_rest(self, name: str) -> float:
+        """What a skin at rest has, in SI units."""
+        H = self.layout.patch.base_curvature
+        return float(of_form(name, np.array([H, 0.0, 0.0]))) if name in _OF_FORM else 0.0
+
+    def on_surface(self, name: str, estimate: Estimate) -> Array:
+        """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
+        if name == "displacement":
+            return estimate.surface
+        if name == "difference":
+            return estimate.surface - estimate.true_surface
+        if name == "error_bar":
+            bars = self.error_bars
+            unknown = np.full(estimate.surface.shape, np.nan)
+            return unknown if bars is None else bars.on_surface(estimate.noise)
+        if name in _OF_FORM:
+            return of_form(name, self._form(estimate.coefficients))
+        if name not in COMPONENTS:
+            raise Refusal(f"expected a quantity that a surface has, got {name!r}; ask of_elements")
+        if name not in self._changes:
+            self._changes[name] = CurvatureMap(self.basis, name, *self.grid)
+        return self._changes[name](estimate.coefficients)
+
+    def directions(self, estimate: Estimate) -> Array:
+        """Both principal curvatures in 1/m, and the angle of the first in rad from x, on the grid.
+
+        They are (3, ny, nx).
+        """
+        xx, yy, xy = form = self._form(estimate.coefficients)
+        angle = np.arctan2(xy, (xx - yy) / 2) / 2
+        return np.stack([of_form("first", form), of_form("second", form), angle])
+
+    def of_elements(self, name: str, estimate: Estimate) -> Array:
+        """The values (P,) in SI units: of curvature as each element reads it; NaN where missing."""
+        if name in COMPONENTS:
+            return estimate.curvature[COMPONENTS.index(name)]
+        if name.startswith("residual_"):
+            return estimate.residual[COMPONENTS.index(name.removeprefix("residual_"))]
+        if name in _OF_FORM:
+            return of_form(name, self._read(estimate.curvature))
+        corners, weights = self._at_elements
+        values = self.on_surface(name, estimate).ravel()[corners]
+        return np.sum(np.where(weights > 0, values, 0.0) * weights, axis=1)
+
+    def _read(self, curvature: Array) -> Array:
+        """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
+        patch = self.layout.patch
+        form = curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
+        return np.where([[False], [True], [True]], 0.0, form) if patch.strip else form

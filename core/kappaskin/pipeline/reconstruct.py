@@ -1,0 +1,237 @@
+"""A file of curvature readings to a file of shapes."""
+
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.bases import Basis, basis_for
+from kappaskin.contact import KINDS, ContactObject, ObjectFinder, PointContact, contact_geometry
+from kappaskin.errors import RankDeficient, Refusal
+from kappaskin.estimation import METHODS, Estimator, Fit, check_method, estimator_for
+from kappaskin.frames import Array, Touch
+from kappaskin.mechanics import Plate
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Disk, Patch, Polygon
+
+_NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
+
+_MOST = 2**27  # numbers in one array: 1 GiB
+
+# What a damaged archive makes zipfile and NumPy raise: RuntimeError when it seems encrypted or
+# packed by a method there is not, MemoryError when it claims to be huge.
+_DAMAGES = (
+    OSError,
+    ValueError,
+    EOFError,
+    RuntimeError,
+    MemoryError,
+    OverflowError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    # Opened here: np.load leaves a file that it opened itself open when the archive is damaged.
+    with path.open("rb") as file:
+        archive = np.load(file, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise ValueError("it holds a single array")
+        names = ("size", "positions", "curvature", "sigma", "radius", "outline", "rigidity")
+        return {name: archive[name] for name in names if name in archive}
+
+
+def _read(path: Path) -> dict[str, Array]:
+    """The arrays of a readings file as numbers; nothing in it is ever executed."""
+    try:
+        found = _arrays(path)
+    except FileNotFoundError as error:
+        raise Refusal(f"{path}: there is no such file; expected an NPZ with {_NEEDED}") from error
+    except _DAMAGES as error:
+        raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
+    for name in ("size", "positions", "curvature"):
+        if name not in found:
+            raise Refusal(f"{path}: has no {name!r} (it has {sorted(found)}); expected {_NEEDED}")
+    for name, values in found.items():
+        if values.dtype.kind not in "fiu":
+            raise Refusal(f"{path}: expected {name} to be real numbers, got {values.dtype}")
+    return {name: values.astype(float) for name, values in found.items()}
+
+
+def _patch(path: Path, size: Array, radius: Array, outline: Array | None) -> Patch:
+    """The skin of `size` (2,), or of size (1,) a strip, bent to one `radius`.
+
+    With an `outline`, (V, 2) in m or one number, it is a polygon, or a disk of that radius.
+    """
+    if outline is not None:
+        skin = Disk(float(outline.item())) if outline.size == 1 else Polygon(outline)
+        if (
+            size.shape != (2,)
+            or not np.allclose(size, (skin.a, skin.b))
+            or np.any(radius != np.inf)
+        ):
+            raise Refusal(
+                f"{path}: expected a flat skin of size {skin.a:g} x {skin.b:g} m, the box of its "
+                f"outline, got size {size} and radius {radius}"
+            )
+        return skin
+    if size.shape not in ((1,), (2,)):
+        raise Refusal(
+            f"{path}: expected size of shape (2,) in m, or (1,) for a strip, got {size.shape}"
+        )
+    if radius.size != 1:
+        raise Refusal(f"{path}: expected one radius in m, got shape {radius.shape}")
+    strip = len(size) == 1
+    return Patch(float(size[0]), 1.0 if strip else float(size[1]), float(radius.item()), strip)
+
+
+def _layout(path: Path, patch: Patch, positions: Array) -> SensorLayout:
+    across = 1 if patch.strip else 2
+    if positions.ndim == 1 and patch.strip:
+        positions = positions[:, None]
+    if positions.ndim != 2 or positions.shape[1] != across:
+        raise Refusal(
+            f"{path}: expected positions of shape (P, {across}) in m, got {positions.shape}"
+        )
+    if patch.strip:
+        positions = np.column_stack([positions, np.full(len(positions), patch.b / 2)])
+    return SensorLayout.scattered(patch, positions)
+
+
+def _shapes(
+    method: str, basis: Basis, layout: SensorLayout, curvature: Array, sigma: Array | None
+) -> dict[str, NDArray[Any]]:
+    """`coefficients`, `sd` and `residual` of all T frames; `sigma` may be of each of them."""
+
+    def told(fit: Fit) -> dict[str, NDArray[Any]]:
+        return {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
+
+    if sigma is None or sigma.ndim < 3:
+        return told(estimator_for(method, basis, layout, sigma)(curvature))
+    frames: list[dict[str, NDArray[Any]]] = []
+    for number, own in enumerate(sigma):
+        try:
+            frames.append(told(estimator_for(method, basis, layout, own)(curvature[number])))
+        except Refusal as error:
+            raise type(error)(f"frame {number}: {error}") from error
+    return {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
+
+
+def _check_sizes(basis: Basis, readings: int, surface: int, method: type[Estimator]) -> None:
+    """Refuse what would exhaust the memory before anything is computed."""
+    (Ni, Nj), N = basis.shape, basis.size
+    if readings < N and not method.has_prior:
+        raise RankDeficient(
+            f"expected at most {readings} functions for {readings} readings per frame, got "
+            f"{Ni} x {Nj} = {N}; use a smaller basis, more elements, or a "
+            "prior (bayes)"
+        )
+    operator = readings * N if method.has_matrix else N
+    if max(operator, surface) > _MOST:
+        raise Refusal(
+            f"expected at most {_MOST} numbers in one array, got {operator} in the operator "
+            f"of the {Ni} x {Nj} basis and {surface} in the surfaces; use a smaller basis, a "
+            "coarser grid or fewer frames"
+        )
+
+
+def reconstruct(
+    readings: Path,
+    basis: tuple[int, int],
+    grid: tuple[int, int] | None = None,
+    edge: str = "hinged",
+    method: str = next(iter(METHODS)),
+    contact: bool = False,
+    objects: bool = False,
+) -> dict[str, NDArray[Any]]:
+    """What `kappaskin reconstruct` writes: `coefficients`, `sd`, `residual` and the surface.
+
+    `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m; with a `grid` of nx x ny
+    points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
+    `method` one of `METHODS`. With `contact` also what `_contacts` gives, with `objects`
+    what `_objects` gives besides.
+    """
+    found = _read(readings)
+    curvature, sigma = found["curvature"], found.get("sigma")
+    radius = found.get("radius", np.array(np.inf))
+    patch = _patch(readings, found["size"], radius, found.get("outline"))
+    layout = _layout(readings, patch, found["positions"])
+    if curvature.ndim == 2:
+        curvature = curvature[None]
+    if curvature.shape[-2:] != (3, len(layout)) or curvature.ndim != 3 or not len(curvature):
+        raise Refusal(
+            f"{readings}: expected curvature of shape (T, 3, {len(layout)}) or "
+            f"(3, {len(layout)}) for {len(layout)} positions, got {found['curvature'].shape}"
+        )
+    if sigma is not None and sigma.ndim > 2 and sigma.shape != curvature.shape:
+        raise Refusal(
+            f"{readings}: expected sigma of shape {curvature.shape} as curvature has, or "
+            f"(3, {len(layout)}), or one number; got {sigma.shape}"
+        )
+    functions = basis_for(patch, edge, *basis)
+    check_method(method)
+    points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
+    _check_sizes(functions, int(layout.live.sum()), points, METHODS[method])
+    out = _shapes(method, functions, layout, curvature, sigma)
+    if grid is not None:
+        x, y = patch.grid(*grid)
+        out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(out["coefficients"])}
+    if contact or objects:
+        rigidity = found.get("rigidity")
+        if rigidity is not None and rigidity.size != 1:
+            raise Refusal(f"expected one rigidity in N m, got shape {rigidity.shape}")
+        plate = Plate(patch, 1.0 if rigidity is None else float(rigidity.item()))
+        fitter = estimator_for(method, functions, layout)
+        touch_of = PointContact(plate, layout, edge)
+        fits = [fitter(frame) for frame in curvature]
+        touches = [touch_of(one.curvature, one) for one in fits]
+        out |= _contacts(fits, touches, forces=rigidity is not None)
+        if objects:
+            find = ObjectFinder(plate, layout, edge)
+            noises = [float(one.noise) for one in fits]
+            out |= _objects([find(*each) for each in zip(curvature, noises, touches, strict=True)])
+    return out
+
+
+def _contacts(fits: list[Fit], touches: list[Touch], forces: bool) -> dict[str, NDArray[Any]]:
+    """The contact of each frame and the skin's geometry there; NaN where there is none.
+
+    `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m; `normal`
+    (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with
+    `forces` also `force` and `force_sd` (T,) in N. `single` and `near_rim` (T,) say whether to
+    trust them (`Touch`). All readings weigh the same.
+    """
+    there = [contact_geometry(one, touch) for one, touch in zip(fits, touches, strict=True)]
+    names = ["displacement", "displacement_sd", "single", "near_rim"]
+    names += ["force", "force_sd"] if forces else []
+    out = {
+        "contact": np.stack([touch.position for touch in touches]),
+        "contact_sd": np.stack([touch.position_sd for touch in touches]),
+    }
+    out |= {name: np.array([getattr(touch, name) for touch in touches]) for name in names}
+    for name in ("normal", "curvature_form", "torsion_form", "principal"):
+        out[name] = np.stack([getattr(geometry, name) for geometry in there])
+    return out
+
+
+def _objects(found: list[ContactObject]) -> dict[str, NDArray[Any]]:
+    """What touches the skin in each frame (`ContactObject`); without a contact NaN and "".
+
+    `object` (T,) is one of `KINDS` or "", `object_probability` (T, 4) of each of them;
+    `object_radius` (T,) and `object_radius_95` (T, 2) in m; `object_axis` and `object_axis_95` (T,)
+    in rad, `object_length` and `object_length_95` (T,) in m.
+    """
+    return {
+        "object": np.array([one.kind for one in found], dtype="U8"),
+        "object_probability": np.array(
+            [[one.probability.get(kind, np.nan) for kind in KINDS] for one in found]
+        ),
+        **{
+            f"object_{name}": np.array([getattr(one, name) for one in found])
+            for name in ("radius", "radius_95", "axis", "axis_95", "length", "length_95")
+        },
+    }

@@ -1,0 +1,305 @@
+"""What the live process reads and finds to a recording, before it goes anywhere else."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from kappaskin._state import Memory, Remembering
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Estimate, Event, Frame, Truth
+from kappaskin.pipeline import Pipeline
+from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import Layout, encode
+from kappaskin.recording.disk import Disk
+from kappaskin.recording.setup_text import said_of_setup
+from kappaskin.recording.writing import RecordingFile, Written
+from kappaskin.scenes import Scene, write_scene
+from kappaskin.sources import Known
+
+_CONTACTS = 1000.0  # a second at most
+_HEAVY = 50.0  # a second at most, of what is as large as a frame
+_BYTES = 4e6  # a second at most, of that
+_BURST = 5  # that may come at once, as frames do
+_INFO = 20  # what a log calls what is no warning
+_FLOAT32 = 7  # what a point cloud calls it
+_NO_TRUTH = Truth(np.empty((0, 0)), np.full(2, math.nan), "")
+_COLUMNS = ("x", "y", "z", "displacement", "xx", "yy", "xy")
+
+
+class Recorder:
+    """Writes the recording `path`; a `Tape` for a source, and for all that becomes of its frames.
+
+    A `Refusal` where no file can be made. No call waits for the disk.
+    """
+
+    def __init__(self, path: Path, now: float, disk: Callable[[Path], Disk] = Disk) -> None:
+        self._file = RecordingFile(path, disk)
+        self._now = now  # host time in s of what came last
+        self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)  # told last, and its layout
+        self._attached: set[str] = set()
+        self._views: _Views | None = None
+        self._contacts = _Room(_CONTACTS)
+
+    @property
+    def written(self) -> Written:
+        return self._file.written
+
+    def end(self) -> None:
+        """Let what waits be written, and the file ended."""
+        self._file.end()
+
+    def close(self) -> None:
+        """End the file, and wait until it is on the disk."""
+        self._file.close()
+
+    def goes_on(self, now: float) -> None:
+        """What is told next belongs to the time `now`: a while may have passed without a source."""
+        self._now = now
+
+    # What the source tells.
+
+    def met(self, text: str) -> None:
+        self._file.put(m.DEVICE, self._now, encode(m.STRING, {"data": text}))
+
+    def came(self, host_time: float, data: bytes) -> None:
+        self._now = host_time
+        self._file.put(m.LINES, host_time, m.pack_line(host_time, False, data))
+
+    def sent(self, host_time: float, data: bytes) -> None:
+        self._now = host_time
+        self._file.put(m.LINES, host_time, m.pack_line(host_time, True, data))
+
+    def ended(self, host_time: float) -> None:
+        """No bytes at all came: the line is gone."""
+        self.came(host_time, b"")
+
+    def mapped(self, since: float, known: Known) -> None:
+        at, offset, half, drift, spread, doubted = known.map
+        said = {
+            "since": since,
+            "at": at,
+            "offset": offset,
+            "half": half,
+            "drift": drift,
+            "spread": spread,
+            "doubted": doubted,
+            "wraps": known.wraps,
+            "last": known.last,
+        }
+        self._file.put(m.CLOCKS, self._now, encode(m.CLOCK, said))
+
+    def simulated(self, frame: Frame) -> None:
+        told, was = frame.truth or _NO_TRUTH, self._truth
+        if told is was or _same(told, was):
+            return
+        if (told.edge, told.coefficients.shape) != (was.edge, was.coefficients.shape):
+            self._truths = _truths_like(told)
+        self._truth = told
+        said: dict[str, object] = {
+            "sequence": frame.sequence,
+            "shape": told.coefficients.shape,
+            "contact": told.contact,
+        }
+        if told.coefficients.size:
+            said["coefficients"] = told.coefficients.ravel()
+        self._file.put(m.TRUTHS, frame.host_time, self._truths(said))
+
+    # What becomes of it.
+
+    def plays(self, scene: Scene) -> None:
+        """The scene is this from now on."""
+        name = f"scene-{len(self._attached)}.toml"
+        self._attached.add(name)
+        try:
+            told = write_scene(scene)
+        except Refusal as refusal:  # an object from a file of its own, say
+            told = f"# {scene.name}: {refusal}\n"
+        self._file.attach(name, "application/toml", told.encode())
+
+    def set_up(self, pipeline: Pipeline) -> None:
+        """Frames go through `pipeline` from now on."""
+        text, files = said_of_setup(pipeline.setup)
+        for name in files.keys() - self._attached:
+            self._attached.add(name)
+            self._file.attach(name, "application/toml", files[name])
+        self._file.put(m.SETUP, self._now, encode(m.STRING, {"data": text}))
+        self._views = _Views(pipeline)
+
+    def remembered(self, memory: Memory) -> None:
+        """The pipeline goes on from this."""
+        for name, values in memory.items():
+            said = {"name": name, "shape": values.shape, "values": values.ravel()}
+            self._file.put(m.MEMORIES, self._now, encode(m.MEMORY, said))
+
+    def left_out(self, kinds: "np.ndarray[tuple[int], np.dtype[np.uint8]]", badness: Array) -> None:
+        """These channels are left out from now on."""
+        said = {"kinds": kinds, "badness": badness}
+        self._file.put(m.LEFT_OUTS, self._now, encode(m.LEFT_OUT, said))
+
+    def happened(self, event: Event) -> None:
+        stamp = self._file.stamp(event.time)
+        said = {
+            "stamp.sec": stamp // 10**9,
+            "stamp.nanosec": stamp % 10**9,
+            "level": _INFO,
+            "name": event.kind,
+            "msg": event.text,
+            "file": "",
+            "function": "",
+            "line": 0,
+        }
+        self._file.put(m.EVENTS, event.time, encode(m.LOG, said))
+
+    def take(self, frame: Frame, estimate: Estimate) -> None:
+        """Take down what a frame came to, as often as there is room for it."""
+        views, time = self._views, estimate.host_time
+        if views is None or not (self._contacts(time) or views.every):
+            return
+        self._file.put(m.CONTACTS, time, _contact(estimate, self._file.stamp(time)))
+        if views.room(time):
+            for topic, data in views.heavy(frame, estimate, self._file.stamp(time)):
+                self._file.put(topic, time, data)
+
+
+def _truths_like(truth: Truth) -> Layout:
+    return Layout(m.TRUTH, {"edge": truth.edge, "coefficients": truth.coefficients.size})
+
+
+def _same(a: Truth, b: Truth) -> bool:
+    """Bit for bit, which is ten times as fast to see as whether numbers are equal."""
+    if a.edge != b.edge or a.contact.tobytes() != b.contact.tobytes():
+        return False
+    shapes = a.coefficients.shape, b.coefficients.shape
+    return shapes[0] == shapes[1] and a.coefficients.tobytes() == b.coefficients.tobytes()
+
+
+class _Room:
+    """Says of each time whether there is room for something that is wanted at a `rate` at most."""
+
+    def __init__(self, rate: float) -> None:
+        self._period, self._next = 1 / rate, -math.inf
+
+    def __call__(self, time: float) -> bool:
+        if time < self._next:
+            return False
+        self._next = max(self._next, time - _BURST * self._period) + self._period
+        return True
+
+
+class _Views:
+    """Estimates of one pipeline to messages."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        layout = pipeline.sensor.layout
+        self._patch, self._positions = layout.patch, layout.positions
+        self._displacement = pipeline.basis.at(layout.positions)
+        P, C, N = len(layout), pipeline.sensor.channels, pipeline.basis.shape
+        head: dict[str, str | int] = {"header.frame_id": m.FRAME}
+        self._pose = Layout(m.POSE, head)
+        self._curvature = Layout(m.CURVATURE, head | {"curvature": 3 * P, "suspect": P})
+        self._shape = Layout(m.COEFFICIENTS, head | {"coefficients": math.prod(N)})
+        self._functions = N
+        self._scanned = 0  # channels in the frame told last
+        self._counts = Layout(m.COUNTS, head | {"channels": 0, "counts": 0})
+        step = 4 * len(_COLUMNS)
+        cloud = head | {"fields": len(_COLUMNS), "data": P * step}
+        for n, name in enumerate(_COLUMNS):
+            cloud[f"fields.{n}.name"] = name
+            cloud[f"fields.{n}.offset"] = 4 * n
+            cloud[f"fields.{n}.datatype"] = _FLOAT32
+            cloud[f"fields.{n}.count"] = 1
+        self._cloud = Layout(m.POINT_CLOUD, cloud)
+        self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
+        fit = pipeline.fit
+        self.every = isinstance(fit, Remembering) and not fit.remembers
+        """Whether estimates depend on which others were made, and so all have to be told."""
+        bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
+        self.room = _Room(min(_HEAVY, _BYTES / bytes_each))
+
+    def heavy(self, frame: Frame, estimate: Estimate, stamp: int) -> list[tuple[m.Topic, bytes]]:
+        """What is as large as a frame."""
+        head = {
+            **_stamped(stamp),
+            "sequence": estimate.sequence,
+            "device_time": estimate.device_time,
+        }
+        curvature = estimate.curvature.reshape(-1)
+        C = len(frame.counts)
+        if self._scanned != C:
+            fixed = {"header.frame_id": m.FRAME, "channels": C, "counts": C}
+            self._scanned, self._counts = C, Layout(m.COUNTS, fixed)
+        counts = {**head, "channels": frame.channels, "counts": frame.counts} if C else head
+        readings = {"curvature": curvature, "noise": estimate.noise, "suspect": estimate.suspect}
+        shape = {"shape": self._functions, "coefficients": estimate.coefficients.ravel()}
+        found = [
+            (m.COUNT, self._counts(counts)),
+            (m.CURVATURES, self._curvature(head | readings)),
+            (m.SHAPES, self._shape(head | shape)),
+            (m.SKIN, self._cloud(_stamped(stamp) | self._points(estimate))),
+        ]
+        if estimate.touch.present:
+            found.append((m.POSES, self._pose(_stamped(stamp) | _pose(estimate))))
+        return found
+
+    def _points(self, estimate: Estimate) -> dict[str, object]:
+        """The skin where its elements are, with what they read."""
+        f = self._displacement @ estimate.coefficients.ravel()
+        rest, normal = self._patch.at_rest(self._positions)
+        columns = [*(rest - normal * f[:, None]).T, f, *estimate.curvature]
+        points = np.stack(columns, axis=1).astype("<f4")
+        return {**self._cloud_size, "data": points.reshape(-1).view(np.uint8)}
+
+
+def _contact(estimate: Estimate, stamp: int) -> bytes:
+    touch, here = estimate.touch, estimate.geometry
+    return m.pack_contact(
+        stamp,
+        estimate.sequence,
+        (estimate.device_time, estimate.host_time, estimate.taken, estimate.taken_sd),
+        (touch.present, touch.single, touch.near_rim, estimate.converged),
+        touch.spare,
+        (
+            estimate.noise,
+            *touch.position.tolist(),
+            *touch.position_sd.tolist(),
+            touch.force,
+            touch.force_sd,
+            touch.displacement,
+            touch.displacement_sd,
+            *here.position.tolist(),
+            *here.frame.ravel().tolist(),
+            *here.metric.ravel().tolist(),
+            *here.curvature_form.ravel().tolist(),
+            *here.torsion_form.tolist(),
+            *here.covariance.ravel().tolist(),
+        ),
+    )
+
+
+def _stamped(stamp: int) -> dict[str, int]:
+    return {"header.stamp.sec": stamp // 10**9, "header.stamp.nanosec": stamp % 10**9}
+
+
+def _pose(estimate: Estimate) -> dict[str, float]:
+    """The contact as a pose: its x along the skin's, its z along the outward normal."""
+    where, axes = estimate.geometry.position.tolist(), estimate.geometry.frame.T.tolist()
+    said = {f"pose.position.{name}": value for name, value in zip("xyz", where, strict=True)}
+    turn = _quaternion(axes)
+    return said | {f"pose.orientation.{n}": q for n, q in zip("xyzw", turn, strict=True)}
+
+
+def _quaternion(R: list[list[float]]) -> tuple[float, float, float, float]:
+    """The unit quaternion x, y, z, w of a rotation matrix, by its largest component."""
+    (a, b, c), (d, e, f), (g, h, i) = R
+    squares = (1 + a - e - i, 1 - a + e - i, 1 - a - e + i, 1 + a + e + i)
+    rows = (
+        (squares[0], b + d, c + g, h - f),
+        (b + d, squares[1], f + h, c - g),
+        (c + g, f + h, squares[2], d - b),
+        (h - f, c - g, d - b, squares[3]),
+    )
+    x, y, z, w = max(rows, key=lambda row: math.hypot(*row))
+    length = math.hypot(x, y, z, w)
+    return x / length, y / length, z / length, w / length

@@ -1,0 +1,300 @@
+"""A recording, played as if it were live: as fast as it was, faster, slower, or frame by frame."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import islice, pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Event, Frame
+from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import decode
+from kappaskin.recording.reading import Message, Recording
+from kappaskin.recording.recorded_frames import Reenactment
+from kappaskin.sensing import Sensor
+from kappaskin.sources import Accounting, Tape, register_scheme
+
+REPLAY = "replay:"
+FASTEST = 10.0
+"""How many times as fast as it was a recording is played at most."""
+
+_NAP = 0.02  # s
+_MOST = 512  # frames given at once
+_BACK = 0.25  # s that are looked through at first for frames to step back over
+_GAP = 0.5  # s without a message that is a gap
+_BRIEF = 0.1  # s of messages between two of them that leave it one
+_TOLD = 500  # gaps, and events, that are told of at most: each status brings them
+_LONGEST = 200  # characters of an event
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Where a recording is played: `at` s of `length` s, `speed` times as fast, 0 while it stands.
+
+    It begins anew at its end if it is `looped`. `gaps` are the times in s, from and to, in which
+    nothing came, `events` what happened and when, in s, the first of many. It was `begun` so many s
+    after 1970; one that is not `whole` was never ended, and is played up to where it breaks off.
+    """
+
+    at: float
+    length: float
+    speed: float
+    looped: bool
+    gaps: tuple[tuple[float, float], ...]
+    events: tuple[Event, ...]
+    begun: float
+    whole: bool
+
+
+class _Ready(NamedTuple):
+    """A frame, the device it is of, and the stamp and place of its message and itself in that."""
+
+    mark: tuple[int, int]
+    frame: Frame
+    sensor: Sensor | None
+
+
+class ReplayedSource:
+    """Yields the frames of the recording at `path` when they are due.
+
+    Opening raises a `Refusal` where it is none.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._clock, self._sleep = clock, sleep
+        self._recording = Recording(path)
+        try:
+            self._begin()
+        except Refusal:
+            self.close()
+            raise
+
+    def _begin(self) -> None:
+        recording = self._recording
+        if not recording.counts.get(m.LINES.name):
+            raise Refusal(
+                f"{recording.path}: expected bytes of a device, got a recording without any"
+            )
+        self._first = recording.first
+        self.length = (recording.last - recording.first) * 1e-9
+        self._gaps, self._happened = self._landmarks()
+        self._speed, self._looped = 1.0, False
+        self._sensor: Sensor | None = None
+        self._made: dict[str, Sensor] = {}
+        self._events: list[Event] = []
+        self._last: _Ready | None = None  # the frame given last
+        self._steps, self._moves = 0, False  # frames to give at once, and go on from there
+        self._back = 0  # frames before the last one given, from which these are
+        self._go_to(0.0)
+
+    def _landmarks(self) -> tuple[tuple[tuple[float, float], ...], tuple[Event, ...]]:
+        gaps: list[tuple[float, float]] = []
+        for a, b in pairwise(self._recording.chunks):
+            begin, end = self._place(a.last), self._place(b.first)
+            if end - begin > _GAP:
+                # An answer about the device's clock alone is no end of a gap.
+                brief = gaps and begin - gaps[-1][1] < _BRIEF
+                gaps.append((gaps.pop()[0] if brief else begin, end))
+        events: list[Event] = []
+        with suppress(Refusal):  # damage is told of where it is played
+            for message in islice(self._recording.messages_on(m.EVENTS), _TOLD):
+                events.append(self._event(message, self._place(message.stamp)))
+        return tuple(gaps[:_TOLD]), tuple(events)
+
+    def _event(self, message: Message, when: float) -> Event:
+        said = decode(m.LOG, message.data)
+        return Event(when, said["name"][:_LONGEST], said["msg"][:_LONGEST])
+
+    def _place(self, stamp: int) -> float:
+        """Where a stamp is, in s from the beginning."""
+        return (stamp - self._first) * 1e-9
+
+    # Where it is played.
+
+    @property
+    def replay(self) -> Replay:
+        where = min(max(self._at(), 0.0), self.length)
+        told = self._speed, self._looped, self._gaps, self._happened
+        return Replay(where, self.length, *told, self._first * 1e-9, self._recording.whole)
+
+    def _at(self) -> float:
+        return self._from + (self._clock() - self._since) * self._speed
+
+    def _go_to(self, at: float) -> None:
+        """Go on from `at` s."""
+        self._from, self._since = at, self._clock()
+        self._reenact = Reenactment(str(self._recording.path), self._made)
+        self._ready: deque[_Ready] = deque()
+        stamp = self._first + round(at * 1e9)
+        # From the chunk before, so that no message is begun in its middle.
+        chunks = self._recording.chunks
+        later = next((n for n, chunk in enumerate(chunks) if chunk.last >= stamp), len(chunks))
+        for topic in (m.DEVICE, m.CLOCKS):
+            if message := self._recording.last_before(topic, stamp):
+                self._reenact.begin_with(message)
+        self._messages: Iterator[Message] = self._recording.messages(max(later - 1, 0))
+        self._next: Message | None = next(self._messages, None)
+        while self._next is not None and self._next.stamp < stamp:
+            self._take(self._next)
+        self._ready.clear()
+
+    def seek(self, at: float | None, speed: float, looped: bool | None = None) -> None:
+        """Go on from `at` s, or from where it is, at a `speed` of at most `FASTEST`; 0 stands.
+
+        Standing, it gives the one frame that is next.
+        """
+        now = self._at() if at is None else at
+        self._speed = min(max(speed, 0.0), FASTEST)
+        self._looped = self._looped if looped is None else looped
+        self._steps, self._moves = 0, False
+        if at is None:
+            self._from, self._since = min(now, self.length), self._clock()
+        else:
+            self._go_to(min(max(at, 0.0), self.length))
+            self._steps = 0 if self._speed else 1
+
+    def step(self, frames: int) -> None:
+        """Stand still, so many `frames` further on, or if negative back.
+
+        Those that were asked for the same way before, and were not given yet, are added.
+        """
+        ahead, back = (self._steps, self._back) if self._moves and self._steps else (0, 0)
+        self.seek(None, 0.0)
+        if self._ready and self._ready[0] is self._last:  # asked for again, and not given yet
+            self._ready.popleft()
+        self._back = back - frames if frames < 0 else 0
+        if self._back:
+            self._go_back(self._back)
+        self._steps, self._moves = 1 if self._back else ahead + max(frames, 1), True
+
+    @property
+    def stands(self) -> bool:
+        """Whether no frame follows by itself."""
+        return not self._speed or self._next is None
+
+    def again(self) -> None:
+        """Give the frame that is shown once more, where none follows it by itself."""
+        if self._last is not None and not self._steps and self.stands:
+            self._ready.appendleft(self._last)
+            self._steps, self._moves = 1, False
+
+    def _go_back(self, frames: int) -> None:
+        """Stand before the frame that was given so many before the last one."""
+        here, back = self._last.mark if self._last else (self._first, 0), _BACK
+        marks, start = deque[tuple[int, int]](), 1.0
+        while len(marks) < frames and start > 0:
+            start, back = max(self._place(here[0]) - back, 0.0), 4 * back
+            self._go_to(start)
+            marks = deque((ready.mark for ready in self._until(here)), frames)
+        if marks:
+            self._go_to(self._place(marks[0][0]))
+            deque(self._until(marks[0]), 0)
+        self._events.clear()
+
+    def _until(self, mark: tuple[int, int]) -> Iterator[_Ready]:
+        """The frames before one, which is then the next."""
+        while self._fill() and self._ready[0].mark < mark:
+            yield self._ready.popleft()
+
+    # What comes.
+
+    def _take(self, message: Message) -> None:
+        """Let one message be the last that came."""
+        for n, frame in enumerate(self._reenact(message)):
+            self._ready.append(_Ready((message.stamp, n), frame, self._reenact.sensor))
+        self._next = next(self._messages, None)
+
+    def _fill(self, until: float = float("inf")) -> bool:
+        """Make a frame ready that is due at `until` s; whether there is one."""
+        while not self._ready and self._next is not None:
+            if self._place(self._next.stamp) > until:
+                break
+            self._tell(self._next)
+            self._take(self._next)
+        return bool(self._ready) and self._place(self._ready[0].mark[0]) <= until
+
+    def _tell(self, message: Message) -> None:
+        if message.topic == m.EVENTS.name:
+            self._events.append(self._event(message, self._clock()))
+
+    def read(self, timeout: float) -> list[Frame]:
+        """The frames that are due, after at most `timeout` s."""
+        frames = self._due()
+        if not frames and self._over():
+            self._go_to(0.0)
+        elif not frames:
+            self._sleep(min(timeout, self._pause()))
+            frames = self._due()
+        return frames
+
+    def _pause(self) -> float:
+        """s until the next message is due."""
+        if self._next is None or not self._speed:
+            return _NAP
+        return max(self._place(self._next.stamp) - self._at(), 0.0) / self._speed
+
+    def _over(self) -> bool:
+        return self._looped and self._speed > 0 and self._at() >= self.length
+
+    def _due(self) -> list[Frame]:
+        until = float("inf") if self._steps else self._at()
+        most = self._steps or (_MOST if self._speed else 0)
+        frames: list[Frame] = []
+        while len(frames) < most and self._fill(until):
+            if frames and self._ready[0].sensor is not self._sensor:
+                break
+            frames.append(self._give(self._ready.popleft()))
+        if self._steps and self._last is not None:
+            over = self._next is None and not self._ready
+            self._steps = 0 if over else self._steps - len(frames)
+            if self._moves:
+                self._from, self._since = self._place(self._last.mark[0]), self._clock()
+        return frames
+
+    def _give(self, ready: _Ready) -> Frame:
+        """The frame, as if it had come when it was due."""
+        self._sensor, frame = ready.sensor, ready.frame
+        self._last = ready
+        came = self._clock()
+        if self._speed:
+            came = self._since + (self._place(ready.mark[0]) - self._from) / self._speed
+        return replace(frame, host_time=came, taken=came - (frame.host_time - frame.taken))
+
+    @property
+    def sensor(self) -> Sensor | None:
+        return self._sensor or self._reenact.sensor
+
+    @property
+    def trouble(self) -> str:
+        return self._reenact.trouble
+
+    @property
+    def temperature(self) -> float:
+        """Not recorded by itself."""
+        return float("nan")
+
+    def events(self) -> list[Event]:
+        """What happened, as it is played."""
+        told, self._events = self._events, []
+        return told
+
+    def record(self, tape: Tape | None) -> None:
+        """Not recorded again: it is a recording."""
+
+    def accounting(self) -> Accounting:
+        return self._reenact.accounting()
+
+    def close(self) -> None:
+        self._recording.close()
+
+
+register_scheme(REPLAY, lambda name: ReplayedSource(Path(name)))

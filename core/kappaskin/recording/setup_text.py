@@ -1,0 +1,90 @@
+"""A setup as text that names the files of its calibration and tare, and back."""
+
+import json
+from collections.abc import Callable
+from dataclasses import fields
+from itertools import islice
+from pathlib import Path
+from typing import Any, cast
+
+from kappaskin.calibration import calibration_in, tare_in, tare_text, to_toml
+from kappaskin.errors import Refusal
+from kappaskin.estimation import METHODS
+from kappaskin.pipeline import Setup
+from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import decode
+from kappaskin.recording.reading import Recording
+
+_WHOLE, _REAL, _TEXT = ("Ni", "Nj", "nx", "ny"), ("hold", "rim_sd"), ("edge", "method")
+_MOST = 4096  # functions or points along one side
+_LONGEST = 2**16
+_SETUPS = 500  # of a recording, the first of more
+
+
+def said_of_setup(setup: Setup) -> tuple[str, dict[str, bytes]]:
+    """The text, and by name the files that it names."""
+    said: dict[str, Any] = {name: getattr(setup, name) for name in (*_WHOLE, *_REAL, *_TEXT)}
+    files: dict[str, bytes] = {}
+    if setup.calibration is not None:
+        said["calibration"] = f"calibration-{setup.calibration.digest[:16]}.toml"
+        files[said["calibration"]] = to_toml(setup.calibration).encode()
+    if setup.tare is not None:
+        said["tare"] = f"tare-{setup.tare.digest[:16]}.toml"
+        files[said["tare"]] = tare_text(setup.tare).encode()
+    return json.dumps(said), files
+
+
+def setup_from(text: str, file: Callable[[str], bytes]) -> Setup:
+    """The setup that `text` tells of, `file` giving what a name stands for.
+
+    A `Refusal` when it is none.
+    """
+    try:
+        if len(text) > _LONGEST:
+            raise ValueError(f"it is {len(text)} characters long")
+        said: Any = json.loads(text)
+        if not isinstance(said, dict):
+            raise TypeError("it has no keys")
+        said = cast("dict[str, Any]", said)
+        if unknown := set(said) - {field.name for field in fields(Setup)}:
+            raise ValueError(f"it has unknown keys {sorted(unknown)}")
+        values = _checked(said)
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise Refusal(f"expected a setup as it was recorded: {error!s:.120}") from error
+    if name := said.get("calibration"):
+        values["calibration"] = calibration_in(file(str(name)), Path(str(name)))
+    if name := said.get("tare"):
+        values["tare"] = tare_in(file(str(name)), str(name))
+    return Setup(**values)
+
+
+def setups_of(recording: Recording) -> list[tuple[float, Setup]]:
+    """The setups in a recording, each with the time in s from its beginning on which it was used.
+
+    A `Refusal` where one is none.
+    """
+    told = recording.messages_on(m.SETUP)
+    return [
+        (
+            (message.stamp - recording.first) * 1e-9,
+            setup_from(decode(m.STRING, message.data)["data"], recording.attachment),
+        )
+        for message in islice(told, _SETUPS)
+    ]
+
+
+def _checked(said: dict[str, Any]) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for name in _WHOLE:
+        values[name] = said[name]
+        if type(said[name]) is not int or not 0 < said[name] <= _MOST:
+            raise ValueError(f"{name} is {said[name]!r:.40}")
+    for name in _REAL:
+        values[name] = float(said[name])
+    for name in _TEXT:
+        values[name] = said[name]
+        if not isinstance(said[name], str):
+            raise TypeError(f"{name} is {said[name]!r:.40}")
+    if values["method"] not in METHODS:
+        raise ValueError(f"method is {values['method']!r:.40}, expected one of {list(METHODS)}")
+    return values

@@ -1,0 +1,86 @@
+"""Elements that fail: dead, stuck or intermittent, as a scene's author decides."""
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.errors import Refusal
+from kappaskin.scenes.effects.effect import Effect, LayoutEffect, ReadingEffect, Running, Size
+from kappaskin.scenes.effects.parameters import Within
+from kappaskin.scenes.effects.survey import Survey
+from kappaskin.sensing import SensorLayout
+
+
+@dataclass(frozen=True)
+class _Failing(Effect):
+    """Some `elements`, each with its three channels, fail."""
+
+    authored: ClassVar = True
+    formula: ClassVar = "share of the elements that fail"
+
+    elements: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        each = self.elements
+        whole = type(each) is tuple and all(type(p) is int and p >= 0 for p in each)
+        if not (whole and len(set(each)) == len(each)):
+            raise Refusal(
+                f"expected {self.name} with a tuple of different elements, counted from 0, got "
+                f"{each!r:.80}"
+            )
+
+    def size(self, survey: Survey) -> Size:
+        return Size(len(self.elements) / len(survey.layout), 0.0)
+
+    def channels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
+        """The channels (3, E) of the failing elements on a skin whose curvature is of `shape`."""
+        P = int(np.prod(shape)) // 3
+        if absent := [p for p in self.elements if p >= P]:
+            raise Refusal(f"expected {self.name} with elements from 0 to {P - 1}, got {absent}")
+        return np.add.outer(P * np.arange(3), np.array(self.elements, np.intp))
+
+
+@dataclass(frozen=True)
+class DeadElements(_Failing, LayoutEffect):
+    """The `elements` never read anything: the layout says so, and the device with it."""
+
+    name: ClassVar = "dead"
+
+    def of(self, layout: SensorLayout) -> SensorLayout:
+        return layout.without(self.elements)
+
+
+@dataclass(frozen=True)
+class StuckElements(_Failing, ReadingEffect):
+    """The `elements` read what they read at the first frame from `since` in s on, ever after."""
+
+    name: ClassVar = "stuck"
+
+    since: Annotated[float, Within(0, 1e9, "s")] = 0.0
+
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
+        from kappaskin.scenes.effects.at_work.failures import stuck
+
+        return stuck(self.channels(shape), self.since)
+
+
+@dataclass(frozen=True)
+class IntermittentElements(_Failing, ReadingEffect):
+    """The `elements` drop to the reading of rest, 0, and come back, each for itself.
+
+    On average they are there for `on` s and away for `off` s at a time (a Markov chain with two
+    states). At first each is there with the probability on / (on + off) that it has ever after.
+    """
+
+    name: ClassVar = "intermittent"
+
+    on: Annotated[float, Within(1e-6, 1e9, "s")] = 1.0
+    off: Annotated[float, Within(1e-6, 1e9, "s")] = 0.1
+
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
+        from kappaskin.scenes.effects.at_work.failures import intermittent
+
+        return intermittent(self.channels(shape), self.on, self.off, rng)

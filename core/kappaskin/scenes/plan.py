@@ -1,0 +1,144 @@
+"""A scene to the effects that it calls for at the accuracy asked for, and why."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from kappaskin.scenes.choice import Choice
+from kappaskin.scenes.effects import EFFECTS
+from kappaskin.scenes.effects.converter import Quantisation, Saturation
+from kappaskin.scenes.effects.effect import NOTHING, Effect, Size
+from kappaskin.scenes.effects.failures import DeadElements
+from kappaskin.scenes.effects.finite_slope import FiniteSlope
+from kappaskin.scenes.effects.gage_length import GageLength
+from kappaskin.scenes.effects.skew import Skew
+from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
+from kappaskin.scenes.scene import Scene
+from kappaskin.scenes.survey import survey
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One effect in a plan: how large it is, whether it is `kept`, and why."""
+
+    name: str
+    size: Size
+    kept: bool
+    why: str
+    effect: Effect | None = field(default=None, repr=False)
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "effect": self.name,
+            "size": self.size.number,
+            "formula": (self.effect or EFFECTS[self.name]).formula,
+            "error": self.size.error,
+            "kept": self.kept,
+            "why": self.why,
+        }
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is simulated of a scene: an entry for every effect that is known.
+
+    Those `kept` are in the order in which they come about.
+    """
+
+    entries: tuple[Entry, ...]
+    kept: tuple[Effect, ...]
+
+    @property
+    def left_out(self) -> float:
+        """By how much all that was left out changes a reading, as a share of the peak."""
+        return sum(entry.size.error for entry in self.entries if not entry.kept)
+
+    def __iter__(self) -> Iterator[Entry]:
+        return iter(self.entries)
+
+
+def effects_of(scene: Scene) -> dict[str, Effect]:
+    """Everything that there is of `scene` to spoil its readings, by name, as it comes about."""
+    plate, layout = scene.plate, scene.layout
+    there: list[Effect] = []
+    if plate.tension and plate.rigidity:  # a drum head is no skin without its tension
+        there.append(Tension(plate.tension))
+    if plate.foundation:
+        there.append(Foam(plate.foundation))
+    if plate.fluid:
+        there.append(Fluid())
+    if layout.gage_length:
+        there.append(GageLength(layout.gage_length))
+    if dead := tuple(np.flatnonzero(~layout.live.any(axis=0)).tolist()):
+        there.append(DeadElements(dead))
+    if not plate.patch.base_curvature and scene.laid is None:
+        there.append(FiniteSlope())
+    if scene.moves:
+        there.append(Skew())
+    there += [*scene.effects, Saturation(scene.transduction), Quantisation(scene.transduction)]
+    return {effect.name: effect for effect in there}
+
+
+def plan(scene: Scene) -> Plan:
+    """What to simulate of `scene`, by its `choice`, with the size of every effect in it."""
+    there, seen = effects_of(scene), survey(scene)
+    sizes = {name: effect.size(seen) for name, effect in there.items()}
+    reasons = _reasons(scene.choice, there, sizes)
+    return Plan(
+        tuple(
+            Entry(name, sizes[name], *reasons[name], there[name])
+            if name in there
+            else Entry(name, NOTHING, False, "not in this scene")
+            for name in dict.fromkeys((*EFFECTS, *there))
+        ),
+        tuple(effect for name, effect in there.items() if reasons[name][0]),
+    )
+
+
+def _reasons(
+    choice: Choice, there: dict[str, Effect], sizes: dict[str, Size]
+) -> dict[str, tuple[bool, str]]:
+    """Whether each effect that is `there` is kept, and why."""
+    found, spent = dict[str, tuple[bool, str]](), 0.0
+    for name in sorted(there, key=lambda name: sizes[name].error):
+        error = sizes[name].error
+        if there[name].authored:
+            found[name] = True, "a failure that the scene asks for"
+        elif name in choice.on | choice.off:
+            found[name] = name in choice.on, "as the scene says"
+        elif not choice.auto:
+            found[name] = True, "the scene asks for all there are"
+        elif spent + error <= choice.accuracy:
+            spent += error
+            found[name] = (
+                False,
+                f"at most {_percent(error)} of the peak, {_percent(spent)} with smaller ones",
+            )
+        else:
+            left = choice.accuracy - spent
+            found[name] = (
+                True,
+                f"up to {_percent(error)} of the peak, where {_percent(left)} may be left out",
+            )
+    return found
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def kept_of(scene: Scene) -> tuple[Effect, ...]:
+    """The effects that `plan` keeps; without a look at the scene where its choice needs none."""
+    if scene.choice.auto:
+        return plan(scene).kept
+    there, off = effects_of(scene), scene.choice.off
+    return tuple(effect for name, effect in there.items() if effect.authored or name not in off)
+
+
+def planned(scene: Scene) -> Scene:
+    """The scene with the effects that its plan keeps chosen by name: nothing is left to plan."""
+    kept = {effect.name for effect in kept_of(scene)}
+    accuracy = scene.choice.accuracy
+    return replace(scene, choice=Choice(accuracy=accuracy, off=frozenset(EFFECTS) - kept))

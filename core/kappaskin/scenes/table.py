@@ -1,0 +1,177 @@
+"""A table of a TOML file to values of the kinds asked for; what nobody asks for is refused."""
+
+import difflib
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import MISSING, fields
+from types import UnionType
+from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
+
+from kappaskin.errors import Refusal
+from kappaskin.scenes.effects.parameters import Within
+from kappaskin.scenes.lines import Lines, Place
+
+_Made = TypeVar("_Made")
+_REQUIRED = object()
+
+_KINDS: dict[Any, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "a text",
+}
+
+
+class _Placed(Refusal):
+    """A refusal that says already where in the file it stands."""
+
+
+class Table:
+    """What a file says at one `place`; it is refused where it says what nobody asks for."""
+
+    def __init__(self, said: dict[str, Any], lines: Lines, name: str, place: Place = ()) -> None:
+        self._said, self._lines, self._name, self.place = said, lines, name, place
+        self._asked: set[str] = set()
+
+    def refusal(self, why: str, key: str = "") -> Refusal:
+        """The refusal of what stands at `key`, with its line."""
+        place = (*self.place, key) if key else self.place
+        return _Placed(f"{self._name}, line {self._lines.of(place)}: {_dotted(place)}{why}")
+
+    @contextmanager
+    def blamed(self, key: str = "") -> Generator[None]:
+        """Say of what is refused meanwhile where it stands in the file."""
+        try:
+            yield
+        except _Placed:
+            raise
+        except Refusal as refusal:
+            raise self.refusal(str(refusal), key) from refusal
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._said
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._said)
+
+    def is_table(self, key: str) -> bool:
+        """Whether there is a table at `key`."""
+        return isinstance(self._said[key], dict)
+
+    def listed(self, key: str) -> list[Any]:
+        """The list at `key`, of values of any kind."""
+        self._asked.add(key)
+        if not isinstance(said := self._said[key], list):
+            raise self.refusal(f"expected a list, got {said!r:.60}", key)
+        return cast("list[Any]", said)
+
+    def get(
+        self, key: str, kind: Any, default: Any = _REQUIRED, within: Within | None = None
+    ) -> Any:
+        """The value at `key`, of `kind`: float, int, bool, str, or a tuple of them.
+
+        Its numbers must be `within` a range, if one is given.
+        """
+        self._asked.add(key)
+        if key in self._said:
+            value: Any = self._as(self._said[key], kind, key)
+            if within is not None and not _all_within(value, within):
+                raise self.refusal(f"expected {within}, got {self._said[key]!r:.60}", key)
+            return value
+        if default is _REQUIRED:
+            raise self.refusal(f"expected {key} = {_expected(kind)}, got none")
+        return default
+
+    def _as(self, value: Any, kind: Any, key: str) -> Any:
+        if isinstance(kind, UnionType):
+            listed = isinstance(value, list)
+            kind = next(k for k in get_args(kind) if listed == (get_origin(k) is tuple))
+        if get_origin(kind) is tuple and isinstance(value, list):
+            kinds, values = get_args(kind), cast("list[Any]", value)
+            each = kinds[:1] * len(values) if kinds[1:] == (...,) else kinds
+            if len(each) == len(values):
+                return tuple(self._as(v, k, key) for v, k in zip(values, each, strict=True))
+        elif kind is float and isinstance(value, int | float) and not isinstance(value, bool):
+            with suppress(OverflowError):  # of a whole number of hundreds of digits
+                return float(value)
+        elif type(value) is kind:
+            return value
+        raise self.refusal(f"expected {_expected(kind)}, got {value!r:.60}", key)
+
+    def table(self, key: str) -> "Table":
+        """The table at `key`; an empty one when there is none."""
+        self._asked.add(key)
+        said = self._said.get(key, {})
+        if not isinstance(said, dict):
+            raise self.refusal(f"expected a table [{key}], got {said!r:.60}", key)
+        return Table(cast("dict[str, Any]", said), self._lines, self._name, (*self.place, key))
+
+    def tables(self, key: str) -> "list[Table]":
+        """The tables of the array [[key]]."""
+        self._asked.add(key)
+        said = self._said.get(key, [])
+        many = cast("list[Any]", said) if isinstance(said, list) else [said]
+        if not all(isinstance(one, dict) for one in many):
+            raise self.refusal(f"expected an array of tables [[{key}]], got {said!r:.60}", key)
+        return [
+            Table(cast("dict[str, Any]", one), self._lines, self._name, (*self.place, key, n))
+            for n, one in enumerate(many)
+        ]
+
+    def make(self, kind: Callable[..., _Made], **given: Any) -> _Made:
+        """An instance of the dataclass `kind`, its fields as the table says, or as `given`."""
+        hints, values = get_type_hints(kind), dict(given)
+        for field in fields(cast("Any", kind)):
+            if field.init and field.name not in given:
+                required = field.default is MISSING and field.default_factory is MISSING
+                if required or field.name in self:
+                    values[field.name] = self.get(field.name, hints[field.name])
+                self._asked.add(field.name)
+        with self.blamed():
+            return kind(**values)
+
+    def choose(self, key: str, among: dict[str, _Made], default: Any = _REQUIRED) -> _Made:
+        """What the name at `key` stands for."""
+        return self.stands_for(self.get(key, str, default), key, among)
+
+    def stands_for(self, name: str, key: str, among: dict[str, _Made]) -> _Made:
+        """What a `name` that was said at `key` stands for."""
+        if name not in among:
+            near = "".join(f"; did you mean {one!r}?" for one in _nearest(name, list(among)))
+            raise self.refusal(f"expected one of {', '.join(among)}, got {name!r}{near}", key)
+        return among[name]
+
+    def done(self, *others: str) -> None:
+        """Refuse a key that nobody asked for; it may be meant as one of those or of `others`."""
+        for key in self._said:
+            if key not in self._asked:
+                near = "".join(
+                    f"; did you mean {one}?" for one in _nearest(key, [*self._asked, *others])
+                )
+                known = near or f"; known are {', '.join(sorted(self._asked))}"
+                raise self.refusal(f"expected no such key{known}", key)
+
+
+def _all_within(value: Any, within: Within) -> bool:
+    each = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else (value,)
+    return all(one in within for one in each)
+
+
+def _nearest(name: str, known: list[str]) -> list[str]:
+    return difflib.get_close_matches(name, known, 1)
+
+
+def _dotted(place: Place) -> str:
+    """The way to a value as a person writes it, tables counted from one."""
+    said = ""
+    for part in place:
+        said += f"[{part + 1}]" if isinstance(part, int) else f".{part}"
+    return f"{said[1:]}: " if said else ""
+
+
+def _expected(kind: Any) -> str:
+    if get_origin(kind) is not tuple:
+        return _KINDS.get(kind, str(kind))
+    kinds = get_args(kind)
+    what = _KINDS.get(kinds[0], "value").removeprefix("a ")
+    return f"a list of {what}s" if kinds[1:] == (...,) else f"a list of {len(kinds)} {what}s"

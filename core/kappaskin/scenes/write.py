@@ -1,0 +1,206 @@
+"""A scene to the text of its file, which `read_scene` reads as the same scene."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kappaskin._toml import table
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.scenes.cylinders import RADII, Presentation, schedule
+from kappaskin.scenes.effects import EFFECTS
+from kappaskin.scenes.effects.effect import Effect
+from kappaskin.scenes.effects.parameters import parameters
+from kappaskin.scenes.effects.strain_limit import StrainLimit
+from kappaskin.scenes.plan import effects_of
+from kappaskin.scenes.read import ELECTRONICS, ELSEWHERE, FORMAT, LOOPS, read_scene
+from kappaskin.scenes.said import said_of
+from kappaskin.scenes.scene import Scene
+from kappaskin.scenes.write_stimulus import TOUCH_UNITS, touch_of
+from kappaskin.sensing import SensorLayout, Transduction
+from kappaskin.skin import Disk, Patch, Polygon
+
+_METRES = ("size", "rim_radius", "outline", "radius", "positions", "gage_length", "radii")
+_UNITS = {
+    **dict.fromkeys((*_METRES, "substrate_thickness", "gage_thickness"), "m"),
+    **{"rigidity": "N m", "tension": "N/m", "foundation": "N/m^3"},
+    **{"axial_stiffness": "N/m", "rim_stiffness": "N/m^2"},
+    **dict.fromkeys(("excitation", "balance_voltage", "rail", "full_scale", "offset"), "V"),
+    **dict.fromkeys(("gage_resistance", "dummy_resistance", "supply_resistance"), "ohm"),
+    **dict.fromkeys(("settling_time", "conversion_time", "hold"), "s"),
+    **{"dwell": "s on each", "rate": "frames/s"},
+}
+_EFFECT_UNITS = {"time_constant": "s", "thresholds": "1/m"}
+_MOST_CELLS = 2**20  # of a grid that is looked for
+
+
+def write_scene(scene: Scene) -> str:
+    """The text of a file of `scene`, whose name is the file's.
+
+    `on` of effects that there is nothing of asks for nothing, and is left out. What no file can
+    say is refused: objects and motions that came from files of their own, or 20 m of skin.
+    """
+    scene.sensor()  # as for a reader, a rate that cannot be kept is refused
+    tables = [
+        table("", _top(scene), _UNITS),
+        table("[skin]", _skin(scene), _UNITS),
+        table("[elements]", _elements(scene.layout), _UNITS),
+        *_electronics(scene.transduction),
+    ]
+    if scene.laid is not None:
+        tables.append(table("[cylinders]", _cylinders(scene.laid, scene.plate.patch), _UNITS))
+    tables += _effects(scene)
+    tables += [table("[[touch]]", touch_of(each), TOUCH_UNITS) for each in scene.stimuli]
+    text = "\n".join(tables)
+    read_scene(text, Path(f"{scene.name}.toml"))  # it refuses what is beyond the limits of a file
+    return text
+
+
+def _top(scene: Scene) -> dict[str, Any]:
+    usual = {
+        "title": scene.name,
+        "text": "",
+        "rate": 500.0,
+        "seed": 0,
+        "reference": [15, 1 if scene.plate.patch.strip else 15],
+        "accuracy": 0.01,
+    }
+    said = {
+        "title": scene.title or scene.name,
+        "text": scene.text,
+        "rate": float(scene.rate),
+        "seed": int(scene.seed),
+        "reference": [int(count) for count in scene.reference],
+        "accuracy": float(scene.choice.accuracy),
+    }
+    return {"format": FORMAT} | {key: said[key] for key in said if said[key] != usual[key]}
+
+
+def _skin(scene: Scene) -> dict[str, Any]:
+    held = {} if scene.edge == "hinged" else {"edge": scene.edge}
+    return {**_patch(scene.plate.patch), **said_of(scene.plate, without=("patch",)), **held}
+
+
+def _patch(patch: Patch) -> dict[str, Any]:
+    match patch:
+        case Disk():
+            return {"shape": "disk", "rim_radius": float(patch.rim_radius)}
+        case Polygon():
+            return {"shape": "polygon", "outline": [list(corner) for corner in patch.vertices]}
+        case _:
+            shape = {"shape": "strip"} if patch.strip else {}
+            size = {"size": [float(patch.a), float(patch.b)]}
+            return {**shape, **size, **said_of(patch, without=("a", "b", "strip"))}
+
+
+def _elements(layout: SensorLayout) -> dict[str, Any]:
+    grid = _grid(layout)
+    made = SensorLayout.scattered(layout.patch, layout.positions) if grid is None else grid[1]
+    dead = np.flatnonzero(~layout.live.any(axis=0)).tolist()
+    if made.shape != layout.shape or (made.without(dead).live != layout.live).any():
+        raise Refusal(
+            "expected elements of which a scene file can tell, got a grid that is not regular, or "
+            "elements of which some channels are dead; those that are dead are so as a whole"
+        )
+    placed = {"positions": layout.positions.tolist()} if grid is None else {"grid": list(grid[0])}
+    gages = said_of(layout, without=("patch", "positions", "live", "shape"))
+    return {**placed, **({"dead": dead} if dead else {}), **gages}
+
+
+def _grid(layout: SensorLayout) -> tuple[tuple[int, int], SensorLayout] | None:
+    """The numbers of a regular grid and its elements, if the layout's are those."""
+    patch, places = layout.patch, layout.positions
+    m, n = layout.shape or (_cells(places[:, 0], patch.a), _cells(places[:, 1], patch.b))
+    if m * n > _MOST_CELLS:
+        return None
+    with suppress(Refusal):  # of cells whose centres are all off a polygon
+        made = SensorLayout.regular(patch, m, n)
+        if made.shape == layout.shape and np.array_equal(made.positions, places):
+            return (m, n), made
+    return None
+
+
+def _cells(places: Array, side: float) -> int:
+    """How many cells of a `side` have centres as near one another as `places` (P,) are."""
+    return round(side / float(np.diff(np.unique(places)).min(initial=side)))
+
+
+def _electronics(electronics: Transduction) -> list[str]:
+    """The tables of what differs from the chain that the electronics are most like."""
+    each = {name: _changes(electronics, chain) for name, chain in ELECTRONICS.items()}
+    like = min(each, key=lambda name: sum(map(len, each[name].values())))
+    told = [] if like == "modern" else [table("[electronics]", {"like": like})]
+    parts = {name: said for name, said in each[like].items() if said}
+    return told + [table(f"[electronics.{name}]", parts[name], _UNITS) for name in parts]
+
+
+def _changes(electronics: Transduction, chain: Transduction) -> dict[str, dict[str, Any]]:
+    """What each part says where it differs from that of `chain`."""
+    names = [field.name for field in fields(chain)]
+    return {name: said_of(getattr(electronics, name), getattr(chain, name)) for name in names}
+
+
+def _cylinders(laid: Presentation, patch: Patch) -> dict[str, Any]:
+    radii = tuple(sorted({s.radius for s in laid.steps if not s.flat}, reverse=True))
+    hold = max(step.hold for step in laid.steps)
+    usual = ()
+    with suppress(Refusal):  # of radii that no schedule has
+        usual = schedule(radii, hold, patch.strip)
+    if laid.steps != usual:
+        raise Refusal(
+            "expected cylinders in the order of a schedule, which is what a scene file can tell, "
+            f"got {len(laid.steps)} other steps; take those of kappaskin.schedule"
+        )
+    said = {"radii": list(radii)} if radii != RADII else {}
+    return {**({"hold": float(hold)} if hold else {}), **said, "dwell": float(laid.dwell)}
+
+
+def _effects(scene: Scene) -> list[str]:
+    names = [effect.name for effect in scene.effects]
+    if names != (ordered := [name for name in EFFECTS if name in names]):
+        raise Refusal(
+            "expected known effects in the order in which they come about, which is that of a "
+            f"scene file, {', '.join(ordered)}; got {', '.join(names)}"
+        )
+    choice = _choice(scene)
+    told = [table("[effects]", choice)] if choice else []
+    return told + [
+        table(f"[effects.{effect.name}]", _effect(effect, scene), _units(effect))
+        for effect in scene.effects
+    ]
+
+
+def _units(effect: Effect) -> Mapping[str, str]:
+    return _EFFECT_UNITS | {key: within.unit for key, within in parameters(type(effect)).items()}
+
+
+def _effect(effect: Effect, scene: Scene) -> dict[str, Any]:
+    if type(effect) is not EFFECTS[effect.name] or effect.name in ELSEWHERE:
+        why = ELSEWHERE.get(effect.name, "it is none of those known")
+        raise Refusal(f"expected no {effect!r:.80} among the effects of a scene file: {why}")
+    for name, loops in LOOPS.items():
+        if effect == loops:
+            return {"like": name}
+    if isinstance(effect, StrainLimit) and effect.transduction != scene.transduction:
+        raise Refusal("expected a strain limit of the scene's own electronics, got another's")
+    return said_of(effect, without=("transduction",))
+
+
+def _choice(scene: Scene) -> dict[str, Any]:
+    """What the file says in `choose`, `on` and `off`."""
+    choice, off = scene.choice, scene.choice.off
+    on = choice.on & effects_of(scene).keys()
+    named: dict[str, Any] = {}
+    if not choice.auto and choice.on | off == EFFECTS.keys():
+        return {"choose": [name for name in EFFECTS if name in on]}
+    if not choice.auto:
+        linear = "finite-slope" in off
+        off = off - {"finite-slope"}
+        named = {"choose": "linear" if linear else "all"}
+    forced = {"on": on, "off": off}
+    lists = {key: [name for name in EFFECTS if name in forced[key]] for key in forced}
+    return named | {key: names for key, names in lists.items() if names}

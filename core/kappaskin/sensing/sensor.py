@@ -1,0 +1,86 @@
+"""What a device says it is: its skin, its elements and its electronics."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Frame, Mask
+from kappaskin.mechanics import Plate
+from kappaskin.sensing.layout import SensorLayout
+from kappaskin.sensing.scan import Scan
+from kappaskin.sensing.transduction import Transduction
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A sensor, real or simulated: a skin held as `edge` says, its elements, its electronics.
+
+    `rate` in frames/s. What channel c of its wire reads is number `channel_map[c]` of the (3, P)
+    array, a permutation (3 P,); without one each is its own.
+    """
+
+    layout: SensorLayout
+    transduction: Transduction
+    plate: Plate
+    edge: str
+    rate: float
+    name: str
+    serial_number: str
+    firmware: str
+    simulated: bool
+    channel_map: NDArray[np.intp] | None = None
+
+    def __post_init__(self) -> None:
+        if self.plate.patch != self.layout.patch:
+            raise Refusal(
+                f"the elements are on {self.layout.patch}, the plate on {self.plate.patch}; use one"
+            )
+        wired = self.channel_map
+        if wired is not None and not np.array_equal(np.sort(wired), np.arange(self.channels)):
+            raise Refusal(
+                f"expected a channel map that names each number from 0 to {self.channels - 1} "
+                f"once, got {len(wired)} numbers that do not"
+            )
+        scan_time = self.transduction.scan_time(self.channels)
+        if not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):
+            raise Refusal(
+                f"{self.channels} channels at {self.transduction.channel_time * 1e6:g} us take "
+                f"{scan_time * 1e3:.3g} ms: expected a rate of at most {1 / scan_time:.1f} "
+                f"frames/s, got {self.rate:g}; lower the rate or the conversion time"
+            )
+
+    @property
+    def channels(self) -> int:
+        return 3 * len(self.layout)
+
+    def scan(self, channels: ArrayLike | None = None) -> Scan:
+        """The scan of `channels` (C,) in their order; of all of them when left out."""
+        every = np.arange(self.channels)
+        chosen = every if channels is None else np.asarray(channels)
+        if chosen.size and not (chosen.dtype.kind in "iu" and chosen.max() < self.channels):
+            raise Refusal(
+                f"expected channels from 0 to {self.channels - 1}, got {channels!s:.80}; channel "
+                "component * P + element is one reading"
+            )
+        electronics = self.transduction
+        return Scan(
+            chosen.astype(np.intp),
+            electronics.multiplexer.settling_time,
+            electronics.converter.conversion_time,
+        )
+
+    @cached_property
+    def _dead(self) -> Mask | None:
+        return None if self.layout.live.all() else ~self.layout.live.ravel()
+
+    def nominal(self, frame: Frame) -> Array:
+        """Curvature (3 P,) in 1/m as Eq. 8 reads it; NaN where dead, unscanned or on a rail."""
+        flat = np.empty(self.channels)
+        flat.fill(np.nan)
+        flat[frame.channels] = self.transduction.curvature(frame.counts)
+        if self._dead is not None:
+            flat[self._dead] = np.nan
+        return flat

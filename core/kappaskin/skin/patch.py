@@ -1,0 +1,219 @@
+"""The skin's own coordinates: x in [0, a], y in [0, b], and the outline that it fills of them."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Mask
+from kappaskin.skin.outline import Outline, checked
+
+_MARGIN = 1e-3  # of a side: how near its rim a point may be and still move with the skin
+_CORNER = 0.02  # of an edge: how near to its ends no place is looked for along it
+_CELLS = 64  # along each side of a raster that tells quickly whether a point is far inside
+_ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this far outside
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A rectangular skin of `a` by `b` metres, held along its edges.
+
+    At rest it is bent along x to `radius` in m, infinite when flat: an arc of length a, or with
+    its width b a cylinder skin. A `strip` is held at its two ends in x only and is alike all along
+    y: a planar curve.
+
+    In space, x runs along the arc, whose highest point is at (a/2, y, 0); the outward normal there
+    is (0, 0, 1). Displacement is positive inward, as a load presses; curvature is positive where
+    the skin is convex seen from outside, so that pressing in adds f_xx (Eq. 3) to 1/radius.
+    """
+
+    a: float
+    b: float
+    radius: float = math.inf
+    strip: bool = False
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(side) and side > 0 for side in (self.a, self.b)):
+            raise Refusal(
+                f"expected a patch with two sides above zero in metres, got {self.a} x {self.b}; "
+                "give lengths such as 0.1 x 0.1"
+            )
+        if not self.radius >= self.a / (2 * math.pi):  # NaN too
+            raise Refusal(
+                f"an arc of {self.a:g} m goes once round at a radius of {self.a / 2 / math.pi:.4g} "
+                f"m: expected a larger base radius, or infinity for a flat skin, got {self.radius}"
+            )
+
+    @property
+    def name(self) -> str:
+        """What it is, as messages call it."""
+        what = f"{'strip' if self.strip else 'patch'} of {self.a:g} x {self.b:g} m"
+        return f"{what} bent to {self.radius:g} m" if self.base_curvature else what
+
+    @property
+    def base_curvature(self) -> float:
+        """1 / radius in 1/m; zero when flat."""
+        return 1 / self.radius
+
+    @property
+    def opening(self) -> float:
+        """The angle of the arc, a / radius in rad; zero when flat."""
+        return self.a / self.radius
+
+    def grid(self, nx: int, ny: int) -> tuple[Array, Array]:
+        """Evenly spaced x (nx,) and y (ny,) in m that include the edges."""
+        if nx < 2 or ny < 2:
+            raise Refusal(f"expected a grid of at least 2 x 2 points, got {nx} x {ny}")
+        return np.linspace(0.0, self.a, nx), np.linspace(0.0, self.b, ny)
+
+    def cell_centres(self, m: int, n: int) -> tuple[Array, Array]:
+        """Centres x (m,) and y (n,) in m of an m x n tiling."""
+        if m < 1 or n < 1:
+            raise Refusal(f"expected at least 1 x 1 cells, got {m} x {n}")
+        return (np.arange(m) + 0.5) * self.a / m, (np.arange(n) + 0.5) * self.b / n
+
+    def contains(self, positions: Array) -> Mask:
+        """Which of `positions` (P, 2) in m lie on the patch, edges included."""
+        return np.all((positions >= 0) & (positions <= (self.a, self.b)), axis=-1)
+
+    def depth(self, positions: Array) -> Array:
+        """How far inside the rim `positions` (P, 2) lie, (P,) in m; below zero off the skin."""
+        far = np.minimum(positions, (self.a, self.b) - positions)
+        return far[:, 0] if self.strip else far.min(axis=-1)
+
+    def inward(self, x: float, y: float) -> tuple[float, float]:
+        """(x, y) in m, or the nearest place to it a thousandth of a side inside the rim."""
+        dx, dy = _MARGIN * self.a, _MARGIN * self.b
+        return min(max(x, dx), self.a - dx), min(max(y, dy), self.b - dy)
+
+    def near_rim(self, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
+        """Places just inside the held edges next to (x, y), and how far as share of a side.
+
+        One for each edge that is no farther than `within` of a side.
+        """
+        a, b, (dx, dy) = self.a, self.b, (_MARGIN * self.a, _MARGIN * self.b)
+        places = [(dx, y, x / a), (a - dx, y, 1 - x / a)]
+        if not self.strip:
+            places += [(x, dy, y / b), (x, b - dy, 1 - y / b)]
+        return [place for place in places if place[2] <= within]
+
+    def moves(self, positions: Array) -> Mask:
+        """Which of `positions` (P, 2) are so far inside the rim that the skin moves there."""
+        return self.depth(positions) >= 0.9 * _MARGIN * min(self.a, self.b)
+
+    def at_rest(self, positions: Array) -> tuple[Array, Array]:
+        """Points (..., 3) in m of the skin at rest and its outward normals (..., 3) there."""
+        points, normals = np.zeros((2, *positions.shape[:-1], 3))
+        points[..., :2] = positions
+        if not self.base_curvature:
+            normals[..., 2] = 1.0
+            return points, normals
+        angle = (positions[..., 0] - self.a / 2) / self.radius
+        normals[..., 0], normals[..., 2] = np.sin(angle), np.cos(angle)
+        points[..., 0] = self.a / 2 + self.radius * normals[..., 0]
+        points[..., 2] = -2 * self.radius * np.sin(angle / 2) ** 2
+        return points, normals
+
+
+@dataclass(frozen=True, init=False)
+class Disk(Patch):
+    """A flat round skin of `rim_radius` in m, held along its rim; it touches x = 0 and y = 0."""
+
+    def __init__(self, rim_radius: float) -> None:
+        if not 0 < rim_radius < math.inf:
+            raise Refusal(f"expected a disk with a radius above zero in metres, got {rim_radius}")
+        super().__init__(2 * rim_radius, 2 * rim_radius)
+
+    @property
+    def rim_radius(self) -> float:
+        """Half of its sides, in m."""
+        return self.a / 2
+
+    @property
+    def name(self) -> str:
+        return f"disk of radius {self.rim_radius:g} m"
+
+    def contains(self, positions: Array) -> Mask:
+        return self.depth(positions) >= -_ROUNDING * self.a
+
+    def depth(self, positions: Array) -> Array:
+        r = self.rim_radius
+        return r - np.hypot(positions[:, 0] - r, positions[:, 1] - r)
+
+    def inward(self, x: float, y: float) -> tuple[float, float]:
+        r = self.rim_radius
+        away = math.hypot(x - r, y - r)
+        share = min(1.0, (1 - 2 * _MARGIN) * r / away) if away else 1.0
+        return r + share * (x - r), r + share * (y - r)
+
+    def near_rim(self, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
+        r = self.rim_radius
+        away = math.hypot(x - r, y - r)
+        if (share := (r - away) / self.a) > within or not away:
+            return []
+        out = (1 - 2 * _MARGIN) * r / away
+        return [(r + out * (x - r), r + out * (y - r), share)]
+
+
+@dataclass(frozen=True, init=False)
+class Polygon(Patch):
+    """A flat skin with the corners `vertices` (V, 2) in m, given either way round.
+
+    Its box begins at x = y = 0.
+    """
+
+    vertices: tuple[tuple[float, float], ...]
+
+    def __init__(self, vertices: ArrayLike) -> None:
+        corners = checked(vertices)
+        super().__init__(*corners.max(axis=0).tolist())
+        object.__setattr__(self, "vertices", tuple((x, y) for x, y in corners.tolist()))
+
+    @property
+    def name(self) -> str:
+        return f"polygon of {len(self.vertices)} corners in {self.a:g} x {self.b:g} m"
+
+    @cached_property
+    def outline(self) -> Outline:
+        return Outline(np.array(self.vertices))
+
+    def contains(self, positions: Array) -> Mask:
+        found = self.outline.inside(positions)
+        found[~found] = self.depth(positions[~found]) >= -_ROUNDING * max(self.a, self.b)
+        return found
+
+    def depth(self, positions: Array) -> Array:
+        with np.errstate(all="ignore"):  # of positions that are not finite
+            return self.outline.depth(positions)
+
+    @cached_property
+    def _raster(self) -> list[list[float]]:
+        """At least how deep in m every point of a cell of the box lies, by row and column."""
+        centres = np.stack(np.meshgrid(*self.cell_centres(_CELLS, _CELLS)), axis=-1)
+        least = self.depth(centres.reshape(-1, 2)) - math.hypot(self.a, self.b) / 2 / _CELLS
+        return least.reshape(_CELLS, _CELLS).tolist()
+
+    def _is_deep(self, x: float, y: float, depth: float) -> bool:
+        """Whether (x, y) is known to lie deeper than `depth` in m without a look at every edge."""
+        column, row = int(_CELLS * x / self.a), int(_CELLS * y / self.b)
+        on = 0 <= row < _CELLS and 0 <= column < _CELLS
+        return on and self._raster[row][column] > depth
+
+    def inward(self, x: float, y: float) -> tuple[float, float]:
+        margin = _MARGIN * min(self.a, self.b)
+        if self._is_deep(x, y, margin) or self.depth(np.array([[x, y]]))[0] >= margin:
+            return x, y
+        return min(self.near_rim(x, y, math.inf), key=lambda place: place[2])[:2]
+
+    def near_rim(self, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
+        shorter, line = min(self.a, self.b), self.outline
+        if self._is_deep(x, y, within * shorter):
+            return []
+        near = line.feet(np.array([[x, y]]), _CORNER)[0] + _MARGIN * shorter * line.normals
+        near = near[self.contains(near)]
+        share = np.hypot(near[:, 0] - x, near[:, 1] - y) / shorter
+        places = zip(near.tolist(), share.tolist(), strict=True)
+        return [(u, v, far) for (u, v), far in places if far <= within]

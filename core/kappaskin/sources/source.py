@@ -1,0 +1,77 @@
+"""Sources of frames: a simulation in this process, bytes on a line, and registered schemes."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from kappaskin.errors import SourceError
+from kappaskin.frames import Event, Frame
+from kappaskin.scenes import load_scene
+from kappaskin.sensing import Sensor
+from kappaskin.sources.accounting import Accounting
+from kappaskin.sources.serial_line import SerialSource as SerialSource
+from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
+from kappaskin.sources.tape import Tape
+
+SIMULATION = "sim:"
+
+
+class Source(Protocol):
+    """Yields frames; nothing after it can tell a simulated from a real one."""
+
+    @property
+    def sensor(self) -> Sensor | None:
+        """What the device says it is; None until it has said so."""
+        ...
+
+    def read(self, timeout: float) -> list[Frame]:
+        """The frames that came, after at most `timeout` s; a `Refusal` when there will be none."""
+        ...
+
+    @property
+    def trouble(self) -> str:
+        """Why no frames come at present, and what to do; empty when nothing is wrong."""
+        ...
+
+    @property
+    def temperature(self) -> float:
+        """The device's temperature in degrees Celsius, as it told last; NaN if it does not."""
+        ...
+
+    def record(self, tape: Tape | None) -> None:
+        """Tell `tape` from now on all that frames come from; nobody without one."""
+        ...
+
+    def events(self) -> list[Event]:
+        """What happened since this was last asked."""
+        ...
+
+    def accounting(self) -> Accounting:
+        """What became of every byte and every sequence number."""
+        ...
+
+    def close(self) -> None: ...
+
+
+_schemes: dict[str, Callable[[str], Source]] = {
+    SIMULATION: lambda name: SimulatedSource(load_scene(name)),
+}
+
+
+def register_scheme(scheme: str, opened: Callable[[str], Source]) -> None:
+    """Open names that begin with `scheme`, such as `replay:`, by `opened` with what follows it."""
+    _schemes[scheme] = opened
+
+
+def open_source(name: str) -> Source:
+    """The source called `name`: `sim:`, `sim:SCENE`, `replay:FILE`, or what pyserial opens.
+
+    `replay:` is registered by the room `recording`, as soon as that is imported.
+    """
+    for scheme, opened in _schemes.items():
+        if name.startswith(scheme):
+            return opened(name.removeprefix(scheme))
+    if not name.strip():
+        raise SourceError(
+            "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"
+        )
+    return SerialSource(name)
