@@ -196,7 +196,7 @@ def _keep(block: Block) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
 def test_what_a_page_shows_runs_and_prints_what_it_says(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, same_but_for_the_last_digit
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for kind in ("DATA", "CONFIG"):
@@ -212,7 +212,9 @@ def test_what_a_page_shows_runs_and_prints_what_it_says(
                 case "toml":
                     _keep(block)
                 case "text":
-                    assert _alike(block.text, printed), f"{where}: got\n{printed}"
+                    same = _alike(block.text, printed)
+                    same = same or same_but_for_the_last_digit(block.text, printed)
+                    assert same, f"{where}: got\n{printed}"
                 case "output":
                     alike = _alike(_without_numbers(block.text), _without_numbers(printed))
                     assert alike, f"{where}: got\n{printed}"

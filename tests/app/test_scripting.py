@@ -7,7 +7,6 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from inspect import ismodule
 from pathlib import Path
 from typing import Any
 
@@ -168,7 +167,7 @@ def _used(text: str) -> set[str]:
     return {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
 
 
-_OFFERED = {n for n, of in vars(kappaskin).items() if n[0] != "_" and not ismodule(of)}
+_OFFERED = set(kappaskin.__all__)
 _QUOTED = "title = \"It's \\\\ '''\"\n"
 
 
