@@ -281,7 +281,8 @@ def _last_digit(number: str) -> float:
 def same_but_for_the_last_digit() -> Callable[[str, str], bool]:
     """Whether two texts are alike but for white space, and numbers by one in their last digit.
 
-    What follows dots at the end of `said` may be anything. Which way a number half way between two roundings falls depends on the processor.
+    What follows dots at the end of `said` may be anything. Which way a number half way between
+    two roundings falls depends on the processor.
     """
 
     def same(said: str, printed: str) -> bool:

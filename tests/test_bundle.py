@@ -61,7 +61,7 @@ def test_the_desktop_entry_is_valid():
 
 
 def test_files_are_told_by_the_endings_that_the_app_gives_them():
-    from kappaskin_app.simulation import OWN
+    from kappaskin_app.shell.simulation import OWN
 
     patterns = [glob.get("pattern") for kind in kinds() for glob in kind.findall(f"{MIME}glob")]
 

@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
     from kappaskin.live import Engine
-    from kappaskin_app.logbook import Logbook
-    from kappaskin_app.recovering import Recovering
-    from kappaskin_app.views.splash import Splash
-    from kappaskin_app.window import MainWindow
+    from kappaskin_app.features.log.logbook import Logbook
+    from kappaskin_app.shell.recovery import Recovering
+    from kappaskin_app.shell.splash import Splash
+    from kappaskin_app.shell.window import MainWindow
 
 log = logging.getLogger("kappaskin")
 
 _LOADED = {
     "pyvistaqt": "Loading the drawing in three dimensions (VTK)",
-    "kappaskin_app.window": "Loading panels and views",
+    "kappaskin_app.shell.window": "Loading panels and views",
 }
 """What takes long to import, in this order, and what is said meanwhile."""
 
@@ -62,7 +62,7 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
         engine = starting.result()
     _stand_behind()
     try:
-        from kappaskin_app.window import MainWindow
+        from kappaskin_app.shell.window import MainWindow
 
         if splash is not None:
             splash.say("Making the window")
@@ -110,9 +110,9 @@ def _application() -> "QApplication":
 
 
 def _splash(kept: Path) -> "Splash":
-    from kappaskin_app.layouts.glance import theme_in
+    from kappaskin_app.shell.layouts.glance import theme_in
+    from kappaskin_app.shell.splash import Splash
     from kappaskin_app.theme import LIGHT, THEMES
-    from kappaskin_app.views.splash import Splash
 
     splash = Splash(THEMES.get(theme_in(kept), LIGHT))
     splash.show()
@@ -187,14 +187,14 @@ def launch(
 
 
 def _kept_file() -> Path:
-    from kappaskin_app.layouts.glance import config_file
+    from kappaskin_app.shell.layouts.glance import config_file
 
     return config_file()
 
 
 def _logbook() -> "Logbook | None":
     """What goes wrong to files, or nothing where none can be written."""
-    from kappaskin_app.logbook import Logbook, log_folder
+    from kappaskin_app.features.log.logbook import Logbook, log_folder
 
     try:
         return Logbook(log_folder())
@@ -205,7 +205,7 @@ def _logbook() -> "Logbook | None":
 
 def _recovering(window: "MainWindow") -> "Recovering | None":
     """What helps the next window after a crash of this one, or nothing where it cannot be kept."""
-    from kappaskin_app.recovering import Recovering, state_folder
+    from kappaskin_app.shell.recovery import Recovering, state_folder
 
     try:
         return Recovering(window, state_folder())

@@ -16,7 +16,7 @@ from shiboken6 import getAllValidWrappers
 
 from kappaskin import Engine
 from kappaskin_app import guard
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
     pytest.exit("the app's tests need a display: run `python3 packaging/start.py test`", 2)

@@ -6,20 +6,20 @@ from types import SimpleNamespace
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.about import DOCKS as ABOUT_DOCKS
-from kappaskin_app.about import PAGES as ABOUT_PAGES
-from kappaskin_app.about import PANELS as ABOUT_PANELS
-from kappaskin_app.history import History
-from kappaskin_app.layouts.layout import DOCKS
-from kappaskin_app.pages import page_called
-from kappaskin_app.panels.compare import OtherForm
-from kappaskin_app.panels.design import DesignForm
-from kappaskin_app.panels.form import Form
-from kappaskin_app.panels.panels import Panels
-from kappaskin_app.settings import Settings
-from kappaskin_app.simulation import scene_of
+from kappaskin_app.features.compare.panel import OtherForm
+from kappaskin_app.features.design.panel import DesignForm
+from kappaskin_app.features.guide.pages import page_called
+from kappaskin_app.shell.about import DOCKS as ABOUT_DOCKS
+from kappaskin_app.shell.about import PAGES as ABOUT_PAGES
+from kappaskin_app.shell.about import PANELS as ABOUT_PANELS
+from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.layouts.layout import DOCKS
+from kappaskin_app.shell.pages import Panels
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.simulation import scene_of
+from kappaskin_app.shell.wishes import Wishes
 from kappaskin_app.theme import THEMES
-from kappaskin_app.wishes import Wishes
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 _CONTROLS = (
     *(QAbstractButton, QAbstractSpinBox, QComboBox, QLineEdit, QAbstractSlider),

@@ -8,11 +8,11 @@ import pytest
 
 from kappaskin import Engine, Left, Setup, Status, Written
 from kappaskin.live.requests import Asked
-from kappaskin_app.adopting import Entrusting, settings_left, words
-from kappaskin_app.history import History
-from kappaskin_app.settings import Settings
-from kappaskin_app.settings_text import settings_in, settings_text
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.resume import Entrusting, settings_left, words
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings_text import settings_in, settings_text
+from kappaskin_app.shell.window import MainWindow
 
 BEFORE = Settings(
     functions_x=6, functions_y=7, load_case="point", x=0.03, y=0.07, theme="dark", colour_by="xx"

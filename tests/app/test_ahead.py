@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 
 from kappaskin import Refusal, read_scene, scene_file
-from kappaskin_app.ahead import Ahead
-from kappaskin_app.memo import Memo
-from kappaskin_app.pressing import tried
-from kappaskin_app.settings import Settings
-from kappaskin_app.simulation import plate_of, scene_of, scene_or_why, with_consequences, written
+from kappaskin_app.shell.cache import Memo
+from kappaskin_app.shell.loads import tried
+from kappaskin_app.shell.scene_making import Ahead
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.simulation import (
+    plate_of,
+    scene_of,
+    scene_or_why,
+    with_consequences,
+    written,
+)
 
 
 @pytest.fixture

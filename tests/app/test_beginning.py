@@ -7,10 +7,10 @@ from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QVBoxLayout, QWidget
 
-from kappaskin_app.layouts.file import KeptFile
-from kappaskin_app.recovering import Last, Recovering
-from kappaskin_app.views.offer import Offer, Offered
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.banner import Offer, Offered
+from kappaskin_app.shell.layouts.file import KeptFile
+from kappaskin_app.shell.recovery import Last, Recovering
+from kappaskin_app.shell.window import MainWindow
 
 
 class Bench(QWidget):

@@ -8,7 +8,7 @@ import numpy as np
 
 from kappaskin import Calibration
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 
 def test_a_refused_file_is_told_where_files_are_loaded(window, tmp_path: Path) -> None:

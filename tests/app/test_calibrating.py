@@ -24,9 +24,9 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin_app.calibrating import Calibrating, parsed_radii
-from kappaskin_app.history import History
-from kappaskin_app.settings import Settings
+from kappaskin_app.features.calibration.calibrating import Calibrating, parsed_radii
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.settings import Settings
 
 THREE = (0.1, 0.05, 0.02)
 SCENE = load_scene("calibration")
@@ -286,7 +286,7 @@ def test_a_computation_that_fails_ends_the_procedure_and_is_told(
     def fails(*_: object) -> None:
         raise ValueError("no such gain")
 
-    monkeypatch.setattr("kappaskin_app.calibrating.calibrate", fails)
+    monkeypatch.setattr("kappaskin_app.features.calibration.calibrating.calibrate", fails)
     calibrating = bench.calibrating
     calibrating.begin(RADII[::2], 0.2)
     calibrating.take_all()

@@ -8,11 +8,11 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QWidget
 
 from kappaskin import Patch, SensorLayout, schedule
-from kappaskin_app.panels.calibration.parts import Heading
+from kappaskin_app.features.calibration.cylinder import CylinderView
+from kappaskin_app.features.calibration.loop_plot import Loop, LoopPlot
+from kappaskin_app.features.calibration.pass_map import PassMap
 from kappaskin_app.theme import letters
-from kappaskin_app.views.cylinder import CylinderView
-from kappaskin_app.views.loop_plot import Loop, LoopPlot
-from kappaskin_app.views.pass_map import PassMap
+from kappaskin_app.widgets.parts import Heading
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QColor
 
-from kappaskin_app.shades import HEALTH
+from kappaskin_app.shell.shades import HEALTH
 from kappaskin_app.theme import DIVERGING
-from kappaskin_app.views.colour_bar import ColourBar
+from kappaskin_app.widgets.colour_bar import ColourBar
 
 
 def words(bar: ColourBar) -> list[str]:

@@ -9,15 +9,15 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import WHY, Patch, SensorLayout
-from kappaskin_app.panels.several import SeveralButton
-from kappaskin_app.scale import Ranges
-from kappaskin_app.settings import Settings
-from kappaskin_app.settings.shown import COLOURS
-from kappaskin_app.shades import HEALTH, HEALTH_COLOURS, SHADES
+from kappaskin_app.features.heatmaps.heatmap import Heatmap
+from kappaskin_app.features.membrane.element_cells import ElementCells
+from kappaskin_app.shell.scale import Ranges
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.shown import COLOURS
+from kappaskin_app.shell.several import SeveralButton
+from kappaskin_app.shell.shades import HEALTH, HEALTH_COLOURS, SHADES
+from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import SATURATED
-from kappaskin_app.views.element_cells import ElementCells
-from kappaskin_app.views.heatmap import Heatmap
-from kappaskin_app.window import MainWindow
 
 ALL = tuple(name for name, _ in COLOURS)
 

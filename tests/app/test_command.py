@@ -10,8 +10,8 @@ import psutil
 import pytest
 from PySide6.QtGui import QImage
 
+from kappaskin_app.shell.badge import SIM, STALE, WAITING, colour_of
 from kappaskin_app.theme import DARK
-from kappaskin_app.views.badge import SIM, STALE, WAITING, colour_of
 
 
 def run(*arguments: str, **more: object) -> subprocess.CompletedProcess[str]:

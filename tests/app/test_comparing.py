@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from kappaskin import Setup
-from kappaskin_app.comparing import Figure, Pair, other_setup
-from kappaskin_app.settings import Settings
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.compare.comparing import Figure, Pair, other_setup
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.window import MainWindow
 
 
 @pytest.fixture

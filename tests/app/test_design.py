@@ -11,16 +11,16 @@ from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import load_scene, prospect, write_scene
 from kappaskin.scenes import read_scene
-from kappaskin_app.designing import design_of, scene_of
-from kappaskin_app.panels.design import DesignForm, _meant, _place
-from kappaskin_app.settings import Settings, ask_of
-from kappaskin_app.settings.asks import Range
-from kappaskin_app.settings.designed import Designed
-from kappaskin_app.simulation import with_consequences
-from kappaskin_app.skins import SHAPES
+from kappaskin_app.features.design.designing import design_of, scene_of
+from kappaskin_app.features.design.panel import DesignForm, _meant, _place
+from kappaskin_app.shell.settings import Settings, ask_of
+from kappaskin_app.shell.settings.asks import Range
+from kappaskin_app.shell.settings.designed import Designed
+from kappaskin_app.shell.simulation import with_consequences
+from kappaskin_app.shell.skins import SHAPES
+from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK, SEQUENTIAL
-from kappaskin_app.views.surface_map import SurfaceMap
-from kappaskin_app.window import MainWindow
+from kappaskin_app.widgets.surface_map import SurfaceMap
 
 RANGES = [n for n in Designed.__dataclass_fields__ if isinstance(ask_of(n), Range)]
 

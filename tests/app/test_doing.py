@@ -1,8 +1,8 @@
 import pytest
 
 from kappaskin import Status
-from kappaskin_app.doing import Doing, Task
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.background import Doing, Task
+from kappaskin_app.shell.window import MainWindow
 
 
 class Bench:

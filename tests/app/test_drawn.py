@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Patch
-from kappaskin_app.views.drawn import DrawnSkin
+from kappaskin_app.shell.drawn_skin import DrawnSkin
 
 FLAT = Patch(0.1, 0.06)
 ARC = Patch(0.04, 0.03, 0.0129)

@@ -3,7 +3,7 @@
 import pytest
 
 from kappaskin import EFFECTS
-from kappaskin_app.effects import called, explained
+from kappaskin_app.shell.effects import called, explained
 
 
 def test_effects_have_names_of_their_own_in_words() -> None:

@@ -20,8 +20,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.layouts.arranging import layout_of, words_of
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.layouts.arranging import layout_of, words_of
+from kappaskin_app.shell.window import MainWindow
 
 _SPARED = ("quit", "undo", "redo")  # the window would be gone; and what the others are tried with
 

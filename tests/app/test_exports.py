@@ -12,9 +12,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import Refusal
-from kappaskin_app.exporting import ExportDialog
-from kappaskin_app.pictures import save_view
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.export.exporting import ExportDialog
+from kappaskin_app.shell.pictures import save_view
+from kappaskin_app.shell.window import MainWindow
 
 
 @pytest.fixture

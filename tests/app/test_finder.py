@@ -8,10 +8,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from kappaskin import scene_file
-from kappaskin_app.finder.finder import Finder
-from kappaskin_app.finder.matching import score
-from kappaskin_app.finder.things import Thing, things_in
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.finder.finder import Finder
+from kappaskin_app.shell.finder.matching import score
+from kappaskin_app.shell.finder.things import Thing, things_in
+from kappaskin_app.shell.window import MainWindow
 
 WORDS = st.text("abc- ", min_size=1, max_size=12)
 

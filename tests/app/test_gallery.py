@@ -6,9 +6,9 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin import SCENES, load_scene
-from kappaskin_app.panels.gallery import ORDER, GalleryPanel, in_order
+from kappaskin_app.features.scene.card import PICTURE, PLAYING
+from kappaskin_app.features.scene.gallery import ORDER, GalleryPanel, in_order
 from kappaskin_app.theme import DARK, LIGHT
-from kappaskin_app.views.card import PICTURE, PLAYING
 
 
 @pytest.fixture

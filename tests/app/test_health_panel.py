@@ -5,12 +5,12 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin import WHY, Finding, Health, Patch, Phase, SensorLayout, Status, load_scene
-from kappaskin_app.map_testing import MapTesting
-from kappaskin_app.panels.health import HealthPanel
-from kappaskin_app.shades import SHADES
+from kappaskin_app.features.health.map_testing import MapTesting
+from kappaskin_app.features.health.panel import HealthPanel
+from kappaskin_app.features.heatmaps.heatmap import Heatmap
+from kappaskin_app.shell.shades import SHADES
+from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK
-from kappaskin_app.views.heatmap import Heatmap
-from kappaskin_app.window import MainWindow
 
 STUCK = Finding(157, 57, "yy", "stuck", 100.0, "reads -1.70 1/m")
 KEPT = Finding(12, 12, "xx", "dead", 20.0, "the device says so", kept=True)

@@ -5,9 +5,9 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Patch, SensorLayout
-from kappaskin_app.shades import SHADES
+from kappaskin_app.features.heatmaps.heatmap import Heatmap
+from kappaskin_app.shell.shades import SHADES
 from kappaskin_app.theme import DARK, DIVERGING
-from kappaskin_app.views.heatmap import Heatmap
 
 TINT = SHADES["xx"].tint(1.0)
 

@@ -3,8 +3,8 @@ from dataclasses import fields, replace
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.history import History
-from kappaskin_app.settings import Settings, change_told
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.settings import Settings, change_told
 
 
 def test_a_change_is_told_and_can_be_undone(qapp: QApplication) -> None:

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
-from kappaskin_app.layouts.file import KeptFile
-from kappaskin_app.layouts.kept import Kept, from_text, to_text
-from kappaskin_app.layouts.layout import READY
+from kappaskin_app.shell.layouts.file import KeptFile
+from kappaskin_app.shell.layouts.kept import Kept, from_text, to_text
+from kappaskin_app.shell.layouts.layout import READY
 
 HOSTILE = (
     "",

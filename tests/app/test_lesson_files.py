@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
-from kappaskin_app.lessons.expression import NUMBER, TRUTH, WORD, expression
-from kappaskin_app.lessons.figures import KINDS, SETTINGS, Watch
-from kappaskin_app.lessons.lesson import UNITS, Number, Task, whole
-from kappaskin_app.lessons.progress import Answer, Progress, judged, number_in
-from kappaskin_app.lessons.reading import DOCKS, READY, lesson_of, read_lesson
-from kappaskin_app.lessons.setting import SETTABLE, checked_setting
-from kappaskin_app.settings import Settings, ask_of
-from kappaskin_app.settings.asks import Range
+from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, WORD, expression
+from kappaskin_app.features.lessons.figures import KINDS, SETTINGS, Watch
+from kappaskin_app.features.lessons.lesson import UNITS, Number, Task, whole
+from kappaskin_app.features.lessons.progress import Answer, Progress, judged, number_in
+from kappaskin_app.features.lessons.reading import DOCKS, READY, lesson_of, read_lesson
+from kappaskin_app.features.lessons.setting import SETTABLE, checked_setting
+from kappaskin_app.shell.settings import Settings, ask_of
+from kappaskin_app.shell.settings.asks import Range
 
 FIGURES_SEEN = [name for name in KINDS if name not in SETTINGS]
 FIGURES = {"force": 0.2, "method": "bayes", "noise": math.nan, "functions_x": 8.0}

@@ -9,11 +9,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QDockWidget, QFileDialog
 
-from kappaskin_app.lessons.lesson import UNITS, Choice, Number, Question, Task
-from kappaskin_app.lessons.progress import DONE
-from kappaskin_app.lessons.reading import DOCKS, READOUTS
-from kappaskin_app.lessons.setting import SETTABLE
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.lessons.lesson import UNITS, Choice, Number, Question, Task
+from kappaskin_app.features.lessons.progress import DONE
+from kappaskin_app.features.lessons.reading import DOCKS, READOUTS
+from kappaskin_app.features.lessons.setting import SETTABLE
+from kappaskin_app.shell.window import MainWindow
 
 
 def take(window: MainWindow, name: str) -> None:

@@ -17,11 +17,11 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import Distances
+from kappaskin_app.features.contact.readouts import Health
+from kappaskin_app.shell.title import Title
+from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import grown
-from kappaskin_app.views.line import Line
-from kappaskin_app.views.readouts import Health
-from kappaskin_app.views.title import Title
-from kappaskin_app.window import MainWindow
+from kappaskin_app.widgets.line import Line
 
 _PATIENCE = 30.0  # s until what was said a moment ago has the room it asks for
 _THREADS = {"stability": "singular-values_0", "design": "design_0", "scene": "gallery_0"}

@@ -1,6 +1,6 @@
 """A line of text that may do without its head."""
 
-from kappaskin_app.views.line import Line
+from kappaskin_app.widgets.line import Line
 
 
 def test_where_room_is_short_the_head_is_left_out_first(qtbot) -> None:

@@ -5,9 +5,9 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 
 from kappaskin import Distances
-from kappaskin_app.views.ruler import told
-from kappaskin_app.views.sight import Sight
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.membrane.ruler import told
+from kappaskin_app.features.membrane.sight import Sight
+from kappaskin_app.shell.window import MainWindow
 
 
 def pixel_of(window: MainWindow, x: float, y: float) -> QPoint:

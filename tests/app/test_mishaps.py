@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Refusal
 from kappaskin_app import guard
-from kappaskin_app.logbook import CRASHES, LOG, Logbook
-from kappaskin_app.reporting import Reporting, Told
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.log.logbook import CRASHES, LOG, Logbook
+from kappaskin_app.features.log.reporting import Reporting, Told
+from kappaskin_app.shell.window import MainWindow
 
 
 def fail() -> None:

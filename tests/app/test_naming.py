@@ -6,8 +6,8 @@ import time
 import pytest
 
 from kappaskin import Pipeline, PointLoad, Setup, Simulator, load_scene
-from kappaskin_app import naming
-from kappaskin_app.naming import curved
+from kappaskin_app.features.contact import naming
+from kappaskin_app.features.contact.naming import curved
 
 
 def _estimate(*loads):
@@ -67,7 +67,7 @@ def test_what_fails_once_is_told_once_and_the_next_estimate_is_named(
         monkeypatch.undo()
         raise ZeroDivisionError("once")
 
-    monkeypatch.setattr("kappaskin_app.naming.curved", fail_once)
+    monkeypatch.setattr("kappaskin_app.features.contact.naming.curved", fail_once)
     until(lambda: told)
     named: list[str] = []
     window.naming.named.connect(named.append)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kappaskin import WHY, Pipeline, Setup, Simulator, Touch, load_scene
+from kappaskin_app.shell.notice import Notice, warnings
 from kappaskin_app.theme import DARK, LIGHT
-from kappaskin_app.views.notice import Notice, warnings
 
 INSIDE = Touch(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
 NEAR = replace(INSIDE, near_rim=True)

@@ -3,7 +3,7 @@
 import pytest
 from PySide6.QtCore import QLocale, Qt
 
-from kappaskin_app.panels.form import RealBox, WholeBox
+from kappaskin_app.shell.form import RealBox, WholeBox
 
 
 def entered(qtbot, box: WholeBox | RealBox, text: str, typed: bool = False) -> float:

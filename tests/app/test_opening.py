@@ -8,10 +8,10 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import scene_file
-from kappaskin_app.drops import dropped_on
-from kappaskin_app.objects import may_choose
-from kappaskin_app.opening import is_calibration
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.presenter.objects import may_choose
+from kappaskin_app.shell.drops import dropped_on
+from kappaskin_app.shell.opening import is_calibration
+from kappaskin_app.shell.window import MainWindow
 
 TETRAHEDRON = np.array([[0, 0, 0], [20, 0, 10], [-10, 17, 10], [-10, -17, 10]])
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Placed, load_scene
-from kappaskin_app.views.drawn import DrawnSkin
-from kappaskin_app.views.sheet import underside
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.membrane.sheet import underside
+from kappaskin_app.shell.drawn_skin import DrawnSkin
+from kappaskin_app.shell.window import MainWindow
 
 FLAT, ARC = Patch(0.1, 0.1), Patch(0.04, 0.03, 0.0129)
 WANTED = ("directions", "band", "frame", "object", "pressed")

@@ -6,7 +6,7 @@ from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Disk, Patch
-from kappaskin_app.views.pad import Hand, Pad
+from kappaskin_app.features.presenter.pad import Hand, Pad
 
 LEFT = Qt.MouseButton.LeftButton
 SHIFT = Qt.KeyboardModifier.ShiftModifier

@@ -7,11 +7,11 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 
 from kappaskin import Finding, Health, Status, load_scene
-from kappaskin_app.facts import facts
-from kappaskin_app.past import SECONDS, Past
-from kappaskin_app.views.curve_plot import Curve, CurvePlot
-from kappaskin_app.views.sight import Sight
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.membrane.sight import Sight
+from kappaskin_app.features.traces.facts import facts
+from kappaskin_app.features.traces.past import SECONDS, Past
+from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.widgets.curve_plot import Curve, CurvePlot
 
 
 def pixel_of(window: MainWindow, element: int) -> QPoint:

@@ -7,9 +7,9 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QDockWidget
 
-from kappaskin_app.cue import Roundness
+from kappaskin_app.features.presenter.cue import Roundness
+from kappaskin_app.shell.badge import GAP, LOST, SIM
 from kappaskin_app.theme import THEMES
-from kappaskin_app.views.badge import GAP, LOST, SIM
 
 LEFT = Qt.MouseButton.LeftButton
 

@@ -9,9 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QLabel, QLineEdit, QWidget
 
 from kappaskin import Latency, Published, PublishNews, Receiver, Status
-from kappaskin_app.columns import scrolled
-from kappaskin_app.panels.publish import PublishPanel
-from kappaskin_app.settings import Settings
+from kappaskin_app.features.publish.panel import PublishPanel
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.widgets.columns import scrolled
 
 FINE = Published("udp://127.0.0.1:9870", receivers=(Receiver("udp://127.0.0.1:9870", 12345, 6),))
 DEAD = Receiver("udp://robot:1", 0, 7, "nobody receives there")

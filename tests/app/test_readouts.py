@@ -2,7 +2,7 @@
 
 import pytest
 
-from kappaskin_app.views.readouts import FIELDS, Health, Readouts
+from kappaskin_app.features.contact.readouts import FIELDS, Health, Readouts
 
 
 @pytest.fixture

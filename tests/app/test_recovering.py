@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin_app.recovering import Last, Recovering, Running, crashed
-from kappaskin_app.settings import Settings
-from kappaskin_app.settings_text import settings_text
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.recovery import Last, Recovering, Running, crashed
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings_text import settings_text
+from kappaskin_app.shell.window import MainWindow
 
 LAST = Last(Settings(functions_x=5), "sim:circle", "there.mcap")
 
@@ -24,7 +24,7 @@ def leave(folder: Path, last: Last = LAST) -> None:
 
 def test_a_window_that_is_killed_leaves_what_it_was_at_once(tmp_path: Path) -> None:
     lines = (
-        "import os, pathlib; from kappaskin_app.recovering import *;"
+        "import os, pathlib; from kappaskin_app.shell.recovery import *;"
         f"Running(pathlib.Path({str(tmp_path)!r})).keep(Last(Settings(functions_x=5),"
         " 'sim:circle', 'there.mcap')); os.kill(os.getpid(), 9)"
     )

@@ -8,8 +8,8 @@ import pytest
 
 from kappaskin import Event, Recording
 from kappaskin.recording import Recorder
-from kappaskin_app.repairs import RepairDialog
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.recording.repairs import RepairDialog
+from kappaskin_app.shell.window import MainWindow
 
 
 @pytest.fixture(autouse=True)

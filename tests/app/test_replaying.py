@@ -13,7 +13,7 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QFileDialog
 
 from kappaskin import Recording, Tare
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 KEYS = Qt.Key
 

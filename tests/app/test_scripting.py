@@ -18,13 +18,13 @@ from PySide6.QtWidgets import QApplication
 import kappaskin
 from kappaskin import Engine, Estimate, Refusal, Tare, scene_file
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin_app.history import History
-from kappaskin_app.scripting import script_of
-from kappaskin_app.session import Session
-from kappaskin_app.settings import Settings
-from kappaskin_app.settings.scene import Written
-from kappaskin_app.simulation import scene_of, with_consequences, written
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.export.scripting import script_of
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.scene import Written
+from kappaskin_app.shell.simulation import scene_of, with_consequences, written
+from kappaskin_app.shell.window import MainWindow
 
 _RUN = """
 import sys

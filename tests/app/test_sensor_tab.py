@@ -14,10 +14,10 @@ from kappaskin import (
     UniformNoise,
     bargain,
 )
-from kappaskin_app.panels.sensor import RegionPanel
-from kappaskin_app.settings import Settings
-from kappaskin_app.simulation import region_of, scene_of, with_consequences
-from kappaskin_app.skins import SHAPES
+from kappaskin_app.features.sensor.panel import RegionPanel
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.simulation import region_of, scene_of, with_consequences
+from kappaskin_app.shell.skins import SHAPES
 
 
 def test_the_default_gages_spoil_nothing_but_the_noise():

@@ -4,11 +4,11 @@ import pytest
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLabel
 
 from kappaskin import EDGES, Status
-from kappaskin_app.panels.compare import OtherForm
-from kappaskin_app.panels.design import DesignForm
-from kappaskin_app.panels.panels import Panels
-from kappaskin_app.settings import SceneSettings, Settings, ask_of, part
-from kappaskin_app.settings.asks import Choice, Range
+from kappaskin_app.features.compare.panel import OtherForm
+from kappaskin_app.features.design.panel import DesignForm
+from kappaskin_app.shell.pages import Panels
+from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of, part
+from kappaskin_app.shell.settings.asks import Choice, Range
 
 ASKED = [f.name for f in fields(Settings) if "ask" in f.metadata]
 

@@ -19,11 +19,17 @@ from kappaskin import (
     load_scene,
     scene_file,
 )
-from kappaskin_app.pressing import dragged
-from kappaskin_app.settings import Settings
-from kappaskin_app.settings.load import LOAD_CASES, SPREAD_CASES
-from kappaskin_app.simulation import is_table_1, plate_of, scene_of, with_consequences, written
-from kappaskin_app.skins import SHAPES
+from kappaskin_app.shell.loads import dragged
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.load import LOAD_CASES, SPREAD_CASES
+from kappaskin_app.shell.simulation import (
+    is_table_1,
+    plate_of,
+    scene_of,
+    with_consequences,
+    written,
+)
+from kappaskin_app.shell.skins import SHAPES
 
 CASES = [case for case, _ in LOAD_CASES]
 READY = ["circle", "centre", "off-centre", "line"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin_app.sound import RATE, Sound, Tone
+from kappaskin_app.features.presenter.sound import RATE, Sound, Tone
 
 
 def pitch(samples) -> float:

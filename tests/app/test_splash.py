@@ -9,11 +9,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.launch import _all_stays
-from kappaskin_app.layouts.file import KeptFile
-from kappaskin_app.layouts.glance import theme_in
-from kappaskin_app.layouts.kept import Kept
+from kappaskin_app.shell.layouts.file import KeptFile
+from kappaskin_app.shell.layouts.glance import theme_in
+from kappaskin_app.shell.layouts.kept import Kept
+from kappaskin_app.shell.splash import Splash
 from kappaskin_app.theme import DARK, LIGHT, Theme
-from kappaskin_app.views.splash import Splash
 
 
 class Membrane(QObject):
@@ -59,7 +59,7 @@ def test_it_goes_when_the_first_estimate_is_drawn_and_no_sooner(splash: Splash) 
 def test_it_goes_where_no_estimate_comes(
     splash: Splash, until: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("kappaskin_app.views.splash._MOST", 20)
+    monkeypatch.setattr("kappaskin_app.shell.splash._MOST", 20)
     splash.finish(window := Window())
     until(lambda: not splash.isVisible())
     assert window.estimate is None

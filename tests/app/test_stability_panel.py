@@ -12,11 +12,11 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import Refusal, SensorLayout, SineBasis, singular_values
-from kappaskin_app.demonstrations import DEMONSTRATIONS
-from kappaskin_app.seeing import MOST, Spectrum
-from kappaskin_app.settings import Settings
-from kappaskin_app.simulation import scene_of
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.stability.demonstrations import DEMONSTRATIONS
+from kappaskin_app.features.stability.seeing import MOST, Spectrum
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.simulation import scene_of
+from kappaskin_app.shell.window import MainWindow
 
 
 def of(**settings: object) -> Spectrum:

@@ -8,16 +8,16 @@ import sys
 import pytest
 from PySide6.QtGui import QFontMetricsF
 
-from kappaskin_app.cue import Cue, Roundness
+from kappaskin_app.features.presenter.banner import REMEDIES
+from kappaskin_app.features.presenter.cue import Cue, Roundness
+from kappaskin_app.features.presenter.pad import Hand
+from kappaskin_app.features.presenter.stage import Stage
+from kappaskin_app.features.presenter.strip import age_in_words
+from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.theme import THEMES
-from kappaskin_app.views.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
-from kappaskin_app.views.banner import REMEDIES
-from kappaskin_app.views.clock import Clock
-from kappaskin_app.views.colour_bar import SkinScale
-from kappaskin_app.views.lettering import CAPTION, PRIMARY
-from kappaskin_app.views.pad import Hand
-from kappaskin_app.views.stage import Stage
-from kappaskin_app.views.strip import age_in_words
+from kappaskin_app.widgets.clock import Clock
+from kappaskin_app.widgets.colour_bar import SkinScale
+from kappaskin_app.widgets.lettering import CAPTION, PRIMARY
 
 CAPITAL = 55  # px: 15 mm on a screen of 24 inches, to be read from three metres
 LONGEST = Cue(
@@ -135,8 +135,8 @@ _AT_150 = """
 from PySide6.QtWidgets import QApplication, QWidget
 app = QApplication([]); app.setStyle("Fusion")
 import sys; sys.path[:0] = [{here!r}]
-from kappaskin_app.views.stage import Stage
-from kappaskin_app.cue import Cue, Roundness
+from kappaskin_app.features.presenter.stage import Stage
+from kappaskin_app.features.presenter.cue import Cue, Roundness
 stage = Stage(QWidget()); stage.resize(1280, 720); stage.present(True); stage.show()
 assert stage.devicePixelRatioF() == 1.5
 stage.show_cue(Cue(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012, "cylinder", 0.06,
@@ -169,7 +169,7 @@ def contrast(one: str, other: str) -> float:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_letters_stand_out_from_their_ground_without_any_colour(theme, qtbot) -> None:
-    from kappaskin_app.views.badge import colour_of
+    from kappaskin_app.shell.badge import colour_of
 
     stage, colours = stage_of((1280, 720), qtbot, theme), THEMES[theme]
     stage.show_cue(LONGEST)

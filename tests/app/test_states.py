@@ -5,9 +5,9 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Finding, Health, Replay, Status, load_scene
-from kappaskin_app.states import state_of
+from kappaskin_app.shell.badge import Badge, colour_of, origin
+from kappaskin_app.shell.states import state_of
 from kappaskin_app.theme import LIGHT
-from kappaskin_app.views.badge import Badge, colour_of, origin
 
 NOW = 100.0
 SENSOR = load_scene("circle").sensor()

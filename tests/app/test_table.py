@@ -5,8 +5,8 @@ import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.table import ELEMENTS, FACTS
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.contact.table import ELEMENTS, FACTS
+from kappaskin_app.shell.window import MainWindow
 
 
 def test_the_table_has_what_the_picture_shows_and_can_be_copied(window: MainWindow, until) -> None:

@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox
 
 from kappaskin import LONGEST_NOTE, Recording, Written
 from kappaskin.recording.writing import RecordingFile
-from kappaskin_app.recordings import newest, proposed, recordings_folder, unfinished
-from kappaskin_app.views.recording_mark import RecordingMark, duration_of, size_of
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.recording.recording_mark import RecordingMark, duration_of, size_of
+from kappaskin_app.shell.folders import newest, proposed, recordings_folder, unfinished
+from kappaskin_app.shell.window import MainWindow
 
 
 @pytest.fixture(autouse=True)

@@ -11,10 +11,10 @@ import pytest
 from kappaskin import Drift, Setup, Status, Tare, Tares, load_scene
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live.tare_taking import TareNews
-from kappaskin_app.history import History
-from kappaskin_app.panels.tare import TarePanel, drift_words, warmth
-from kappaskin_app.settings import Settings
-from kappaskin_app.taring import Taring, ago
+from kappaskin_app.features.calibration.tare import TarePanel, drift_words, warmth
+from kappaskin_app.features.calibration.taring import Taring, ago
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.settings import Settings
 
 SENSOR = replace(load_scene("centre").sensor(), serial_number="KS-7", simulated=False)
 OTHER = replace(SENSOR, serial_number="KS-8")
@@ -284,7 +284,7 @@ def test_a_window_tares_a_skin_at_rest_and_refuses_a_loaded_one(window, until):
 
 
 def test_the_age_has_its_error_bar(window, until):
-    from kappaskin_app.views.readouts import Health
+    from kappaskin_app.features.contact.readouts import Health
 
     def told(age, sd):
         window.readouts.show_health(Health(500, 60, age, sd, 0, 0, 0))
@@ -298,7 +298,7 @@ def test_the_age_has_its_error_bar(window, until):
 
 
 def test_large_counts_are_told_in_few_digits(window):
-    from kappaskin_app.views.readouts import Health
+    from kappaskin_app.features.contact.readouts import Health
 
     def told(*counts):
         window.readouts.show_health(Health(500, 60, 0.01, 0.0, *counts))

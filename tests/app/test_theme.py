@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QApplication, QScrollBar
 
+from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, colour_of
 from kappaskin_app.theme import (
     DARK_INK,
     DIVERGING,
@@ -16,7 +17,6 @@ from kappaskin_app.theme import (
     Theme,
     bar_palette,
 )
-from kappaskin_app.views.badge import GAP, LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, colour_of
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from PySide6.QtGui import QImage
 
 from kappaskin import Presentation, load_scene
 from kappaskin.scenes.motion import Path, Press, Release
+from kappaskin_app.features.scene.timeline import Timeline
+from kappaskin_app.features.scene.track import profile
 from kappaskin_app.theme import DARK, LIGHT
-from kappaskin_app.views.timeline import Timeline
-from kappaskin_app.views.track import profile
 
 LEFT = Qt.MouseButton.LeftButton
 

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.actions import plain
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.actions import plain
+from kappaskin_app.shell.window import MainWindow
 
 _ASKS = (QAbstractButton, QAbstractSlider, QAbstractSpinBox, QComboBox, QLineEdit)
 _SHOWS = (QAbstractItemView, QPlainTextEdit)  # what they are in may explain them

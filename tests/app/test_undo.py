@@ -10,7 +10,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication, QTabBar
 
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 LEFT = Qt.MouseButton.LeftButton
 

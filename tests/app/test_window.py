@@ -7,10 +7,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QImage
 from PySide6.QtWidgets import QDockWidget, QMenu, QPushButton, QScrollArea, QScrollBar
 
-from kappaskin_app.actions import plain
+from kappaskin_app.shell.actions import plain
+from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import THEMES, bar_palette
-from kappaskin_app.views.line import Line
-from kappaskin_app.window import MainWindow
+from kappaskin_app.widgets.line import Line
 
 
 def test_no_view_is_blank(window: MainWindow, until, colours_in) -> None:

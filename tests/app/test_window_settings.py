@@ -15,9 +15,9 @@ from PySide6.QtWidgets import (
     QLineEdit,
 )
 
-from kappaskin_app.panels.form import Form
-from kappaskin_app.settings import Settings
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.window import MainWindow
 
 
 def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot) -> None:

@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 
 from kappaskin import EDGES, Disk
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 
 def _shown(window: MainWindow) -> bool:

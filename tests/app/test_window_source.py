@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from kappaskin import SCENES, Port
-from kappaskin_app.settings.load import READY_CASES
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.settings.load import READY_CASES
+from kappaskin_app.shell.window import MainWindow
 
 
 def test_the_simulation_is_shown_as_a_simulation(window: MainWindow, until) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from kappaskin import Refusal
-from kappaskin_app.working import WorkDialog, ended, with_ending
+from kappaskin_app.shell.work_dialog import WorkDialog, ended, with_ending
 
 
 class Failing:

@@ -9,7 +9,7 @@ import time
 
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
 
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 _SPARED = ("quit",)
 

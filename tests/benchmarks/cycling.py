@@ -15,7 +15,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
 from kappaskin.studies.drills.held import Held
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 _DRAWN = 5  # pictures of the skin, of each window
 

@@ -19,9 +19,9 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Engine
-from kappaskin_app.layouts.layout import BOTTOM, LEFT, RIGHT, Layout, Place
-from kappaskin_app.settings.shown import COLOURS
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.layouts.layout import BOTTOM, LEFT, RIGHT, Layout, Place
+from kappaskin_app.shell.settings.shown import COLOURS
+from kappaskin_app.shell.window import MainWindow
 
 SETTLE = 3.0
 _SHOWN = Layout(

@@ -9,7 +9,7 @@ import psutil
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 SETTLE = 8.0
 

@@ -17,7 +17,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app import guard
-from kappaskin_app.window import MainWindow
+from kappaskin_app.shell.window import MainWindow
 
 SETTLE = 70.0  # s: by then each change was made four times, and each panel shown
 _EVERY = 1.0  # s between two changes of a setting

@@ -49,7 +49,7 @@ from kappaskin.sources import (
 )
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
 from kappaskin.sources.wire import encode, encode_command
-from kappaskin_app.lessons.reading import READY, read_lesson
+from kappaskin_app.features.lessons.reading import READY, read_lesson
 
 Read = Callable[[bytes, Path], object]
 

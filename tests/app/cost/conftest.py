@@ -6,9 +6,9 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Cost, Setting
-from kappaskin_app import costing
-from kappaskin_app.costing import in_words
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.accuracy import costing
+from kappaskin_app.features.accuracy.costing import in_words
+from kappaskin_app.shell.window import MainWindow
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ import math
 import pytest
 
 from kappaskin import METHODS
-from kappaskin_app.amounts import duration, length
-from kappaskin_app.costing import Frontier
-from kappaskin_app.settings.shown import METHOD_NAMES
-from kappaskin_app.views.log_axis import LogAxis
+from kappaskin_app.features.accuracy.costing import Frontier
+from kappaskin_app.shell.settings.shown import METHOD_NAMES
+from kappaskin_app.widgets.amounts import duration, length
+from kappaskin_app.widgets.log_axis import LogAxis
 
 
 def test_every_method_has_a_name_that_people_read() -> None:

@@ -6,10 +6,10 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin import Setting
-from kappaskin_app.costing import in_words
-from kappaskin_app.settings import Settings
-from kappaskin_app.simulation import scene_of, scene_of_sensor
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.accuracy.costing import in_words
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.simulation import scene_of, scene_of_sensor
+from kappaskin_app.shell.window import MainWindow
 
 from .conftest import all_measured
 

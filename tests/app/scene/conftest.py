@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QApplication, QDoubleSpinBox
 
 from kappaskin import SCENES
 from kappaskin.sources import information
-from kappaskin_app.panels.scene_form.form import SceneForm
-from kappaskin_app.window import MainWindow
+from kappaskin_app.features.scene.scene_form.form import SceneForm
+from kappaskin_app.shell.window import MainWindow
 
 GALLERY, EDIT, EFFECTS_PAGE = range(3)
 FOLDER = files("kappaskin_resources") / "scenes"

@@ -16,10 +16,10 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import SCENES
-from kappaskin_app.panels.scene_form.form import SceneForm
-from kappaskin_app.panels.scene_form.sections import sections_of
-from kappaskin_app.panels.scene_form.words import How
-from kappaskin_app.scene_text import changes
+from kappaskin_app.features.scene.scene_form.form import SceneForm
+from kappaskin_app.features.scene.scene_form.sections import sections_of
+from kappaskin_app.features.scene.scene_form.words import How
+from kappaskin_app.features.scene.scene_text import changes
 
 from .conftest import TEXTS, box_at, said_by
 

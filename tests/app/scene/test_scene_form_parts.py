@@ -14,10 +14,10 @@ from PySide6.QtWidgets import QComboBox, QToolButton
 
 from kappaskin import EFFECTS
 from kappaskin.scenes import read_scene
-from kappaskin_app.panels.scene_form.form import SceneForm
-from kappaskin_app.panels.scene_form.section import Offer, Section
-from kappaskin_app.panels.scene_form.sections import sections_of
-from kappaskin_app.scene_text import changes, parts
+from kappaskin_app.features.scene.scene_form.form import SceneForm
+from kappaskin_app.features.scene.scene_form.section import Offer, Section
+from kappaskin_app.features.scene.scene_form.sections import sections_of
+from kappaskin_app.features.scene.scene_text import changes, parts
 
 from .conftest import TEXTS, TOUCHED, said_by
 

@@ -7,8 +7,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog
 
 from kappaskin import EFFECTS, read_scene, scene_file
-from kappaskin_app.settings import Settings
-from kappaskin_app.views.card import PLAYING
+from kappaskin_app.features.scene.card import PLAYING
+from kappaskin_app.shell.settings import Settings
 
 from .conftest import EDIT, EFFECTS_PAGE, GALLERY, plays
 

@@ -7,9 +7,9 @@ import pytest
 from PySide6.QtCore import QSize
 
 from kappaskin import SCENES, Disk, PointLoad, Polygon, SensorLayout, load_scene
+from kappaskin_app.features.scene.relief import relief
+from kappaskin_app.features.scene.scene_picture import picture
 from kappaskin_app.theme import DARK, LIGHT
-from kappaskin_app.views.relief import relief
-from kappaskin_app.views.scene_picture import picture
 
 SIZE = QSize(96, 60)
 

@@ -9,14 +9,14 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import SCENES, Refusal, load_scene, planned, read_scene, scene_file
-from kappaskin_app.history import History
-from kappaskin_app.scene_text import changes
-from kappaskin_app.scene_text.changes import OFF, ON, PLANNED, forced
-from kappaskin_app.scene_text.places import shifted
-from kappaskin_app.settings import Settings
-from kappaskin_app.settings.scene import Written
-from kappaskin_app.touching import Held, touches_at
-from kappaskin_app.wishes import Wishes
+from kappaskin_app.features.scene.scene_text import changes
+from kappaskin_app.features.scene.scene_text.changes import OFF, ON, PLANNED, forced
+from kappaskin_app.features.scene.scene_text.places import shifted
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.scene import Written
+from kappaskin_app.shell.touching import Held, touches_at
+from kappaskin_app.shell.wishes import Wishes
 
 READY = [name for name in SCENES if load_scene(name).stimuli]
 

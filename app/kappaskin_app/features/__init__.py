@@ -1,0 +1,1 @@
+"""The features: one folder for each thing a person does."""

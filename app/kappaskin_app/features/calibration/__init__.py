@@ -1,0 +1,1 @@
+"""Calibration on cylinders, and tare."""

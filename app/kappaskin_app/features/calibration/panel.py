@@ -1,0 +1,126 @@
+"""Calibration on cylinders of known radius, from the first question to the file."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QSignalBlocker
+from PySide6.QtWidgets import QFileDialog, QPushButton, QWidget
+
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
+from kappaskin.scenes import radii_for
+from kappaskin_app.features.calibration.calibrating import Calibrating, parsed_radii
+from kappaskin_app.features.calibration.outcome import Outcome
+from kappaskin_app.features.calibration.start import Start
+from kappaskin_app.features.calibration.steps import Steps
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.panel import Panel
+from kappaskin_app.theme import Theme
+from kappaskin_app.widgets.parts import FILES, sentence
+
+
+class CalibratePanel(Panel):
+    """Guides through a calibration on cylinders, and shows what came of it."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Cylinders of known radius", parent)
+        self.start, self.steps, self.outcome = Start(), Steps(), Outcome()
+        for page in (self.start, self.steps, self.outcome):
+            self.body.addWidget(page)
+        self._calibrating: Calibrating | None = None
+        self._status = Status()
+        self._meeting = 0
+        self._phase: QWidget = self.start
+        self._show_page()
+        for editor in (self.start.seconds, self.start.hold):
+            editor.valueChanged.connect(self._plan)
+        self.start.radii.textChanged.connect(self._plan)
+
+    def attend(self, calibrating: Calibrating) -> None:
+        """Show how `calibrating` goes, and tell it what a person wishes."""
+        self._calibrating = calibrating
+        start, steps, outcome = self.start, self.steps, self.outcome
+        calibrating.changed.connect(guarded(self._show))
+        for button, wish in (
+            (start.begin, self._begin),
+            (steps.take, calibrating.take),
+            (steps.redo, calibrating.redo),
+            (steps.cancel, calibrating.cancel),
+            (steps.all, self._take_all),
+            (outcome.use, calibrating.use),
+            (outcome.leave, calibrating.leave),
+            (outcome.save, self._save),
+        ):
+            button.clicked.connect(guarded(lambda *_, wish=wish: wish()))
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        self._status = status
+        self.steps.all.setVisible(simulating)
+        self.start.begin.setEnabled(status.sensor is not None and status.state == "streaming")
+        if status.sensor is not None and status.meetings != self._meeting:
+            self._meeting = status.meetings
+            radii = ", ".join(f"{1e3 * radius:g}" for radius in radii_for(status.sensor))
+            with QSignalBlocker(self.start.radii):
+                self.start.radii.setText(radii)
+                self.start.radii.setCursorPosition(0)
+            self._plan()
+
+    def show_theme(self, theme: Theme) -> None:
+        super().show_theme(theme)
+        for view in (self.steps.drawing, self.outcome.map, self.outcome.plot):
+            view.show_theme(theme)
+        self.outcome.show_colour(theme.accent)
+
+    def _plan(self, *_: object) -> None:
+        sensor = self._status.sensor
+        self.start.show_plan(sensor is not None and sensor.layout.patch.strip)
+
+    def _begin(self) -> None:
+        if self._calibrating is None:
+            return
+        try:
+            radii = parsed_radii(self.start.radii.text())
+        except Refusal as refusal:
+            self.show_message(sentence(str(refusal)))
+            return
+        self._calibrating.begin(radii, self.start.seconds.value(), self.start.hold.value())
+
+    def _take_all(self) -> None:
+        if self._calibrating is not None:
+            now = self._calibrating
+            (now.pause if now.unattended else now.take_all)()
+
+    def _save(self) -> None:
+        if self._calibrating is None or self._calibrating.result is None:
+            return
+        found = self._calibrating.result.report.calibration
+        name = f"{found.serial_number}-{found.date.astimezone():%Y%m%d}.calibration.toml"
+        path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, FILES)
+        if path:
+            self._calibrating.save(Path(path))
+
+    def _show(self) -> None:
+        now = self._calibrating
+        if now is None:
+            return
+        phase = self.steps if now.procedure else self.outcome if now.result else self.start
+        if now.procedure:
+            self.steps.show_step(now, now.procedure, now.step)
+        elif now.result:
+            self.outcome.show_result(now.result)
+        self.show_message(sentence(now.message or now.done), hint=not now.message)
+        if phase is not self._phase:
+            self._phase = phase
+            self._show_page()
+            if self.isVisible():
+                self._firstbutton().setFocus()
+
+    def _firstbutton(self) -> QPushButton:
+        return {
+            self.start: self.start.begin,
+            self.steps: self.steps.take,
+            self.outcome: self.outcome.use,
+        }[self._phase]
+
+    def _show_page(self) -> None:
+        for page in (self.start, self.steps, self.outcome):
+            page.setVisible(page is self._phase)

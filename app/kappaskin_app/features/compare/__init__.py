@@ -1,0 +1,1 @@
+"""Two setups on the same readings."""

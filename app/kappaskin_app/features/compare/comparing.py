@@ -1,0 +1,164 @@
+"""What the engine computes of the same frames with other settings, held against what is in use."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+
+from kappaskin.frames import Estimate
+from kappaskin.live import Computed, Status
+from kappaskin.pipeline import Setup
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.settings import Settings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of A and of B, each (value, standard deviation), in the unit that it is shown."""
+
+    label: str
+    unit: str
+    digits: int
+    a: tuple[float, float]
+    b: tuple[float, float]
+
+    @property
+    def difference(self) -> tuple[float, float]:
+        """B less A; the errors as if they had nothing in common."""
+        return self.b[0] - self.a[0], math.hypot(self.a[1], self.b[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """One frame computed with both setups."""
+
+    a: Estimate
+    b: Estimate
+
+    @property
+    def difference(self) -> Array | None:
+        """The surface of B less that of A, (ny, nx) in m; None where they are of other points."""
+        if self.a.surface.shape != self.b.surface.shape:
+            return None
+        return self.b.surface - self.a.surface
+
+    def figures(self) -> list[Figure]:
+        """What both say of the contact."""
+        found = [
+            (
+                label,
+                unit,
+                digits,
+                *((scale * v, scale * sd) for v, sd in map(read, (self.a, self.b))),
+            )
+            for label, unit, digits, scale, read in _FIGURES
+        ]
+        return [Figure(*row) for row in found]
+
+
+def _place(axis: int) -> Callable[[Estimate], tuple[float, float]]:
+    return lambda e: (float(e.touch.position[axis]), float(e.touch.position_sd[axis]))
+
+
+def _principal(which: int) -> Callable[[Estimate], tuple[float, float]]:
+    return lambda e: (
+        float(e.geometry.principal[which]),
+        float(e.geometry.principal_sd[which]),
+    )
+
+
+_FIGURES: tuple[tuple[str, str, int, float, Callable[[Estimate], tuple[float, float]]], ...] = (
+    ("Contact x", "mm", 2, 1e3, _place(0)),
+    ("Contact y", "mm", 2, 1e3, _place(1)),
+    ("Force", "mN", 1, 1e3, lambda e: (e.touch.force, e.touch.force_sd)),
+    ("Depth", "\N{MICRO SIGN}m", 0, 1e6, lambda e: (e.touch.displacement, e.touch.displacement_sd)),
+    ("Larger \N{GREEK SMALL LETTER KAPPA}", "1/m", 2, 1.0, _principal(0)),
+    ("Smaller \N{GREEK SMALL LETTER KAPPA}", "1/m", 2, 1.0, _principal(1)),
+)
+
+
+def other_setup(settings: Settings, setup: Setup) -> Setup:
+    """B: the `setup` in use, but for what `settings` say of it."""
+    s = settings
+    return replace(
+        setup,
+        Ni=s.other_x,
+        Nj=s.other_y,
+        method=s.other_method,
+        edge=s.other_edge,
+        calibration=setup.calibration if s.other_calibrated else None,
+        tare=setup.tare if s.other_tared else None,
+    )
+
+
+class Comparing(QObject):
+    """Has the engine compute with B while somebody looks; `compared` brings each new pair.
+
+    `told` is how B is doing, None while nobody looks.
+    """
+
+    compared = Signal(Pair)
+
+    def __init__(self, history: History, session: Session, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._history, self._session = history, session
+        self._asked: Setup | None = None
+        self._watched = False
+        self._shown: tuple[int, ...] = ()
+
+    def watch(self, watched: bool) -> None:
+        """Compute with B from now on, or no more."""
+        if watched != self._watched and not self._session.closed:
+            self._watched = watched
+            self._shown = ()
+            self._ask()
+
+    def swap(self) -> None:
+        """Let what is in use and B change places, as one change."""
+        s = self._history.settings
+        self._history.change(
+            "Swap A and B",
+            -1,
+            functions_x=s.other_x,
+            functions_y=s.other_y,
+            method=s.other_method,
+            fit_edge=s.other_edge,
+            other_x=s.functions_x,
+            other_y=s.functions_y,
+            other_method=s.method,
+            other_edge=s.fit_edge,
+        )
+
+    def _ask(self) -> None:
+        wanted = None
+        if self._watched:
+            wanted = other_setup(self._history.settings, self._session.asked)
+        if wanted != self._asked:
+            self._asked = wanted
+            self._session.engine.compare(wanted)
+
+    def follow(self, status: Status) -> None:
+        """Ask for what is wanted by now, and bring what came of it."""
+        self._ask()
+        if self._watched and (pair := self._read(status)) is not None:
+            shown = pair.a.generation, pair.b.generation, pair.a.sequence
+            if shown != self._shown:
+                self._shown = shown
+                self.compared.emit(pair)
+
+    def _read(self, status: Status) -> Pair | None:
+        """The newest frame that was computed with both."""
+        engine = self._session.engine
+        b = engine.beside(status)
+        a = None if b is None else engine.latest(status, b.sequence)
+        return None if a is None or b is None else Pair(a, b)
+
+    @property
+    def told(self) -> Computed | None:
+        return self._session.status.beside if self._watched else None

@@ -1,0 +1,1 @@
+"""Connection: which source is read, and the events on its line."""

@@ -1,0 +1,1 @@
+"""The contact in numbers and words."""

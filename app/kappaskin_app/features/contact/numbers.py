@@ -1,0 +1,109 @@
+"""The skin's picture in words and numbers, for who cannot see it or wants to keep it."""
+
+import time
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin.frames import Estimate
+from kappaskin.sensing import Sensor
+from kappaskin_app.features.contact.table import (
+    ELEMENTS,
+    FACTS,
+    Rows,
+    csv_of,
+    elements_of,
+    facts_of,
+)
+from kappaskin_app.guard import guarded
+from kappaskin_app.widgets.rows import fit_rows
+
+_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+_BESIDE = 14  # px left and right of a column's head together
+_LINES = 6  # that are seen of a table at least
+_EVERY = 0.5  # s between two readings: faster cannot be read
+
+
+class NumbersPanel(QWidget):
+    """Shows the contact and every element as tables, which can be copied as CSV."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.facts = _table("contact", "Contact and what touches", FACTS)
+        self.elements = _table("elements", "Readings of every element", ELEMENTS)
+        self.copy = QPushButton("&Copy as CSV")
+        self.copy.setToolTip("Copy both tables, for a spreadsheet.")
+        self.copy.clicked.connect(guarded(lambda *_: self._copy()))
+        self._facts, self._elements = Rows(), Rows()
+        self._next = 0.0
+        left, around = QVBoxLayout(), QHBoxLayout(self)
+        left.addWidget(self.facts)
+        left.addWidget(self.copy)
+        around.addLayout(left, 2)
+        around.addWidget(self.elements, 3)
+
+    def show_estimate(self, estimate: Estimate | None, sensor: Sensor | None, what: str) -> None:
+        """Show the numbers of an estimate, as often as they can be read; or none."""
+        now = time.monotonic()
+        if not self.isVisible() or now < self._next:
+            return
+        self._next = now + _EVERY
+        self._facts, self._elements = [], []
+        if estimate is not None and sensor is not None:
+            self._facts, self._elements = facts_of(estimate, what), elements_of(estimate, sensor)
+        _fill(self.facts, self._facts)
+        _fill(self.elements, self._elements)
+        if self._facts:
+            self.facts.setSpan(len(self._facts) - 1, 1, 1, len(FACTS) - 1)  # words, no number
+
+    def _copy(self) -> None:
+        text = csv_of((FACTS, self._facts), (ELEMENTS, self._elements))
+        QGuiApplication.clipboard().setText(text)
+
+
+def _table(name: str, title: str, head: Sequence[str]) -> QTableWidget:
+    table = QTableWidget(0, len(head))
+    table.setObjectName(name)
+    table.setAccessibleName(title)
+    table.setHorizontalHeaderLabels(list(head))
+    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    table.setTabKeyNavigation(False)  # Tab leads on, the arrows go through the table
+    table.setWordWrap(False)
+    table.verticalHeader().hide()
+    header = table.horizontalHeader()
+    header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+    header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+    return table
+
+
+def _fill(table: QTableWidget, rows: Rows) -> None:
+    """Write rows into a table, but for what stands there."""
+    table.setRowCount(len(rows))
+    fit_rows(table)
+    wide = table.fontMetrics().horizontalAdvance
+    heads = map(table.horizontalHeaderItem, range(table.columnCount()))
+    widest = max((wide(head.text()) for head in heads if head is not None), default=0)
+    table.horizontalHeader().setMinimumSectionSize(widest + _BESIDE)
+    table.setMinimumHeight((_LINES + 1) * table.verticalHeader().defaultSectionSize())
+    for row, texts in enumerate(rows):
+        for column, text in enumerate(texts):
+            item = table.item(row, column)
+            if item is None:
+                item = QTableWidgetItem()
+                table.setItem(row, column, item)
+            if item.text() != text:
+                item.setText(text)
+                item.setToolTip(text)
+                item.setTextAlignment(_RIGHT if text[-1:].isdigit() else _LEFT)

@@ -1,0 +1,220 @@
+"""The numbers in words: how live it is, where the contact is and how wrong the shape is."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import QEvent
+from PySide6.QtGui import QFont, QFontInfo, QResizeEvent
+from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QWidget
+
+from kappaskin.frames import Estimate, Touch
+from kappaskin_app.theme import Theme
+from kappaskin_app.widgets.line import Line
+
+_FINE = 0.02  # mm of error bar, below which a hundredth is too coarse
+_TINY = 0.05  # ms of error bar, below which it would be shown as none
+NONE = "\N{EN DASH}"
+
+
+@dataclass(frozen=True)
+class Health:
+    """How live the view is: `rate` in frames/s, `drawn` in pictures/s, `age` in s.
+
+    `age_sd` in s is the standard deviation of the age, infinite where it is only the least.
+    """
+
+    rate: float
+    drawn: float
+    age: float
+    age_sd: float
+    lost: int
+    discarded: int
+    skipped: int
+
+
+FIELDS = {
+    "rate": ("Frames", "Frames that come per second, and pictures drawn of them."),
+    "age": (
+        "Age",
+        "How old what you see was when it was drawn: since its scan began, with the standard "
+        "deviation that the device's clock is known to by pings. At least so old, where a line "
+        "answers none: then since its bytes came.",
+    ),
+    "lost": (
+        "Lost frames",
+        "Frames that never came; skipped: too many to compute; B: bytes that made no sense.",
+    ),
+    "contact": (
+        "Contact",
+        "Where one point load explains the readings best; spread: they are not of one; near rim: "
+        "too near a held edge for place and force to be trusted.",
+    ),
+    "force": ("Force", "How hard that load presses, with its error bar."),
+    "depth": (
+        "Depth",
+        "Displacement at the contact, with its error bar; positive is in.",
+    ),
+    "error": (
+        "Error at load",
+        "Reconstructed minus true displacement there (simulated only).",
+    ),
+    "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
+}
+
+_DIGITS = 1.14  # as wide as a character on average, the space between two fields with it
+_SMALL = 0.85  # of a number's letters are those of its name
+_WIDTHS = {
+    "contact": 22,
+    "rate": 15,
+    "lost": 19,
+    "force": 14,
+    "depth": 15,
+    "age": 10,
+    "error": 10,
+    "rms": 9,
+}
+"""Characters of each, as many as it mostly has."""
+
+
+def _with_error(value: float, sd: float, digits: int, unit: str) -> str:
+    if not math.isfinite(value):
+        return NONE
+    bar = f" \N{PLUS-MINUS SIGN} {sd:.{digits}f}" if math.isfinite(sd) else ""
+    return f"{_number(value, digits)}{bar} {unit}"
+
+
+def _number(value: float, digits: int, sign: str = "") -> str:
+    rounded = round(value, digits) + 0.0  # no minus before a zero
+    return f"{rounded:{sign}.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def _short(count: int) -> str:
+    """A count in few digits, so that three of them fit beside each other."""
+    if count < 10_000:
+        return str(count)
+    return f"{count / 1e3:.0f} k" if count < 999_500 else f"{count / 1e6:.1f} M"
+
+
+def _contact(touch: Touch) -> str:
+    if not touch.present:
+        return "none"
+    x, y = touch.position * 1e3
+    if touch.near_rim:
+        return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, near rim"
+    if not touch.single:
+        return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, spread"
+    sd = float(np.max(touch.position_sd)) * 1e3
+    return f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.2f} mm"
+
+
+def _age(age: float, sd: float) -> str:
+    """An age in ms with its error bar, unless that is too small to be seen."""
+    if not math.isfinite(age):
+        return NONE
+    if not math.isfinite(sd):
+        return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
+    return f"{age:.0f} ms" if sd < _TINY else _with_error(age, sd, 0 if sd >= 1 else 1, "ms")
+
+
+def _force(touch: Touch) -> str:
+    if abs(touch.force) >= 1:
+        return _with_error(touch.force, touch.force_sd, 3, "N")
+    return _with_error(touch.force * 1e3, touch.force_sd * 1e3, 1, "mN")
+
+
+class Readouts(QWidget):
+    """Names above numbers, each of a fixed width so that nothing jitters.
+
+    In two rows where the letters are too large for one.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(6, 2, 6, 2)
+        self._grid.setHorizontalSpacing(6)
+        self._grid.setVerticalSpacing(0)
+        self._names: list[QLabel] = []
+        self._numbers: dict[str, Line] = {}
+        for key, (name, tip) in FIELDS.items():
+            above, below = QLabel(name), Line(NONE)
+            bold = below.font()
+            bold.setWeight(QFont.Weight.DemiBold)
+            below.setFont(bold)
+            for widget in (above, below):
+                widget.setToolTip(tip)
+            self._names.append(above)
+            self._numbers[key] = below
+        self._columns = 0
+        self._lay_out(len(FIELDS))
+
+    def _lay_out(self, columns: int) -> None:
+        """Put so many fields beside each other."""
+        if columns == self._columns:
+            return
+        self._columns = columns
+        for column in range(len(FIELDS)):
+            self._grid.setColumnStretch(column, 0)
+        fields = zip(self._names, self._numbers.items(), strict=True)
+        for number, (above, (key, below)) in enumerate(fields):
+            row, column = divmod(number, columns)
+            self._grid.addWidget(above, 2 * row, column)
+            self._grid.addWidget(below, 2 * row + 1, column)
+            stretch = max(self._grid.columnStretch(column), _WIDTHS[key])
+            self._grid.setColumnStretch(column, stretch)
+
+    def _fit(self) -> None:
+        digit = self._numbers["rate"].fontMetrics().horizontalAdvance("0")
+        room = self.width() >= _DIGITS * digit * sum(_WIDTHS.values())
+        self._lay_out(len(FIELDS) if room else len(FIELDS) // 2)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self._fit()
+
+    def text(self, key: str) -> str:
+        return self._numbers[key].text()
+
+    @property
+    def parts(self) -> dict[str, list[QWidget]]:
+        """Each number with what stands above it, by name."""
+        return {
+            key: [number, name]
+            for (key, number), name in zip(self._numbers.items(), self._names, strict=True)
+        }
+
+    def show_health(self, health: Health) -> None:
+        self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
+        self._write("age", _age(1e3 * health.age, 1e3 * health.age_sd))
+        also = ((health.skipped, "skipped"), (health.discarded, "B"))
+        lost = [_short(health.lost), *(f"{_short(count)} {what}" for count, what in also if count)]
+        self._write("lost", ", ".join(lost))
+
+    def show_estimate(self, estimate: Estimate | None) -> None:
+        if estimate is None:
+            for key in ("contact", "force", "depth", "error", "rms"):
+                self._write(key, NONE)
+            return
+        touch = estimate.touch
+        self._write("contact", _contact(touch))
+        self._write("force", _force(touch))
+        depth, sd = touch.displacement * 1e3, touch.displacement_sd * 1e3
+        digits = 3 if sd < _FINE else 2
+        self._write("depth", _with_error(depth, sd, digits, "mm"))
+        error, rms = estimate.error_at_load * 1e3, estimate.error_rms * 1e3
+        self._write("error", f"{_number(error, 3, '+')} mm" if math.isfinite(error) else NONE)
+        self._write("rms", f"{_number(rms, 3)} mm" if math.isfinite(rms) else NONE)
+
+    def _write(self, key: str, text: str) -> None:
+        self._numbers[key].show_text(text)
+
+    def show_theme(self, theme: Theme) -> None:
+        size = round(_SMALL * QFontInfo(QApplication.font()).pixelSize())
+        for label in self._names:
+            label.setStyleSheet(f"color: {theme.faint}; font-size: {size}px;")

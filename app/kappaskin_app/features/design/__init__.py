@@ -1,0 +1,1 @@
+"""Design of a sensor before it is built."""

@@ -1,0 +1,147 @@
+"""What the window does now, as a Python script that does the same."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from kappaskin.errors import Refusal
+from kappaskin.estimation import Region
+from kappaskin.pipeline import Setup
+from kappaskin.recording import said_of_setup
+from kappaskin.scenes import SCENES, read_scene_text, scene_file, write_scene
+from kappaskin_app.shell.session import RECORDED, Session
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.scene import Written
+from kappaskin_app.shell.simulation import OWN, region_of
+
+_NAMES = ("Region", "Setup", "load_scene", "planned", "read_scene", "setup_from")
+_SCRIPT = Template('''\
+"""What Kappaskin's window shows, from Python."""
+
+import time
+$paths
+from kappaskin import $names
+
+$said
+
+def estimates(seconds):
+    """The newest estimate, ten times a second."""
+    with Engine() as engine:
+        $asked
+        end, last = time.monotonic() + seconds, -1
+        while time.monotonic() < end:
+            status = engine.status()
+            estimate = engine.latest(status)
+            if estimate is not None and estimate.sequence != last:
+                last = estimate.sequence
+                yield estimate
+            time.sleep(0.1)
+        if last < 0:
+            print(status.state, status.message)
+
+
+if __name__ == "__main__":  # the engine is a process of its own, which reads this file too
+    for e in estimates(seconds=5.0):
+        x, y = 1e3 * e.touch.position
+        force, deepest = 1e3 * e.touch.force, 1e3 * abs(e.surface).max()
+        print(
+            f"{e.device_time:9.3f} s  contact {x:6.2f}, {y:6.2f} mm  force {force:7.1f} mN  "
+            f"deepest {deepest:6.3f} mm  noise {e.noise:.3f} 1/m"
+        )
+''')
+
+
+@dataclass(frozen=True)
+class Script:
+    """The `text`, and the `files` that it reads, by the name that it looks for beside them."""
+
+    text: str
+    files: Mapping[str, bytes]
+
+
+def script_of(session: Session, settings: Settings, folder: Path) -> Script:
+    """The script for what `session` reads; the files of its setup are to be put into `folder`.
+
+    A `Refusal` while nothing is read, or where no text can say what is simulated.
+    """
+    if not session.source:
+        raise Refusal("expected a source that is read, got none; connect one, then copy again")
+    setup, files = _setup(session.asked, folder)
+    made, asked = [f"SETUP = {setup}"], ["engine.set_up(SETUP)"]
+    if (region := region_of(settings)) != Region():
+        made.append(f"REGION = {_made(region)}")
+        asked.append("engine.scan(REGION)")
+    if settings.targets:
+        asked.append(f"engine.publish({settings.targets!r})")
+    asked.append(f"engine.connect({_said(_source(session))})")
+    if session.inside:
+        made.append(f"SCENE = {_scene(session, settings)}")
+        asked += ["engine.play(planned(SCENE))", "engine.seek(0.0)"]
+    return Script(_composed("\n".join(made), asked), files)
+
+
+def _composed(made: str, asked: list[str]) -> str:
+    used = f"{made}{asked}"
+    names = ["Engine", *(name for name in _NAMES if f"{name}(" in used)]
+    paths = "from pathlib import Path\n" if "Path(" in made else ""
+    between = "\n        "
+    return _SCRIPT.substitute(
+        paths=paths, names=", ".join(names), said=f"{made}\n", asked=between.join(asked)
+    )
+
+
+def _source(session: Session) -> str:
+    """The name of the source from wherever the script is run; what is played comes after it."""
+    if session.inside:
+        return "sim:"
+    name = session.source
+    return (
+        f"{RECORDED}{Path(name.removeprefix(RECORDED)).absolute()}" if session.replaying else name
+    )
+
+
+def _said(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
+
+
+def _made(value: Any, always: tuple[str, ...] = ()) -> str:
+    """A dataclass as it is made: what is not as it usually is of it, and those named `always`."""
+    usual, said = type(value)(), {f.name: getattr(value, f.name) for f in fields(value)}
+    told = (f"{n}={_said(v)}" for n, v in said.items() if n in always or v != getattr(usual, n))
+    return f"{type(value).__name__}({', '.join(told)})"
+
+
+def _setup(setup: Setup, folder: Path) -> tuple[str, Mapping[str, bytes]]:
+    """A setup as it is made, and the files that it has its calibration and its tare from."""
+    text, files = said_of_setup(setup)
+    if not files:
+        return _made(setup, ("Ni", "Nj", "method")), files
+    read = f"lambda name: Path({_said(str(folder))}, name).read_bytes()"
+    return f"setup_from(\n    {text!r},\n    {read},\n)", files
+
+
+def _scene(session: Session, settings: Settings) -> str:
+    """How the scene is made that is simulated."""
+    written = settings.written
+    if written is None or session.refusal:
+        return _read(write_scene(session.scene), OWN)
+    if not _is_in_its_file(written):
+        return _read(written.text, written.file.absolute())
+    ready = written.file.stem in SCENES and scene_file(written.file.stem) == written.file
+    return f"load_scene({_said(written.file.stem if ready else str(written.file.absolute()))})"
+
+
+def _is_in_its_file(written: Written) -> bool:
+    try:
+        return written.file.is_file() and read_scene_text(written.file) == written.text
+    except Refusal:
+        return False
+
+
+def _read(text: str, file: Path) -> str:
+    plain = "'''" not in text and "\\" not in text and not text.endswith("'")
+    quoted = f"'''{text}'''" if plain else repr(text)
+    return f"read_scene({quoted}, Path({_said(str(file))}))"

@@ -1,0 +1,226 @@
+"""The guide to read: its pages listed, the text of one, and the way back."""
+
+from PySide6.QtCore import QEvent, QSignalBlocker, Qt, QTimer, QUrl
+from PySide6.QtGui import (
+    QBrush,
+    QColor,
+    QFontDatabase,
+    QPixmap,
+    QResizeEvent,
+    QShowEvent,
+    QTextBlock,
+    QTextBlockFormat,
+    QTextCharFormat,
+    QTextCursor,
+    QTextDocument,
+    QTextFormat,
+    QTextFrameFormat,
+    QTextTable,
+)
+from PySide6.QtWidgets import QHBoxLayout, QListWidget, QTextBrowser, QVBoxLayout, QWidget
+
+from kappaskin_app.features.guide.pages import Page, pages
+from kappaskin_app.guard import guarded
+from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.widgets.parts import button, in_a_row
+
+_PRINTED = ("text", "output")  # fences around what a command prints
+_WIDEST = 88  # of the text, in letters M: longer lines are hard to follow
+_MARGIN, _CODE, _CELL, _ABOVE = 14, 10, 4, 8  # px
+
+
+class GuidePanel(QWidget):
+    """Shows one page after the other, as a person goes from link to link."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.contents, self.text = QListWidget(), _Text()
+        self.contents.setAccessibleName("Pages of the guide")
+        self.contents.setToolTip("The pages of the guide; Ctrl+K finds every heading in them.")
+        self.back = button("\N{LEFTWARDS ARROW} &Back", "guide-back", "The page before (Alt+Left).")
+        self.forward = button(
+            "&Forward \N{RIGHTWARDS ARROW}", "guide-forward", "On again, after Back (Alt+Right)."
+        )
+        for page in pages():
+            self.contents.addItem(page.title)
+        self._lay_out()
+        self.contents.currentRowChanged.connect(guarded(self._choose))
+        self.text.sourceChanged.connect(guarded(self._show_where))
+        for way, available, go in (
+            (self.back, self.text.backwardAvailable, self.text.backward),
+            (self.forward, self.text.forwardAvailable, self.text.forward),
+        ):
+            way.setEnabled(False)
+            available.connect(way.setEnabled)
+            way.clicked.connect(guarded(lambda *_, go=go: go()))
+
+    def _lay_out(self) -> None:
+        beside, left = QHBoxLayout(self), QVBoxLayout()
+        left.addLayout(in_a_row(self.back, self.forward))
+        left.addWidget(self.contents, 1)
+        beside.addLayout(left)
+        beside.addWidget(self.text, 1)
+
+    def read(self, page: Page, heading: str = "") -> None:
+        """Show a page, from a heading in it on."""
+        url = QUrl.fromLocalFile(str(page.file))
+        url.setFragment(heading)
+        self.text.setSource(url)
+
+    def _choose(self, row: int) -> None:
+        self.read(pages()[row])
+
+    def _show_where(self, url: QUrl) -> None:
+        """Mark the page in the contents; none for a file that is none of them."""
+        listed = [str(page.file) for page in pages()]
+        row = listed.index(url.toLocalFile()) if url.toLocalFile() in listed else -1
+        with QSignalBlocker(self.contents):
+            self.contents.setCurrentRow(row)
+        self.text.dress()
+        self.text.scroll_to(url.fragment())
+
+    def _fit(self) -> None:
+        self.contents.setFixedWidth(self.contents.sizeHintForColumn(0) + 4 * _CELL)
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            QTimer.singleShot(0, self, guarded(self._fit))  # once the list has its letters
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._fit()
+        if self.text.source().isEmpty():
+            self.read(pages()[0])
+
+    def show_theme(self, theme: Theme) -> None:
+        self.text.show_theme(theme)
+
+
+class _Text(QTextBrowser):
+    """A page of Markdown, in lines that are not too long."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._theme = LIGHT
+        self.setAccessibleName("The page of the guide")
+        self.setOpenExternalLinks(True)
+        self.setLineWrapMode(QTextBrowser.LineWrapMode.FixedPixelWidth)
+
+    def loadResource(self, kind: int, name: QUrl) -> object:
+        """What a page names; pictures no wider than its lines."""
+        found = super().loadResource(kind, name)
+        if kind != QTextDocument.ResourceType.ImageResource:
+            return found
+        picture, wide = QPixmap(name.toLocalFile()), self.lineWrapColumnOrWidth() - 3 * _MARGIN
+        if picture.width() <= wide:
+            return found
+        return picture.scaledToWidth(wide, Qt.TransformationMode.SmoothTransformation)
+
+    def scroll_to(self, heading: str) -> None:
+        """Bring a heading to the top, if there is one of these words."""
+        for block in _blocks(self.document()):
+            if heading and block.blockFormat().headingLevel() and block.text() == heading:
+                top = self.document().documentLayout().blockBoundingRect(block).top()
+                self.verticalScrollBar().setValue(round(top))
+
+    def show_theme(self, theme: Theme) -> None:
+        if theme != self._theme:
+            self._theme = theme
+            at = self.verticalScrollBar().value()
+            self.reload()  # links have the colour of the palette with which they were read
+            self.dress()
+            self.verticalScrollBar().setValue(at)
+
+    def dress(self) -> None:
+        """Give code a ground and letters as large as others, and tables thin lines."""
+        document, theme = self.document(), self._theme
+        document.setDocumentMargin(_MARGIN)
+        for frame in document.rootFrame().childFrames():
+            if isinstance(frame, QTextTable):
+                _rule(frame, theme)
+        for block in _blocks(document):
+            if _is_code(block):
+                _ground(block, theme)
+            elif block.blockFormat().headingLevel():
+                _space(block)
+            _enlarge(block, self.font().pointSizeF())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self._fit()
+            self.dress()
+
+    def _fit(self) -> None:
+        widest = _WIDEST * self.fontMetrics().horizontalAdvance("M")
+        self.setLineWrapColumnOrWidth(min(self.viewport().width(), widest))
+
+
+def _blocks(document: QTextDocument) -> list[QTextBlock]:
+    found, block = list[QTextBlock](), document.begin()
+    while block.isValid():
+        found.append(block)
+        block = block.next()
+    return found
+
+
+def _rule(table: QTextTable, theme: Theme) -> None:
+    how = table.format()
+    how.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
+    how.setBorderBrush(QBrush(QColor(theme.line)))
+    how.setBorder(1)
+    how.setBorderCollapse(True)
+    how.setCellPadding(_CELL)
+    table.setFormat(how)
+
+
+def _is_code(block: QTextBlock) -> bool:
+    return block.blockFormat().hasProperty(QTextFormat.Property.BlockCodeFence)
+
+
+def _kind(block: QTextBlock) -> str:
+    """What the fence around a line of code says; of no code nothing."""
+    return str(block.blockFormat().property(QTextFormat.Property.BlockCodeLanguage) or "")
+
+
+def _ground(block: QTextBlock, theme: Theme) -> None:
+    """A line of code; what a command prints is fainter than what is typed."""
+    cursor, ground, letters = QTextCursor(block), QTextBlockFormat(), QTextCharFormat()
+    ground.setBackground(QColor(theme.window))
+    ground.setLeftMargin(_CODE)
+    if _kind(block) != _kind(block.previous()):
+        ground.setTopMargin(_ABOVE / 2)
+    if not _is_code(block.next()):
+        ground.setBottomMargin(_ABOVE)
+    fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont).family()
+    letters.setFontFamilies([fixed])
+    letters.setForeground(QColor(theme.faint if _kind(block) in _PRINTED else theme.text))
+    cursor.mergeBlockFormat(ground)
+    cursor.select(QTextCursor.SelectionType.LineUnderCursor)
+    cursor.mergeCharFormat(letters)
+
+
+def _enlarge(block: QTextBlock, size: float) -> None:
+    """Let words of code be so many points large: they follow no change of the letters."""
+    larger, cursor, at = QTextCharFormat(), QTextCursor(block), block.begin()
+    larger.setFontPointSize(size)
+    while not at.atEnd():
+        words = at.fragment()
+        if _is_code(block) or words.charFormat().fontFixedPitch():
+            cursor.setPosition(words.position())
+            cursor.setPosition(words.position() + words.length(), QTextCursor.MoveMode.KeepAnchor)
+            cursor.mergeCharFormat(larger)
+        at += 1
+
+
+def _space(block: QTextBlock) -> None:
+    """Room around a heading."""
+    room = QTextBlockFormat()
+    room.setTopMargin(2 * _ABOVE)
+    room.setBottomMargin(_ABOVE)
+    QTextCursor(block).mergeBlockFormat(room)

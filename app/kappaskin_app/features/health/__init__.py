@@ -1,0 +1,1 @@
+"""Health of the channels, and a test of their map."""

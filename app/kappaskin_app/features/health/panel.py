@@ -1,0 +1,120 @@
+"""Which channels are not to be trusted, what leaving them out costs, and a test of their map."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QSizePolicy,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin.health import Health
+from kappaskin.live import Status
+from kappaskin_app.features.health.map_testing import MapTesting
+from kappaskin_app.features.health.press import PressPage
+from kappaskin_app.guard import guarded
+from kappaskin_app.theme import Theme
+from kappaskin_app.widgets.parts import sentence, text_label
+from kappaskin_app.widgets.rows import fit_rows
+
+_COLUMNS = ("Element", "Channel", "What", "Since", "Figure")
+_TIP = (
+    "Channels that are dead, stuck, noisy, on a rail, swapped, drifting or off. They are left out "
+    "of the shape until they agree with those around them again; a dead, stuck or swapped one "
+    "shows that only while it is moved. Choose one to see where it is."
+)
+
+
+class HealthPanel(QWidget):
+    """The findings as a list, their cost in words, and the press-here test beside them.
+
+    `pointed` says which element is looked at, -1 for none.
+    """
+
+    pointed = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.words, self.press = text_label("", _TIP), PressPage()
+        self.table = self._made_table()
+        self._shown = Health()
+        left = QVBoxLayout()
+        left.setSpacing(4)
+        left.addWidget(self.words)
+        left.addWidget(self.table, 1)
+        around = QHBoxLayout(self)
+        around.setContentsMargins(8, 4, 8, 6)
+        around.setSpacing(12)
+        around.addLayout(left, 3)
+        around.addWidget(self.press, 2)
+        self._show(Health(), 0.0)
+
+    def _made_table(self) -> QTableWidget:
+        table = QTableWidget(0, len(_COLUMNS))
+        table.setObjectName("findings")
+        table.setAccessibleName("Channels that are found wanting")
+        table.setToolTip(_TIP)
+        table.setHorizontalHeaderLabels(_COLUMNS)
+        table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        table.setTabKeyNavigation(False)  # Tab leads on, the arrows go through the list
+        table.setWordWrap(False)
+        table.verticalHeader().hide()
+        # As high as there is room: it scrolls by itself.
+        table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+        header = table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setStretchLastSection(True)
+        table.itemSelectionChanged.connect(guarded(self._point))
+        return table
+
+    def attend(self, testing: MapTesting) -> None:
+        """Show how `testing` goes, and tell it what a person wishes."""
+        self.press.attend(testing)
+
+    def show_status(self, status: Status, inside: bool) -> None:
+        if self.isVisible():
+            self._show(status.health, status.reported)
+        self.press.show_status(status, inside)
+
+    def _show(self, health: Health, now: float) -> None:
+        words = sentence(str(health))
+        if len(health.findings) < health.count:
+            words += f" The first {len(health.findings)} are listed."
+        if words != self.words.text():
+            self.words.setText(words)
+        fit_rows(self.table)
+        self.table.setRowCount(len(health.findings))
+        for row, finding in enumerate(health.findings):
+            age = max(0.0, now - finding.since)
+            since = f"{age:.0f} s" if age < 90 else f"{age / 60:.0f} min"
+            kind = f"{finding.kind}, kept" if finding.kept else finding.kind
+            texts = (str(finding.element), finding.component, kind, since, finding.figure)
+            for column, text in enumerate(texts):
+                self._write(row, column, text.replace("-", "\N{MINUS SIGN}"))
+        self._shown = health
+
+    def _write(self, row: int, column: int, text: str) -> None:
+        item = self.table.item(row, column)
+        if item is None:
+            item = QTableWidgetItem()
+            if column == 0:
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.table.setItem(row, column, item)
+        if item.text() != text:
+            item.setText(text)
+            item.setToolTip(text)
+
+    def _point(self) -> None:
+        rows = self.table.selectionModel().selectedRows()
+        findings = self._shown.findings
+        there = [index.row() for index in rows if index.row() < len(findings)]
+        self.pointed.emit(findings[there[0]].element if there else -1)
+
+    def show_theme(self, theme: Theme) -> None:
+        self.press.show_theme(theme)

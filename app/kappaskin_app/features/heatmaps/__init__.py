@@ -1,0 +1,1 @@
+"""Heatmaps: a quantity of every element, not interpolated."""

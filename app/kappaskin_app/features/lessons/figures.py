@@ -1,0 +1,105 @@
+"""What the window shows, as figures by name, for a lesson's questions."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
+from kappaskin_app.features.lessons.expression import NUMBER, WORD
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.asks import Choice, Several, Text
+
+if TYPE_CHECKING:
+    from kappaskin_app.features.stability.seeing import Spectrum
+
+_RECENT = 24  # estimates of which the median is taken: one alone jumps with the noise
+
+
+def _peak(row: int) -> Callable[[Estimate], float]:
+    def peak(estimate: Estimate) -> float:
+        readings = estimate.curvature[row][np.isfinite(estimate.curvature[row])]
+        return float(readings[np.argmax(np.abs(readings))]) if len(readings) else math.nan
+
+    return peak
+
+
+OF_AN_ESTIMATE: dict[str, Callable[[Estimate], float]] = {
+    "error_rms": lambda e: e.error_rms,
+    "error_at_load": lambda e: e.error_at_load,
+    "noise": lambda e: e.noise,
+    "contact": lambda e: float(e.touch.present),
+    "contact_x": lambda e: float(e.touch.position[0]),
+    "contact_y": lambda e: float(e.touch.position[1]),
+    "contact_sd": lambda e: float(np.max(e.touch.position_sd)),
+    "measured_force": lambda e: e.touch.force,
+    "force_sd": lambda e: e.touch.force_sd,
+    "depth": lambda e: e.touch.displacement,
+    "depth_sd": lambda e: e.touch.displacement_sd,
+    "spread": lambda e: float(e.touch.present and not e.touch.single),
+    "near_rim": lambda e: float(e.touch.near_rim),
+    "peak_xx": _peak(0),
+    "peak_yy": _peak(1),
+    "peak_xy": _peak(2),
+    "suspects": lambda e: float(np.count_nonzero(e.suspect)),
+    "unread": lambda e: float(np.isnan(e.curvature).any(axis=0).sum()),
+}
+"""Figures of one estimate, in SI units; yes is 1, no is 0."""
+
+OF_THE_STATUS: dict[str, Callable[[Status], float]] = {
+    "rate": lambda s: s.rate,
+    "refused": lambda s: float(bool(s.refusal)),
+    "findings": lambda s: float(len(s.health.findings)),
+}
+OF_THE_SPECTRUM: dict[str, Callable[["Spectrum"], float]] = {
+    "silent": lambda s: float(s.silent),
+    "condition": lambda s: math.inf if s.silent else float(s.values[0] / s.values[-1]),
+}
+"""Figures that are there while Stability is shown."""
+
+
+def _kind_of(how: object) -> str:
+    return WORD if isinstance(how, Choice | Text) else NUMBER
+
+
+SETTINGS = {
+    field.name: _kind_of(field.metadata["ask"])
+    for field in fields(Settings)
+    if "ask" in field.metadata and not isinstance(field.metadata["ask"], Several)
+}
+KINDS = dict.fromkeys((*OF_AN_ESTIMATE, *OF_THE_STATUS, *OF_THE_SPECTRUM), NUMBER) | SETTINGS
+"""Every name that an expression may have, with whether it is a number or a word."""
+
+
+class Watch:
+    """Keeps the last estimates of the present settings, for figures that stand still."""
+
+    def __init__(self) -> None:
+        self._recent: deque[Estimate] = deque(maxlen=_RECENT)
+
+    def receive(self, estimate: Estimate) -> None:
+        self._recent.append(estimate)
+
+    def forget(self) -> None:
+        """What was seen before something changed."""
+        self._recent.clear()
+
+    def figures(
+        self, settings: Settings, status: Status, spectrum: "Spectrum | None"
+    ) -> dict[str, float | str]:
+        """Every figure as it is now; NaN where there is none."""
+        found: dict[str, float | str] = {
+            name: value if isinstance(value := getattr(settings, name), str) else float(value)
+            for name in SETTINGS
+        }
+        for name, of in OF_AN_ESTIMATE.items():
+            values = [value for e in self._recent if math.isfinite(value := of(e))]
+            found[name] = float(np.median(values)) if values else math.nan
+        found |= {name: of(status) for name, of in OF_THE_STATUS.items()}
+        for name, seen in OF_THE_SPECTRUM.items():
+            found[name] = math.nan if spectrum is None else seen(spectrum)
+        return found

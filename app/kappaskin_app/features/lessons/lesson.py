@@ -1,0 +1,129 @@
+"""A lesson and its steps, as a file says them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from kappaskin.scenes import scene_file
+from kappaskin_app.features.lessons.expression import Expression
+from kappaskin_app.shell.settings import SceneSettings
+from kappaskin_app.shell.settings.sensor import Scanning
+from kappaskin_app.shell.settings.shown import Fit, View
+from kappaskin_app.shell.simulation import written
+from kappaskin_app.shell.skins import SHAPES
+
+UNITS = {
+    "": 1.0,
+    "m": 1.0,
+    "mm": 1e-3,
+    "\N{MICRO SIGN}m": 1e-6,
+    "N": 1.0,
+    "mN": 1e-3,
+    "1/m": 1.0,
+    "V": 1.0,
+    "mV": 1e-3,
+    "s": 1.0,
+    "ms": 1e-3,
+    "%": 1e-2,
+    "times": 1.0,
+    "frames/s": 1.0,
+}
+"""What one of each unit that an answer may have is in SI units."""
+
+_PLAIN = {
+    field.name: field.default
+    for kind in (SceneSettings, Fit, Scanning, View)
+    for field in fields(kind)
+    if field.name != "theme"
+} | {"calibration": None, "tare": None}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of several `options` is `right`, counted from 0."""
+
+    options: tuple[str, ...]
+    right: int
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number within `tolerance` of what is `expected`, both in SI units, asked in `unit`."""
+
+    expected: Expression
+    tolerance: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """Something to do, done when `check` holds of what the window shows; `solution` does it."""
+
+    check: Expression
+    solution: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked, with a `hint` after a wrong answer and an explanation at the end."""
+
+    text: str
+    how: Choice | Number | Task
+    hint: str
+    explain: str
+
+
+@dataclass(frozen=True)
+class Button:
+    """Something that breaks what is seen, or mends it: `sets` on top of the step's settings."""
+
+    label: str
+    sets: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A `title`, a `text` in Markdown, and what it does to the window.
+
+    `sets` are the settings it begins with, None where it leaves all as it is; `point` names what
+    is pointed at.
+    """
+
+    title: str
+    text: str
+    sets: Mapping[str, Any] | None = None
+    point: tuple[str, ...] = ()
+    buttons: tuple[Button, ...] = ()
+    question: Question | None = None
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """Some `minutes` in which one learns something, step by step."""
+
+    name: str
+    title: str
+    minutes: int
+    learn: str
+    steps: tuple[Step, ...]
+
+    def begins(self, step: int) -> Mapping[str, Any] | None:
+        """The settings that `step` begins with, be it those of a step before it."""
+        earlier = (one.sets for one in reversed(self.steps[: step + 1]))
+        return next((sets for sets in earlier if sets is not None), None)
+
+    @property
+    def questions(self) -> int:
+        return sum(step.question is not None for step in self.steps)
+
+
+def whole(sets: Mapping[str, Any]) -> dict[str, Any]:
+    """All settings of a step that says `sets`: the others are plain, and a shape is of its size.
+
+    A "scene" among them is the ready scene that is played.
+    """
+    said = dict(sets)
+    shape = SHAPES[said.get("shape", "flat")]
+    scene = said.pop("scene", "")
+    played = {"written": written(scene_file(scene))} if scene else {}
+    return _PLAIN | {**shape.asks, **shape.begins} | played | said

@@ -1,0 +1,119 @@
+"""Lessons: the list of them, the step that is taken, and the figure at the end."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin_app.features.lessons.ending import EndPage
+from kappaskin_app.features.lessons.listing import ListPage
+from kappaskin_app.features.lessons.step import StepPage
+from kappaskin_app.features.lessons.teaching import Teaching
+from kappaskin_app.guard import guarded
+from kappaskin_app.theme import Theme
+from kappaskin_app.widgets.parts import button
+
+
+class LessonPanel(QWidget):
+    """Shows what `Teaching` knows and tells it what a person wishes; `seen` when it is shown."""
+
+    seen = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.list, self.step, self.end = ListPage(), StepPage(), EndPage()
+        self.pages = QStackedWidget()
+        for page in (self.step, self.end):
+            self.pages.addWidget(page)
+        self.where, self.bar = QLabel(), QProgressBar()
+        self.where.setTextFormat(Qt.TextFormat.PlainText)
+        self.bar.setTextVisible(False)
+        self.bar.setFixedHeight(4)
+        self.back = button("\N{LEFTWARDS ARROW} &Back", "lesson-back", "The step before.")
+        self.next = button("&Next \N{RIGHTWARDS ARROW}", "lesson-next", "The step after this one.")
+        self.leave = button(
+            "&Leave", "leave-lesson", "Back to the list, with the settings from before the lesson."
+        )
+        self._taking = QWidget()
+        self._lay_out()
+        self._teaching: Teaching | None = None
+
+    def _lay_out(self) -> None:
+        inside = QVBoxLayout(self._taking)
+        inside.setContentsMargins(8, 4, 8, 8)
+        row = QHBoxLayout()
+        for widget in (self.back, self.next):
+            row.addWidget(widget, 1)
+        row.addWidget(self.leave)
+        for widget in (self.where, self.bar):
+            inside.addWidget(widget)
+        inside.addWidget(self.pages, 1)
+        inside.addLayout(row)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        for widget in (self.list, self._taking):
+            whole.addWidget(widget)
+        self._taking.hide()
+
+    def attend(self, teaching: Teaching) -> None:
+        """Show how `teaching` goes, and tell it what a person wishes."""
+        self._teaching = teaching
+        teaching.changed.connect(guarded(self._show))
+        self.seen.connect(guarded(teaching.look))
+        self.list.taken.connect(guarded(teaching.take))
+        self.list.open_wanted.connect(guarded(teaching.open))
+        self.step.answered.connect(guarded(teaching.answer))
+        self.step.show_wanted.connect(guarded(teaching.show_how))
+        self.step.pressed.connect(guarded(teaching.press))
+        self.end.hand_in_wanted.connect(guarded(teaching.hand_in))
+        self.leave.clicked.connect(guarded(lambda *_: teaching.leave()))
+        for where, by in ((self.back, -1), (self.next, 1)):
+            where.clicked.connect(guarded(lambda *_, by=by: self._go(by)))
+
+    def _go(self, by: int) -> None:
+        teaching = self._teaching
+        if teaching is not None and teaching.progress is not None:
+            teaching.go(teaching.progress.step + by)
+
+    def _show(self) -> None:
+        teaching = self._teaching
+        if teaching is None:
+            return
+        progress = teaching.progress
+        self.list.setVisible(progress is None)
+        self._taking.setVisible(progress is not None)
+        if progress is None:
+            self.list.show_lessons(teaching.taken, teaching.message)
+            self.step.forget()
+            return
+        steps = len(progress.lesson.steps)
+        at = "the end" if progress.at_end else f"step {progress.step + 1} of {steps}"
+        self.where.setText(f"{progress.lesson.title}: {at}")
+        self.bar.setRange(0, steps)
+        self.bar.setValue(progress.step)
+        self.back.setEnabled(progress.step > 0)
+        self.next.setEnabled(not progress.at_end)
+        self.pages.setCurrentWidget(self.end if progress.at_end else self.step)
+        if progress.at_end:
+            self.end.show_progress(progress)
+        else:
+            self.step.show_progress(progress, teaching.message)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.seen.emit()
+
+    def show_theme(self, theme: Theme) -> None:
+        for page in (self.list, self.step):
+            page.show_theme(theme)
+        self.where.setStyleSheet(f"color: {theme.faint};")
+        self.bar.setStyleSheet(
+            f"QProgressBar {{ background: {theme.line}; border: none; border-radius: 2px; }}"
+            f"QProgressBar::chunk {{ background: {theme.accent}; border-radius: 2px; }}"
+        )

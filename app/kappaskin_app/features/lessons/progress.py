@@ -1,0 +1,117 @@
+"""How far a person is in a lesson, and what came of each question."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+from kappaskin.errors import Refusal
+from kappaskin_app.features.lessons.expression import Figures
+from kappaskin_app.features.lessons.lesson import UNITS, Choice, Lesson, Number, Question, Task
+
+DONE = "done"
+"""What is given as the answer to a task: that it is done."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was `given` last, after how many `tries`, and whether that was `right`."""
+
+    given: str = ""
+    tries: int = 0
+    right: bool = False
+
+    @property
+    def told(self) -> bool:
+        """Whether there is nothing left to try: it was right, or the explanation was given."""
+        return self.right or self.tries >= 2
+
+    def outcome(self) -> str:
+        """What came of it, in words."""
+        if not self.tries:
+            return "not answered"
+        if not self.right:
+            return "explained" if self.told else "not right yet"
+        return "right" if self.tries == 1 else f"right at try {self.tries}"
+
+
+def judged(question: Question, given: str, figures: Figures, before: Answer) -> Answer:
+    """The answer that is `given` now; a `Refusal` where it is none that could be judged."""
+    right = _right(question.how, given, figures)
+    words = question.how.options[int(given)] if isinstance(question.how, Choice) else given
+    if isinstance(question.how, Number):
+        words = f"{given.strip()} {question.how.unit}".strip()
+    return replace(before, given=words, tries=before.tries + 1, right=right)
+
+
+def _right(how: Choice | Number | Task, given: str, figures: Figures) -> bool:
+    match how:
+        case Choice(right=right):
+            if not given:
+                raise Refusal("Choose one of the answers first.")
+            return int(given) == right
+        case Task(check=check):
+            return bool(check(figures))
+        case Number(expected=expected, tolerance=tolerance, unit=unit):
+            there = float(expected(figures))
+            if not math.isfinite(there):
+                raise Refusal("The window shows no such number yet: wait a moment.")
+            return abs(number_in(given) * UNITS[unit] - there) <= tolerance
+
+
+def number_in(text: str) -> float:
+    """The number that a person typed, with a comma or a point."""
+    try:
+        value = float(text.strip().replace(",", ".").replace("\N{MINUS SIGN}", "-"))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise Refusal("Type a number, such as 4.7.")
+    return value
+
+
+@dataclass
+class Progress:
+    """Where in a `lesson` a person is, by `step`, and the answers by step."""
+
+    lesson: Lesson
+    step: int = 0
+    seen: int = 0
+    answers: dict[int, Answer] = field(default_factory=dict[int, Answer])
+
+    def go(self, step: int) -> None:
+        """Go to a step; one past the last is where the figure is handed in."""
+        self.step = min(max(step, 0), len(self.lesson.steps))
+        self.seen = max(self.seen, self.step)
+
+    @property
+    def at_end(self) -> bool:
+        return self.step == len(self.lesson.steps)
+
+    @property
+    def question(self) -> Question | None:
+        return None if self.at_end else self.lesson.steps[self.step].question
+
+    @property
+    def answer(self) -> Answer:
+        """The answer to this step's question so far."""
+        return self.answers.get(self.step, Answer())
+
+    def give(self, given: str, figures: Figures) -> None:
+        """Answer this step's question, once it is not told already."""
+        if self.question is not None and not self.answer.told:
+            self.answers[self.step] = judged(self.question, given, figures, self.answer)
+
+    def describe(self) -> str:
+        """How far it is, in a few words."""
+        right = sum(answer.right for answer in self.answers.values())
+        if self.seen == len(self.lesson.steps):
+            return f"done, {right} of {self.lesson.questions} right"
+        return f"step {self.seen + 1} of {len(self.lesson.steps)}" if self.seen else ""
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Of each question: its step's title, what was asked, the answer, what came of it."""
+        found: list[tuple[str, str, str, str]] = []
+        for number, step in enumerate(self.lesson.steps):
+            if step.question is not None:
+                answer = self.answers.get(number, Answer())
+                found.append((step.title, step.question.text, answer.given, answer.outcome()))
+        return found

@@ -1,0 +1,279 @@
+"""The text of a lesson to the lesson; whatever is wrong is refused with its file and line."""
+
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar
+
+from kappaskin.errors import Refusal
+from kappaskin.scenes import SCENES
+from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, Expression, expression
+from kappaskin_app.features.lessons.figures import KINDS
+from kappaskin_app.features.lessons.lesson import (
+    UNITS,
+    Button,
+    Choice,
+    Lesson,
+    Number,
+    Question,
+    Step,
+    Task,
+)
+from kappaskin_app.features.lessons.setting import SETTABLE, checked_setting
+
+_FOLDER = Path(str(files("kappaskin_resources"))) / "lessons"
+READY = tuple(sorted(_FOLDER.glob("[0-9]*.md")))
+"""The files of the lessons that come with the program, in their order."""
+
+DOCKS = ("curvature", "cost", "stability", "scene", "health", "compare")
+_NUMBERS = ("rate", "contact", "force", "depth", "error", "rms")
+READOUTS = tuple(f"readout-{name}" for name in _NUMBERS)
+_PLACES = {*DOCKS, *READOUTS, *SETTABLE}
+
+_FORMAT = 1
+_LARGEST = 200_000  # bytes of a file
+_STEPS, _TEXT, _LINE = 40, 2000, 300  # steps; letters of a step, and of a line of it
+_HEAD = re.compile(r"\+\+\+\n(.*?)^\+\+\+\n", re.DOTALL | re.MULTILINE)
+_STEP = re.compile(r"^## +(.+)$", re.MULTILINE)
+_BLOCK = re.compile(r"^```toml\n(.*?)^```[ \t]*$", re.DOTALL | re.MULTILINE)
+_AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
+
+_HEAD_KEYS = {"format", "title", "minutes", "learn", "set"}
+_QUESTION_KEYS = {"question", "hint", "explain"}
+_WAYS = {
+    "choices": {"choices", "right"},
+    "number": {"number", "tolerance", "unit"},
+    "check": {"check", "solution"},
+}
+_STEP_KEYS = {"set", "scene", "point", "button", *_QUESTION_KEYS}.union(*_WAYS.values())
+
+_Some = TypeVar("_Some")
+
+
+def read_lesson(file: Path) -> Lesson:
+    """The lesson in `file`; a `Refusal` says what is wrong where."""
+    try:
+        with file.open("rb") as opened:
+            data = opened.read(_LARGEST + 1)
+        text = data.decode("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise Refusal(f"{file}: expected a lesson in UTF-8 text, got none: {error}") from error
+    return lesson_of(text, file.name)
+
+
+def lesson_of(text: str, name: str) -> Lesson:
+    """The lesson that a `text` says, which is called `name`."""
+    if len(text) > _LARGEST:
+        raise Refusal(f"{name}: expected a lesson of at most {_LARGEST} letters, got more")
+    text = text.replace("\r\n", "\n")
+    head = _HEAD.match(text)
+    if head is None:
+        raise Refusal(f"{name}, line 1: expected a head between two lines +++; see the guide")
+    table = _Table.parse(name, head[1], 2)
+    table.only(_HEAD_KEYS)
+    if table.get("format", int) != _FORMAT:
+        raise table.refusal("format", f"{_FORMAT}, which this version reads")
+    usual = table.settings("set")
+    begins = list(_STEP.finditer(text, head.end()))
+    if not 1 <= len(begins) <= _STEPS:
+        raise Refusal(
+            f"{name}: expected 1 to {_STEPS} steps, each below a line '## Title', got {len(begins)}"
+        )
+    if text[head.end() : begins[0].start()].strip():
+        line = _line(text, head.end()) + 1
+        raise Refusal(f"{name}, line {line}: expected a line '## Title' before any text")
+    ends = [*(match.start() for match in begins[1:]), len(text)]
+    steps = tuple(
+        _step(name, match[1].strip(), text, match.end(), end, usual)
+        for match, end in zip(begins, ends, strict=True)
+    )
+    return Lesson(
+        name,
+        table.words("title"),
+        table.within("minutes", 1, 120),
+        table.words("learn"),
+        steps,
+    )
+
+
+def _line(text: str, at: int) -> int:
+    return text.count("\n", 0, at) + 1
+
+
+def _step(name: str, title: str, text: str, begin: int, end: int, usual: dict[str, Any]) -> Step:
+    body = text[begin:end]
+    blocks = list(_BLOCK.finditer(body))
+    line = _line(text, begin)
+    if len(blocks) > 1 or (not blocks and "```toml" in body):
+        raise Refusal(
+            f"{name}, line {line}: expected one block ```toml in a step, closed by ```, got "
+            f"{len(blocks)}"
+        )
+    words = (body if not blocks else body[: blocks[0].start()] + body[blocks[0].end() :]).strip()
+    if not 1 <= len(words) <= _TEXT:
+        raise Refusal(
+            f"{name}, line {line}: expected a text of 1 to {_TEXT} letters, got {len(words)}"
+        )
+    at = line if not blocks else _line(text, begin + blocks[0].start(1))
+    table = _Table.parse(name, blocks[0][1] if blocks else "", at)
+    table.only(_STEP_KEYS)
+    sets = usual | table.placed() if {"set", "scene"} & set(table.said) else None
+    buttons = table.get("button", list, [])
+    return Step(
+        title,
+        words,
+        sets,
+        table.places(),
+        tuple(_button(table, one, dict(sets or usual)) for one in buttons),
+        _question(table) if _question_keys(table) else None,
+    )
+
+
+def _button(table: "_Table", said: Any, on: Mapping[str, Any]) -> Button:
+    if not isinstance(said, dict):
+        raise table.refusal("button", "a table [[button]]")
+    inner = _Table(table.name, table.text, table.line, said)
+    inner.only({"label", "set", "scene"})
+    return Button(inner.words("label"), {**on, **inner.placed()})
+
+
+def _question_keys(table: "_Table") -> set[str]:
+    return set(table.said) & (_QUESTION_KEYS | set[str]().union(*_WAYS.values()))
+
+
+def _question(table: "_Table") -> Question:
+    ways = [way for way in _WAYS if way in table.said]
+    if len(ways) != 1:
+        raise table.refusal("question", "one of choices, number or check with a question")
+    others = _question_keys(table) - _QUESTION_KEYS - _WAYS[ways[0]]
+    if others:
+        raise table.refusal(min(others), f"only {', '.join(sorted(_WAYS[ways[0]]))} beside it")
+    how: Callable[[_Table], Choice | Number | Task] = {
+        "choices": _choice,
+        "number": _number,
+        "check": _task,
+    }[ways[0]]
+    return Question(
+        table.words("question"), how(table), table.words("hint"), table.words("explain")
+    )
+
+
+def _choice(table: "_Table") -> Choice:
+    options = table.get("choices", list)
+    if not 2 <= len(options) <= 6 or not all(isinstance(one, str) for one in options):
+        raise table.refusal("choices", "2 to 6 answers, each in quotes")
+    return Choice(tuple(options), table.within("right", 1, len(options)) - 1)
+
+
+def _number(table: "_Table") -> Number:
+    said = table.said["number"]
+    text = said if isinstance(said, str) else repr(table.real("number"))
+    unit = table.get("unit", str, "")
+    if unit not in UNITS:
+        raise table.refusal("unit", f"one of {', '.join(filter(None, UNITS))}, or none")
+    tolerance = table.real("tolerance")
+    if not tolerance > 0:
+        raise table.refusal("tolerance", "a number above zero, in SI units")
+    return Number(table.asked("number", text, NUMBER), tolerance, unit)
+
+
+def _task(table: "_Table") -> Task:
+    check = table.asked("check", table.get("check", str), TRUTH)
+    return Task(check, table.settings("solution"))
+
+
+@dataclass(frozen=True)
+class _Table:
+    """What a piece of TOML says, which begins at a `line` of the file called `name`."""
+
+    name: str
+    text: str
+    line: int
+    said: dict[str, Any]
+
+    @classmethod
+    def parse(cls, name: str, text: str, line: int) -> "_Table":
+        try:
+            said = tomllib.loads(text)
+            repr(said)  # refused here: a number in hexadecimal that is too long to be told
+            return cls(name, text, line, said)
+        except (ValueError, RecursionError) as error:  # also of a number too long to read
+            at = _AT_LINE.search(str(error))
+            where = line + int(at[1]) - 1 if at else line
+            why = _AT_LINE.sub("", str(error)).strip()
+            raise Refusal(f"{name}, line {where}: expected TOML, got a mistake: {why}") from error
+
+    def refusal(self, key: str, expected: str) -> Refusal:
+        """What to say of the value of `key`, with the line it stands in."""
+        found = re.search(rf"^[ \t\[]*{re.escape(key)}\b", self.text, re.MULTILINE)
+        line = self.line + (_line(self.text, found.start()) - 1 if found else 0)
+        got = repr(self.said[key]) if key in self.said else "nothing"
+        got = got if len(got) <= 80 else got[:77] + "..."
+        return Refusal(f"{self.name}, line {line}: expected {key} to be {expected}; got {got}")
+
+    def only(self, keys: set[str]) -> None:
+        for key in self.said:
+            if key not in keys:
+                known = ", ".join(sorted(keys))
+                raise self.refusal(key, f"left out or spelt as one of {known}")
+
+    def get(self, key: str, kind: type[_Some], usual: _Some | None = None) -> _Some:
+        value = self.said.get(key, usual)
+        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+            names = {str: "text in quotes", int: "a whole number", list: "a list", dict: "a table"}
+            raise self.refusal(key, names.get(kind, kind.__name__))
+        return value
+
+    def words(self, key: str) -> str:
+        text = self.get(key, str).strip()
+        if not 1 <= len(text) <= 2 * _LINE:
+            raise self.refusal(key, f"text of 1 to {2 * _LINE} letters")
+        return text
+
+    def real(self, key: str) -> float:
+        value = self.said.get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.refusal(key, "a number, in SI units")
+        with suppress(OverflowError):
+            return float(value)
+        raise self.refusal(key, "a number that is not as large")
+
+    def within(self, key: str, least: int, most: int) -> int:
+        value = self.get(key, int)
+        if not least <= value <= most:
+            raise self.refusal(key, f"from {least} to {most}")
+        return value
+
+    def asked(self, key: str, text: str, wanted: str) -> Expression:
+        try:
+            return expression(text, KINDS, wanted)
+        except Refusal as refusal:
+            raise self.refusal(key, f"right ({refusal})") from refusal
+
+    def settings(self, key: str) -> dict[str, Any]:
+        """The settings in the table `key`, by their names; none where there is none."""
+        said = self.get(key, dict, {})
+        try:
+            return {str(name): checked_setting(str(name), one) for name, one in said.items()}
+        except Refusal as refusal:
+            raise self.refusal(key, f"settings ({refusal})") from refusal
+
+    def placed(self) -> dict[str, Any]:
+        """The settings of a step or a button, and the ready scene among them."""
+        scene = self.get("scene", str, "")
+        if "scene" in self.said and scene not in SCENES:
+            raise self.refusal("scene", f"one of {', '.join(SCENES)}")
+        return self.settings("set") | ({"scene": scene} if scene else {})
+
+    def places(self) -> tuple[str, ...]:
+        """What is pointed at."""
+        places = self.get("point", list, [])
+        for place in places:
+            if place not in _PLACES:
+                docks = ", ".join((*DOCKS, *READOUTS))
+                raise self.refusal("point", f"settings by their names, or of {docks}")
+        return tuple(places)

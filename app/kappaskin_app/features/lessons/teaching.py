@@ -1,0 +1,235 @@
+"""A lesson on the window: its steps as undoable settings, its questions judged by what is seen."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QPixmap
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate
+from kappaskin_app.features.lessons.figures import Watch
+from kappaskin_app.features.lessons.lesson import Task, whole
+from kappaskin_app.features.lessons.progress import Progress
+from kappaskin_app.features.lessons.reading import READY, read_lesson
+from kappaskin_app.features.lessons.sheet import sheet
+from kappaskin_app.features.stability.seeing import Seeing
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.pictures import chosen_file, save_view
+from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.settings import Settings
+
+_FILES = "Lesson (*.md)"
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a person is: at which `step` of which lesson, with which `settings`.
+
+    `before` are the settings, and the source, that were before the lesson.
+    """
+
+    progress: Progress | None
+    step: int
+    settings: Settings
+    before: tuple[Settings, str] | None
+
+
+class Teaching(QObject):
+    """Knows the lessons, by file, and how far each is; `changed` tells when that is another.
+
+    `progress` is that of the lesson that is taken, None while none is; `message` says why an answer
+    could not be judged, or a file not be read. `told` says what came of a wish, `pointed` at what
+    to point, `taken_up` that a lesson which was left is taken again. It is told how to `connect`
+    to a source, and gets pictures of what is seen and the words below them.
+    """
+
+    changed = Signal()
+    told = Signal(str)
+    pointed = Signal(tuple)
+    taken_up = Signal()
+
+    def __init__(
+        self,
+        history: History,
+        session: Session,
+        seeing: Seeing,
+        window: QWidget,
+        connect: Callable[[str], None],
+        views: Callable[[], list[QPixmap]],
+        caption: Callable[[], str],
+    ) -> None:
+        super().__init__(window)
+        self._history, self._session, self._seeing = history, session, seeing
+        self._window, self._connect = window, connect
+        self._views, self._caption = views, caption
+        self.taken: dict[str, Progress] = {}
+        self.progress: Progress | None = None
+        self.message = ""
+        self._watch = Watch()
+        self._before: tuple[Settings, str] | None = None
+        session.estimated.connect(guarded(self._receive))
+        history.changed.connect(guarded(lambda *_: self._watch.forget()))
+
+    def _receive(self, estimate: Estimate) -> None:
+        if self.progress is not None:
+            self._watch.receive(estimate)
+
+    def look(self) -> None:
+        """Read the lessons that come with the program, the first time that somebody asks."""
+        if not self.taken:
+            self.taken = {str(file): Progress(read_lesson(file)) for file in READY}
+            self.changed.emit()
+
+    # What a person wishes.
+
+    def open(self) -> None:
+        """Ask for a file, and take the lesson in it."""
+        file, _ = QFileDialog.getOpenFileName(self._window, "Open a lesson", "", _FILES)
+        if file:
+            self.open_file(Path(file))
+
+    def open_file(self, file: Path) -> None:
+        """Take the lesson in a file of one's own, or say why there is none."""
+        self.look()
+        try:
+            self.taken[str(file)] = Progress(read_lesson(file))
+        except Refusal as refusal:
+            self.message = str(refusal)
+            self.changed.emit()
+            return
+        self.take(str(file))
+
+    def take(self, file: str) -> None:
+        """Begin the lesson in `file`, or go on where it was left."""
+        progress = self.taken[file]
+        self._go(progress, 0 if progress.at_end else progress.step)
+
+    def leave(self) -> None:
+        """Have the settings, and the source, from before the lesson."""
+        if self._before is None:
+            return
+        settings, source = self._before
+        before = {name: getattr(settings, name) for name in whole({})}
+        self._step("leave the lesson", _Place(None, 0, replace(self._now.settings, **before), None))
+        if source != self._session.source and not source.startswith("sim:"):
+            self._connect(source)
+
+    def go(self, step: int) -> None:
+        """Go to another step of the lesson."""
+        if self.progress is not None and step != self.progress.step:
+            self._go(self.progress, step)
+
+    def _go(self, progress: Progress, step: int) -> None:
+        lesson, step = progress.lesson, min(max(step, 0), len(progress.lesson.steps))
+        sets = lesson.steps[step].sets if step < len(lesson.steps) else None
+        if step <= progress.step and step < len(lesson.steps):
+            sets = lesson.begins(step)
+        now = self._now
+        before = now.before or (now.settings, self._session.source)
+        if sets is not None:
+            self._simulate()
+        settings = now.settings if sets is None else replace(now.settings, **whole(sets))
+        self._step(f"lesson step {step + 1}", _Place(progress, step, settings, before))
+        if sets is not None:
+            self._play(sets)
+
+    # Where it is, which can be undone.
+
+    @property
+    def _now(self) -> _Place:
+        step = self.progress.step if self.progress else 0
+        return _Place(self.progress, step, self._history.settings, self._before)
+
+    def _step(self, text: str, after: _Place) -> None:
+        if after != self._now:
+            self._history.step(text, self._have, self._now, after)
+
+    def _have(self, place: _Place) -> None:
+        """Be at a place, and have its settings."""
+        left, progress = self.progress is None, place.progress
+        self.progress, self._before, self.message = progress, place.before, ""
+        if progress is not None:
+            progress.go(place.step)
+        if place.settings != self._history.settings:
+            self._history.apply(place.settings)
+        at_work = progress is not None and not progress.at_end
+        self.pointed.emit(progress.lesson.steps[place.step].point if progress and at_work else ())
+        self.changed.emit()
+        if left and progress is not None:
+            self._simulate()
+            self.taken_up.emit()
+
+    def answer(self, given: str) -> None:
+        """Judge an answer by what the window shows now."""
+        if self.progress is None:
+            return
+        try:
+            self.message = ""
+            self.progress.give(given, self.figures())
+        except Refusal as refusal:
+            self.message = str(refusal)
+        self.changed.emit()
+
+    def press(self, number: int) -> None:
+        """Break something, or mend it, as the button of this step says."""
+        if self.progress is not None and not self.progress.at_end:
+            button = self.progress.lesson.steps[self.progress.step].buttons[number]
+            self._put(button.label, button.sets)
+
+    def show_how(self) -> None:
+        """Do what was to be done."""
+        question = None if self.progress is None else self.progress.question
+        if question is not None and isinstance(question.how, Task):
+            self._history.change("Show how it is done", -1, **question.how.solution)
+
+    def hand_in(self, student: str) -> None:
+        """Ask for a file, and write the figure of this lesson to it."""
+        progress, now = self.progress, datetime.now()
+        if progress is None:
+            return
+        settings, views, caption = self._history.settings, self._views(), self._caption()
+        try:
+            path = chosen_file(self._window, "the figure", flat=True)
+        except Refusal as refusal:
+            self.told.emit(str(refusal))
+            return
+        if path is None:
+            return
+        made = sheet(progress, student, views, settings, now)
+        try:
+            save_view(made, path, progress.lesson.title, f"{student.strip()}: {caption}")
+            self.told.emit(f"Saved {path}")
+        except Refusal as refusal:
+            self.told.emit(str(refusal))
+        made.deleteLater()
+
+    def _put(self, text: str, sets: Mapping[str, Any]) -> None:
+        """Have the settings that a button says, on the simulated skin."""
+        self._simulate()
+        self._history.change(text, -1, **whole(sets))
+        self._play(sets)
+
+    def _simulate(self) -> None:
+        session = self._session
+        if not session.inside or session.status.state in ("off", "lost"):
+            self._connect("sim:")
+
+    def _play(self, sets: Mapping[str, Any]) -> None:
+        session = self._session
+        if "scene" in sets:
+            session.seek(0.0)
+        if not session.running:
+            session.run(True)
+
+    # What is so.
+
+    def figures(self) -> dict[str, float | str]:
+        """What the window shows now, by name."""
+        session = self._session
+        return self._watch.figures(self._history.settings, session.status, self._seeing.seen)

@@ -1,0 +1,1 @@
+"""Log, errors and reports."""

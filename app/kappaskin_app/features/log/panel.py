@@ -1,0 +1,114 @@
+"""What the program logged: when, how grave, what; filtered, copied, cleared."""
+
+import logging
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QGuiApplication
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin_app.features.log.logged import Line, Logged
+from kappaskin_app.guard import guarded
+from kappaskin_app.theme import LIGHT, Theme
+
+_ROOM = 6  # px above and below a line together
+_HEAD = ("Time", "Level", "Text")
+_LEVELS = (
+    ("Everything", logging.NOTSET),
+    ("Warnings and errors", logging.WARNING),
+    ("Errors", logging.ERROR),
+)
+_NOTHING = "Nothing of that kind was logged since the window was opened."
+
+
+class LogPanel(QWidget):
+    """Lists what a `logged` keeps, newest first."""
+
+    def __init__(self, logged: Logged, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._logged, self._seen, self._theme = logged, -1, LIGHT
+        self._lines: list[Line] = []
+        self.level, self.nothing = QComboBox(), QLabel(_NOTHING)
+        for words, level in _LEVELS:
+            self.level.addItem(words, level)
+        self.level.setAccessibleName("What is listed")
+        self.level.setToolTip("How grave something must be to be listed.")
+        self.level.currentIndexChanged.connect(guarded(lambda *_: self._fill()))
+        self.copy, self.clear = QPushButton("&Copy these"), QPushButton("C&lear")
+        self.copy.setToolTip("Copy what is listed, each with all of its lines, as text.")
+        self.clear.setToolTip("Forget these lines here; the file that Report takes along has them.")
+        self.copy.clicked.connect(guarded(lambda *_: self._copy()))
+        self.clear.clicked.connect(guarded(lambda *_: self._clear()))
+        self.table = _table()
+        row, column = QHBoxLayout(), QVBoxLayout(self)
+        for widget in (self.level, self.copy, self.clear):
+            row.addWidget(widget)
+        row.addStretch(1)
+        column.addLayout(row)
+        column.addWidget(self.nothing)
+        column.addWidget(self.table, 1)
+
+    def look(self) -> None:
+        """List what is new, while somebody looks."""
+        if self.isVisible() and self._seen != self._logged.count:
+            self._fill()
+
+    def _fill(self) -> None:
+        self._seen = self._logged.count
+        least = self.level.currentData()
+        self._lines = [line for line in reversed(list(self._logged.lines)) if line.level >= least]
+        self.table.setRowCount(len(self._lines))
+        self.table.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + _ROOM)
+        for row, line in enumerate(self._lines):
+            for column, text in enumerate((line.clock, line.word, line.text)):
+                self.table.setItem(row, column, self._item(line, text))
+        self.table.setVisible(bool(self._lines))
+        self.nothing.setVisible(not self._lines)
+        for button in (self.copy, self.clear):
+            button.setEnabled(bool(self._lines))
+
+    def _item(self, line: Line, text: str) -> QTableWidgetItem:
+        item = QTableWidgetItem(text)
+        item.setToolTip(line.whole)
+        if line.level >= logging.WARNING:
+            item.setForeground(QColor(self._theme.alert))
+        return item
+
+    def _copy(self) -> None:
+        each = (f"{line.clock} {line.word}: {line.whole}" for line in self._lines)
+        QGuiApplication.clipboard().setText("\n".join(each))
+
+    def _clear(self) -> None:
+        self._logged.clear()
+        self._fill()
+
+    def show_theme(self, theme: Theme) -> None:
+        if theme != self._theme:
+            self._theme, self._seen = theme, -1
+
+
+def _table() -> QTableWidget:
+    table = QTableWidget(0, len(_HEAD))
+    table.setObjectName("log")
+    table.setAccessibleName("What was logged, newest first")
+    table.setHorizontalHeaderLabels(list(_HEAD))
+    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+    table.setTabKeyNavigation(False)  # Tab leads on, the arrows go through the table
+    table.setWordWrap(False)
+    table.setTextElideMode(Qt.TextElideMode.ElideRight)
+    table.verticalHeader().hide()
+    header = table.horizontalHeader()
+    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    header.setStretchLastSection(True)
+    return table

@@ -1,0 +1,1 @@
+"""The skin in three dimensions."""

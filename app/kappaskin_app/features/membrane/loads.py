@@ -1,0 +1,74 @@
+"""Simulated loads as they are drawn on the skin: arrows, and a line round what is spread."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from kappaskin.mechanics import Load
+from kappaskin_app.features.membrane.drag import ARROW
+from kappaskin_app.features.membrane.unlit import UNLIT, pixels
+from kappaskin_app.shell.drawn_skin import DrawnSkin
+from kappaskin_app.shell.footprint import footprint
+
+Array = NDArray[np.float64]
+
+_RED = "#e8543f"
+
+
+class DrawnLoads:
+    """An arrow for each load, more of them made when there are more than ever before."""
+
+    def __init__(self, plotter: Any) -> None:
+        self._plotter = plotter
+        # Sized for a skin of size 1, and scaled to the one there is.
+        self._arrow = pv.Arrow(
+            start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35
+        )
+        self._arrows: list[pv.Actor] = []
+        self._line: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
+        self._line_actor = plotter.add_mesh(
+            self._line,
+            line_width=pixels(plotter, 5),
+            color=_RED,
+            **UNLIT,
+        )
+
+    def show(self, loads: Sequence[Load], skin: DrawnSkin, lift: float) -> Array:
+        """Draw `loads` where they are now on `skin`; the places (k, 2) in m that they stand at."""
+        centres = np.array([load.centre() for load in loads]).reshape(-1, 2)
+        while len(self._arrows) < len(centres):
+            self._arrows.append(
+                self._plotter.add_mesh(self._arrow, color=_RED, reset_camera=False, render=False)
+            )
+        for number, arrow in enumerate(self._arrows):
+            there = number < len(centres)
+            # Inwards for a push; for a pull outwards, from the surface.
+            pulls = there and loads[number].force < 0
+            arrow.scale = (skin.size, skin.size, -skin.size if pulls else skin.size)
+            place = centres[number] if there else np.full(2, np.nan)
+            put_upright(arrow, skin, place, ARROW * skin.size if pulls else 0.0)
+        self._show_footprints(loads, skin, lift)
+        return centres
+
+    def _show_footprints(self, loads: Sequence[Load], skin: DrawnSkin, lift: float) -> None:
+        lines = [line for line in map(footprint, loads) if line is not None]
+        self._line_actor.visibility = bool(lines)
+        if lines:
+            points, _ = skin.place(np.concatenate(lines), lift)
+            if len(points) != self._line.n_points:
+                each = np.arange(len(points)).reshape(len(lines), -1)
+                self._line.points = points
+                self._line.lines = np.insert(each, 0, each.shape[1], axis=1).ravel()
+            self._line.points[:] = points
+
+
+def put_upright(actor: pv.Actor, skin: DrawnSkin, position: Array, above: float = 0.0) -> None:
+    """Put an actor on the drawn skin at `position` (2,) in m, upright on it, or hide it at NaN."""
+    actor.visibility = shown = bool(np.isfinite(position).all())
+    if shown:
+        points, out = skin.place(position[None], above)
+        actor.position = tuple(points[0])
+        actor.orientation = (0.0, np.degrees(np.arctan2(out[0, 0], out[0, 2])), 0.0)

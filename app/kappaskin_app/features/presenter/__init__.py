@@ -1,0 +1,1 @@
+"""The presenter's view, and force feedback by hand and sound."""

@@ -1,0 +1,1 @@
+"""Estimates published to other programs."""

@@ -1,0 +1,184 @@
+"""A row that shows and asks where in a recording the replay is, how fast, and if it goes on."""
+
+from collections.abc import Sequence
+from functools import partial
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from kappaskin.frames import Event
+from kappaskin.recording import Replay
+from kappaskin_app.features.recording.landmarks import Landmarks, minutes
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.form import ChoiceBox, well_behaved
+from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.widgets.clock import Clock
+from kappaskin_app.widgets.glyphs import glyph_button, icon
+
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""How many times as fast as it was a recording may be played."""
+
+_TIPS = {
+    "previous": "Go to the event before (Ctrl+[)",
+    "back": "One frame back (comma, Left)",
+    "play": "Let the recording go on from here (Space)",
+    "pause": "Let the recording stand (Space)",
+    "forward": "One frame on (period, Right)",
+    "next": "Go to the next event (Ctrl+])",
+    "loop": "Begin anew at the end (Ctrl+Shift+L)",
+}
+_SPEED = "How many times as fast as it was (Ctrl+Shift+Up, Ctrl+Shift+Down)"
+
+
+class Transport(QWidget):
+    """Shows a replay; `sought` asks for another time in s, `step_wanted` for so many frames.
+
+    `jump_wanted` asks for the event after (1) or before (-1), `play_wanted` to go on or to stand.
+    """
+
+    sought = Signal(float)
+    step_wanted = Signal(int)
+    jump_wanted = Signal(int)
+    play_wanted = Signal(bool)
+    speed_wanted = Signal(float)
+    loop_wanted = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Transport of the recording")
+        self.buttons = {name: glyph_button(name) for name in _TIPS if name != "pause"}
+        self.play, self.loop = self.buttons["play"], self.buttons["loop"]
+        self.loop.setCheckable(True)
+        self.course = Landmarks()
+        self.clock = Clock("Time in the recording, and how long it is.")
+        self.speed = self._made_speed()
+        self.setFocusProxy(self.course)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(6, 0, 8, 0)
+        row.setSpacing(2)
+        names = ("previous", "back", "play", "forward", "next")
+        before = [self.buttons[name] for name in names]
+        for widget in (*before, self.course, self.clock, self.speed, self.loop):
+            row.addWidget(widget, int(widget is self.course))
+        row.insertSpacing(row.indexOf(self.speed), 6)
+        self._shown: tuple[object, ...] = ()
+        self._playing, self._theme, self.there = True, LIGHT, False
+        self._wire()
+        self.show_theme(LIGHT)
+        self.hide()
+
+    def _made_speed(self) -> ChoiceBox:
+        box = ChoiceBox()
+        box.setObjectName("speed")
+        box.setAccessibleName("Speed of the replay")
+        for speed in SPEEDS:
+            box.addItem(f"\N{MULTIPLICATION SIGN} {speed:g}", speed)
+        box.setToolTip(_SPEED)
+        well_behaved(box)
+        return box
+
+    def _wire(self) -> None:
+        buttons = self.buttons
+        for name, frames in (("back", -1), ("forward", 1)):
+            buttons[name].setAutoRepeat(True)
+            buttons[name].clicked.connect(guarded(partial(self._step, frames)))
+        for name, way in (("previous", -1), ("next", 1)):
+            buttons[name].clicked.connect(guarded(partial(self._jump, way)))
+        self.play.clicked.connect(guarded(lambda *_: self.play_wanted.emit(not self._playing)))
+        self.loop.clicked.connect(guarded(lambda *_: self.loop_wanted.emit(self.loop.isChecked())))
+        self.speed.activated.connect(
+            guarded(lambda index: self.speed_wanted.emit(self.speed.itemData(index)))
+        )
+        self.course.sought.connect(guarded(self._seek))
+
+    def _step(self, frames: int, *_: object) -> None:
+        self.step_wanted.emit(frames)
+
+    def _jump(self, way: int, *_: object) -> None:
+        self.jump_wanted.emit(way)
+
+    def _seek(self, seconds: float) -> None:
+        self._show_clock(seconds)
+        self.sought.emit(seconds)
+
+    # What is so.
+
+    def show_recording(self, replay: Replay | None, events: Sequence[Event] = ()) -> None:
+        """Show a recording in which these `events` happened, or none."""
+        there = replay is not None
+        if there != self.there:
+            self.there = there
+            self.course.setSliderDown(False)  # the mouse may be let go where this is not seen
+            self.setVisible(there)
+        if replay is None:
+            self._shown = ()
+            return
+        shown = replay.begun, replay.length, replay.gaps, tuple(events)
+        if shown != self._shown:
+            self._shown = shown
+            self.course.show_replay(replay, events)
+            self._show_clock(0.0)
+            for name in ("previous", "next"):
+                self.buttons[name].setEnabled(bool(events))
+
+    def show_time(self, seconds: float, playing: bool) -> None:
+        """Show where it is, in s, and whether it goes on."""
+        if playing != self._playing:
+            self._playing = playing
+            self._show_playing()
+        if not self.course.isSliderDown() and seconds != self.course.time:
+            self.course.show_time(seconds)
+            self._show_clock(seconds)
+
+    def show_manner(self, speed: float, looped: bool) -> None:
+        """Show how fast it is played, and whether it begins anew at its end."""
+        self.loop.setChecked(looped)
+        with QSignalBlocker(self.speed):
+            self.speed.setCurrentIndex(self.speed.findData(speed))
+
+    def _show_clock(self, seconds: float) -> None:
+        whole = minutes(self.course.last)
+        self.clock.show_text(f"{minutes(seconds)} of {whole}", f"{whole} of {whole}")
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self.course.show_theme(theme)
+        for name, button in self.buttons.items():
+            button.setIcon(icon(name, theme))
+            button.setToolTip(_TIPS[name])
+            button.setAccessibleName(_TIPS[name].partition(" (")[0])
+        self._show_playing()
+
+    def _show_playing(self) -> None:
+        name = "pause" if self._playing else "play"
+        self.play.setIcon(icon(name, self._theme))
+        self.play.setToolTip(_TIPS[name])
+        self.play.setAccessibleName(name.capitalize())
+
+    # Keys.
+
+    def take_key(self, event: QKeyEvent) -> bool:
+        """Do what a key asks for; whether it asks for anything."""
+        plain = Qt.KeyboardModifier.KeypadModifier
+        if not self.there or event.modifiers() & ~plain:
+            return False
+        keys, key, course = Qt.Key, Qt.Key(event.key()), self.course
+        steps = {keys.Key_Left: -1, keys.Key_Comma: -1, keys.Key_Right: 1, keys.Key_Period: 1}
+        to = {
+            keys.Key_PageUp: course.time + course.duration / 10,
+            keys.Key_PageDown: course.time - course.duration / 10,
+            keys.Key_Home: 0.0,
+            keys.Key_End: course.last,
+        }
+        if key in steps:
+            self.step_wanted.emit(steps[key])
+        elif key in to:
+            course.seek(to[key])
+        elif key == keys.Key_Space and not event.isAutoRepeat():
+            self.play.click()
+        return key in steps or key in to or key == keys.Key_Space
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not self.take_key(event):
+            super().keyPressEvent(event)

@@ -1,0 +1,1 @@
+"""The scene: chosen, edited, planned, played, pressed."""

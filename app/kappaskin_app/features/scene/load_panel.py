@@ -1,0 +1,89 @@
+"""What presses on the simulated skin, and what noise its readings have."""
+
+from PySide6.QtWidgets import QComboBox, QLabel, QWidget
+
+from kappaskin.live import Status
+from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.load import (
+    FREE_CASES,
+    LOAD_CASES,
+    SIZES,
+    SPREAD_CASES,
+    TABLE_1_CASES,
+    TWO_ENDED,
+)
+from kappaskin_app.shell.simulation import is_table_1
+
+_OTHER = "Only for the simulated skin of these panels (Ctrl+M)."
+
+
+class SimulationForm(Form):
+    """A form that belongs to the simulation, and says so while a real sensor is connected."""
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        for editor in self.editors():
+            editor.setEnabled(simulating)
+        if simulating:
+            self.show_message(self.alarm(status))
+        else:
+            self.show_message(_OTHER, hint=True)
+
+    def alarm(self, status: Status) -> str:
+        """What is wrong with what is asked for here, while it is simulated."""
+        return ""
+
+
+class LoadPanel(SimulationForm):
+    """Asks for the load case; a free one has its place and its force, a spread one its size."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        names = ("load_case", "force", "x", "y", "x_end", "y_end", "size", "size_y")
+        super().__init__("Load", names, parent)
+        self._refusal = ""
+
+    def show_settings(self, settings: Settings) -> None:
+        for name, side in (("x", settings.side_x), ("y", settings.side_y)):
+            self.show_limit(name, side)
+            self.show_limit(f"{name}_end", side)
+        self.show_limit("size", settings.side_x)
+        self.show_limit("size_y", settings.side_y)
+        self._show_cases(is_table_1(settings))
+        super().show_settings(settings)
+        self._show_rows_of(settings.load_case)
+
+    def _show_rows_of(self, case: str) -> None:
+        rows = {"load_case"} | ({"force", "x", "y"} if case in FREE_CASES else set())
+        rows |= {"x_end", "y_end"} if case in TWO_ENDED else set()
+        rows |= {"size"} if case in SPREAD_CASES else set()
+        self.show_rows(rows | ({"size_y"} if case == "rectangle" else set()))
+        label = self.form.labelForField(self.editor("size"))
+        if isinstance(label, QLabel) and case in SIZES:
+            label.setText(SIZES[case])
+
+    def show_refusal(self, text: str) -> None:
+        """Say why the load or the skin asked for cannot be, or nothing when it can."""
+        self._refusal = text
+
+    def alarm(self, status: Status) -> str:
+        return f"The last load stays: {self._refusal}." if self._refusal else ""
+
+    def _show_cases(self, table_1: bool) -> None:
+        """Call the cases Table 1's where they are."""
+        box = self.editor("load_case")
+        for index, (case, words) in enumerate(LOAD_CASES):
+            also = " (Table 1)" if table_1 and case in TABLE_1_CASES else ""
+            if isinstance(box, QComboBox):
+                box.setItemText(index, words + also)
+
+
+class NoisePanel(SimulationForm):
+    """Asks for the noise of the simulated readings."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Noise", ("noise_kind", "noise_rms", "noise_seed"), parent)
+
+    def show_settings(self, settings: Settings) -> None:
+        super().show_settings(settings)
+        noisy = settings.noise_kind != "none"
+        self.show_rows({"noise_kind"} | ({"noise_rms", "noise_seed"} if noisy else set()))

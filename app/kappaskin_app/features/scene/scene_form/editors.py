@@ -1,0 +1,257 @@
+"""Editors for the values of a scene, by kind of value."""
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import tomlkit
+from PySide6.QtCore import QRegularExpression, QSignalBlocker, Qt
+from PySide6.QtGui import QRegularExpressionValidator
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QHBoxLayout,
+    QLineEdit,
+    QSizePolicy,
+    QSpinBox,
+    QWidget,
+)
+
+from kappaskin_app.features.scene.scene_form.numbers import (
+    NumberBox,
+    WholeNumberBox,
+    meant,
+    read_numbers,
+    shown,
+)
+from kappaskin_app.features.scene.scene_form.section import Row
+from kappaskin_app.features.scene.scene_form.words import DEGREE, How
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.form import ChoiceBox, well_behaved
+
+_WIDEST = 300  # px of an editor that is no line of text
+_TYPED = QRegularExpression(r"[-+0-9.eE,; ]*")
+
+Said = Callable[[Any], None]
+
+
+@dataclass
+class Editor:
+    """A widget with how to show a value in it; `value` is the one it shows.
+
+    It is made of several widgets if `parts` are given.
+    """
+
+    widget: QWidget
+    fill: Callable[[Any], None]
+    parts: tuple[QWidget, ...] = ()
+    value: Any = field(default=None, init=False)
+
+    @property
+    def stops(self) -> tuple[QWidget, ...]:
+        """What takes the keyboard, one after the other."""
+        return self.parts or (self.widget,)
+
+    def show(self, value: Any) -> None:
+        """Show another value; the same one leaves alone what is being typed."""
+        if value != self.value or type(value) is not type(self.value):
+            self.value = value
+            self.fill(value)
+
+
+def editor_for(row: Row, said: Said, small: bool = False) -> Editor:
+    """An editor that tells `said` of each value that a person gives it."""
+    count, _, kind = row.kind.rpartition(" ")
+    if count:
+        editor = _several(row, kind, int(count), said, small)
+    elif kind in _MAKERS:
+        editor = _MAKERS[kind](row, said)
+    else:
+        editor = _spin(row, kind, row.usual, said, small)
+    for widget in editor.stops:
+        well_behaved(widget)
+        widget.setToolTip(row.how.explained)
+    editor.widget.setObjectName(".".join(map(str, row.place)))
+    editor.show(row.value)
+    return editor
+
+
+def _spin(row: Row, kind: str, usual: Any, said: Said, small: bool) -> Editor:
+    how = row.how
+    box = _whole_box(how, said) if kind == "whole" else _number_box(how, usual, said)
+    if how.unit:
+        box.setSuffix(f"{'' if how.unit == DEGREE[0] else ' '}{how.unit}")
+    box.setKeyboardTracking(False)
+    box.setAlignment(Qt.AlignmentFlag.AlignRight)
+    if small:
+        box.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
+    room = box.fontMetrics().horizontalAdvance(f"{'00.00' if small else '00.0000'}{box.suffix()}")
+    box.setMinimumWidth(room + (10 if small else 30))
+    _as_wide_as_there_is_room(box)
+
+    def fill(value: Any) -> None:
+        with QSignalBlocker(box):
+            box.show_value(value)
+
+    return Editor(box, fill)
+
+
+def _number_box(how: How, usual: Any, said: Said) -> NumberBox:
+    box = NumberBox(how, usual)
+    box.valueChanged.connect(guarded(lambda value: said(meant(value, how))))
+    return box
+
+
+def _whole_box(how: How, said: Said) -> WholeNumberBox:
+    box = WholeNumberBox(how)
+    box.valueChanged.connect(guarded(said))
+    return box
+
+
+def _several(row: Row, kind: str, count: int, said: Said, small: bool) -> Editor:
+    holder = QWidget()
+    across = QHBoxLayout(holder)
+    across.setContentsMargins(0, 0, 0, 0)
+    across.setSpacing(4)
+    usual = row.usual if isinstance(row.usual, list) and len(row.usual) == count else []
+    largest = max((one for one in usual if isinstance(one, int | float)), default=None)
+
+    def one_said(index: int) -> Said:
+        def tell(value: Any) -> None:
+            said([*editor.value[:index], value, *editor.value[index + 1 :]])
+
+        return tell
+
+    each = [_spin(row, kind, largest, one_said(index), True) for index in range(count)]
+    for one in each:
+        across.addWidget(one.widget)
+
+    def fill(values: Any) -> None:
+        for one, value in zip(each, values, strict=True):
+            one.show(value)
+
+    _as_wide_as_there_is_room(holder)
+    editor = Editor(holder, fill, tuple(one.widget for one in each))
+    return editor
+
+
+def _as_wide_as_there_is_room(widget: QWidget) -> None:
+    widget.setMaximumWidth(_WIDEST)
+    widget.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+
+
+def _switch(row: Row, said: Said) -> Editor:
+    box = QCheckBox()
+    box.toggled.connect(guarded(said))
+    return Editor(box, _quietly(box, box.setChecked))
+
+
+def _choice(row: Row, said: Said) -> Editor:
+    box = ChoiceBox()
+    for value, words in row.how.choices:
+        box.addItem(words, value)
+    _as_wide_as_there_is_room(box)
+    box.activated.connect(guarded(lambda index: said(box.itemData(index))))
+
+    def fill(value: Any) -> None:
+        if box.findData(value) < 0:
+            box.addItem(value, value)  # what nobody knows is shown as it is
+        box.setCurrentIndex(box.findData(value))
+
+    return Editor(box, fill)
+
+
+def _quietly(widget: QWidget, fill: Callable[[Any], None]) -> Callable[[Any], None]:
+    def quiet(value: Any) -> None:
+        with QSignalBlocker(widget):
+            fill(value)
+
+    return quiet
+
+
+def _line(
+    line: QLineEdit, words: Callable[[Any], str], read: Callable[[str, Any], Any], said: Said
+) -> Editor:
+    """An editor of one line; what cannot be read is what it was."""
+    line.setMinimumWidth(60)
+
+    def fill(value: Any) -> None:
+        if line.text() != words(value):
+            line.setText(words(value))
+            line.setCursorPosition(0)
+
+    def finished() -> None:
+        text = line.text()
+        if text == words(editor.value):
+            return
+        try:
+            value = read(text, editor.value)
+        except ValueError:
+            value = editor.value
+        fill(value)
+        if value != editor.value:
+            said(value)
+
+    line.editingFinished.connect(guarded(finished))
+    editor = Editor(line, fill)
+    return editor
+
+
+def _text(row: Row, said: Said) -> Editor:
+    return _line(QLineEdit(), str, lambda text, _: text, said)
+
+
+def _literal(row: Row, said: Said) -> Editor:
+    """What has no editor of its own, as TOML says it."""
+
+    def words(value: Any) -> str:
+        return tomlkit.item(value).as_string()
+
+    def read(text: str, _: Any) -> Any:
+        found = tomllib.loads(f"value = {text}")
+        if len(found) != 1:
+            raise ValueError("expected one value")
+        return found["value"]
+
+    return _line(QLineEdit(), words, read, said)
+
+
+def _numbers_line() -> QLineEdit:
+    line = QLineEdit()
+    line.setValidator(QRegularExpressionValidator(_TYPED, line))
+    return line
+
+
+def _numbers(row: Row, said: Said) -> Editor:
+    def words(values: list[Any]) -> str:
+        return ", ".join(shown(value, row.how) for value in values)
+
+    def read(text: str, before: list[Any]) -> list[Any]:
+        return read_numbers(text, before, row.how, whole=row.kind == "wholes")
+
+    return _line(_numbers_line(), words, read, said)
+
+
+def _pairs(row: Row, said: Said) -> Editor:
+    def words(pairs: list[list[Any]]) -> str:
+        return "; ".join(", ".join(shown(one, row.how) for one in pair) for pair in pairs)
+
+    def read(text: str, before: list[list[Any]]) -> list[list[Any]]:
+        each = [part for part in text.split(";") if part.strip(" ,")]
+        befores = [*before, *([[]] * len(each))]
+        return [
+            read_numbers(*both, row.how, whole=False) for both in zip(each, befores, strict=False)
+        ]
+
+    return _line(_numbers_line(), words, read, said)
+
+
+_MAKERS: dict[str, Callable[[Row, Said], Editor]] = {
+    "switch": _switch,
+    "choice": _choice,
+    "text": _text,
+    "literal": _literal,
+    "numbers": _numbers,
+    "wholes": _numbers,
+    "pairs": _pairs,
+}

@@ -1,0 +1,107 @@
+"""A row that shows and asks where in its duration a scene is: a button, its course and a clock."""
+
+import math
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from kappaskin.scenes import Scene
+from kappaskin_app.features.scene.track import Track
+from kappaskin_app.guard import guarded
+from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.widgets.clock import Clock
+from kappaskin_app.widgets.glyphs import glyph_button, icon
+
+_TIP = "The time in the scene, which begins anew when it is over."
+
+
+class Timeline(QWidget):
+    """A row that shows the time in a scene; `sought` asks for another one, in s.
+
+    `play_wanted` asks to play, or to pause.
+    """
+
+    sought = Signal(float)
+    play_wanted = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Timeline")
+        self.play = glyph_button("timeline-play")
+        self.track, self.clock = Track(), Clock(_TIP)
+        self.setFocusProxy(self.track)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(6, 0, 8, 0)
+        row.setSpacing(6)
+        for widget in (self.play, self.track, self.clock):
+            row.addWidget(widget, int(widget is self.track))
+        self._scene: Scene | None = None
+        self._playing, self._theme = True, LIGHT
+        self._show_playing()
+        self.play.clicked.connect(guarded(lambda *_: self.play_wanted.emit(not self._playing)))
+        self.track.sought.connect(guarded(self._seek))
+        self.hide()
+
+    def show_scene(self, scene: Scene | None) -> None:
+        """Show the course of `scene`; nothing of none, or of one in which nothing moves."""
+        self.track.setSliderDown(False)  # the mouse may be let go where this is not seen
+        goes = scene is not None and (len(scene.laid.steps) > 1 if scene.laid else scene.moves)
+        self._scene = scene if goes else None
+        self.setVisible(self._scene is not None)
+        if self._scene is not None:
+            self.track.show_scene(self._scene)
+            self._show_clock(0.0, self._scene.duration)
+
+    def show_time(self, seconds: float, playing: bool) -> None:
+        """Show a time in s since the scene began for the first time, and whether it goes on."""
+        if playing != self._playing:
+            self._playing = playing
+            self._show_playing()
+        if self._scene is None or self.track.isSliderDown() or not math.isfinite(seconds):
+            return
+        time = seconds % self._scene.duration
+        if time != self.track.time:
+            self.track.show_time(time)
+            self._show_clock(time, self._scene.duration)
+
+    def _show_clock(self, seconds: float, duration: float) -> None:
+        whole = f"{duration:.2f}"
+        self.clock.show_text(f"{seconds:.2f} s of {whole} s", f"{whole} s of {whole} s")
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self.track.show_theme(theme)
+        self._show_playing()
+
+    def _show_playing(self) -> None:
+        verb = "Pause" if self._playing else "Play"
+        self.play.setAccessibleName(verb)
+        what = "Hold the scene as it is now" if self._playing else "Let the scene go on from here"
+        self.play.setToolTip(f"{what} (Space)")
+        self.play.setIcon(icon("pause" if self._playing else "play", self._theme))
+
+    def _seek(self, seconds: float) -> None:
+        if self._scene is not None:
+            self._show_clock(seconds, self._scene.duration)
+            self.sought.emit(seconds)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        track, keys, scene = self.track, Qt.Key, self._scene
+        if scene is None or event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier:
+            super().keyPressEvent(event)
+            return
+        to = {
+            keys.Key_Left: track.time - track.frame,
+            keys.Key_Right: track.time + track.frame,
+            keys.Key_PageUp: track.time + scene.duration / 10,
+            keys.Key_PageDown: track.time - scene.duration / 10,
+            keys.Key_Home: 0.0,
+            keys.Key_End: track.last,
+        }.get(Qt.Key(event.key()))
+        if to is not None:
+            track.seek(to)
+        elif event.key() == keys.Key_Space:
+            self.play.click()
+        else:
+            super().keyPressEvent(event)

@@ -1,0 +1,1 @@
+"""The simulated sensor: skin, elements, electronics, scanned region."""

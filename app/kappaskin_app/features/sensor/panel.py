@@ -1,0 +1,114 @@
+"""The simulated electronics and what spoils them; which elements are scanned, and at what cost."""
+
+import math
+
+from PySide6.QtWidgets import QLabel, QWidget
+
+from kappaskin.estimation import Bargain
+from kappaskin.live import Status
+from kappaskin.sensing import Sensor
+from kappaskin_app.features.scene.load_panel import SimulationForm
+from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.settings import Settings
+
+_CHOOSE = "Click elements on a heatmap to choose them."
+
+
+def _facts(sensor: Sensor) -> tuple[str, str, str]:
+    """What the electronics come to: frame rate, smallest step and range, strain limit."""
+    chain = sensor.transduction
+    most = min(abs(limit) for limit in chain.limits) * chain.resolution
+    return (
+        f"{sensor.channels} channels, {1 / chain.scan_time(sensor.channels):.0f}/s",
+        f"{chain.resolution:.2g} 1/m, to \N{PLUS-MINUS SIGN}{most:.0f} 1/m",
+        f"1 % at {chain.strain_limit_curvature:.0f} 1/m",
+    )
+
+
+class ElectronicsPanel(SimulationForm):
+    """Asks for the electronics; says how fast, how fine and how far they read."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Electronics", ("electronics", "bits", "conversion_time"), parent)
+        self._facts = [QLabel() for _ in range(3)]
+        rows = (
+            ("Frame", "The most frames per second: one over the time of all channels."),
+            ("Step", "The curvature of one count, and how far the converter reads."),
+            ("Strain", "Where a gage strains by 1 %, beyond which metal foil is not elastic."),
+        )
+        for (name, tip), fact in zip(rows, self._facts, strict=True):
+            label = QLabel(name)
+            for widget in (label, fact):
+                widget.setToolTip(tip)
+            self.form.addRow(label, fact)
+        self._sensor: Sensor | None = None
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        super().show_status(status, simulating)
+        if status.sensor is not None and status.sensor is not self._sensor:
+            self._sensor = status.sensor
+            for label, text in zip(self._facts, _facts(status.sensor), strict=True):
+                label.setText(text)
+
+
+class SpoilsPanel(SimulationForm):
+    """Asks for hysteresis, creep and tolerance."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Gages", ("loops", "creep", "tolerance"), parent)
+
+
+class RegionPanel(Form):
+    """Asks for a region of interest; says what it buys and costs, or why there can be none."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Region of interest", ("region", "region_radius", "region_share"), parent)
+        self._region, self._chosen = "off", 0
+        self._told, self._rates = "", (math.inf, math.inf)
+
+    def show_settings(self, settings: Settings) -> None:
+        super().show_settings(settings)
+        self._region, self._chosen = settings.region, len(settings.region_elements)
+        round_a_contact = settings.region in ("skin", "intrinsic")
+        rows = {"region"} | ({"region_radius"} if round_a_contact else set())
+        self.show_rows(rows | ({"region_share"} if settings.region != "off" else set()))
+
+    def show_bargain(self, bargain: Bargain | None) -> None:
+        """What the region in use buys and costs; None while that is not known."""
+        self._told = "" if bargain is None else _words(bargain, *self._rates)
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        if status.sensor is not None:
+            self._rates = status.region.rate, status.sensor.rate
+        if status.region_refusal:
+            self.show_message(f"{status.region_refusal}.")
+        elif self._region == "elements" and not self._chosen:
+            self.show_message(_CHOOSE, hint=True)
+        else:
+            self.show_message(self._told if self._region != "off" else "", hint=True)
+
+
+def _words(bargain: Bargain, asked: float, without: float) -> str:
+    """What a region of which `asked` frames/s are wanted buys and costs; so many come `without`."""
+    rate, full_rate = min(asked, bargain.rate), min(without, bargain.full_rate)
+    buys = (
+        f"buys {rate:.0f} instead of {full_rate:.0f} frames/s, {rate / full_rate:.1f} times"
+        if rate > 1.005 * full_rate
+        else f"buys no rate: all channels come at {full_rate:.0f} frames/s as well"
+    )
+    more = f" (it could be {bargain.rate:.0f})" if bargain.rate > 1.005 * rate else ""
+    told = [axis for axis in (0, 1) if math.isfinite(bargain.full_bound[axis])]  # a strip's x alone
+    if not told:
+        return f"Scans {bargain.channels} channels a frame. It {buys}{more}."
+    mm, full = (1e3 * max(bound[told]) for bound in (bargain.bound, bargain.full_bound))
+    all_tell = f"all channels to \N{PLUS-MINUS SIGN}{full:.2f} mm"
+    if not math.isfinite(mm):
+        costs = f"costs accuracy: one frame does not tell where the contact is, {all_tell} at best"
+        return f"Scans {bargain.channels} channels a frame. It {buys}{more}. It {costs}."
+    costs = (
+        f"costs accuracy: one frame tells where the contact is to \N{PLUS-MINUS SIGN}{mm:.2f} mm "
+        f"at best, {all_tell}"
+        if mm > 1.005 * full
+        else f"costs no accuracy: \N{PLUS-MINUS SIGN}{full:.2f} mm at best, as all channels"
+    )
+    return f"Scans {bargain.channels} channels a frame. It {buys}{more}. It {costs}."

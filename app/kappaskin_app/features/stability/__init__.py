@@ -1,0 +1,1 @@
+"""Observability of shapes, and hard cases."""

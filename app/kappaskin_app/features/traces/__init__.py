@@ -1,0 +1,1 @@
+"""One element in detail, and traces over time."""

@@ -1,0 +1,114 @@
+"""The card of one element: what it reads, read and will read by; and traces of several."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+
+from kappaskin.frames import COMPONENTS
+from kappaskin_app.theme import Theme
+from kappaskin_app.widgets.curve_plot import Curve, CurvePlot
+
+Array = NDArray[np.float64]
+
+_NONE = "Click an element, on the skin or in a heatmap."
+_NONE_TRACED = "Click an element and press Trace it, on its card (Ctrl+Alt+E)."
+_TRACE = "The curvature over the last 10 s, in every frame that was computed, up to 500 a second."
+_SPECTRUM = (
+    "The amplitude of the sine of each frequency that fits best to the last 10 s, by least squares "
+    "(Lomb and Scargle), up to half of the frames in a second: hum stands out as a line."
+)
+
+
+class ElementCard(QWidget):
+    """Facts of an element beside its last seconds; `traced` asks to trace it, or no more."""
+
+    traced = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.title, self.facts = QLabel(_NONE), QLabel()
+        for label in (self.title, self.facts):
+            label.setTextFormat(Qt.TextFormat.RichText)
+            label.setWordWrap(True)
+            label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.button = QPushButton("&Trace it")
+        self.button.setToolTip("Add this element to the traces (Ctrl+Alt+T), or take it out.")
+        self.button.clicked.connect(lambda *_: self.traced.emit())
+        self.button.setEnabled(False)
+        self.past = CurvePlot("Curvature", "1/m", True, _TRACE)
+        self.spectrum = CurvePlot("Amplitude", "1/m", False, _SPECTRUM)
+        left = QVBoxLayout()
+        for widget in (self.title, self.facts):
+            left.addWidget(widget)
+        left.addWidget(self.button, 0, Qt.AlignmentFlag.AlignLeft)
+        left.addStretch(1)
+        around = QHBoxLayout(self)
+        around.setContentsMargins(8, 4, 8, 6)
+        around.addLayout(left, 4)
+        around.addWidget(self.past, 3)
+        around.addWidget(self.spectrum, 3)
+
+    def show_facts(self, title: str, facts: str) -> None:
+        """Write what is known of the element; nothing of none."""
+        for label, text in ((self.title, title or _NONE), (self.facts, facts)):
+            if text != label.text():
+                label.setText(text)
+        self.button.setEnabled(bool(title))
+
+    def show_tracing(self, traced: bool) -> None:
+        self.button.setText("Do not &trace it" if traced else "&Trace it")
+
+    def show_past(self, times: Array, values: Array, seconds: float) -> None:
+        """Draw `values` (T, 3) in 1/m at `times` (T,) in s up to now."""
+        curves = [Curve(name, n, values[:, n]) for n, name in enumerate(COMPONENTS)]
+        self.past.show_curves(times, curves, (-seconds, 0.0), "s")
+
+    def show_spectrum(self, frequencies: Array, amplitudes: Array) -> None:
+        """Draw `amplitudes` (3, F) in 1/m at `frequencies` (F,) in Hz; or say so of none."""
+        curves = [Curve(name, n, amplitudes[n]) for n, name in enumerate(COMPONENTS)]
+        if not len(frequencies):
+            self.spectrum.show_curves(frequencies, (), (0.0, 1.0), "Hz", "Not enough readings yet.")
+            return
+        span = (0.0, float(frequencies[-1]))
+        self.spectrum.show_curves(frequencies, curves, span, "Hz")
+
+    def show_theme(self, theme: Theme) -> None:
+        self.past.show_theme(theme)
+        self.spectrum.show_theme(theme)
+
+
+class Traces(QWidget):
+    """One plot for each component, with a curve for each element; `pointed` tells at which."""
+
+    pointed = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.plots = [CurvePlot(f"Curvature {name}", "1/m", True, _TRACE) for name in COMPONENTS]
+        around = QHBoxLayout(self)
+        around.setContentsMargins(8, 4, 8, 6)
+        for plot in self.plots:
+            around.addWidget(plot)
+            plot.pointed.connect(self.pointed)
+
+    def show_past(
+        self, elements: Sequence[int], times: Array, values: Array, seconds: float
+    ) -> None:
+        """Draw `values` (T, 3, k) in 1/m of k `elements` at `times` (T,) in s up to now."""
+        for row, plot in enumerate(self.plots):
+            curves = [
+                Curve(str(element), n, values[:, row, n], element)
+                for n, element in enumerate(elements)
+            ]
+            plot.show_curves(times, curves, (-seconds, 0.0), "s", _NONE_TRACED)
+
+    def mark(self, element: int) -> None:
+        for plot in self.plots:
+            plot.mark(element)
+
+    def show_theme(self, theme: Theme) -> None:
+        for plot in self.plots:
+            plot.show_theme(theme)

@@ -1,1 +1,0 @@
-"""Lessons: read from files, judged by what the window shows, played on it."""

@@ -1,1 +1,0 @@
-"""Panels ask a person for settings and show what became of them; they never compute."""

@@ -1,3 +1,0 @@
-"""Forms over the text of a scene: what it says as editors, and an edit as the new text."""
-
-from kappaskin_app.panels.scene_form.form import SceneForm as SceneForm

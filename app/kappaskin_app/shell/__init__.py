@@ -1,0 +1,1 @@
+"""The shell of the app: window, session, settings, actions, docks, layouts, background tasks."""

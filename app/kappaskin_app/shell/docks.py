@@ -1,0 +1,139 @@
+"""Panels around the skin of a window: beside it, and below it one in the place of another."""
+
+from functools import partial
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QWidget
+
+from kappaskin_app.shell.about import DOCKS
+from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.title import Title
+from kappaskin_app.widgets.columns import heighten
+
+_HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
+_HEIGHTS = {"scene": 0.38, "compare": 0.36, "design": 0.4, "guide": 0.5}
+_UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that one
+_LEAST = 40  # px of a dock that is scrolled, without its title
+_BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
+
+
+class Dock(QDockWidget):
+    """A dock that tells when a person closed it, as hiding or covering it is not."""
+
+    closed = Signal()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        super().closeEvent(event)
+        self.closed.emit()
+
+
+class Docks:
+    """The docks of a `window`, by name."""
+
+    def __init__(self, window: QMainWindow) -> None:
+        self._window = window
+        self._docks: dict[str, Dock] = {}
+        self._shown: dict[str, QWidget] = {}
+        self._keys: dict[str, str] = {}
+        self._above: dict[str, str] = {}
+
+    def __getitem__(self, name: str) -> Dock:
+        return self._docks[name]
+
+    def widget(self, name: str) -> QWidget:
+        """What a dock shows, without what scrolls it where there is no room for all of it."""
+        return self._shown[name]
+
+    def by_name(self) -> dict[str, QDockWidget]:
+        return {**self._docks}
+
+    @property
+    def below(self) -> list[QDockWidget]:
+        """Those that share the place below the skin."""
+        return [self._docks[name] for name in self._keys if name not in self._above]
+
+    def put_beside(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
+        """Show a widget in a column beside the skin."""
+        dock = self._docks[name] = Dock(title, self._window)
+        self._shown[name] = widget
+        dock.setObjectName(name)
+        dock.setToolTip(DOCKS.get(name, ""))  # also of what in it explains nothing itself
+        dock.setTitleBarWidget(Title(dock))
+        dock.setWidget(widget)
+        self._window.addDockWidget(area, dock)
+
+    def put_below(self, name: str, title: str, widget: QWidget, key: str) -> None:
+        """Have a widget below the skin, hidden until it is asked for with `key`."""
+        before = self.below
+        area = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
+        area.setFrameShape(QScrollArea.Shape.NoFrame)
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # a stop on the way of Tab that nobody sees
+        area.setMinimumHeight(_LEAST)
+        area.setWidget(widget)
+        self.put_beside(name, title, area, _BELOW)
+        self._shown[name] = widget
+        self._keys[name] = key
+        dock = self[name]
+        if before:
+            self._window.tabifyDockWidget(before[-1], dock)
+        # Wider than a column beside it.
+        dock.setAllowedAreas(Qt.DockWidgetArea.TopDockWidgetArea | _BELOW)
+        dock.hide()  # so that a small window is left to the skin
+
+    def put_above(self, name: str, title: str, widget: QWidget, other: str, key: str) -> None:
+        """Have a widget above the `other` in its column, hidden until asked for with `key`."""
+        self.put_beside(name, title, widget, self._window.dockWidgetArea(self[other]))
+        self._keys[name], self._above[name] = key, other
+        self._window.splitDockWidget(self[name], self[other], Qt.Orientation.Vertical)
+        self[name].hide()
+
+    def add_actions(self, actions: Actions, menu: str) -> None:
+        """Register how each is shown and hidden."""
+        for name, dock in self._docks.items():
+            if name not in self._keys:
+                action = dock.toggleViewAction()
+                action.setToolTip(dock.toolTip())
+                action.setStatusTip(dock.toolTip())
+                actions.register(f"dock-{name}", menu, action)
+        for name, key in self._keys.items():
+            dock = self[name]
+            turn = partial(self._turn, name)
+            action = actions.add(
+                f"dock-{name}", menu, dock.windowTitle(), turn, key, dock.toolTip()
+            )
+            action.setCheckable(True)
+            dock.visibilityChanged.connect(action.setChecked)
+
+    def _turn(self, name: str) -> None:
+        """Show a dock, before the other in its place; hide one that is seen."""
+        if self[name].visibleRegion().isEmpty():
+            self.reveal(name)
+        else:
+            self[name].hide()
+
+    def reveal(self, name: str) -> None:
+        """Show a dock, before the other in its place."""
+        dock = self[name]
+        if not dock.visibleRegion().isEmpty():
+            return
+        dock.show()
+        if dock in self.below and not dock.isFloating():
+            least = self._needed(name) + dock.height() - dock.widget().height()
+            heighten(self._window, dock, _HEIGHTS.get(name, _HEIGHT), least)
+        self._share_columns()
+        dock.raise_()
+
+    def _needed(self, name: str) -> int:
+        """The px of height that what a dock shows needs, in lines as wide as the window."""
+        shown = self.widget(name)
+        layout = shown.layout()
+        if layout is not None and layout.hasHeightForWidth():
+            return layout.totalMinimumHeightForWidth(self._window.width())
+        return shown.minimumSizeHint().height()
+
+    def _share_columns(self) -> None:
+        heights = [round(share * self._window.height()) for share in _UPPER]
+        for above, other in self._above.items():
+            both = [self[above], self[other]]
+            self._window.resizeDocks(both, heights, Qt.Orientation.Vertical)

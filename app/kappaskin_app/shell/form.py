@@ -1,0 +1,294 @@
+"""Editors for settings, made from what `settings` says of each."""
+
+import math
+import re
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QPaintEvent, QStandardItemModel, QValidator
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QLabel,
+    QLineEdit,
+    QSizePolicy,
+    QSpinBox,
+    QStyle,
+    QStyleOptionComboBox,
+    QStylePainter,
+    QToolButton,
+    QWidget,
+)
+
+from kappaskin_app.shell.keys import for_the_window
+from kappaskin_app.shell.panel import Panel
+from kappaskin_app.shell.settings import Settings, ask_of
+from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch, Text
+from kappaskin_app.shell.several import SeveralButton
+
+_AT_FIRST = Settings()
+_BEGUN = re.compile(r"[+-]?\d*\.?(\d*|\d+e[+-]?)", re.IGNORECASE)  # what may become a number
+_LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
+
+
+class WholeBox(QSpinBox):
+    """Takes any digits and goes to the nearest number allowed, instead of dropping digits."""
+
+    def validate(self, text: str, position: int) -> object:
+        return _typing(self, text.removesuffix(self.suffix())), text, position
+
+    def fixup(self, text: str) -> str:
+        typed = _typed(text.removesuffix(self.suffix()), self.value())
+        return str(round(min(max(typed, self.minimum()), self.maximum())))
+
+    def valueFromText(self, text: str) -> int:
+        return round(_typed(text.removesuffix(self.suffix()), self.value()))
+
+
+class RealBox(QDoubleSpinBox):
+    """The same for numbers with decimals, and a comma is a point."""
+
+    def validate(self, text: str, position: int) -> object:
+        text = text.replace(",", ".")
+        return _typing(self, text.removesuffix(self.suffix())), text, position
+
+    def fixup(self, text: str) -> str:
+        typed = _typed(text.removesuffix(self.suffix()), self.value())
+        return self.textFromValue(min(max(typed, self.minimum()), self.maximum()))
+
+    def valueFromText(self, text: str) -> float:
+        return _typed(text.removesuffix(self.suffix()), self.value())
+
+
+class ChoiceBox(QComboBox):
+    """Where there is no room for all of the words, dots say so."""
+
+    def words_shown(self) -> str:
+        option = QStyleOptionComboBox()
+        self.initStyleOption(option)
+        field = QStyle.SubControl.SC_ComboBoxEditField
+        kind = QStyle.ComplexControl.CC_ComboBox
+        room = self.style().subControlRect(kind, option, field, self).width() - 2
+        words = self.currentText()
+        return self.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter, option = QStylePainter(self), QStyleOptionComboBox()
+        self.initStyleOption(option)
+        option.currentText = self.words_shown()  # pyright: ignore[reportAttributeAccessIssue]
+        painter.drawComplexControl(QStyle.ComplexControl.CC_ComboBox, option)
+        painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
+
+
+def _typed(text: str, before: float) -> float:
+    """The number typed, or that `before` where none is yet: an error here would end the app."""
+    try:
+        value = float(text)
+    except ValueError:
+        return before
+    return value if math.isfinite(value) else before
+
+
+def _typing(box: QSpinBox | QDoubleSpinBox, text: str) -> QValidator.State:
+    try:
+        value = float(text)
+    except ValueError:
+        begun = _BEGUN.fullmatch(text.strip())
+        return QValidator.State.Intermediate if begun else QValidator.State.Invalid
+    inside = box.minimum() <= value <= box.maximum()
+    return QValidator.State.Acceptable if inside else QValidator.State.Intermediate
+
+
+class _Manners(QObject):
+    """Makes an editor leave its keys to the window, and the wheel to the panel it scrolls in."""
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if for_the_window(event):
+            event.ignore()  # else a line edit would take it for its own text
+            return True
+        if (
+            event.type() == QEvent.Type.Wheel
+            and isinstance(watched, QWidget)
+            and not watched.hasFocus()
+        ):
+            event.ignore()
+            return True
+        return False
+
+
+def well_behaved(editor: QWidget) -> None:
+    manners = _Manners(editor)
+    editor.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    for widget in (editor, *editor.findChildren(QLineEdit)):
+        widget.installEventFilter(manners)
+
+
+@dataclass(frozen=True)
+class _Editor:
+    """A widget with how to show a value in it."""
+
+    widget: QWidget
+    show: Callable[[Any], None]
+
+
+def _whole(how: Range, said: Callable[[Any], None]) -> _Editor:
+    box = WholeBox()
+    box.setRange(int(how.least), int(how.most))
+    box.setSingleStep(int(how.step))
+    box.valueChanged.connect(said)
+    return _Editor(_dressed(box, how), lambda value: box.setValue(int(value)))
+
+
+def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
+    if not how.decimals and how.scale == 1:
+        return _whole(how, said)
+    box = RealBox()
+    box.setLocale(QLocale.c())
+    box.setDecimals(how.decimals)
+    box.setRange(how.least * how.scale, how.most * how.scale)
+    box.setSingleStep(how.step * how.scale)
+    box.valueChanged.connect(lambda value: said(value / how.scale))
+    return _Editor(_dressed(box, how), lambda value: box.setValue(value * how.scale))
+
+
+def _dressed(box: QSpinBox | QDoubleSpinBox, how: Range) -> QWidget:
+    if how.unit:
+        box.setSuffix(f" {how.unit}")
+    box.setToolTip(_tip_of(how, how.most))
+    box.setKeyboardTracking(False)
+    box.setAlignment(Qt.AlignmentFlag.AlignRight)
+    return box
+
+
+def _tip_of(how: Range, most: float) -> str:
+    low, high = round(how.least * how.scale, 6), round(most * how.scale, how.decimals)
+    return f"{how.tip} From {low:g} to {high:g} {how.unit}".rstrip() + "."
+
+
+def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:
+    box = ChoiceBox()
+    for value, words in how.options:
+        box.addItem(words, value)
+    if max(len(words) for _, words in how.options) > _LONG:
+        # Or one long answer would take its width from the skin beside the form.
+        box.view().setMinimumWidth(box.sizeHint().width())
+        box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        box.setMinimumContentsLength(_SEEN)
+        box.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+    box.activated.connect(lambda index: said(box.itemData(index)))
+    return _Editor(box, lambda value: box.setCurrentIndex(box.findData(value)))
+
+
+def _several(how: Several, said: Callable[[Any], None]) -> _Editor:
+    button = SeveralButton(how.options)
+    button.chosen.connect(said)
+    return _Editor(button, button.show_chosen)
+
+
+def _switch(how: Switch, said: Callable[[Any], None]) -> _Editor:
+    box = QCheckBox(how.label)
+    box.toggled.connect(said)
+    return _Editor(box, box.setChecked)
+
+
+def _text(said: Callable[[Any], None]) -> _Editor:
+    box = QLineEdit()
+    box.editingFinished.connect(lambda: said(box.text().strip()))
+    return _Editor(box, box.setText)
+
+
+def _editor(name: str, said: Callable[[Any], None]) -> _Editor:
+    how = ask_of(name)
+    if isinstance(how, Text):
+        return _text(said)
+    if isinstance(how, Range):
+        return _range(how, said)
+    if isinstance(how, Several):
+        return _several(how, said)
+    return _choice(how, said) if isinstance(how, Choice) else _switch(how, said)
+
+
+class Form(Panel):
+    """A panel with an editor for each of some settings; `reset_wanted` names those to reset."""
+
+    reset_wanted = Signal(str, tuple)
+
+    def __init__(self, title: str, names: tuple[str, ...], parent: QWidget | None = None) -> None:
+        super().__init__(title, parent)
+        self.form = QFormLayout()
+        self.form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
+        self.form.setVerticalSpacing(5)
+        self.body.addLayout(self.form)
+        self._editors: dict[str, _Editor] = {}
+        for name in names:
+            self._add(name)
+        self.reset = QToolButton(text="Reset")  # pyright: ignore[reportCallIssue]
+        self.reset.setAccessibleName(f"Reset {title}")
+        self.reset.setToolTip(
+            "Every setting of this panel as it is at first; Ctrl+Z takes it back."
+        )
+        self.reset.clicked.connect(lambda: self.reset_wanted.emit(title, self.names))
+        self.reset.hide()
+        self._corner.insertWidget(0, self.reset)
+
+    def _add(self, name: str) -> None:
+        how = ask_of(name)
+        editor = _editor(name, lambda value: self.wished.emit(name, value))
+        if not isinstance(how, Range):
+            editor.widget.setToolTip(how.tip)
+        editor.widget.setObjectName(name)
+        well_behaved(editor.widget)
+        self._editors[name] = editor
+        label = QLabel("" if isinstance(how, Switch) else how.label)
+        label.setBuddy(editor.widget)
+        label.setToolTip(how.tip)
+        self.form.addRow(label, self.field(name, editor.widget))
+
+    def field(self, name: str, editor: QWidget) -> QWidget:
+        """What stands beside the label of a setting: its editor, and what else one may want."""
+        return editor
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The settings that it asks for."""
+        return tuple(self._editors)
+
+    def editors(self) -> list[QWidget]:
+        return [editor.widget for editor in self._editors.values()]
+
+    def editor(self, name: str) -> QWidget:
+        return self._editors[name].widget
+
+    def show_settings(self, settings: Settings) -> None:
+        for name, editor in self._editors.items():
+            with QSignalBlocker(editor.widget):
+                editor.show(getattr(settings, name))
+        self.reset.setVisible(
+            any(getattr(settings, name) != getattr(_AT_FIRST, name) for name in self._editors)
+        )
+        self.place_corner()
+
+    def show_rows(self, names: set[str]) -> None:
+        """Show only the rows of these settings."""
+        for name, editor in self._editors.items():
+            self.form.setRowVisible(editor.widget, name in names)
+
+    def offer(self, name: str, values: Collection[str]) -> None:
+        """Let only these be chosen of the choice called `name`."""
+        box = self.editor(name)
+        model = box.model() if isinstance(box, QComboBox) else None
+        if isinstance(box, QComboBox) and isinstance(model, QStandardItemModel):
+            for index in range(box.count()):
+                model.item(index).setEnabled(box.itemData(index) in values)
+
+    def show_limit(self, name: str, most: float) -> None:
+        """Let the number asked for as `name` be at most `most`, in SI units."""
+        how, box = ask_of(name), self.editor(name)
+        if isinstance(how, Range) and isinstance(box, QDoubleSpinBox):
+            with QSignalBlocker(box):
+                box.setMaximum(most * how.scale)
+            box.setToolTip(_tip_of(how, most))

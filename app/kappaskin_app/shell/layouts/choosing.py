@@ -1,0 +1,168 @@
+"""Layouts as a person chooses, saves, renames and deletes them."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QInputDialog, QMenu
+
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.layouts.arranging import arrange, layout_of
+from kappaskin_app.shell.layouts.layout import LIVE, PRESENTER, READY, Layout
+from kappaskin_app.shell.layouts.noting import Noting
+
+if TYPE_CHECKING:
+    from kappaskin_app.shell.window import MainWindow
+
+_MENU = "Layo&ut"
+_DOTS = "\N{HORIZONTAL ELLIPSIS}"
+_LONGEST = 60  # characters of a name
+_TIPS = {
+    LIVE: "Settings and curvature beside the skin: how the window begins",
+    "Teach": "The lessons above the settings",
+    "Calibrate": "The page Calibrate, and the health of the elements below the skin",
+    "Study": "What accuracy costs below the skin",
+    PRESENTER: "The skin and what is felt fill the screen; Esc leaves",
+}
+
+
+class Layouts(QObject):
+    """Arranges the docks of a `window`; `own` are those saved, `changed` tells that they did."""
+
+    told = Signal(str)
+    changed = Signal()
+
+    def __init__(self, window: "MainWindow") -> None:
+        super().__init__(window)
+        self._window, self._docks, self._panels = window, window.docks.by_name(), window.panels
+        self._presenting, self._history = window.presenting, window.history
+        self._noting = Noting(window, self)
+        self.note = self._noting.note
+        self.own: dict[str, Layout] = {}
+        self._menu = QMenu(window)
+        self._menu.aboutToShow.connect(guarded(self._list))
+
+    def add_actions(self, actions: Actions) -> None:
+        """Register what a person can do."""
+        add = partial(actions.add, menu=_MENU)
+        for name in READY:
+            act = partial(self.choose, name)
+            add(f"layout-{name.lower()}", text=f"&{name}", act=act, tip=_TIPS[name])
+        own = add("layout-own", text="Your &own", act=lambda: None, tip="Layouts you saved")
+        own.setMenu(self._menu)
+        for name, text, act, tip in (
+            ("save", f"Sa&ve this layout{_DOTS}", self.ask_name, "Keep it under a name"),
+            ("rename", f"Re&name a layout{_DOTS}", self.ask_rename, "Give it another name"),
+            ("delete", f"&Delete a layout{_DOTS}", self.ask_delete, "Forget one of your own"),
+            ("reset", "&Reset the layout", self.reset, "Every panel where it is at first"),
+        ):
+            add(f"layout-{name}", text=text, act=act, tip=tip)
+
+    # What is so.
+
+    @property
+    def now(self) -> Layout:
+        """How the window is arranged, or was before it was presented."""
+        self._presenting.leave()
+        return layout_of(self._window, self._docks, self._panels)
+
+    def apply(self, layout: Layout) -> None:
+        """Arrange the window so, which is no step by itself."""
+        self._noting.settle()
+        self._presenting.leave()
+        arrange(self._window, self._docks, self._panels, layout)
+
+    # What a person wishes.
+
+    def choose(self, name: str) -> None:
+        """Arrange the window as the layout of this name, as a step that can be undone."""
+        layout = self.own[name] if name in self.own else READY[name]
+        if (before := self.now) != layout:
+            self._history.step(f"layout {name}", self.apply, before, layout)
+        if name == PRESENTER:
+            self._presenting.enter()
+
+    def reset(self) -> None:
+        """Arrange the window as it is at first."""
+        self.choose(LIVE)
+
+    def save(self, name: str) -> None:
+        """Keep this layout under a name, in the place of another of that name."""
+        name = name.strip()
+        if not name or len(name) > _LONGEST or name in READY:
+            taken = ", ".join(READY)
+            self.told.emit(
+                f"Expected a name of at most {_LONGEST} characters other than {taken}, got "
+                f"{name!r:.80}: choose another"
+            )
+            return
+        self._step(f"save the layout {name}", self.own | {name: self.now})
+        self.told.emit(f"Saved the layout {name}")
+
+    def rename(self, old: str, new: str) -> None:
+        """Call a layout otherwise."""
+        new = new.strip()
+        if new in self.own or new in READY or not 0 < len(new) <= _LONGEST:
+            self.told.emit(f"{new!r:.80} cannot be its name or is another's: choose another")
+            return
+        renamed = {new if name == old else name: each for name, each in self.own.items()}
+        self._step(f"call the layout {old} {new}", renamed)
+
+    def delete(self, name: str) -> None:
+        """Forget a layout."""
+        kept = {other: each for other, each in self.own.items() if other != name}
+        self._step(f"delete the layout {name}", kept)
+        self.told.emit(f"Deleted the layout {name}")
+
+    def _step(self, text: str, own: Mapping[str, Layout]) -> None:
+        self._history.step(text, self._have, self.own, own)
+
+    def _have(self, own: Mapping[str, Layout]) -> None:
+        self.own = dict(own)
+        self.changed.emit()
+
+    # Asking.
+
+    def ask_name(self) -> None:
+        """Ask for a name, and keep this layout under it."""
+        self._ask("Save this layout", "Its name:", self.save)
+
+    def ask_rename(self) -> None:
+        """Ask which is to be called how."""
+        self._ask_which("Rename a layout", self._ask_other_name)
+
+    def _ask_other_name(self, old: str) -> None:
+        self._ask("Rename a layout", f"{old} is to be called:", partial(self.rename, old), old)
+
+    def ask_delete(self) -> None:
+        """Ask which is to be forgotten."""
+        self._ask_which("Delete a layout", self.delete)
+
+    def _ask_which(self, title: str, act: Callable[[str], None]) -> None:
+        if not self.own:
+            self.told.emit("There is no layout of your own yet: save one first")
+            return
+        dialog = self._ask(title, "Which one:", act)
+        dialog.setComboBoxItems(list(self.own))
+
+    def _ask(
+        self, title: str, label: str, act: Callable[[str], None], begun: str = ""
+    ) -> QInputDialog:
+        dialog = QInputDialog(self._window)
+        dialog.setWindowTitle(title)
+        dialog.setLabelText(label)
+        dialog.setTextValue(begun)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.textValueSelected.connect(guarded(act))
+        dialog.open()
+        return dialog
+
+    def _list(self) -> None:
+        self._menu.clear()
+        for name in self.own:
+            action = self._menu.addAction(name.replace("&", "&&"))
+            action.triggered.connect(guarded(lambda *_, name=name: self.choose(name)))
+        if self._menu.isEmpty():
+            self._menu.addAction("None yet: save one").setEnabled(False)

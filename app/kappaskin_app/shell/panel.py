@@ -1,0 +1,121 @@
+"""What every panel is: a titled box that shows what is so and says what a person wishes."""
+
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin.live import Status
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.about import PAGES, PANELS
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.widgets.columns import scroll_to
+
+_GROWN = 20  # ms after which the page of a panel that grew has grown too
+
+
+class Panel(QGroupBox):
+    """A titled box with a message at its foot; `wished` says which setting is to be what.
+
+    In its corner a button says what it is for, at its head, and `read_wanted` which page of the
+    guide a person wants to read on.
+    """
+
+    wished = Signal(str, object)
+    read_wanted = Signal(str)
+
+    def __init__(self, title: str, parent: QWidget | None = None) -> None:
+        super().__init__(title, parent)
+        self.message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        how = Qt.TextInteractionFlag
+        self.message.setTextInteractionFlags(
+            how.TextSelectableByMouse | how.TextSelectableByKeyboard
+        )
+        self._theme, self._hint = LIGHT, False
+        self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
+        self._grown.timeout.connect(guarded(self._answer))
+        what = PANELS.get(title, "")
+        self.about = QLabel(_leading_on(title, what), wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.about.setTextInteractionFlags(how.TextBrowserInteraction)
+        self.about.linkActivated.connect(self.read_wanted)
+        self.help = QToolButton(text="?", checkable=True)  # pyright: ignore[reportCallIssue]
+        self.help.setAccessibleName(f"What {title} is for")
+        self.help.setToolTip(f"What this panel is for: {what}")
+        self.help.toggled.connect(self.about.setVisible)
+        self.help.setVisible(bool(what))
+        self.corner = QWidget(self)
+        self._corner = QHBoxLayout(self.corner)
+        self._corner.setContentsMargins(0, 0, 0, 0)
+        self._corner.addWidget(self.help)
+        self.body = QVBoxLayout()
+        self._around = QVBoxLayout(self)
+        self._around.setContentsMargins(8, 6, 8, 8)
+        self._around.addWidget(self.about)
+        self._around.addLayout(self.body)
+        self._around.addWidget(self.message)
+
+    def show_settings(self, settings: Settings) -> None:
+        """Show what is chosen."""
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        """Show how the engine is doing, and whether the app's own simulation is playing."""
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self._paint()
+
+    def show_message(self, text: str, hint: bool = False) -> None:
+        """Say something at the foot, or nothing: an alarm, or only a hint."""
+        if (text, hint) != (self.message.text(), self._hint):
+            self._hint = hint
+            self.message.setText(text)
+            self._paint()
+        self.message.setVisible(bool(text))
+
+    def _paint(self) -> None:
+        colour = self._theme.faint if self._hint else self._theme.alert
+        self.message.setStyleSheet(f"color: {colour};")
+        self.about.setStyleSheet(f"color: {self._theme.faint};")
+        for button in self.corner.findChildren(QToolButton):
+            button.setStyleSheet(_corner_style(self._theme))
+
+    def place_corner(self) -> None:
+        """Put the corner's buttons beside the title."""
+        size = self.corner.sizeHint().boundedTo(QSize(self.width(), self.fontMetrics().height()))
+        self.corner.setGeometry(self.width() - size.width(), 0, size.width(), size.height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.place_corner()
+        if 0 < event.oldSize().height() < event.size().height():
+            self._grown.start()
+
+    def _answer(self) -> None:
+        """Bring in sight what is said now to who has just asked for something here."""
+        asked = QApplication.focusWidget()
+        if asked is not None and self.isAncestorOf(asked):
+            scroll_to(self)
+            scroll_to(asked)
+
+
+def _leading_on(title: str, what: str) -> str:
+    """What a panel is for, with a link to the page of the guide that tells more."""
+    return f'{what} <a href="{PAGES[title]}">More in the guide</a>' if title in PAGES else what
+
+
+def _corner_style(theme: Theme) -> str:
+    """Words without a frame, until they are pointed at or reached by Tab."""
+    seen = f"color: {theme.text}; border-color: {theme.accent};"
+    return (
+        f"QToolButton {{ color: {theme.faint}; border: 1px solid transparent; border-radius: 3px;"
+        " padding: 0 4px; }"
+        f"QToolButton:hover, QToolButton:focus, QToolButton:checked {{ {seen} }}"
+    )

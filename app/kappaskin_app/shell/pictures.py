@@ -1,0 +1,127 @@
+"""A view to a picture in a file, PNG or SVG, with a line below it that says what it shows."""
+
+from collections.abc import Callable
+from datetime import datetime
+from importlib import metadata
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtGui import QFont, QFontMetrics, QImage, QPainter
+from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
+from kappaskin_app.shell.work_dialog import says_kind, with_ending
+
+_MARGIN, _TEXT = 8, 11  # px
+_MOST = 1000  # px of a caption
+_WRAPPED = int(Qt.TextFlag.TextWordWrap)
+
+
+def caption_of(status: Status, at: float, now: datetime) -> str:
+    """What was shown `now`, `at` s of the device's time: device, settings, version, in words."""
+    setup, sensor = status.setup, status.sensor
+    parts = [f"kappaskin {metadata.version('kappaskin')}", f"{now:%Y-%m-%d %H:%M:%S}"]
+    if sensor is not None:
+        parts += [f"{sensor.name} {sensor.serial_number}", f"{at:.3f} s"]
+        parts.append(f"{setup.Ni} x {setup.Nj} functions, {setup.method}")
+        for name, kept in (("calibration", setup.calibration), ("tare", setup.tare)):
+            if kept is not None:
+                parts.append(f"{name} of {kept.date:%Y-%m-%d %H:%M} ({kept.digest[:8]})")
+    return "  \N{MIDDLE DOT}  ".join(parts)
+
+
+def write_png(image: QImage, path: Path) -> None:
+    """Write an `image`, in any thread; a `Refusal` where that cannot be."""
+    if not image.save(str(path)):
+        raise _unwritable(path)
+
+
+def save_view(
+    view: QWidget,
+    path: Path,
+    title: str,
+    caption: str,
+    flat: bool = True,
+    write: Callable[[QImage, Path], None] = write_png,
+) -> None:
+    """Write `view` as a PNG, or if it is `flat` as an SVG; `title` and `caption` go into both.
+
+    A `Refusal` where that cannot be.
+    """
+    if path.suffix.lower() == ".png":
+        write(_png(view, title, caption), path)
+    elif path.suffix.lower() == ".svg" and flat:
+        _save_svg(view, path, title, caption)
+    else:
+        kinds = ".png or .svg" if flat else ".png, since it is in three dimensions"
+        raise Refusal(f"{path.name}: expected a file that ends in {kinds}")
+
+
+def _png(view: QWidget, title: str, caption: str) -> QImage:
+    # What is drawn in three dimensions is in the window's picture alone.
+    seen = view.window().grab(QRect(view.mapTo(view.window(), QPoint(0, 0)), view.size()))
+    ratio = seen.devicePixelRatio()
+    image = QImage(_size(view, caption) * ratio, QImage.Format.Format_RGB32)
+    image.setDevicePixelRatio(ratio)
+    image.fill(view.palette().window().color())
+    with QPainter(image) as painter:
+        painter.drawPixmap(0, 0, seen)
+        _write(painter, view, caption)
+    for key, text in (("Title", title), ("Description", caption), ("Software", "kappaskin")):
+        image.setText(key, text)
+    return image
+
+
+def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
+    try:
+        path.open("wb").close()  # Qt tells nobody why it could not
+    except OSError as error:
+        raise _unwritable(path) from error
+    drawing = QSvgGenerator()
+    drawing.setFileName(str(path))
+    size = _size(view, caption)
+    drawing.setSize(size)
+    drawing.setViewBox(QRect(QPoint(0, 0), size))
+    drawing.setTitle(title)
+    drawing.setDescription(caption)
+    with QPainter(drawing) as painter:
+        painter.fillRect(QRect(QPoint(0, 0), size), view.palette().window())
+        view.render(painter, QPoint(0, 0))
+        _write(painter, view, caption)
+
+
+def _size(view: QWidget, caption: str) -> QSize:
+    """Of the view, and of as many lines below it as the caption takes."""
+    return QSize(view.width(), view.height() + _lines(view, caption).height() + 2 * _MARGIN)
+
+
+def _font(view: QWidget) -> QFont:
+    font = view.font()
+    font.setPixelSize(_TEXT)
+    return font
+
+
+def _lines(view: QWidget, caption: str) -> QRect:
+    room = QRect(_MARGIN, view.height() + _MARGIN, view.width() - 2 * _MARGIN, _MOST)
+    return QFontMetrics(_font(view)).boundingRect(room, _WRAPPED, caption)
+
+
+def _write(painter: QPainter, view: QWidget, caption: str) -> None:
+    painter.setPen(view.palette().windowText().color())
+    painter.setFont(_font(view))
+    painter.drawText(_lines(view, caption), _WRAPPED, caption)
+
+
+def _unwritable(path: Path) -> Refusal:
+    return Refusal(f"{path}: cannot be written; choose another place")
+
+
+def chosen_file(parent: QWidget, title: str, flat: bool) -> Path | None:
+    """The file that a person chooses for a picture, if any; a `Refusal` as of `with_ending`."""
+    kinds = "Picture (*.png);;Drawing (*.svg)" if flat else "Picture (*.png)"
+    name, kind = QFileDialog.getSaveFileName(parent, f"Export {title}", "", kinds)
+    if not name:
+        return None
+    return Path(name) if says_kind(Path(name)) else with_ending(name, kind[-5:-1])

@@ -1,0 +1,151 @@
+"""What a window is at, kept in a file while it is open: what is left of one is of a crash."""
+
+import json
+import os
+import platform
+import time
+from contextlib import suppress
+from dataclasses import dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import platformdirs
+from PySide6.QtCore import QLockFile, QObject
+
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
+from kappaskin_app.features.log.mishaps import REPORT_TIP
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.banner import Offered
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings_text import OF_SENSORS, settings_in, settings_text
+
+if TYPE_CHECKING:
+    from kappaskin_app.shell.window import MainWindow
+
+_FILES = "window-*.json"
+_EVERY = 1.0  # s between two looks at what is to be kept
+_TIP = (
+    "The program was ended, by itself or by the system, before it was closed. What you take up of "
+    "it can be undone (Ctrl+Z); Report saves what helps to find out why."
+)
+_SETTINGS = "Every setting as it was then, but for the calibration and tare of a sensor."
+
+
+@dataclass(frozen=True)
+class Last:
+    """What a window was at: its `settings`, and what it read or `recording` it wrote, if any."""
+
+    settings: Settings
+    source: str = ""
+    recording: str = ""
+
+
+class Running:
+    """Keeps in a `folder` what an open window is at, until it is closed in order."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._file = folder / f"window-{os.getpid()}.json"
+        self._lock = _lock(self._file)
+        self._lock.tryLock(0)
+        self._kept: Last | None = None
+
+    def keep(self, last: Last) -> None:
+        """Write down what is so now, if it is something else."""
+        if last == self._kept:
+            return
+        self._kept = last
+        said = {
+            "settings": json.loads(settings_text(last.settings)),
+            "source": last.source,
+            "recording": last.recording,
+        }
+        part = self._file.with_suffix(".part")
+        part.write_text(json.dumps(said, indent=1), encoding="utf-8")
+        part.replace(self._file)  # whole, or not at all
+
+    def close(self) -> None:
+        self._file.unlink(missing_ok=True)
+        self._lock.unlock()
+
+
+def crashed(folder: Path) -> Last | None:
+    """What the last window was at that did not close in order; told once."""
+    left: list[tuple[float, Last]] = []
+    for file in folder.glob(_FILES):
+        lock = _lock(file)
+        if lock.tryLock(0):  # nobody holds it who is alive
+            with suppress(OSError, ValueError, KeyError, TypeError, Refusal):
+                left.append((file.stat().st_mtime, _read(file)))
+            file.unlink(missing_ok=True)
+            lock.unlock()
+    return max(left, key=lambda one: one[0])[1] if left else None
+
+
+def _read(file: Path) -> Last:
+    said = json.loads(file.read_text(encoding="utf-8"))
+    settings = settings_in(json.dumps(said["settings"]))
+    return Last(settings, str(said["source"]), str(said["recording"]))
+
+
+def _lock(file: Path) -> QLockFile:
+    lock = QLockFile(str(file.with_suffix(".lock")))
+    lock.setStaleLockTime(0)  # however long its window has been open
+    return lock
+
+
+class Recovering(QObject):
+    """Keeps in a `folder` what a `window` is at, and offers what one was at that crashed."""
+
+    def __init__(self, window: "MainWindow", folder: Path) -> None:
+        super().__init__(window)
+        self._window, last = window, crashed(folder)
+        self._running, self._next = Running(folder), 0.0
+        window.session.reported.connect(guarded(self._keep))
+        # What went on recording by itself was taken over with its settings already.
+        if last is not None and window.session.engine.adopted is None:
+            self.offer(last)
+
+    def _keep(self, status: Status) -> None:
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + _EVERY
+            recording = str(status.recording.path) if status.recording.active else ""
+            window = self._window
+            self._running.keep(Last(window.history.settings, window.session.source, recording))
+
+    def offer(self, last: Last) -> None:
+        """Offer what is left of the last session: whoever wants none of it goes on."""
+        window = self._window
+        offered = [Offered("Its se&ttings", _SETTINGS, partial(self._use, last))]
+        if last.source and not last.source.startswith("sim:"):
+            connect = partial(window.connect_to, last.source)
+            offered.append(Offered("Its s&ource", f"Connect {last.source} again.", connect))
+        if (recording := _left(last.recording)) is not None:
+            play = partial(window.replaying.open_file, recording)
+            offered.append(Offered("Its recordin&g", f"Play {recording}.", play))
+        report = window.mishaps.report.ask
+        offered.append(Offered("Re&port\N{HORIZONTAL ELLIPSIS}", REPORT_TIP, report))
+        window.offer.show_offer("The last session ended unexpectedly. Take up:", _TIP, offered)
+
+    def _use(self, last: Last) -> None:
+        names = (f.name for f in fields(Settings) if f.name not in OF_SENSORS)
+        values = {name: getattr(last.settings, name) for name in names}
+        self._window.history.change("Settings of the last session", -1, **values)
+
+    def close(self) -> None:
+        self._running.close()
+
+
+def _left(recording: str) -> Path | None:
+    """The file that is left of a recording, whole or not."""
+    there = [Path(name) for name in (recording, f"{recording}.part") if recording]
+    return next((path for path in there if path.exists()), None)
+
+
+def state_folder() -> Path:
+    """Where open windows of this user and machine keep what they are at."""
+    state = platformdirs.user_state_path("kappaskin", appauthor=False)
+    return state / "open" / platform.node()

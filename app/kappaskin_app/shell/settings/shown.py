@@ -1,0 +1,222 @@
+"""What the shape is fitted with, and how it is shown."""
+
+from dataclasses import dataclass
+
+from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch, asked
+from kappaskin_app.shell.settings.skin import EDGE_NAMES
+
+COLOURS = (
+    ("displacement", "Displacement"),
+    ("xx", "Curvature xx"),
+    ("yy", "Curvature yy"),
+    ("xy", "Twist xy"),
+    ("first", "Principal curvature 1"),
+    ("second", "Principal curvature 2"),
+    ("mean", "Mean curvature"),
+    ("gaussian", "Gaussian curvature"),
+    ("residual_xx", "Residual xx"),
+    ("residual_yy", "Residual yy"),
+    ("residual_xy", "Residual xy"),
+    ("error_bar", "Error bar"),
+    ("difference", "Difference to the truth"),
+    ("health", "Health"),
+)
+METHOD_NAMES = (
+    ("least-squares", "Least squares"),
+    ("as-printed", "As printed (Eq. 6)"),
+    ("direct", "Direct, each frame anew"),
+    ("fast", "Fast, a regular grid"),
+    ("tracking", "Tracking, from frame to frame"),
+    ("bayes", "Bayes, a plate's prior"),
+    ("finite-slope", "Finite slope"),
+    ("robust", "Robust, leaves out bad elements"),
+)
+METHOD_SHORT = {name: words.split(",")[0].split(" (")[0] for name, words in METHOD_NAMES}
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The functions that the shape is made of, and how they are fitted."""
+
+    functions_x: int = asked(
+        8,
+        Range(
+            "Functions along x",
+            "Ni, the number of functions along x (Eq. 1). More follow finer shapes and more noise; "
+            "with more than elements both along x and along y, readings cannot decide all of them.",
+            1,
+            64,
+            1,
+        ),
+    )
+    functions_y: int = asked(
+        8, Range("Functions along y", "Nj, the same along y (Eq. 1).", 1, 64, 1)
+    )
+    method: str = asked(
+        "least-squares",
+        Choice(
+            "Estimator",
+            "How the shape is found from the readings. Every way tells its error bars; Cost of "
+            "accuracy (F9) shows what each takes and gives.",
+            METHOD_NAMES,
+        ),
+    )
+    fit_edge: str = asked(
+        "",
+        Choice(
+            "Edge assumed",
+            "How the fit believes that the skin is held. Another edge than the skin's own shows "
+            "what a wrong belief costs: compare the errors above.",
+            (("", "As the skin says"), *EDGE_NAMES),
+        ),
+    )
+
+
+def _cut(side: str, axis: str) -> Range:
+    tip = f"Cut away what lies beyond this share of the skin, seen from above along {axis}."
+    return Range(f"{side} {axis}", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
+
+
+def _cut_level(side: str, beyond: str) -> Range:
+    tip = (
+        f"Cut away what is drawn {beyond} this level, from as deep (0 %) to as high (100 %) as "
+        "the skin may be drawn."
+    )
+    return Range(f"{side} height", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
+
+
+@dataclass(frozen=True)
+class View:
+    """How the skin is shown."""
+
+    colour_by: str = asked(
+        "displacement",
+        Choice(
+            "Colour",
+            "What colours the skin: how far it moved, how it bends (Eqs. 3 to 5) and curves, what "
+            "the fit leaves of the readings, how sure it is, how wrong, or which elements are "
+            "well. Above the scale of colours stands which it is, with its equation.",
+            COLOURS,
+        ),
+    )
+    colour_from: str = asked(
+        "smooth",
+        Choice(
+            "Coloured",
+            "Smooth: the surface that was fitted, at every point. Per element: each element's own "
+            "cell in the colour of what it reads, nothing interpolated; residuals and health are "
+            "always so.",
+            (("smooth", "Smooth"), ("elements", "Per element")),
+        ),
+    )
+    maps: tuple[str, ...] = asked(
+        ("xx", "yy", "xy"),
+        Several(
+            "Heatmaps",
+            "Which heatmaps are shown beside the skin, one cell for each element. What is not "
+            "shown is not computed.",
+            COLOURS,
+        ),
+    )
+    one_range: bool = asked(
+        False,
+        Switch(
+            "One range for all",
+            "Let the colours of all curvatures that are shown reach as far as those of the "
+            "largest, and those of all residuals, so that they can be compared.",
+        ),
+    )
+    exaggeration: float = asked(
+        6.0,
+        Range(
+            "Height",
+            "How many times the displacement is drawn larger, at most: never so much that it "
+            "leaves the picture. Below the colours stands how many times it is.",
+            1,
+            50,
+            1,
+            1.0,
+            "times",
+        ),
+    )
+    show_elements: bool = asked(True, Switch("Elements", "Draw the sensing elements as points."))
+    show_truth: bool = asked(
+        True,
+        Switch("True surface", "Draw the surface the simulation knows as a wireframe."),
+    )
+    show_directions: bool = asked(
+        False,
+        Switch(
+            "Principal directions",
+            "Crosses along the directions in which the skin curves most and least, as long as it "
+            "does: orange where it is convex, blue where it is hollow. tan 2\u03b1 = 2 xy / "
+            "(xx \u2212 yy).",
+        ),
+    )
+    show_band: bool = asked(
+        False,
+        Switch(
+            "Error band",
+            "Two translucent surfaces, two standard deviations of the displacement below and "
+            "above: the true one lies between them at about 95 of 100 places, as far as noise "
+            "alone errs.",
+        ),
+    )
+    show_frame: bool = asked(
+        False,
+        Switch(
+            "Contact frame",
+            "At the contact the normal of the skin (green) and its two principal directions "
+            "(orange, blue). The cone holds the normal with 95 % by the error bars of the slopes, "
+            "stretched as the skin is.",
+        ),
+    )
+    show_object: bool = asked(
+        False,
+        Switch(
+            "Object found",
+            "What the readings say touches the skin (plane, cylinder, sphere or edge), green and "
+            "translucent where it touches, stretched in height as the skin is. Of a radius known "
+            "to be below some length, it has that.",
+        ),
+    )
+    show_pressed: bool = asked(
+        False,
+        Switch(
+            "Object pressed",
+            "The rigid object of a simulated scene, red and translucent, where it is pressed in "
+            "and stretched in height as the skin is. Loads of the panels have none.",
+        ),
+    )
+    from_x: float = asked(0.0, _cut("From", "x"))
+    to_x: float = asked(1.0, _cut("To", "x"))
+    from_y: float = asked(0.0, _cut("From", "y"))
+    to_y: float = asked(1.0, _cut("To", "y"))
+    from_z: float = asked(0.0, _cut_level("From", "below"))
+    to_z: float = asked(1.0, _cut_level("To", "above"))
+    theme: str = asked(
+        "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
+    )
+    show_start: bool = asked(
+        True,
+        Switch(
+            "Ways to begin",
+            "Offer above the skin, whenever the window opens, what one may begin with: a scene, a "
+            "sensor, a lesson, a recording.",
+        ),
+    )
+    traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
+    # How far colours reach, in SI units: on one side, or on both. 0 follows what is shown.
+    range_displacement: float = 0.0
+    range_xx: float = 0.0
+    range_yy: float = 0.0
+    range_xy: float = 0.0
+    range_first: float = 0.0
+    range_second: float = 0.0
+    range_mean: float = 0.0
+    range_gaussian: float = 0.0
+    range_residual_xx: float = 0.0
+    range_residual_yy: float = 0.0
+    range_residual_xy: float = 0.0
+    range_error_bar: float = 0.0
+    range_difference: float = 0.0

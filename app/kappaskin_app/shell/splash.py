@@ -1,0 +1,77 @@
+"""What is being loaded, in words, until the skin is drawn."""
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QMetaObject, Qt, QTimer
+from PySide6.QtGui import QGuiApplication, QMouseEvent
+from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
+
+from kappaskin_app.theme import Theme
+
+if TYPE_CHECKING:
+    from kappaskin_app.shell.window import MainWindow
+
+_WIDTH = 66  # letters wide
+_MOST = 2500  # ms that it stands before a window into which nothing comes
+_READING = "Waiting for the first reading"
+_DOTS = "\N{HORIZONTAL ELLIPSIS}"
+
+
+class Splash(QWidget):
+    """Says what is loaded; goes when the first estimate is drawn, at a click, or after a while."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(None, Qt.WindowType.SplashScreen | Qt.WindowType.FramelessWindowHint)
+        self.setObjectName("splash")
+        self.setAccessibleName("Kappaskin is starting")
+        # Put away before there is a window, it would be the last one and end the program.
+        self.setAttribute(Qt.WidgetAttribute.WA_QuitOnClose, False)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self._watching: QMetaObject.Connection | None = None
+        self.setStyleSheet(
+            f"#splash {{ background: {theme.window}; border: 1px solid {theme.line}; }}"
+            f"QLabel {{ color: {theme.text}; }}"
+        )
+        self.words = QLabel()
+        self.words.setStyleSheet(f"color: {theme.faint};")
+        layout = QVBoxLayout(self)
+        margin = self.fontMetrics().height()
+        layout.setContentsMargins(2 * margin, margin, 2 * margin, margin)
+        for label in (_name(theme), QLabel("The shape of a skin from its curvature"), self.words):
+            layout.addWidget(label)
+        self.setFixedSize(_WIDTH * self.fontMetrics().averageCharWidth(), self.sizeHint().height())
+        self.move(QGuiApplication.primaryScreen().geometry().center() - self.rect().center())
+
+    def say(self, words: str) -> None:
+        """Say this at once: nothing else is drawn while something is loaded."""
+        self.words.setText(words + _DOTS)
+        self.words.setAccessibleName(self.words.text())
+        QApplication.processEvents()
+
+    def finish(self, window: "MainWindow") -> None:
+        """Wait for the first reading to be drawn in a `window`, and go."""
+        self.say(_READING)
+        # The connection holds this splash, which nothing else does, until it goes.
+        self._watching = window.membrane.drawn.connect(
+            lambda: self._go() if window.display.estimate_shown() is not None else None
+        )
+        QTimer.singleShot(_MOST, self, self._go)
+
+    def _go(self) -> None:
+        if self._watching is not None:
+            self.disconnect(self._watching)
+            self._watching = None
+            self.close()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.close()
+
+
+def _name(theme: Theme) -> QLabel:
+    name = QLabel("Kappaskin")
+    font = name.font()
+    font.setPointSizeF(2 * font.pointSizeF())
+    font.setBold(True)
+    name.setFont(font)
+    name.setStyleSheet(f"color: {theme.accent};")
+    return name

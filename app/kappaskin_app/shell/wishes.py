@@ -1,0 +1,221 @@
+"""What a person wants, as undoable changes of the settings."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from kappaskin.live import Status
+from kappaskin.mechanics import Load
+from kappaskin.studies import Setting
+from kappaskin_app.features.scene.scene_text.changes import forced
+from kappaskin_app.features.scene.scene_text.places import instead, pressed, shifted
+from kappaskin_app.features.stability.demonstrations import DEMONSTRATIONS, Demonstration
+from kappaskin_app.shell.effects import called
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.loads import dragged
+from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.publishing import Sending
+from kappaskin_app.shell.settings.scene import Written
+from kappaskin_app.shell.simulation import (
+    NO_ELEMENTS,
+    OWN,
+    elements_of,
+    patch_of,
+    text_of,
+    with_consequences,
+)
+from kappaskin_app.shell.touching import Held, most_times
+
+_TITLES = {name[:1].lower() + name[1:] for name in (d.title for d in DEMONSTRATIONS)}
+
+
+class Wishes:
+    """Turns wishes of panels, menus and views into commands of the history."""
+
+    def __init__(self, history: History, session: Session) -> None:
+        self._history, self._session = history, session
+        self._gesture, self._grabbed_end = -1, False
+        self._held: Held | None = None
+        self._grabbed_load: Load | None = None
+        self._place = (0.0, 0.0)
+        self._grabbed_in: Written | None = None
+        self._begun: tuple[Demonstration, int, Settings] | None = None
+
+    def wish(self, name: str, value: Any) -> None:
+        """Make the setting `name` what is wished, and what follows from it."""
+        changed = with_consequences(self._history.settings, self._session.scene, name, value)
+        self._history.wish(name, **changed)
+
+    def choose(self, element: int) -> None:
+        """Take an element into the region of those chosen, or out of it."""
+        settings = self._history.settings
+        if settings.region == "elements":
+            chosen = set(settings.region_elements) ^ {element}
+            self._history.change("Choose elements", region_elements=tuple(sorted(chosen)))
+
+    def take(self, setting: Setting) -> None:
+        """Fit as `setting` says, on as many elements."""
+        along_x, along_y = setting.functions
+        changed = {"method": setting.method, "functions_x": along_x, "functions_y": along_y}
+        elements = setting.elements
+        another = elements != elements_of(self._history.settings)
+        if elements is not None and another and self._session.simulating:
+            changed |= {"elements_x": elements[0], "elements_y": elements[1], **NO_ELEMENTS}
+        self._history.change("Choice by its cost", -1, **changed)
+
+    def demonstrate(self, demonstration: Demonstration) -> None:
+        """Bring a hard case about, as one step."""
+        gesture = self._history.new_gesture()
+        self._history.change(demonstration.title, gesture, **demonstration.changes())
+        if demonstration.then:
+            self._begun = demonstration, gesture, self._history.settings
+
+    @property
+    def demonstrates(self) -> bool:
+        """Whether the last step, which undoing takes back, brought a hard case about."""
+        # By its words: Qt's own commands, asked for at every step, come and go with their wrappers.
+        return self._history.stack.undoText() in _TITLES
+
+    def follow(self, status: Status) -> None:
+        """Go on with the hard case that was begun, once its skin is there."""
+        if self._begun is None:
+            return
+        demonstration, gesture, settings = self._begun
+        if self._history.settings != settings:
+            self._begun = None  # something else was wished meanwhile
+            return
+        there = status.sensor is not None and status.sensor.plate.patch == patch_of(settings)
+        if there and status.slot is not None and not status.computing:
+            self._begun = None
+            self._history.change(demonstration.title, gesture, **demonstration.then)
+
+    def toggle(self, name: str) -> None:
+        self.wish(name, not getattr(self._history.settings, name))
+
+    def switch_theme(self) -> None:
+        self.wish("theme", "light" if self._history.settings.theme == "dark" else "dark")
+
+    def exaggerate(self, step: int) -> None:
+        wanted = self._history.settings.exaggeration + step
+        self.wish("exaggeration", float(min(max(wanted, 1), 50)))
+
+    def reset(self) -> None:
+        now = self._history.settings
+        kept = Settings(calibration=now.calibration, tare=now.tare)  # no matter of taste
+        sending = {field.name: getattr(now, field.name) for field in fields(Sending)}  # nor this
+        self._history.change("Reset settings", -1, **vars(kept) | sending)
+
+    def reset_panel(self, title: str, names: Sequence[str]) -> None:
+        """Have some settings as they are at first, with what follows from each."""
+        now, first = self._history.settings, Settings()
+        for name in names:
+            if getattr(now, name) != (value := getattr(first, name)):
+                now = replace(now, **with_consequences(now, self._session.scene, name, value))
+        changed = {field.name: getattr(now, field.name) for field in fields(Settings)}
+        self._history.change(f"Reset {title}", -1, **changed)
+
+    # Scenes as they are written.
+
+    def play(self, written: Written) -> None:
+        """Play a scene that is written, from its beginning."""
+        self._session.begin(written)
+
+    def write(self, text: str) -> None:
+        """Play what was written instead of the scene so far; a row of keys is one step to undo."""
+        if (written := self._written_anew(text)) is not None:
+            self._history.wish("written", written=written)
+
+    def _written_anew(self, text: str) -> Written | None:
+        """The scene with another text; None where it has this one."""
+        now = self._history.settings.written
+        if now is not None and text == now.text:
+            return None
+        return Written(text, OWN if now is None else now.file)
+
+    def save(self, file: Path) -> None:
+        """Write the scene into a file, beside which it is from now on; an `OSError` may come."""
+        settings = self._history.settings
+        file.write_text(text_of(settings), encoding="utf-8")
+        if settings.written is not None:
+            self._history.change("Save the scene", -1, written=replace(settings.written, file=file))
+
+    def force(self, effect: str, how: str) -> None:
+        """Force an effect on or off, or leave it to the plan; refused where the text is no TOML."""
+        written = self._written_anew(forced(text_of(self._history.settings), effect, how))
+        if written is not None:
+            self._history.change(f"Force {called(effect).lower()}", -1, written=written)
+
+    def touch_with(self, said: Mapping[str, Any], x: float, y: float, force: float) -> None:
+        """Let the object that is `said` touch instead of what does, at its place, as hard."""
+        written = self._written_anew(
+            instead(
+                text_of(self._history.settings),
+                0,
+                {**said, "x": round(x, 6), "y": round(y, 6), "force": float(f"{force:.4g}")},
+            )
+        )
+        if written is not None:
+            self._history.change("Choose what touches", -1, written=written)
+
+    # Loads that are dragged.
+
+    def grab(self, x: float, y: float) -> None:
+        """Take hold of the load at (x, y) in m: what is dragged until it is let go is one step."""
+        settings, session = self._history.settings, self._session
+        second = math.dist((x, y), (settings.x_end, settings.y_end))
+        self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
+        self._gesture, self._grabbed_in = self._history.new_gesture(), settings.written
+        # What is seen is in it: no other scene stays, nor does until this one is made.
+        writes = settings.written is not None and not (session.refusal or session.making)
+        self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
+        self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
+        self._place = x, y
+
+    @property
+    def _there(self) -> bool:
+        """Whether what was grabbed still is: it was not undone, nor another scene chosen."""
+        return self._history.settings.written == self._grabbed_in
+
+    def drag(self, x: float, y: float) -> None:
+        settings, scene = self._history.settings, self._session.scene
+        if not self._there:
+            return
+        if self._held is not None:
+            self._session.move(self._held.moved_to(x, y))
+        elif settings.written is None:
+            self._place = x, y
+            moved = dragged(settings, scene, x, y, self._grabbed_end)
+            self._history.change("Drag the load", self._gesture, **moved)
+
+    def press(self, times: float) -> None:
+        """Let what was grabbed press so many `times` as hard as it did then."""
+        settings, scene = self._history.settings, self._session.scene
+        if not self._there:
+            return
+        if self._held is not None:
+            self._session.move(self._held.pressed(times))
+        elif settings.written is None and self._grabbed_load is not None:
+            times = min(times, max(most_times(scene, self._grabbed_load), 1.0))
+            moved = dragged(settings, scene, *self._place, self._grabbed_end)
+            # Two points share their force.
+            whole = self._grabbed_load.force * max(len(scene.loads), 1)
+            self._history.change("Press harder", self._gesture, **moved | {"force": whole * times})
+
+    def release(self) -> None:
+        held, written = self._held, self._history.settings.written
+        self._gesture, self._held = -1, None
+        if self._there and held is not None and written is not None and held.moved:
+            text = shifted(written.text, held.number, *held.by)
+            text = pressed(text, held.number, held.times) if held.times != 1 else text
+            self._history.change("Drag the load", -1, written=replace(written, text=text))
+
+    def give_up(self) -> None:
+        """Put the load back to where it was grabbed."""
+        if self._held is not None and self._there:
+            self._session.move(self._held.scene)
+        elif self._held is None:
+            self._history.cancel(self._gesture)
+        self._gesture, self._held = -1, None

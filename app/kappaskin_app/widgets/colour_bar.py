@@ -1,0 +1,173 @@
+"""What the colours mean: a scale with its limits and unit, which may be locked."""
+
+import numpy as np
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
+
+from kappaskin_app.shell.scale import in_digits
+from kappaskin_app.shell.shades import Tint
+from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
+from kappaskin_app.widgets.lettering import read_from_afar
+
+_COLOURS, _GAP = 22, 4  # px of the bar without its numbers, and right of them
+_WIDEST = "\N{MINUS SIGN}0.005"  # of the numbers, more or less
+_SWATCH = 10  # px of a colour in the legend
+
+
+class ColourBar(QWidget):
+    """A vertical scale of colours with its limits and unit, over colours that mean something else.
+
+    Of kinds, which have no scale, there is the legend only.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._tint = Tint(DIVERGING, (-1.0, 1.0), "1/m")
+        self.legend: tuple[tuple[str, str], ...] = ()
+        """Colours, as #rrggbb, with their words, the lowest first."""
+        self.widen()
+
+    def minimumSizeHint(self) -> QSize:
+        line = self.fontMetrics().height()
+        return QSize(_COLOURS, 3 * line + 10 if self.scaled else len(self.legend) * (line + 2))
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self.widen()
+
+    def widen(self) -> None:
+        """Have room for numbers and legend in the letters of now."""
+        wide = self.fontMetrics().horizontalAdvance
+        legend = max((_SWATCH + wide(words) for _, words in self.legend), default=0)
+        numbers = max(map(wide, (_WIDEST, *self._numbers.values())))
+        self.setFixedWidth(max(_COLOURS + numbers, 8 + legend) + _GAP)
+
+    @property
+    def _numbers(self) -> dict[float, str]:
+        """What is written at which shares of the scale."""
+        low, high = self.limits
+        span = (high - low) / 2
+        return {share: in_digits(low + share * (high - low), span) for share in (0.0, 0.5, 1.0)}
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        return self._tint.limits
+
+    @property
+    def reach(self) -> float:
+        """How far the colours reach, as a range is locked to it."""
+        return self._tint.limit
+
+    @property
+    def scaled(self) -> bool:
+        """Whether there is a scale."""
+        return not self._tint.kinds
+
+    def show_scale(self, colours: Colours, limits: tuple[float, float], unit: str) -> None:
+        self.show_tint(Tint(colours, limits, unit))
+
+    def show_tint(self, tint: Tint, legend: tuple[tuple[str, str], ...] = ()) -> None:
+        """Show a scale, and a `legend` of other colours that are seen, (#rrggbb, words)."""
+        was = self._tint
+        if (was.limits, was.unit, self.legend) != (tint.limits, tint.unit, legend) or (
+            was.colours is not tint.colours
+        ):
+            self._tint, self.legend = tint, legend
+            self.widen()
+            self.updateGeometry()
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setPen(self.palette().windowText().color())
+        line = painter.fontMetrics().height()
+        bottom = float(self.height())
+        for colour, words in self.legend:
+            bottom -= line + 2
+            painter.fillRect(
+                QRectF(4, bottom + (line - _SWATCH) / 2, _SWATCH, _SWATCH), QColor(colour)
+            )
+            room = QRectF(8 + _SWATCH, bottom, self.width() - _SWATCH - 8, line)
+            painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, words)
+        if self.scaled:
+            self._paint_scale(painter, line, bottom)
+
+    def _paint_scale(self, painter: QPainter, line: int, bottom: float) -> None:
+        bar = QRectF(4, line + 4, 14, max(bottom - line - 10, 10))
+        ramp = np.ascontiguousarray(self._tint.colours[::-1, None])
+        image = QImage(ramp.tobytes(), 1, 256, 3, QImage.Format.Format_RGB888)
+        painter.drawImage(bar, image)
+        painter.drawText(QPointF(2, painter.fontMetrics().ascent()), self._tint.unit)
+        for share, text in self._numbers.items():
+            if share == 0.5 and bar.height() < 3 * line:
+                continue
+            y = bar.bottom() - share * bar.height()
+            top = min(max(y - line / 2, bar.top()), bar.bottom() - line)
+            painter.drawText(QPointF(bar.right() + 4, top + painter.fontMetrics().ascent()), text)
+
+
+class LockButton(QToolButton):
+    """Says whether a range of colours is locked; `wanted` says that it should be, or not."""
+
+    wanted = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setCheckable(True)
+        self.setToolTip("Keep the colours' range as it is now; else it follows what is shown.")
+        self.clicked.connect(self._ask)
+        self.show_locked(False)
+
+    def _ask(self, locked: bool) -> None:
+        self.setChecked(not locked)  # the answer comes back through show_locked
+        self.wanted.emit(locked)
+
+    def show_locked(self, locked: bool) -> None:
+        self.setChecked(locked)
+        self.setText("Locked" if locked else "Lock")
+
+
+class SkinScale(QWidget):
+    """What colours the skin, on which scale, its lock, and how many times larger it is drawn."""
+
+    lock_wanted = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.what = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
+        self.bar, self.lock = ColourBar(), LockButton()
+        self.bar.show_scale(SEQUENTIAL, (0.0, 1.0), "mm")
+        self.lock.wanted.connect(self.lock_wanted)
+        self._symbol = ""
+        self.times = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
+        self.times.setToolTip(
+            "How many times the displacement is drawn larger: what Height asks for, or as much of "
+            "it as fits into the picture."
+        )
+        around = QVBoxLayout(self)
+        around.setContentsMargins(0, 4, 0, 4)
+        around.addWidget(self.what)
+        around.addWidget(self.bar, 1)
+        around.addWidget(self.lock, 0, Qt.AlignmentFlag.AlignHCenter)
+        around.addWidget(self.times)
+
+    def show_unit(self, unit: float) -> None:
+        """Be read from afar where a unit is so many px, and ask nothing then; else as usual."""
+        for part in (self.lock, self.times):
+            part.setVisible(not unit)
+        self.setFont(read_from_afar(unit))
+
+    def show_what(self, symbol: str, tip: str) -> None:
+        """Say by its `symbol` in HTML what colours the skin; the `tip` explains it."""
+        if symbol != self._symbol:
+            self._symbol = symbol
+            self.what.setText(f"<b>{symbol}</b>")
+            self.what.setToolTip(tip)
+
+    def show_times(self, times: float) -> None:
+        """Say how many `times` higher the skin is drawn."""
+        text = f"height\n\N{MULTIPLICATION SIGN} {times:.3g}"
+        if text != self.times.text():
+            self.times.setText(text)
