@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
     from kappaskin.live import Engine
-    from kappaskin_app.features.log.logbook import Logbook
+    from kappaskin_app.shell.logbook import Logbook
     from kappaskin_app.shell.recovery import Recovering
     from kappaskin_app.shell.splash import Splash
     from kappaskin_app.shell.window import MainWindow
@@ -31,7 +31,7 @@ log = logging.getLogger("kappaskin")
 
 _LOADED = {
     "pyvistaqt": "Loading the drawing in three dimensions (VTK)",
-    "kappaskin_app.shell.window": "Loading panels and views",
+    "kappaskin_app.features": "Loading panels and views",
 }
 """What takes long to import, in this order, and what is said meanwhile."""
 
@@ -62,11 +62,12 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
         engine = starting.result()
     _stand_behind()
     try:
+        from kappaskin_app.features import FEATURES
         from kappaskin_app.shell.window import MainWindow
 
         if splash is not None:
             splash.say("Making the window")
-        window = MainWindow(source, engine)
+        window = MainWindow([made() for made in FEATURES], source, engine)
     except BaseException:
         engine.close()
         raise
@@ -156,10 +157,11 @@ def launch(
     # What a script opens for some seconds is the same whatever was before.
     application, window = opened(source, _kept_file() if seconds is None else None)
     recovering = _recovering(window)
-    if presenting and not window.session.engine.adopted:
-        window.presenting.enter()
-    if seconds is None:
-        window.beginning.begin()
+    full_screen = window.layouts.full_screen
+    if presenting and full_screen is not None and not window.session.engine.adopted:
+        full_screen.enter()
+    elif seconds is None:
+        window.menus.welcome.begin()
     if file is not None:
         window.opening.begin_with(file)
     from PySide6.QtCore import QTimer
@@ -194,7 +196,7 @@ def _kept_file() -> Path:
 
 def _logbook() -> "Logbook | None":
     """What goes wrong to files, or nothing where none can be written."""
-    from kappaskin_app.features.log.logbook import Logbook, log_folder
+    from kappaskin_app.shell.logbook import Logbook, log_folder
 
     try:
         return Logbook(log_folder())

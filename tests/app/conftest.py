@@ -4,7 +4,8 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ from shiboken6 import getAllValidWrappers
 
 from kappaskin import Engine
 from kappaskin_app import guard
-from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.features import FEATURES
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.window import Feature, MainWindow
 
 if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
     pytest.exit("the app's tests need a display: run `python3 packaging/start.py test`", 2)
@@ -41,6 +44,63 @@ def no_window_and_no_failure_left(
     kinds = [type(each) for each in getAllValidWrappers()]
     assert kinds.count(QSurface) <= kinds.count(QtInteractor)
     assert not failures or request.node.get_closest_marker("fails_inside")
+
+
+class TestedWindow(MainWindow):
+    """A window with all features, or those given, whose parts are found by their names alone."""
+
+    __test__ = False
+
+    def __init__(
+        self,
+        source: str = "sim:",
+        engine: Engine | None = None,
+        features: Iterable[Callable[[], Feature]] = FEATURES,
+    ) -> None:
+        super().__init__([made() for made in features], source, engine)
+
+    def __getattr__(self, name: str) -> Any:
+        features = self.__dict__.get("features", {}).values()
+        found = [vars(feature)[name] for feature in features if name in vars(feature)]
+        if not found:
+            raise AttributeError(f"no part of the shell and no feature's is called {name!r}")
+        return found[0]
+
+
+class LonePanels:
+    """The panels of a window, whose requests nobody follows; each by its name alone."""
+
+    def __init__(self, window: TestedWindow) -> None:
+        self.window, self.pages = window, window.panels
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.pages, name, None) or getattr(self.window, name)
+
+
+@pytest.fixture(scope="module")
+def _lone_panels(qapp: QApplication) -> Iterator[LonePanels]:
+    window = TestedWindow("sim:")
+    window.session.engine.disconnect()
+    window.session.timer.stop()
+    for signal in (window.panels.requested, window.panels.reset_requested):
+        signal.disconnect()
+    yield LonePanels(window)
+    window.close()
+    window.deleteLater()
+
+
+@pytest.fixture
+def panels(_lone_panels: LonePanels) -> LonePanels:
+    """All panels of settings, as they are at first."""
+    _lone_panels.pages.show_settings(Settings())
+    _lone_panels.pages.setCurrentIndex(0)
+    return _lone_panels
+
+
+@pytest.fixture(scope="session")
+def window_class() -> type[TestedWindow]:
+    """What opens a window."""
+    return TestedWindow
 
 
 Wait = Callable[[Callable[[], bool]], None]
@@ -78,7 +138,7 @@ def opened(qapp: QApplication) -> Iterator[Callable[..., MainWindow]]:
     made: list[MainWindow] = []
 
     def opened(source: str, engine: Engine | None = None) -> MainWindow:
-        made.append(MainWindow(source, engine))
+        made.append(TestedWindow(source, engine))
         made[-1].show()
         made[-1].activateWindow()
         return made[-1]
@@ -97,7 +157,7 @@ def window(opened: Callable[..., MainWindow], until: Wait) -> MainWindow:
     ages = window.membrane.ages
     until(lambda: window.isActiveWindow() and any(math.isfinite(age) for _, age in ages))
     drawn = len(ages)
-    until(lambda: window.badge.state == "SIM" and len(ages) > drawn + 1)
+    until(lambda: window.display.badge.state == "SIM" and len(ages) > drawn + 1)
     return window
 
 

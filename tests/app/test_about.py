@@ -1,10 +1,8 @@
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.features.compare.panel import OtherForm
 from kappaskin_app.features.design.panel import DesignForm
@@ -15,32 +13,20 @@ from kappaskin_app.shell.about import PANELS as ABOUT_PANELS
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.layouts.layout import DOCKS
-from kappaskin_app.shell.pages import Panels
+from kappaskin_app.shell.requests import Requests
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import scene_of
-from kappaskin_app.shell.wishes import Wishes
 from kappaskin_app.theme import THEMES
 
 
-@pytest.fixture
-def panels(qapp: QApplication) -> Iterator[Panels]:
-    made = Panels()
-    made.show_settings(Settings())
-    made.resize(340, 900)
-    made.show()
-    yield made
-    made.close()
-    made.deleteLater()
-
-
-def test_every_panel_and_every_dock_says_what_it_is_for(panels: Panels) -> None:
+def test_every_panel_and_every_dock_says_what_it_is_for(panels) -> None:
     titles = {panel.title() for panel in panels.all()} | {OtherForm().title(), DesignForm().title()}
     assert titles == set(ABOUT_PANELS)
     assert set(DOCKS) == set(ABOUT_DOCKS)
     assert all(len(text) > 40 for text in (*ABOUT_PANELS.values(), *ABOUT_DOCKS.values()))
 
 
-def test_what_a_panel_is_for_is_shown_in_it_as_long_as_wanted(panels: Panels) -> None:
+def test_what_a_panel_is_for_is_shown_in_it_as_long_as_wanted(panels) -> None:
     for panel in panels.all():
         assert not panel.about.isVisibleTo(panel)
         panel.help.click()
@@ -49,7 +35,7 @@ def test_what_a_panel_is_for_is_shown_in_it_as_long_as_wanted(panels: Panels) ->
         assert not panel.about.isVisibleTo(panel)
 
 
-def test_it_leads_on_to_a_page_of_the_guide(panels: Panels) -> None:
+def test_it_leads_on_to_a_page_of_the_guide(panels) -> None:
     assert set(ABOUT_PAGES) == set(ABOUT_PANELS)
     asked: list[str] = []
     for panel in panels.all():
@@ -60,7 +46,7 @@ def test_it_leads_on_to_a_page_of_the_guide(panels: Panels) -> None:
     assert len(asked) == len(panels.all())
 
 
-def test_its_buttons_stand_beside_the_title_and_inside(panels: Panels, until) -> None:
+def test_its_buttons_stand_beside_the_title_and_inside(panels, until) -> None:
     for theme in THEMES.values():
         panels.show_theme(theme)
         panels.show_settings(replace(Settings(), functions_x=5))
@@ -73,16 +59,16 @@ def test_its_buttons_stand_beside_the_title_and_inside(panels: Panels, until) ->
 
 
 def test_a_panel_is_reset_in_one_step_and_offers_it_only_where_something_was_changed(
-    panels: Panels,
+    panels,
 ) -> None:
     history = History(Settings())
-    wishes = Wishes(history, SimpleNamespace(scene=scene_of(Settings())))
+    requests = Requests(history, SimpleNamespace(scene=scene_of(Settings())))
     history.changed.connect(panels.show_settings)
-    panels.reset_wanted.connect(wishes.reset_panel)
+    panels.reset_requested.connect(requests.reset_panel)
     assert not any(p.reset.isVisibleTo(p) for p in panels.all() if isinstance(p, Form))
-    wishes.wish("functions_x", 5)
-    wishes.wish("functions_y", 6)
-    wishes.wish("noise_rms", 0.5)
+    requests.set("functions_x", 5)
+    requests.set("functions_y", 6)
+    requests.set("noise_rms", 0.5)
     panels.basis.reset.click()
     assert history.settings == replace(Settings(), noise_rms=0.5)
     assert not panels.basis.reset.isVisibleTo(panels.basis)
@@ -91,12 +77,12 @@ def test_a_panel_is_reset_in_one_step_and_offers_it_only_where_something_was_cha
     assert (history.settings.functions_x, history.settings.functions_y) == (5, 6)
 
 
-def test_what_follows_from_a_setting_is_reset_with_it(qapp: QApplication) -> None:
+def test_what_follows_from_a_setting_is_reset_with_it(panels) -> None:
     history = History(Settings())
-    wishes = Wishes(history, SimpleNamespace(scene=scene_of(Settings())))
-    wishes.wish("shape", "cylinder")
+    requests = Requests(history, SimpleNamespace(scene=scene_of(Settings())))
+    requests.set("shape", "cylinder")
     assert history.settings.x != Settings().x
-    wishes.reset_panel("Shape", Panels().shape.names)
+    requests.reset_panel("Shape", panels.shape.names)
     assert history.settings.shape == Settings().shape
     assert history.settings.side_x == Settings().side_x
     assert history.settings.x == pytest.approx(Settings().x)

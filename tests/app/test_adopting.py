@@ -37,17 +37,17 @@ def test_the_next_window_goes_on_as_the_last_one_was(
     alone = abandoned(folder, tmp_path / "press.mcap", entrusted=settings_text(BEFORE).encode())
     until(lambda: bool(list(folder.glob("*.note"))))
     window: MainWindow = opened("/dev/ttyABSENT7", Engine(orphans=folder))
-    until(lambda: window.badge.state == "SIM" and window.taping.recording)
+    until(lambda: window.display.badge.state == "SIM" and window.taping.recording)
     status = window.session.status
     assert (status.generation, status.setup) == (alone.generation, Setup(6, 7))
     assert window.history.settings == BEFORE
     assert not window.history.stack.canUndo()
-    text = window.panels.recording.message.text()
+    text = window.recording.message.text()
     assert text.startswith("The recording press.mcap of the simulated skin went on for ")
     assert text.endswith(
         "You asked for /dev/ttyABSENT7: Connect goes there, and the recording goes on with it."
     )
-    assert window.panels.connection.source() == "/dev/ttyABSENT7"
+    assert window.connection.source() == "/dev/ttyABSENT7"
     until(lambda: window.session.estimate.true_contact.tolist() == [0.03, 0.07])
     assert window.session.scene.loads[0].centre().tolist() == [0.03, 0.07]
     window.actions_by_name["record"].trigger()

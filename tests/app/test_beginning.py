@@ -95,45 +95,47 @@ def test_it_goes_by_itself_but_not_while_somebody_is_at_it(bench: Bench, until) 
 def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwanted(
     window: MainWindow, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    window.beginning.begin()
-    until(lambda: window.offer.height() > 20)
+    window.menus.welcome.begin()
+    until(lambda: window.display.centre.offer.height() > 20)
     QApplication.processEvents()
-    assert len(window.offer.buttons) == 6
-    above = window.offer.mapTo(window, QPoint(0, window.offer.height())).y()
+    assert len(window.display.centre.offer.buttons) == 6
+    above = window.display.centre.offer.mapTo(
+        window, QPoint(0, window.display.centre.offer.height())
+    ).y()
     assert above <= window.membrane.mapTo(window, QPoint(0, 0)).y()
-    QTest.keyClick(window.offer.buttons[0], Qt.Key.Key_Escape)
-    assert not window.offer.isVisible()
+    QTest.keyClick(window.display.centre.offer.buttons[0], Qt.Key.Key_Escape)
+    assert not window.display.centre.offer.isVisible()
     window.keeping.begin(tmp_path / "window.toml")
-    window.beginning.begin()
-    window.offer.buttons[-1].click()
+    window.menus.welcome.begin()
+    window.display.centre.offer.buttons[-1].click()
     window.keeping.write()
     assert not KeptFile(tmp_path / "window.toml").read()[0].start
-    window.beginning.begin()
-    assert not window.offer.isVisible()
+    window.menus.welcome.begin()
+    assert not window.display.centre.offer.isVisible()
     window.history.stack.undo()
     with monkeypatch.context() as patch:
         patch.setattr(window.session, "source", "/dev/ttyACM0")  # as the command may say
-        window.beginning.begin()
-    assert not window.offer.isVisible()
-    window.beginning.begin()
-    assert window.offer.isVisible()
-    window.offer.buttons[2].click()
+        window.menus.welcome.begin()
+    assert not window.display.centre.offer.isVisible()
+    window.menus.welcome.begin()
+    assert window.display.centre.offer.isVisible()
+    window.display.centre.offer.buttons[2].click()
     until(lambda: window.lesson.isVisible())
 
 
 def test_ways_to_begin_go_when_something_is_begun_and_give_way_to_what_a_crash_left(
     window: MainWindow, tmp_path: Path
 ) -> None:
-    window.beginning.begin()
-    window.wishes.wish("functions_x", 5)
-    assert not window.offer.isVisible()
+    window.menus.welcome.begin()
+    window.requests.set("functions_x", 5)
+    assert not window.display.centre.offer.isVisible()
     (tmp_path / "window-1.json").write_text("{}")
     recovering = Recovering(window, tmp_path)
     recovering.offer(Last(window.history.settings))
-    window.beginning.begin()
-    assert window.offer.words.text().startswith("The last session")
-    window.wishes.wish("functions_x", 6)
-    assert window.offer.isVisible()
+    window.menus.welcome.begin()
+    assert window.display.centre.offer.words.text().startswith("The last session")
+    window.requests.set("functions_x", 6)
+    assert window.display.centre.offer.isVisible()
     recovering.close()
 
 

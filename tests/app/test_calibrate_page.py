@@ -12,10 +12,9 @@ from kappaskin_app.shell.window import MainWindow
 
 
 def test_a_refused_file_is_told_where_files_are_loaded(window, tmp_path: Path) -> None:
-    panels = window.panels
     window.calibrating.load(tmp_path / "none.toml")
-    assert "none.toml" in panels.in_use.message.text()
-    assert not panels.calibrate.message.text()
+    assert "none.toml" in window.in_use.message.text()
+    assert not window.calibrate.message.text()
 
 
 def _error(window: MainWindow, until: Callable[..., None]) -> float:
@@ -36,8 +35,8 @@ def test_a_calibration_taken_in_the_window_mends_the_shape(
     window.history.change("Spoil", loops="second", tolerance=0.1)
     until(lambda: window.session.estimate.error_rms > 1e-4)  # of 16 um before
     nominal = _error(window, until)
-    panels, panel = window.panels, window.panels.calibrate
-    panels.show_calibration()
+    panel = window.calibrate
+    window.panels.reveal(panel)
     panel.start.radii.setText("150, 80, 45")
     panel.start.seconds.setValue(0.1)
     panel.start.begin.click()
@@ -51,7 +50,7 @@ def test_a_calibration_taken_in_the_window_mends_the_shape(
     until(lambda: window.session.status.setup.calibration is not None)
     calibrated = _error(window, until)
     assert calibrated < 0.2 * nominal
-    assert "channels" in panels.connection.device.text()
+    assert "channels" in window.connection.device.text()
     window.history.stack.undo()
     until(lambda: window.session.status.setup.calibration is None)
     assert _error(window, until) > 0.8 * nominal
@@ -76,6 +75,6 @@ def test_a_calibration_rests_while_another_skin_is_connected(
     window.history.change("Fewer", elements_x=8)
     until(lambda: window.session.status.setup.calibration is None)
     until(lambda: window.session.estimate is not None)
-    until(lambda: "Not in use" in window.panels.in_use.message.text())
+    until(lambda: "Not in use" in window.in_use.message.text())
     window.history.stack.undo()
     until(lambda: window.session.status.setup.calibration is not None)

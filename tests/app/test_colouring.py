@@ -139,16 +139,16 @@ def test_every_colour_is_drawn_smooth_and_per_element(window: MainWindow, until)
         for how in ("smooth", "elements"):
             window.history.change("Colour", -1, colour_by=name, colour_from=how)
             told = f"<b>{SHADES[name].symbol}</b>"
-            until(lambda told=told: window.display.scale.what.text() == told)
+            until(lambda told=told: window.scale.what.text() == told)
             drawn = len(window.membrane.ages)
             until(lambda drawn=drawn: len(window.membrane.ages) > drawn + 1)
     window.history.change("Colour", -1, colour_by="error_bar", colour_from="smooth")
-    until(lambda: window.display.scale.bar.limits[1] > 0.005)
+    until(lambda: window.scale.bar.limits[1] > 0.005)
     assert window.membrane.caption.input == ""
 
 
 def test_all_ranges_are_locked_in_one_step_and_freed_in_another(window: MainWindow, until) -> None:
-    until(lambda: window.display.scale.bar.limits == (0.0, 5.0))
+    until(lambda: window.scale.bar.limits == (0.0, 5.0))
     time.sleep(0.1)
     lock = window.actions_by_name["lock-ranges"]
     lock.trigger()
@@ -165,16 +165,16 @@ def test_all_ranges_are_locked_in_one_step_and_freed_in_another(window: MainWind
 
 def test_only_ranges_that_are_seen_are_locked(window: MainWindow, until) -> None:
     window.docks["curvature"].hide()
-    window.display.show_mode(np.zeros(window.session.estimate.surface.shape), "A shape")
-    until(lambda: window.display.scale.bar.limits == (-1.0, 1.0))
+    window.selection.show_mode(np.zeros(window.session.estimate.surface.shape), "A shape")
+    until(lambda: window.scale.bar.limits == (-1.0, 1.0))
     lock = window.actions_by_name["lock-ranges"]
 
     lock.trigger()
 
     settings = window.history.settings
     assert [settings.range_displacement, settings.range_xx, settings.range_yy] == [0, 0, 0]
-    window.display.show_mode(None)
-    until(lambda: window.display.scale.bar.limits != (-1.0, 1.0))
+    window.selection.show_mode(None)
+    until(lambda: window.scale.bar.limits != (-1.0, 1.0))
     lock.trigger()
     assert window.history.settings.range_displacement == pytest.approx(5e-3)
     assert window.history.settings.range_xx == 0

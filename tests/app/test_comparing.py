@@ -83,7 +83,7 @@ def test_a_basis_that_the_readings_do_not_decide_is_refused_for_b_alone(
 ) -> None:
     window.history.change("Many", -1, other_x=12, other_y=12)
     until(lambda: "determine 140 of the 144" in window.compare.form.message.text())
-    assert window.panels.basis.message.text() == ""
+    assert window.basis.message.text() == ""
 
 
 def test_ending_it_leaves_the_window_as_it_was_and_the_engine_to_a_alone(
@@ -103,7 +103,7 @@ def test_it_works_on_a_recording_that_stands(
     window: MainWindow, recording: Path, pairs: list[Pair], until
 ) -> None:
     window.replaying.open_file(recording)
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     window.replaying.go(False)
     window.replaying.seek(0.4)
     until(lambda: abs(pairs[-1].a.device_time - 0.4) < 0.02)

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QLineEdit
 
 from kappaskin import Event, Port, Status, load_scene
 from kappaskin_app.features.connection import plugs
-from kappaskin_app.features.connection.events import Happenings
 from kappaskin_app.features.connection.panel import ConnectionPanel
 from kappaskin_app.features.connection.plugs import Plugs
+from kappaskin_app.features.log.events import Happenings
 
 SKIN = Port("/dev/ttyACM0", "Fingertip of ten by ten elements", "Kappa Ltd", "SN-4711", (1, 2))
 BOARD = Port("/dev/ttyUSB0", "CP2102N", "Silicon Labs", "beef", (3, 4), opened=False)

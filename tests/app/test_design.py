@@ -80,7 +80,7 @@ def test_a_design_is_predicted_checked_undone_and_saved(
     until(lambda: designing.prospect is not None and not designing.predicting)
     first = designing.prospect.rms
 
-    window.wishes.wish("design_noise", 0.46)
+    window.requests.set("design_noise", 0.46)
     until(lambda: designing.prospect.rms > 1.5 * first and not designing.predicting)
     assert designing.prospect.rms == pytest.approx(2 * first)
     assert "elements" in design.words.text()
@@ -93,7 +93,7 @@ def test_a_design_is_predicted_checked_undone_and_saved(
     assert [curve.name for curve in design.along.curves] == ["predicted", "simulated"]
     assert "times as predicted" in design.words.text()
 
-    window.wishes.wish("design_place", "clustered")
+    window.requests.set("design_place", "clustered")
     until(lambda: designing.check is None and not designing.predicting)
     file = tmp_path / "mine.toml"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
@@ -120,7 +120,7 @@ def test_placing_takes_a_while_and_can_be_ended(window: MainWindow, until):
     designing = window.designing
     window.docks.reveal("design")
 
-    window.wishes.wish("design_place", "A")
+    window.requests.set("design_place", "A")
     until(lambda: designing.predicting)
     designing.cancel()
     assert not designing.predicting

@@ -58,9 +58,9 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
             )
 
     window.session.estimated.connect(note)
-    until(lambda: window.badge.state == "SIM")  # the device says that it is a simulated one
+    until(lambda: window.display.badge.state == "SIM")  # the device says that it is a simulated one
     end = time.monotonic() + 10
-    until(lambda: time.monotonic() > end and window.badge.state == "SIM")
+    until(lambda: time.monotonic() > end and window.display.badge.state == "SIM")
     assert colours_in(window, window.membrane) > 500
     for heatmap in window.heatmaps.values():
         assert colours_in(window, heatmap.cells) > 20
@@ -69,21 +69,21 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
 
     told = json.loads(device.stop())
     gone = time.monotonic()
-    until(lambda: window.badge.state == "LOST", 1.0)
+    until(lambda: window.display.badge.state == "LOST", 1.0)
     assert time.monotonic() - gone < 1.0
     counts = window.session.status.accounting
     assert told["unsent"] == 0
     assert counts.lost == 0
     assert counts.accepted == told["spent"]
     assert window.session.status.events[-1].kind == "gone"
-    assert device.port in window.panels.connection.message.text()
+    assert device.port in window.connection.message.text()
     assert window.membrane.greyed
 
     again = Device()
     try:
-        window.panels.connection.sources.setCurrentText(again.port)
-        window.panels.connection.connect_button.click()
-        until(lambda: window.badge.state == "SIM")
+        window.connection.sources.setCurrentText(again.port)
+        window.connection.connect_button.click()
+        until(lambda: window.display.badge.state == "SIM")
         shown = len(errors)
         until(lambda: len(errors) > shown + 20 and not window.membrane.greyed)
     finally:
@@ -92,6 +92,6 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
 
 def test_a_killed_device_is_lost_within_a_second(opened, until, device: Device) -> None:
     window = opened(device.port)
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.display.badge.state == "SIM")
     device.stop(signal.SIGKILL)
-    until(lambda: window.badge.state == "LOST", 1.0)
+    until(lambda: window.display.badge.state == "LOST", 1.0)

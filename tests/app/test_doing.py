@@ -1,7 +1,7 @@
 import pytest
 
 from kappaskin import Status
-from kappaskin_app.shell.background import Doing, Task
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -10,11 +10,11 @@ class Bench:
 
     def __init__(self) -> None:
         self.now, self.going, self.told = 0.0, set[str](), list[str]()
-        tasks = [
-            Task(name, lambda name=name: name in self.going, lambda name=name: self.end(name))
-            for name in ("Counting", "Sorting")
-        ]
-        self.doing = Doing(tasks, clock=lambda: self.now)
+        self.doing = Tasks(clock=lambda: self.now)
+        for name in ("Counting", "Sorting"):
+            self.doing.add(
+                name, lambda name=name: name in self.going, lambda name=name: self.end(name)
+            )
         self.doing.told.connect(self.told.append)
 
     def end(self, name: str) -> None:
@@ -61,11 +61,11 @@ def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
 ) -> None:
     window.costing.watch(True)
     until(lambda: window.costing.running)
-    until(lambda: "accuracy" in window.activity.words.text())
-    window.activity.cancel.click()
+    until(lambda: "accuracy" in window.display.foot.activity.words.text())
+    window.display.foot.activity.cancel.click()
     assert not window.costing.running
     assert window.costing.refusal.startswith("Cancelled")
-    until(lambda: "accuracy" not in window.activity.words.text())
+    until(lambda: "accuracy" not in window.display.foot.activity.words.text())
     window.costing.measure()
     assert not window.costing.refusal
 

@@ -92,8 +92,8 @@ def test_every_action_can_be_taken_undone_and_redone(
                 assert _sizes(window) == pytest.approx(sizes, abs=0.004), name
         changed |= {name} if after != before else set()
     assert {"theme", "look-from-above", "dock-cost", "calibrate", "layout-study"} < changed
-    window.connect_to("sim:")
-    until(lambda: window.badge.state == "SIM")
+    window.session.request_source("sim:")
+    until(lambda: window.display.badge.state == "SIM")
 
 
 def _use(control: QWidget) -> None:
@@ -131,8 +131,8 @@ def test_every_control_can_be_used(window: MainWindow, nothing_chosen, until) ->
                         _after(window, lambda control=control: _use(control))
     assert len(used) > 60
     window.history.stack.setIndex(0)
-    window.connect_to("sim:")
-    until(lambda: window.badge.state == "SIM")
+    window.session.request_source("sim:")
+    until(lambda: window.display.badge.state == "SIM")
 
 
 def test_all_of_vtk_that_was_loaded_meanwhile_is_in_the_bundle(others_vtk: set[str]) -> None:

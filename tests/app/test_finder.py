@@ -113,7 +113,7 @@ def test_ctrl_k_finds_every_kind_of_thing_in_the_window(
     window: MainWindow, until, qtbot, tmp_path: Path
 ) -> None:
     settings = window.history.settings
-    box = window.panels.basis.editor("functions_x")
+    box = window.basis.editor("functions_x")
     box.setFocus()
     qtbot.keyClick(box, Qt.Key.Key_K, Qt.KeyboardModifier.ControlModifier)
     finder = window.menus.finder
@@ -129,11 +129,11 @@ def test_ctrl_k_finds_every_kind_of_thing_in_the_window(
     window.history.stack.undo()
     assert window.history.settings == settings
     do("foam")
-    assert window.focusWidget() is window.panels.support.editor("foam")
+    assert window.focusWidget() is window.support.editor("foam")
     do("scene effects")
     assert window.scene.effects.isVisible()
     do("disconnect")
-    until(lambda: window.badge.state == "OFF")
+    until(lambda: window.display.badge.state == "OFF")
     file = tmp_path / "my own fingertip.toml"
     file.write_text(scene_file("demo").read_text(encoding="utf-8"), encoding="utf-8")
     window.opening.note(tmp_path / "gone.mcap")
@@ -143,7 +143,7 @@ def test_ctrl_k_finds_every_kind_of_thing_in_the_window(
     do("own fing")
     until(lambda: getattr(window.history.settings.written, "file", None) == file)
     do("play scene coin")
-    until(lambda: window.session.source == "sim:" and window.badge.state == "SIM")
+    until(lambda: window.session.source == "sim:" and window.display.badge.state == "SIM")
     assert window.history.settings.written.file.stem == "coin"
     names = [thing.name for thing in things_in(window)]
     assert len(set(names)) == len(names)

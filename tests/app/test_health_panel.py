@@ -106,7 +106,7 @@ def test_what_is_found_is_shown_in_the_list_on_the_heatmap_and_on_the_skin(
     until(lambda: {"44", "45"} <= {row[0] for row in told(failing.health)})
     assert "channels left out, error bars +" in failing.health.words.text()
     until(lambda: failing.membrane.out.actor.visibility)
-    failing.display.point(44)
+    failing.selection.point(44)
     until(lambda: failing.heatmaps["xx"].value.text().endswith(", dead"))
     assert failing.minimumSizeHint().height() <= 800
 
@@ -122,7 +122,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert "Press it now" in page.words.text()
     asked = window.testing.test.asked
     x, y = window.session.scene.layout.positions[asked]
-    wishes, at = window.wishes, window.session.estimate.touch.position
+    wishes, at = window.requests, window.session.estimate.touch.position
 
     wishes.grab(*at)
     wishes.drag(float(x), float(y))
@@ -138,7 +138,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert [p.verdict for p in window.testing.test.done] == ["skipped", "nothing"]
     page.stop.click()
     assert not window.testing.running
-    assert not window.membrane.asked.actor.visibility or window.display._asked == -1  # noqa: SLF001
+    assert not window.membrane.asked.actor.visibility or window.selection.asked_for == -1
 
 
 def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(

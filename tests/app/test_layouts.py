@@ -170,7 +170,7 @@ def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) ->
     path = tmp_path / "deep" / "window.toml"
     window = opened("sim:")
     window.keeping.begin(path)
-    window.wishes.wish("theme", "light")
+    window.requests.set("theme", "light")
     window.layouts.choose("Study")
     assert window.cost.isVisible()
     window.layouts.save("Mine")

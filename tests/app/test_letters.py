@@ -28,17 +28,17 @@ _THREADS = {"stability": "singular-values_0", "design": "design_0", "scene": "ga
 
 
 @pytest.fixture(scope="module")
-def shared(qapp: QApplication, until) -> Iterator[MainWindow]:
+def shared(qapp: QApplication, until, window_class) -> Iterator[MainWindow]:
     qapp.setStyle("Fusion")
-    window = MainWindow("sim:")
+    window = window_class("sim:")
     window.show()
-    until(lambda: bool(window.object.text()))
+    until(lambda: bool(window.display.foot.object.text()))
     # Their threads are those of no one test.
     for name, thread in _THREADS.items():
         window.docks.reveal(name)
         until(lambda thread=thread: thread in {each.name for each in threading.enumerate()})
         window.docks[name].hide()
-    window.wishes.wish("letters", 200.0)
+    window.requests.set("letters", 200.0)
     yield window
     window.history.stack.setIndex(0)
     window.close()
@@ -117,12 +117,12 @@ def test_a_dock_below_shows_all_or_scrolls_it(large: MainWindow, name: str) -> N
 
 def test_ways_to_begin_stand_whole_above_a_dock(large: MainWindow) -> None:
     large.docks.reveal("design")
-    large.beginning.offer()
+    large.menus.welcome.offer()
     _settle()
-    wrong, size = cut(large.offer), (large.width(), large.height())
-    low = max(button.geometry().bottom() for button in large.offer.buttons)
-    inside = low < large.offer.height()
-    large.offer.hide()
+    wrong, size = cut(large.display.centre.offer), (large.width(), large.height())
+    low = max(button.geometry().bottom() for button in large.display.centre.offer.buttons)
+    inside = low < large.display.centre.offer.height()
+    large.display.centre.offer.hide()
     large.docks["design"].hide()
     assert (wrong, inside, size) == ([], True, (1280, 800))
 
@@ -150,8 +150,8 @@ def test_how_long_the_sides_of_the_skin_are_is_read_whole(large: MainWindow) -> 
 
 
 def test_a_step_of_a_calibration_is_not_wider_than_its_page(large: MainWindow) -> None:
-    large.panels.show_calibration()
-    panel = large.panels.calibrate
+    large.panels.reveal(large.calibrate)
+    panel = large.calibrate
     page = panel.parentWidget()
     while not isinstance(page, QScrollArea):
         page = page.parentWidget()
@@ -164,7 +164,7 @@ def test_a_step_of_a_calibration_is_not_wider_than_its_page(large: MainWindow) -
 
 
 def test_what_is_written_in_the_picture_is_read_whole(large: MainWindow) -> None:
-    membrane, ruler = large.membrane, large.display.measuring.ruler
+    membrane, ruler = large.membrane, large.view.measuring.ruler
     wide, high = membrane.plotter.render_window.GetSize()
     found = Distances(0.0849, 0.0851, -0.00212)
     ruler.show(membrane.skin, np.array([(0.02, 0.02), (0.08, 0.08)]), 0.0, found)

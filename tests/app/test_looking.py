@@ -29,7 +29,7 @@ def test_two_clicks_measure_a_third_begins_anew_and_escape_ends(
     left, plotter = Qt.MouseButton.LeftButton, window.membrane.plotter
     window.history.change("Rest", -1, load_case="point", force=0.0, noise_kind="none")
     until(lambda: np.abs(window.session.estimate.surface).max() < 1e-6)
-    ruler, action = window.display.measuring.ruler, window.actions_by_name["measure"]
+    ruler, action = window.view.measuring.ruler, window.actions_by_name["measure"]
     action.trigger()
     assert action.isChecked()
     assert "click a place" in ruler.text.input

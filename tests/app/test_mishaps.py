@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Refusal
 from kappaskin_app import guard
-from kappaskin_app.features.log.logbook import CRASHES, LOG, Logbook
 from kappaskin_app.features.log.reporting import Reporting, Told
+from kappaskin_app.shell.logbook import CRASHES, LOG, Logbook
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -68,7 +68,7 @@ def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
     assert window.mishaps.count.text() == "2 failures"
     assert window.mishaps.count.isVisible()
     window.tell("in passing")
-    window.activity.show_work("Counting: 1 s", True)
+    window.display.foot.activity.show_work("Counting: 1 s", True)
     for _ in range(5):
         QApplication.processEvents()
     assert not window.display.notice.isVisible()  # or the two would stand over each other

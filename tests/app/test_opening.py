@@ -8,9 +8,8 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import scene_file
-from kappaskin_app.features.presenter.objects import may_choose
-from kappaskin_app.shell.drops import dropped_on
-from kappaskin_app.shell.opening import is_calibration
+from kappaskin_app.features.calibration import is_calibration
+from kappaskin_app.shell.touching import may_choose
 from kappaskin_app.shell.window import MainWindow
 
 TETRAHEDRON = np.array([[0, 0, 0], [20, 0, 10], [-10, 17, 10], [-10, -17, 10]])
@@ -29,9 +28,10 @@ def _drop(window: MainWindow, file: Path) -> None:
     QApplication.sendEvent(window, QDropEvent(QPointF(9, 9), copy, data, some, none))
 
 
-@pytest.mark.parametrize("name", ["a.mcap", "a.mcap.part", "a.toml", "A.STL", "a.ply", "a.obj"])
-def test_each_kind_of_file_is_taken_and_others_are_passed_over(name: str) -> None:
-    assert dropped_on(_data(Path("notes.txt"), Path(name))).name == name
+def test_each_kind_of_file_is_taken_and_others_are_passed_over(window: MainWindow) -> None:
+    dropped_on = window.opening.drops.dropped_on
+    for name in ("a.mcap", "a.mcap.part", "a.toml", "A.STL", "a.ply", "a.obj"):
+        assert dropped_on(_data(Path("notes.txt"), Path(name))).name == name
     assert dropped_on(_data(Path("notes.txt"))) is None
 
 

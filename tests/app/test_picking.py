@@ -108,13 +108,13 @@ def test_pointing_at_an_element_marks_it_in_every_view(
     window: MainWindow, until, points_at
 ) -> None:
     seen = []
-    window.display.pointed.connect(seen.append)
+    window.selection.pointed.connect(seen.append)
     points_at(window.membrane.plotter, pixel_of(window, 17))
     points_at(window.membrane.plotter, pixel_of(window, 42))  # before the next look
     until(lambda: seen[-1:] == [42])
     assert all(marks.actor.visibility for marks in window.membrane.pointed)
     until(lambda: "at (25, 45) mm" in window.heatmaps["yy"].value.text())
-    window.display.point(-1)
+    window.selection.point(-1)
     assert not any(marks.actor.visibility for marks in window.membrane.pointed)
 
 
@@ -156,6 +156,6 @@ def test_another_skin_with_as_many_elements_has_no_past(window: MainWindow, unti
             kept.append(len(past.of([0])[0]))
 
     session.estimated.connect(note)
-    window.wishes.wish("side_x", 0.15)
+    window.requests.set("side_x", 0.15)
     until(lambda: kept)
     assert kept[0] < 100

@@ -18,7 +18,7 @@ LEFT = Qt.MouseButton.LeftButton
 def demo(opened, until):
     """The window on the demonstration, presenting, once something is felt."""
     window = opened("sim:demo")
-    until(lambda: window.isActiveWindow() and window.badge.state == "SIM")
+    until(lambda: window.isActiveWindow() and window.display.badge.state == "SIM")
     window.presenting.enter()
     until(lambda: window.presenting.cue is not None)
     pad = window.presenting.stage.operator.pad
@@ -36,7 +36,11 @@ def layout_of(window):
         window.geometry(),
         window.windowState(),
         sorted((d.objectName(), not d.visibleRegion().isEmpty(), *_size(d)) for d in docks),
-        [window.menuBar().isVisible(), window.statusBar().isVisible(), window.badge.isVisible()],
+        [
+            window.menuBar().isVisible(),
+            window.statusBar().isVisible(),
+            window.display.badge.isVisible(),
+        ],
     )
 
 
@@ -169,7 +173,7 @@ def test_a_lost_line_says_what_to_do_and_what_is_felt_comes_back(demo, until) ->
 
 def test_a_recording_that_stands_is_felt_where_it_stands(opened, recording, until) -> None:
     window = opened(f"replay:{recording}")
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     window.replaying.go(False)
     window.replaying.seek(0.3)
     until(lambda: window.session.status.replay.at == 0.3)

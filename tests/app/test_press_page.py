@@ -29,7 +29,7 @@ def test_a_scene_that_is_chosen_meanwhile_does_not_press_by_itself(window, until
     file, played = scene_file("tapping"), []
     window.session.playing.connect(played.append)
 
-    window.wishes.play(Written(file.read_text(encoding="utf-8"), file))
+    window.editing.play(Written(file.read_text(encoding="utf-8"), file))
 
     until(lambda: played)
     assert not window.session.running
@@ -43,6 +43,6 @@ def test_the_element_asked_for_is_marked_on_the_skin_until_the_test_ends(window,
     window.testing.begin(quick=True)
     until(lambda: window.membrane.asked.actor.visibility)
     window.actions_by_name["disconnect"].trigger()
-    until(lambda: window.badge.state == "OFF")
+    until(lambda: window.display.badge.state == "OFF")
     assert not window.testing.running
     assert not window.membrane.asked.actor.visibility

@@ -105,8 +105,8 @@ def test_the_window_publishes_when_asked_and_undo_ends_it(window, until) -> None
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(30)
-        panel = window.panels.publish
-        window.wishes.wish("udp_to", f"127.0.0.1:{receiver.getsockname()[1]}")
+        panel = window.publish
+        window.requests.set("udp_to", f"127.0.0.1:{receiver.getsockname()[1]}")
         assert window.session.status.publishing.targets == ()
         panel.editor("send_udp").click()
         until(lambda: "sent" in panel.counts.text())
@@ -118,22 +118,22 @@ def test_the_window_publishes_when_asked_and_undo_ends_it(window, until) -> None
 
 
 def test_what_is_no_address_is_refused_in_the_panel_and_nothing_is_sent(window, until) -> None:
-    panel = window.panels.publish
-    window.wishes.wish("send_udp", True)
+    panel = window.publish
+    window.requests.set("send_udp", True)
     until(lambda: window.session.status.publishing.targets)
-    window.wishes.wish("udp_to", "robot:70000")
+    window.requests.set("udp_to", "robot:70000")
     until(lambda: "Nothing is sent: expected a port" in panel.message.text())
     until(lambda: window.session.status.publishing.targets == ())
-    window.wishes.wish("udp_to", "nowhere.invalid:1")
+    window.requests.set("udp_to", "nowhere.invalid:1")
     until(lambda: "nowhere.invalid is not known" in panel.message.text())
-    window.wishes.wish("send_udp", False)
+    window.requests.set("send_udp", False)
     until(lambda: panel.message.text() == "")
 
 
 def test_resetting_settings_leaves_receivers_alone(window) -> None:
-    window.wishes.wish("serve_foxglove", True)
-    window.wishes.wish("functions_x", 5)
-    window.wishes.reset()
+    window.requests.set("serve_foxglove", True)
+    window.requests.set("functions_x", 5)
+    window.requests.reset()
     assert (window.history.settings.functions_x, window.history.settings.serve_foxglove) == (
         8,
         True,

@@ -62,8 +62,8 @@ def kinds(window):
 def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -> None:
     device = plug(serial_number="A-1")
     window = opened(str(device.link))
-    until(lambda: window.badge.state == "LIVE" and len(window.membrane.ages) > 3)
-    until(lambda: "messages lost" in window.panels.connection.losses.text())
+    until(lambda: window.display.badge.state == "LIVE" and len(window.membrane.ages) > 3)
+    until(lambda: "messages lost" in window.connection.losses.text())
 
     # A region of interest is scanned, and held for as long as the others take to come up.
     inside = tuple(10 * row + column for row in range(3, 7) for column in range(3, 7))
@@ -76,11 +76,11 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
 
     # Pulled: the last picture stays, with since when and what to do across it.
     device.pull()
-    until(lambda: window.badge.state == "LOST")
-    alarm, message = window.membrane.alarm, window.panels.connection.message
+    until(lambda: window.display.badge.state == "LOST")
+    alarm, message = window.membrane.alarm, window.connection.message
     assert alarm.text.startswith("LOST ")
     assert "the line is gone" in window.statusBar().currentMessage()
-    assert not window.object.isVisible()  # or the message would have no room
+    assert not window.display.foot.object.isVisible()  # or the message would have no room
     assert colours_in(window, window.membrane) > 300
     heights = window.membrane.skin.height.copy()
     until(lambda: int(alarm.text.split()[1]) >= 2)
@@ -92,17 +92,17 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
 
     # Back: live again at once, with the same pipeline.
     device = plug(serial_number="A-1")
-    until(lambda: window.badge.state == "LIVE")
+    until(lambda: window.display.badge.state == "LIVE")
     assert alarm.text == ""
     assert window.session.status.generation == generation
     assert kinds(window) == ["back", "gone", "met"]
-    until(lambda: "began anew once" in window.panels.connection.losses.text())
+    until(lambda: "began anew once" in window.connection.losses.text())
 
     # Another device on the port is said, with both names.
     device.pull()
-    until(lambda: window.badge.state == "LOST")
+    until(lambda: window.display.badge.state == "LOST")
     plug(serial_number="B-2", name="Thumb")
-    until(lambda: window.badge.state == "LIVE")
+    until(lambda: window.display.badge.state == "LIVE")
     until(
         lambda: window.display.notice.warning.startswith("Another device: Thumb B-2 instead of A-1")
     )
@@ -111,7 +111,7 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     os.kill(window.session.engine.pid, signal.SIGKILL)
     until(lambda: kinds(window)[:4] == ["met", "engine", "other", "gone"])
     assert "ended unexpectedly and was started again" in window.happenings.list.toPlainText()
-    until(lambda: window.badge.state == "LIVE")
+    until(lambda: window.display.badge.state == "LIVE")
     assert not message.isVisible()
 
     # What happened can be read, by key or by a click on the badge.
@@ -119,12 +119,12 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     assert window.happenings.isVisible()
     qtbot.keyClick(window.happenings, Qt.Key.Key_Escape)
     assert not window.happenings.isVisible()
-    qtbot.mouseClick(window.badge, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
+    qtbot.mouseClick(window.display.badge, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
     assert window.happenings.isVisible()
     window.happenings.close()
 
     # What is read from elsewhere has no other device in its place.
     assert "Another device" in window.display.notice.warning
     window.actions_by_name["simulate"].trigger()
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.display.badge.state == "SIM")
     until(lambda: "Another device" not in window.display.notice.warning)

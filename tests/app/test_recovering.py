@@ -56,11 +56,11 @@ def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
 ) -> None:
     leave(tmp_path)
     recovering = Recovering(window, tmp_path)
-    assert window.offer.isVisible()
-    texts = [button.text().replace("&", "") for button in window.offer.buttons]
+    assert window.display.centre.offer.isVisible()
+    texts = [button.text().replace("&", "") for button in window.display.centre.offer.buttons]
     assert texts == ["Its settings", "Report\N{HORIZONTAL ELLIPSIS}"]  # the recording is gone
-    window.offer.buttons[0].click()
-    assert not window.offer.isVisible()
+    window.display.centre.offer.buttons[0].click()
+    assert not window.display.centre.offer.isVisible()
     assert window.history.settings.functions_x == 5
     window.history.stack.undo()
     assert window.history.settings.functions_x == 8
@@ -70,7 +70,7 @@ def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
 
 def test_after_an_orderly_end_nothing_is_offered(window: MainWindow, tmp_path: Path) -> None:
     recovering = Recovering(window, tmp_path)
-    assert not window.offer.isVisible()
+    assert not window.display.centre.offer.isVisible()
     recovering.close()
 
 
@@ -82,7 +82,9 @@ def test_a_recording_that_is_left_is_offered(
     Path(f"{there}{suffix}").write_bytes(recording.read_bytes())
     leave(tmp_path / "open", Last(Settings(), "", str(there)))
     recovering = Recovering(window, tmp_path / "open")
-    take = next(b for b in window.offer.buttons if "recording" in b.text().replace("&", ""))
+    take = next(
+        b for b in window.display.centre.offer.buttons if "recording" in b.text().replace("&", "")
+    )
     take.click()
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     recovering.close()

@@ -38,7 +38,7 @@ def dialog(qtbot) -> RepairDialog:
 def test_one_that_breaks_off_is_repaired_beside_it_and_played(
     window: MainWindow, broken: Path, until
 ) -> None:
-    was, panel = broken.read_bytes(), window.panels.recording
+    was, panel = broken.read_bytes(), window.recording
     window.panels.turn(1)
     window.replaying.open_file(broken)
     until(panel.repair.isVisible)  # on its page
@@ -58,10 +58,10 @@ def test_one_that_breaks_off_is_repaired_beside_it_and_played(
 def test_damage_found_while_it_is_played_is_offered_to_be_repaired(
     window: MainWindow, recording: Path, tmp_path: Path, until
 ) -> None:
-    copy, panel = tmp_path / "copy.mcap", window.panels.recording
+    copy, panel = tmp_path / "copy.mcap", window.recording
     copy.write_bytes(recording.read_bytes())
     window.replaying.open_file(copy)
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     assert not panel.offer.isVisibleTo(panel)
     with Recording(copy) as whole:
         third = whole.chunks[2].at
@@ -72,7 +72,7 @@ def test_damage_found_while_it_is_played_is_offered_to_be_repaired(
 
 
 def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
-    path, panel = tmp_path / "picture.mcap", window.panels.recording
+    path, panel = tmp_path / "picture.mcap", window.recording
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(500))
     window.replaying.open_file(path)
     until(lambda: "expected a recording" in panel.message.text())
@@ -80,7 +80,7 @@ def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Pat
 
 
 def test_one_without_readings_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
-    path, panel = tmp_path / "empty.mcap", window.panels.recording
+    path, panel = tmp_path / "empty.mcap", window.recording
     with closing(Recorder(path, 0.0)) as recorder:
         recorder.happened(Event(0.0, "note", "nothing else"))
     window.replaying.open_file(path)

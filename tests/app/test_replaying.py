@@ -30,7 +30,7 @@ def player(opened: Callable[[str], MainWindow], recording: Path, until) -> MainW
     """The window on the recording, playing."""
     window = opened(f"replay:{recording}")
     until(lambda: window.replaying.seen is not None)
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     until(lambda: window.replaying.time > 0)
     return window
 
@@ -53,9 +53,9 @@ def _at(window: MainWindow) -> float:
 
 
 def test_a_recording_is_never_called_live_and_names_its_day(player: MainWindow, until) -> None:
-    until(lambda: "Recorded" in player.panels.connection.device.text())
-    assert f"{datetime.now():%Y-%m-%d}" in player.panels.connection.device.text()
-    assert "Simulated skin" in player.panels.connection.device.text()
+    until(lambda: "Recorded" in player.connection.device.text())
+    assert f"{datetime.now():%Y-%m-%d}" in player.connection.device.text()
+    assert "Simulated skin" in player.connection.device.text()
     until(lambda: player.windowTitle().startswith("example.mcap, recorded"))
     assert player.transport.isVisible()
     assert not player.timeline.isVisible()
@@ -63,17 +63,17 @@ def test_a_recording_is_never_called_live_and_names_its_day(player: MainWindow, 
 
 def test_one_that_stands_is_paused_and_not_stale(standing: MainWindow, qtbot, until) -> None:
     qtbot.wait(700)
-    assert standing.badge.state == "REPLAY \N{MIDDLE DOT} paused"
+    assert standing.display.badge.state == "REPLAY \N{MIDDLE DOT} paused"
     assert not standing.membrane.greyed
     until(lambda: standing.readouts.text("contact").endswith(" mm"))
 
 
 def test_where_nothing_came_it_is_grey(standing: MainWindow, until) -> None:
     standing.replaying.seek(1.4)
-    until(lambda: standing.badge.state == "REPLAY \N{MIDDLE DOT} gap")
+    until(lambda: standing.display.badge.state == "REPLAY \N{MIDDLE DOT} gap")
     until(lambda: standing.membrane.greyed)
     standing.presenting.enter()
-    until(lambda: standing.presenting.stage.strip.state == standing.badge.state)
+    until(lambda: standing.presenting.stage.strip.state == standing.display.badge.state)
     assert "Ctrl+P" in standing.presenting.stage.banner.remedy
     assert standing.presenting.stage.banner.isVisible()
 
@@ -83,7 +83,7 @@ def test_the_settings_recorded_are_used_and_can_be_undone(
 ) -> None:
     window.history.change("Other", -1, functions_x=3, method="bayes")
     window.replaying.open_file(recording)
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     settings = window.history.settings
     assert (settings.functions_x, settings.functions_y, settings.method) == (8, 8, "least-squares")
     window.history.stack.undo()
@@ -121,9 +121,9 @@ def test_keys_left_over_go_to_the_transport(standing: MainWindow, qtbot, until) 
     until(lambda: _at(standing) == 0.0)
     standing.replaying.play_at(0.25)  # or it may be over before anybody looks
     qtbot.keyClick(view, KEYS.Key_Space)
-    until(lambda: standing.badge.state == "REPLAY" and _at(standing) > 0.1)
+    until(lambda: standing.display.badge.state == "REPLAY" and _at(standing) > 0.1)
     qtbot.keyClick(view, KEYS.Key_Space)
-    until(lambda: standing.badge.state.endswith("paused"))
+    until(lambda: standing.display.badge.state.endswith("paused"))
 
 
 def test_every_step_asked_for_is_taken(standing: MainWindow, until) -> None:
@@ -155,11 +155,11 @@ def test_scrubbing_ends_where_the_mouse_let_go(standing: MainWindow, qtbot, unti
 def test_it_ends_paused_and_plays_again_from_the_beginning(player: MainWindow, until) -> None:
     player.replaying.seek(2.3)
     # It stands at its beginning too, until the settings recorded are in use.
-    until(lambda: player.badge.state.endswith("paused") and _at(player) > 0)
+    until(lambda: player.display.badge.state.endswith("paused") and _at(player) > 0)
     assert _at(player) == player.session.status.replay.length
     player.replaying.play_at(0.1)  # or it may be over again before anybody looks
     player.actions_by_name["pause"].trigger()
-    until(lambda: player.badge.state == "REPLAY" and _at(player) < 1.0)
+    until(lambda: player.display.badge.state == "REPLAY" and _at(player) < 1.0)
 
 
 def test_one_that_loops_begins_anew(player: MainWindow, until) -> None:
@@ -167,7 +167,7 @@ def test_one_that_loops_begins_anew(player: MainWindow, until) -> None:
     player.replaying.play_at(10.0)
     player.replaying.seek(2.0)
     until(lambda: 0 < _at(player) < 1.0)
-    assert player.badge.state != "REPLAY \N{MIDDLE DOT} paused"
+    assert player.display.badge.state != "REPLAY \N{MIDDLE DOT} paused"
 
 
 def test_events_are_jumped_to(standing: MainWindow, until) -> None:
@@ -203,7 +203,7 @@ def test_speeds_are_asked_for_by_keys(standing: MainWindow, until) -> None:
 
 def test_the_simulation_comes_back_without_a_trace(player: MainWindow, until) -> None:
     player.actions_by_name["simulate"].trigger()
-    until(lambda: player.badge.state == "SIM")
+    until(lambda: player.display.badge.state == "SIM")
     until(lambda: not player.transport.isVisible())
     until(lambda: player.windowTitle() == "Kappaskin")
     assert not player.actions_by_name["replay-forward"].isEnabled()
@@ -220,7 +220,7 @@ def test_calibration_and_tare_are_the_live_ones_again(
     mine = Tare(sensor.name, "other", "layout", day, 20.0, 500, 1.0, offset, offset)
     window.history.change("Mine", -1, tare=mine)
     window.replaying.open_file(recording)
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     assert window.history.settings.tare is None  # recorded without
     window.actions_by_name["simulate"].trigger()
     assert window.history.settings.tare is mine
@@ -228,8 +228,8 @@ def test_calibration_and_tare_are_the_live_ones_again(
 
 def test_nothing_is_recorded_of_a_recording(player: MainWindow, until) -> None:
     until(lambda: not player.actions_by_name["record"].isEnabled())
-    assert "copy its file" in player.panels.recording.record.toolTip()
-    assert not player.panels.recording.record.isEnabled()
+    assert "copy its file" in player.recording.record.toolTip()
+    assert not player.recording.record.isEnabled()
 
 
 # Opening.
@@ -245,7 +245,7 @@ def test_a_recording_dropped_on_the_window_is_played(
     QApplication.sendEvent(window, enter)
     assert enter.isAccepted()
     QApplication.sendEvent(window, QDropEvent(QPointF(9, 9), copy, data, some, none))
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
 
 
 def test_another_file_dropped_is_not_taken(window: MainWindow, tmp_path: Path) -> None:
@@ -265,20 +265,20 @@ def test_one_is_opened_by_the_dialog_and_is_recent_then(
 ) -> None:
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(recording), ""))
     window.actions_by_name["open-recording"].trigger()
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     menu = window.actions_by_name["recent"].menu()
     menu.aboutToShow.emit()
     assert [action.text() for action in menu.actions()] == ["example.mcap", "", "&Clear this list"]
-    assert window.panels.connection.source() == f"replay:{recording}"
+    assert window.connection.source() == f"replay:{recording}"
 
 
 def test_one_typed_as_a_source_is_played_with_its_settings(
     window: MainWindow, recording: Path, until
 ) -> None:
     window.history.change("Other", -1, functions_x=3)
-    window.panels.connection.sources.setCurrentText(f"replay:{recording}")
-    window.panels.connection.connect_button.click()
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    window.connection.sources.setCurrentText(f"replay:{recording}")
+    window.connection.connect_button.click()
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     assert window.history.settings.functions_x == 8
 
 
@@ -298,10 +298,10 @@ def test_what_is_no_recording_is_refused_and_the_session_goes_on(
     if content is not None:
         file.write_bytes(content)
     window.replaying.open_file(file)
-    panel = window.panels.recording
+    panel = window.recording
     until(lambda: why in panel.message.text())
     assert "foreign.mcap" in panel.message.text()
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.display.badge.state == "SIM")
     assert window.session.source == "sim:"
 
 
@@ -313,8 +313,8 @@ def test_one_of_a_later_version_is_refused(
         recording.read_bytes().replace(b"format\x01\0\0\x001", b"format\x01\0\0\x009")
     )
     window.replaying.open_file(later)
-    until(lambda: "update this program" in window.panels.recording.message.text())
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: "update this program" in window.recording.message.text())
+    until(lambda: window.display.badge.state == "SIM")
 
 
 def test_one_never_ended_is_played_up_to_where_it_breaks_off(
@@ -325,10 +325,10 @@ def test_one_never_ended_is_played_up_to_where_it_breaks_off(
     part = tmp_path / "broken.mcap.part"
     part.write_bytes(recording.read_bytes()[:within_the_last])
     window.replaying.open_file(part)
-    until(lambda: window.badge.state.startswith("REPLAY"))
-    assert "was never ended" in window.panels.recording.message.text()
-    assert window.panels.recording.copy_button.isVisibleTo(window.panels.recording)
-    until(lambda: "never ended" in window.panels.connection.device.text())
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
+    assert "was never ended" in window.recording.message.text()
+    assert window.recording.copy_button.isVisibleTo(window.recording)
+    until(lambda: "never ended" in window.connection.device.text())
 
 
 def test_one_that_goes_while_it_is_played_leaves_the_session(
@@ -337,11 +337,11 @@ def test_one_that_goes_while_it_is_played_leaves_the_session(
     copy = tmp_path / "copy.mcap"
     copy.write_bytes(recording.read_bytes())
     window.replaying.open_file(copy)
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     os.truncate(copy, 100)
     window.replaying.seek(2.2)
-    until(lambda: window.badge.state == "LOST")
+    until(lambda: window.display.badge.state == "LOST")
     assert "copy.mcap" in window.session.alarm()
     assert not window.transport.isVisible()
     window.actions_by_name["simulate"].trigger()
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.display.badge.state == "SIM")

@@ -57,7 +57,7 @@ def test_until_elements_are_chosen_all_are_scanned():
 
 
 def test_a_click_chooses_an_element_and_another_lets_it_go(window):
-    window.wishes.wish("region", "elements")
+    window.requests.set("region", "elements")
     for _ in range(3):
         window.heatmaps["xx"].chosen.emit(44)
 
@@ -74,11 +74,11 @@ def test_a_click_chooses_nothing_while_no_elements_are_asked_for(window):
 
 
 def test_a_region_says_what_it_buys_and_costs(window, until):
-    window.wishes.wish("electronics", "second")
-    window.wishes.wish("region", "skin")
+    window.requests.set("electronics", "second")
+    window.requests.set("region", "skin")
 
-    until(lambda: "instead of 166 frames/s" in window.panels.region.message.text())
-    assert "one frame tells where the contact is to" in window.panels.region.message.text()
+    until(lambda: "instead of 166 frames/s" in window.region.message.text())
+    assert "one frame tells where the contact is to" in window.region.message.text()
     until(lambda: window.session.estimate is not None and not window.session.estimate.fresh.all())
 
 
@@ -108,9 +108,9 @@ def test_a_bargain_is_of_the_frames_that_really_come(qapp, electronics, buys):
 
 @pytest.mark.parametrize("name", ["creep", "tolerance", "region_share"])
 def test_a_share_is_shown_in_per_cent(window, name):
-    window.wishes.wish(name, 0.15)
+    window.requests.set(name, 0.15)
 
-    panel = window.panels.region if name == "region_share" else window.panels.spoils
+    panel = window.region if name == "region_share" else window.spoils
     assert panel.editor(name).text() == "15 %"
 
 

@@ -1,24 +1,18 @@
 from dataclasses import fields, replace
 
 import pytest
-from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QLabel
+from PySide6.QtWidgets import QAbstractSpinBox, QComboBox, QLabel
 
 from kappaskin import EDGES, Status
 from kappaskin_app.features.compare.panel import OtherForm
 from kappaskin_app.features.design.panel import DesignForm
-from kappaskin_app.shell.pages import Panels
 from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of, part
 from kappaskin_app.shell.settings.asks import Choice, Range
 
 ASKED = [f.name for f in fields(Settings) if "ask" in f.metadata]
 
 
-@pytest.fixture
-def panels(qapp: QApplication) -> Panels:
-    return Panels()
-
-
-def test_every_setting_asked_for_stands_in_one_panel(panels: Panels) -> None:
+def test_every_setting_asked_for_stands_in_one_panel(panels) -> None:
     # Those of what is compared with and of what is designed stand beside their views.
     forms = [*panels.all(), OtherForm(), DesignForm()]
     shown = [name for form in forms for name in ASKED if form.findChild(object, name)]
@@ -51,18 +45,18 @@ def test_only_what_makes_the_scene_belongs_to_it() -> None:
         assert part(replace(Settings(), **change), SceneSettings) != was
 
 
-def test_showing_settings_wishes_nothing(panels: Panels) -> None:
+def test_showing_settings_wishes_nothing(panels) -> None:
     wishes = []
-    panels.wished.connect(lambda *wish: wishes.append(wish))
+    panels.requested.connect(lambda *wish: wishes.append(wish))
     changed = {"functions_x": 3, "x": 0.01, "theme": "light", "shape": "cylinder", "fluid": True}
     panels.show_settings(replace(Settings(), **changed))
     panels.show_settings(replace(Settings(), side_x=0.02, x=0.01))
     assert wishes == []
 
 
-def test_an_editor_wishes_in_si_units_and_shows_its_unit(panels: Panels) -> None:
+def test_an_editor_wishes_in_si_units_and_shows_its_unit(panels) -> None:
     wishes = []
-    panels.wished.connect(lambda *wish: wishes.append(wish))
+    panels.requested.connect(lambda *wish: wishes.append(wish))
     for panel, name, typed, wished, unit in (
         (panels.load, "x", 12.5, 0.0125, " mm"),
         (panels.support, "foam", 20.0, 2e4, " kN/m\u00b3"),
@@ -75,17 +69,17 @@ def test_an_editor_wishes_in_si_units_and_shows_its_unit(panels: Panels) -> None
         assert box.text().endswith(unit)
 
 
-def test_a_choice_made_with_the_keyboard_is_a_wish(panels: Panels, qtbot) -> None:
+def test_a_choice_made_with_the_keyboard_is_a_wish(panels, qtbot) -> None:
     wishes = []
     panels.show_settings(Settings())
-    panels.wished.connect(lambda *wish: wishes.append(wish))
+    panels.requested.connect(lambda *wish: wishes.append(wish))
     box = panels.noise.editor("noise_kind")
     assert isinstance(box, QComboBox)
     qtbot.keyClick(box, "G")
     assert wishes == [("noise_kind", "gaussian")]
 
 
-def test_a_ready_case_asks_for_no_place(panels: Panels) -> None:
+def test_a_ready_case_asks_for_no_place(panels) -> None:
     load = panels.load
     load.show_settings(Settings(load_case="centre"))
     assert load.form.isRowVisible(load.editor("load_case"))
@@ -104,7 +98,7 @@ def test_a_ready_case_asks_for_no_place(panels: Panels) -> None:
     ],
 )
 def test_a_spread_load_asks_for_its_size_by_its_name(
-    panels: Panels, case: str, rows: list[str], called: str
+    panels, case: str, rows: list[str], called: str
 ) -> None:
     load = panels.load
     load.show_settings(Settings(load_case=case))
@@ -117,7 +111,7 @@ def test_a_spread_load_asks_for_its_size_by_its_name(
     assert not load.form.isRowVisible(load.editor("x_end"))
 
 
-def test_only_a_bent_skin_asks_for_a_radius_and_says_how_far_it_opens(panels: Panels) -> None:
+def test_only_a_bent_skin_asks_for_a_radius_and_says_how_far_it_opens(panels) -> None:
     shape = panels.shape
     panels.show_settings(Settings())
     assert not shape.form.isRowVisible(shape.editor("base_radius"))
@@ -128,7 +122,7 @@ def test_only_a_bent_skin_asks_for_a_radius_and_says_how_far_it_opens(panels: Pa
     assert shape.opening.text() == "85.9\N{DEGREE SIGN}"
 
 
-def test_a_load_can_be_placed_on_the_skin_only(panels: Panels) -> None:
+def test_a_load_can_be_placed_on_the_skin_only(panels) -> None:
     panels.show_settings(Settings(side_x=0.04, x=0.03, load_case="point"))
     box = panels.load.editor("x")
     box.setProperty("value", 70.0)
@@ -136,7 +130,7 @@ def test_a_load_can_be_placed_on_the_skin_only(panels: Panels) -> None:
     assert "From 0 to 40 mm" in box.toolTip()
 
 
-def test_cases_are_called_table_1s_where_they_are(panels: Panels) -> None:
+def test_cases_are_called_table_1s_where_they_are(panels) -> None:
     box = panels.load.editor("load_case")
     assert isinstance(box, QComboBox)
 
@@ -150,14 +144,14 @@ def test_cases_are_called_table_1s_where_they_are(panels: Panels) -> None:
         assert not any("Table 1" in text for text in words())
 
 
-def test_every_page_has_its_own_letter(panels: Panels) -> None:
+def test_every_page_has_its_own_letter(panels) -> None:
     titles = [panels.tabText(index) for index in range(panels.count())]
     letters = [title[title.index("&") + 1].lower() for title in titles]
     assert len(set(letters)) == len(letters)
     assert not set(letters) & set("fesvh")  # the menus'
 
 
-def test_pages_turn_round_and_round(panels: Panels) -> None:
+def test_pages_turn_round_and_round(panels) -> None:
     pages = []
     for step in (1, 1, -1):
         panels.turn(step)
@@ -165,7 +159,7 @@ def test_pages_turn_round_and_round(panels: Panels) -> None:
     assert pages == [1 % panels.count(), 2 % panels.count(), 1]
 
 
-def test_a_skin_that_cannot_be_is_explained_until_it_can(panels: Panels) -> None:
+def test_a_skin_that_cannot_be_is_explained_until_it_can(panels) -> None:
     shape, status = panels.shape, Status()
     shape.show_refusal("too small a radius")
     shape.show_status(status, simulating=True)
@@ -177,7 +171,7 @@ def test_a_skin_that_cannot_be_is_explained_until_it_can(panels: Panels) -> None
     assert shape.message.text() == ""
 
 
-def test_a_choice_without_room_for_all_its_words_says_so(panels: Panels) -> None:
+def test_a_choice_without_room_for_all_its_words_says_so(panels) -> None:
     box = panels.basis.editor("method")
     box.setCurrentText("Robust, leaves out bad elements")
     box.resize(110, box.height())

@@ -16,15 +16,14 @@ from kappaskin_app.shell.splash import Splash
 from kappaskin_app.theme import DARK, LIGHT, Theme
 
 
-class Membrane(QObject):
-    drawn = Signal()
-
-
-class Window:
+class Window(QObject):
     """What a splash asks of a window: whether an estimate is shown, and when it is drawn."""
 
+    drawn = Signal()
+
     def __init__(self) -> None:
-        self.membrane, self.display, self.estimate = Membrane(), self, None
+        super().__init__()
+        self.display, self.estimate = self, None
 
     def estimate_shown(self) -> object:
         return self.estimate
@@ -49,10 +48,10 @@ def test_it_says_at_once_what_is_loaded_and_all_of_it(splash: Splash) -> None:
 def test_it_goes_when_the_first_estimate_is_drawn_and_no_sooner(splash: Splash) -> None:
     window = Window()
     splash.finish(window)
-    window.membrane.drawn.emit()
+    window.display.drawn.emit()
     assert splash.isVisible()
     window.estimate = "an estimate"
-    window.membrane.drawn.emit()
+    window.display.drawn.emit()
     assert not splash.isVisible()
 
 

@@ -90,7 +90,7 @@ def test_dead_elements_read_nothing_and_are_refused_where_there_are_none() -> No
 def test_other_elements_or_another_shape_are_all_alive(window: MainWindow) -> None:
     for name, value in (("elements_x", 9), ("shape", "disk")):
         window.history.change("Dead", -1, dead_elements=(50,))
-        window.wishes.wish(name, value)
+        window.requests.set(name, value)
         assert window.history.settings.dead_elements == ()
 
 
@@ -133,7 +133,7 @@ def test_a_demonstration_is_one_step_and_back_undoes_it(window: MainWindow, unti
         button.click()
     assert window.history.settings.shape == "strip"
     until(lambda: window.membrane.skin.patch.strip)
-    assert "dead" not in window.panels.connection.device.text()  # of xx, which it has
+    assert "dead" not in window.connection.device.text()  # of xx, which it has
     until(lambda: window.session.estimate is not None)
     for _ in range(6):
         panel.undo.click()
@@ -149,7 +149,7 @@ def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_o
     until(lambda: window.history.settings.fit_edge == "sliding")
     until(lambda: "moves the skin as a whole" in panel.refused.text())
     assert panel.refused.text().startswith("In use: Least squares, 8 x 1 functions. 10")
-    until(lambda: window.session.estimate is not None and window.badge.state == "SIM")
+    until(lambda: window.session.estimate is not None and window.display.badge.state == "SIM")
     until(lambda: "infinite: one of 8 shapes changes no reading" in panel.words.text())
     panel.undo.click()
     assert window.history.settings == was
@@ -161,7 +161,7 @@ def test_a_demonstration_that_is_overtaken_does_not_go_on(window: MainWindow, un
     window.history.stack.undo()
     until(lambda: window.session.status.sensor is not None and not window.session.status.computing)
     for _ in range(3):
-        window.wishes.follow(window.session.status)
+        window.demonstrating.follow(window.session.status)
     assert window.history.settings.fit_edge == ""
 
 
@@ -175,13 +175,13 @@ def test_how_things_are_shown_stays_through_a_demonstration(window: MainWindow, 
 def test_the_worst_seen_shape_colours_the_skin_while_it_is_looked_at(
     window: MainWindow, until
 ) -> None:
-    bar, caption = window.display.scale.bar, window.membrane.caption
+    bar, caption = window.scale.bar, window.membrane.caption
     panel = _opened(window, until).stability
     assert not caption.input  # all are seen alike: none is telling
     panel.buttons[1].click()
     until(lambda: caption.input == "Colours: shape 64 of 64, no measurement")
     until(lambda: bar.limits == (-1.0, 1.0))
-    assert not window.display.scale.lock.isEnabled()
+    assert not window.scale.lock.isEnabled()
     values = window.membrane.surface.mesh.point_data["value"]
     until(lambda: np.abs(values).max() == pytest.approx(1.0))
     panel.on_skin.click()
@@ -191,7 +191,7 @@ def test_the_worst_seen_shape_colours_the_skin_while_it_is_looked_at(
     assert caption.input
     window.actions_by_name["dock-stability"].trigger()
     assert not caption.input
-    assert window.display.scale.lock.isEnabled()
+    assert window.scale.lock.isEnabled()
     until(lambda: bar.limits != (-1.0, 1.0))
 
 
@@ -290,5 +290,5 @@ def test_the_panels_below_the_skin_cannot_be_dropped_into_a_column(window: MainW
 
 def test_what_is_in_use_is_said_where_the_method_is_refused(window: MainWindow, until) -> None:
     window.history.change("Fast", -1, method="fast", functions_x=12, functions_y=12)
-    message = window.panels.basis.message
+    message = window.basis.message
     until(lambda: message.text().startswith("In use: Least squares, 8 x 8 functions. Expected"))

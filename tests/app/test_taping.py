@@ -54,10 +54,10 @@ def test_a_recording_is_begun_shown_and_ended(
     assert asked[0].parent == folder
     until(lambda: _mark(window).isVisible() and _mark(window).head.startswith("REC 0:0"))
     until(lambda: action.text() == "&Stop recording")
-    assert window.panels.recording.record.text() == "Stop"
+    assert window.recording.record.text() == "Stop"
     action.trigger()
     until(lambda: not _mark(window).isVisible())
-    assert window.panels.recording.what.text().endswith(asked[0].name)
+    assert window.recording.what.text().endswith(asked[0].name)
     assert window.statusBar().currentMessage().startswith(f"Recorded {asked[0]}")
     with Recording(asked[0]) as recorded:
         assert recorded.whole
@@ -67,10 +67,10 @@ def test_it_goes_on_when_the_source_changes(window: MainWindow, asked: list[Path
     window.actions_by_name["record"].trigger()
     until(lambda: window.taping.written.messages > 0)
     window.actions_by_name["disconnect"].trigger()
-    until(lambda: window.badge.state == "OFF")
+    until(lambda: window.display.badge.state == "OFF")
     assert window.taping.recording
     window.actions_by_name["simulate"].trigger()
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.display.badge.state == "SIM")
     messages = window.taping.written.messages
     until(lambda: window.taping.written.messages > messages + 50)
     assert _mark(window).isVisible()
@@ -91,7 +91,7 @@ def test_a_note_goes_into_the_recording_and_the_list(
     window.actions_by_name["record"].trigger()
     until(lambda: not window.taping.recording)
     window.replaying.open_file(asked[0])
-    until(lambda: window.badge.state.startswith("REPLAY"))
+    until(lambda: window.display.badge.state.startswith("REPLAY"))
     assert [event.text for event in window.replaying.events] == ["another object"]
 
 
@@ -102,10 +102,10 @@ def test_one_that_ends_by_itself_says_so_until_it_is_seen(
     until(lambda: window.taping.written.messages > 0)
     Path(f"{asked[0]}.part").rename(f"{asked[0]}.elsewhere")
     until(lambda: bool(window.taping.ended))
-    assert "moved or removed" in window.panels.recording.message.text()
+    assert "moved or removed" in window.recording.message.text()
     assert _mark(window).isVisible()
     assert _mark(window).head == "REC ended"
-    until(lambda: window.badge.state == "SIM")  # what is live goes on
+    until(lambda: window.display.badge.state == "SIM")  # what is live goes on
     _mark(window).clicked.emit()
     until(lambda: not _mark(window).isVisible())
 
@@ -114,7 +114,7 @@ def test_nothing_is_ever_written_over(window: MainWindow, tmp_path: Path, until)
     there = tmp_path / "there.mcap"
     there.write_bytes(b"mine")
     window.taping.begin(there)
-    until(lambda: "is there already" in window.panels.recording.message.text())
+    until(lambda: "is there already" in window.recording.message.text())
     assert there.read_bytes() == b"mine"
     assert not window.taping.recording
     assert not _mark(window).isVisible()  # it never began
@@ -126,8 +126,8 @@ def test_a_place_that_cannot_be_written_to_is_refused(
     window: MainWindow, until, place: str
 ) -> None:
     window.taping.begin(Path(place))
-    until(lambda: "cannot be written" in window.panels.recording.message.text())
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: "cannot be written" in window.recording.message.text())
+    until(lambda: window.display.badge.state == "SIM")
 
 
 def test_a_folder_that_cannot_be_made_is_told_and_another_asked_for(
@@ -149,10 +149,10 @@ def test_what_was_never_ended_is_offered_to_be_repaired(opened, until, folder: P
     folder.mkdir(parents=True)
     (folder / "it's mine.mcap.part").write_bytes(b"")
     window = opened("sim:")
-    until(lambda: window.badge.state == "SIM")
-    text = window.panels.recording.message.text()
+    until(lambda: window.display.badge.state == "SIM")
+    text = window.recording.message.text()
     assert "it's mine.mcap.part was never ended" in text
-    window.panels.recording.copy_button.click()
+    window.recording.copy_button.click()
     command = QGuiApplication.clipboard().text()
     assert command.startswith("kappaskin repair ")
     assert shlex.split(command)[2:] == [

@@ -265,7 +265,7 @@ def test_a_time_that_passed_is_one_number(seconds, words):
 def test_a_window_tares_a_skin_at_rest_and_refuses_a_loaded_one(window, until):
     window.history.change("Centre", -1, load_case="centre")
     until(lambda: not window.session.scene.moves and not window.session.status.computing)
-    action, panel = window.actions_by_name["tare"], window.panels.tare
+    action, panel = window.actions_by_name["tare"], window.tare
     until(lambda: action.isEnabled())
     action.trigger()
     until(lambda: bool(panel.message.text()))

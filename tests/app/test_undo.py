@@ -16,11 +16,11 @@ LEFT = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture(scope="module")
-def shared(qapp: QApplication, until) -> Iterator[MainWindow]:
+def shared(qapp: QApplication, until, window_class) -> Iterator[MainWindow]:
     qapp.setStyle("Fusion")
-    window = MainWindow("sim:")
+    window = window_class("sim:")
     window.show()
-    until(lambda: bool(window.object.text()))  # its threads are those of no one test
+    until(lambda: bool(window.display.foot.object.text()))  # its threads are those of no one test
     window.heatmaps["xx"].chosen.emit(0)
     until(lambda: "error-bars_0" in {thread.name for thread in threading.enumerate()})
     window.history.stack.undo()
@@ -33,7 +33,7 @@ def shared(qapp: QApplication, until) -> Iterator[MainWindow]:
 @pytest.fixture
 def here(shared: MainWindow, until) -> Iterator[MainWindow]:
     """The one window of these tests, as it was at first."""
-    until(lambda: shared.badge.state == "SIM" and shared.membrane.surface.actor is not None)
+    until(lambda: shared.display.badge.state == "SIM" and shared.membrane.surface.actor is not None)
     shared.show()
     _settle()
     shared.history.stack.clear()
@@ -115,7 +115,7 @@ def test_a_direction_after_a_turn_is_a_step_that_goes_back_to_the_turn(
 def test_another_skin_is_seen_from_where_the_last_one_was(here: MainWindow, until) -> None:
     camera = (0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.7, 0.7, 30.0, 0.0, 0.0)
     here.history.change("Turn", -1, camera=camera)
-    here.wishes.wish("shape", "cylinder")
+    here.requests.set("shape", "cylinder")
     until(lambda: here.membrane.skin.patch.base_curvature > 0)
     assert here.history.settings.camera == camera
     at, focus = _camera(here)[:3], _camera(here)[3:6]
@@ -188,7 +188,7 @@ def test_a_window_that_grows_for_a_dock_has_that_as_a_step(here: MainWindow) -> 
 
 
 def test_what_is_undone_at_once_is_what_was_done_last(here: MainWindow) -> None:
-    here.wishes.wish("letters", 110.0)
+    here.requests.set("letters", 110.0)
     _settle()
     here.docks["settings"].hide()
     here.actions_by_name["undo"].trigger()
@@ -218,13 +218,13 @@ def test_with_nothing_to_undo_the_action_says_so(here: MainWindow) -> None:
     undo: Callable[[], bool] = here.actions_by_name["undo"].isEnabled
     assert not undo()
     assert here.actions_by_name.why_not("undo") == "there is nothing to undo"
-    here.wishes.wish("letters", 110.0)
+    here.requests.set("letters", 110.0)
     assert undo()
     assert here.actions_by_name["undo"].text() == "&Undo: letters 100 \N{RIGHTWARDS ARROW} 110 %"
 
 
 def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
-    measuring, undo = here.display.measuring, here.actions_by_name["undo"]
+    measuring, undo = here.view.measuring, here.actions_by_name["undo"]
     here.actions_by_name["measure"].trigger()
     for place in ((0.02, 0.03), (0.05, 0.06)):
         here.membrane.pointing.clicked.emit(*place)
@@ -242,7 +242,7 @@ def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
 
 
 def test_places_beside_the_skin_that_there_is_now_do_not_come_back(here: MainWindow) -> None:
-    measuring = here.display.measuring
+    measuring = here.view.measuring
     measuring.have(((0.02, 0.03), (0.1, 0.1)))
     assert len(measuring.places) == 2
     measuring.have(((0.02, 0.03), (0.11, 0.1)))

@@ -29,7 +29,7 @@ def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot
 
 
 def test_ctrl_z_works_while_an_editor_has_the_focus(window: MainWindow, qtbot) -> None:
-    box = window.panels.basis.editor("functions_x")
+    box = window.basis.editor("functions_x")
     box.setFocus()
     qtbot.keyClick(box, Qt.Key.Key_Down)
     assert window.history.settings.functions_x == 7
@@ -38,8 +38,8 @@ def test_ctrl_z_works_while_an_editor_has_the_focus(window: MainWindow, qtbot) -
 
 
 def test_the_wheel_changes_no_editor_without_the_focus(window: MainWindow, qtbot) -> None:
-    box = window.panels.noise.editor("noise_seed")
-    window.panels.basis.editor("functions_x").setFocus()
+    box = window.noise.editor("noise_seed")
+    window.basis.editor("functions_x").setFocus()
     here = QPointF(box.rect().center())
     event = QWheelEvent(
         here,
@@ -59,7 +59,7 @@ def test_a_basis_the_readings_do_not_decide_is_refused_in_its_panel(
     window: MainWindow, until
 ) -> None:
     window.history.change("Functions", -1, functions_x=12, functions_y=12)
-    message = window.panels.basis.message
+    message = window.basis.message
     until(lambda: "determine 140 of the 144" in message.text())
     assert window.session.estimate.coefficients.shape == (8, 8)
     window.history.stack.undo()
@@ -78,7 +78,7 @@ def test_noise_turned_off_leaves_only_what_the_basis_cannot_follow(
 def test_too_large_a_number_typed_becomes_the_largest_not_another(
     window: MainWindow, qtbot
 ) -> None:
-    box = window.panels.basis.editor("functions_x")
+    box = window.basis.editor("functions_x")
     box.selectAll()
     qtbot.keyClicks(box, "99")
     qtbot.keyClick(box, Qt.Key.Key_Return)
@@ -86,7 +86,7 @@ def test_too_large_a_number_typed_becomes_the_largest_not_another(
 
 
 def test_steps_of_one_setting_in_a_row_are_one_to_undo(window: MainWindow, qtbot) -> None:
-    box = window.panels.basis.editor("functions_x")
+    box = window.basis.editor("functions_x")
     for _ in range(3):
         qtbot.keyClick(box, Qt.Key.Key_Down)
     assert window.history.settings.functions_x == 5
@@ -118,7 +118,7 @@ def test_a_wrong_belief_about_the_edge_costs(window: MainWindow, until) -> None:
 
 
 def test_the_colours_of_the_skin_can_be_locked_and_undone(window: MainWindow, until) -> None:
-    scale = window.display.scale
+    scale = window.scale
     until(lambda: scale.bar.limits == (0.0, 5.0))
     scale.lock.click()
     assert window.history.settings.range_displacement == pytest.approx(5e-3)
@@ -147,7 +147,7 @@ def test_every_button_and_editor_explains_itself(window: MainWindow) -> None:
 def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     window: MainWindow, qtbot, shape: str
 ) -> None:
-    window.wishes.wish("shape", shape)
+    window.requests.set("shape", shape)
     window.history.change("All", -1, load_case="two-points", side_x=0.03, x=0.02, region="skin")
     obeyed = set()
     window.actions_by_name["dock-compare"].trigger()

@@ -51,7 +51,7 @@ def test_a_load_cannot_be_dragged_when_nothing_comes_in(window: MainWindow, unti
     until(lambda: len(window.membrane.drag.handles) == 1)
     window.actions_by_name["disconnect"].trigger()
     until(lambda: not len(window.membrane.drag.handles))
-    assert not window.panels.load.editor("load_case").isEnabled()
+    assert not window.load.editor("load_case").isEnabled()
 
 
 def test_two_points_are_not_called_one(window: MainWindow, until) -> None:
@@ -86,9 +86,9 @@ def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
 
 def test_a_load_over_the_rim_is_explained_where_it_is_placed(window: MainWindow, until) -> None:
     window.history.change("Load", -1, load_case="disc", x=0.001)
-    until(lambda: "reaches over the rim" in window.panels.load.message.text())
+    until(lambda: "reaches over the rim" in window.load.message.text())
     window.history.stack.undo()
-    until(lambda: not window.panels.load.message.text())
+    until(lambda: not window.load.message.text())
 
 
 def test_only_edges_that_the_skin_can_have_are_offered(window: MainWindow, until) -> None:
@@ -96,10 +96,10 @@ def test_only_edges_that_the_skin_can_have_are_offered(window: MainWindow, until
         box = panel.editor(name)
         return [box.itemData(i) for i in range(box.count()) if box.model().item(i).isEnabled()]
 
-    shape, basis = window.panels.shape, window.panels.basis
+    shape, basis = window.shape, window.basis
     assert offered(shape, "edge") == list(EDGES)
     window.history.change("Edges", -1, edge="elastic", fit_edge="elastic")
-    window.wishes.wish("shape", "cylinder")
+    window.requests.set("shape", "cylinder")
     assert (window.history.settings.edge, window.history.settings.fit_edge) == ("hinged", "")
     _met(window, until)
     assert offered(shape, "edge") == ["hinged", "sliding", "clamped"]
@@ -123,12 +123,12 @@ def test_another_skin_is_drawn_bent_and_undone_flat_again(
     window: MainWindow, until, qtbot, colours_in
 ) -> None:
     was = window.history.settings
-    box = window.panels.shape.editor("shape")
+    box = window.shape.editor("shape")
     window.panels.setCurrentIndex(1)
     qtbot.keyClick(box, "C")
     _met(window, until)
     assert window.membrane.skin.patch.radius == pytest.approx(0.0129)
-    assert "radius 12.9 mm" in window.panels.connection.device.text()
+    assert "radius 12.9 mm" in window.connection.device.text()
     drawn = len(window.membrane.ages)
     until(lambda: len(window.membrane.ages) > drawn + 3)
     until(lambda: colours_in(window, window.membrane) > 500)
@@ -142,10 +142,10 @@ def test_another_skin_is_drawn_bent_and_undone_flat_again(
 def test_a_skin_that_cannot_be_is_refused_in_its_panel_and_the_last_one_stays(
     window: MainWindow, until
 ) -> None:
-    message = window.panels.shape.message
-    window.wishes.wish("shape", "cylinder")
+    message = window.shape.message
+    window.requests.set("shape", "cylinder")
     _met(window, until)
-    window.wishes.wish("base_radius", 0.004)
+    window.requests.set("base_radius", 0.004)
     until(lambda: "larger base radius" in message.text())
     assert window.session.scene.plate.patch.radius == pytest.approx(0.0129)
     window.history.change("Case", -1, load_case="point")
@@ -160,7 +160,7 @@ def test_too_few_elements_for_the_basis_are_said_where_they_are_chosen(
 ) -> None:
     window.history.change("Few", -1, elements_x=3, elements_y=4)
     _met(window, until)
-    for panel in (window.panels.elements, window.panels.basis):
+    for panel in (window.elements, window.basis):
         until(lambda message=panel.message: "3 x 4 elements" in message.text())
     assert window.session.estimate.coefficients.size < 36
     assert len(window.heatmaps["xx"].cells.grab().toImage().size().toTuple()) == 2
@@ -170,14 +170,14 @@ def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
     window: MainWindow, until, colours_in
 ) -> None:
     window.history.change("Disk", -1, shape="disk", rim_radius=0.043)  # no other test made it
-    message = window.panels.shape.message
+    message = window.shape.message
     until(lambda: "Computing this skin" in message.text())
     until(lambda: isinstance(window.membrane.skin.patch, Disk))
     until(lambda: window.session.estimate is not None and not message.text())
     until(lambda: colours_in(window, window.membrane) > 300)
     assert window.session.estimate.curvature.shape == (3, 80)
-    until(lambda: "skin there curves" in window.object.text())
-    window.wishes.wish("edge", "elastic")
+    until(lambda: "skin there curves" in window.display.foot.object.text())
+    window.requests.set("edge", "elastic")
     until(lambda: "elastic" in message.text())
     assert window.session.scene.edge == "hinged"
 
@@ -185,7 +185,7 @@ def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
 def test_a_load_dragged_on_a_bent_skin_is_where_the_mouse_let_go(
     window: MainWindow, until, qtbot
 ) -> None:
-    window.wishes.wish("shape", "cylinder")
+    window.requests.set("shape", "cylinder")
     window.history.change("Point", -1, load_case="point", force=0.3)
     _met(window, until)
     until(lambda: _shown(window))
@@ -226,7 +226,7 @@ def test_no_height_leaves_the_picture_and_the_true_one_is_written(
 ) -> None:
     window.history.change("High", -1, exaggeration=50, load_case="point", force=0.9)
     until(lambda: window.session.estimate.surface.max() > 0.02)
-    view, times = window.membrane, window.display.scale.times
+    view, times = window.membrane, window.scale.times
     until(lambda: times.text() != "height\n\N{MULTIPLICATION SIGN} 6")
     until(lambda: -view.skin.height.min() > 20)
     assert -view.skin.height.min() <= view.skin.deepest * (1 + 1e-9)
@@ -235,7 +235,7 @@ def test_no_height_leaves_the_picture_and_the_true_one_is_written(
 
 
 def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> None:
-    window.wishes.wish("shape", "cylinder")
+    window.requests.set("shape", "cylinder")
     _met(window, until)
     renderer, skin = window.membrane.plotter.renderer, window.membrane.skin
     for name in ("look-from-above", "look-along-y", "look-along-x", "camera"):

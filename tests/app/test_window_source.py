@@ -11,40 +11,40 @@ from kappaskin_app.shell.window import MainWindow
 
 
 def test_the_simulation_is_shown_as_a_simulation(window: MainWindow, until) -> None:
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.display.badge.state == "SIM")
     units = {"contact": " mm", "rms": " mm", "age": " ms", "force": " mN"}
     until(lambda: all(window.readouts.text(name).endswith(unit) for name, unit in units.items()))
 
 
 def test_a_port_typed_is_the_port_meant(window: MainWindow, qtbot) -> None:
-    window.panels.connection.show_ports([Port("/dev/ttyACM10", "Board")])
-    line = window.panels.connection.sources.lineEdit()
+    window.connection.show_ports([Port("/dev/ttyACM10", "Board")])
+    line = window.connection.sources.lineEdit()
     line.selectAll()
     qtbot.keyClicks(line, "/dev/ttyACM1")
-    assert window.panels.connection.source() == "/dev/ttyACM1"
+    assert window.connection.source() == "/dev/ttyACM1"
 
 
 def test_an_absent_port_says_why_and_the_simulation_comes_back(window: MainWindow, until) -> None:
-    window.panels.connection.sources.setCurrentText("/dev/ttyNOWHERE")
-    window.panels.connection.connect_button.click()
-    until(lambda: window.badge.state == "LOST")
-    assert "there is no such port" in window.panels.connection.message.text()
+    window.connection.sources.setCurrentText("/dev/ttyNOWHERE")
+    window.connection.connect_button.click()
+    until(lambda: window.display.badge.state == "LOST")
+    assert "there is no such port" in window.connection.message.text()
     until(lambda: window.readouts.text("contact") == "\N{EN DASH}")
     window.actions_by_name["simulate"].trigger()
-    until(lambda: window.badge.state == "SIM")
-    assert not window.panels.connection.message.isVisible()
+    until(lambda: window.display.badge.state == "SIM")
+    assert not window.connection.message.isVisible()
 
 
 def test_a_scene_of_its_own_is_shown_as_it_is_and_leaves_the_load_to_itself(opened, until) -> None:
     window = opened("sim:calibration")
     until(lambda: window.session.estimate is not None)
     assert window.session.status.sensor.transduction.amplifier.gain == 35  # no load case has it
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.display.badge.state == "SIM")
     assert not window.session.simulating
-    assert "Only for the simulated skin" in window.panels.load.message.text()
+    assert "Only for the simulated skin" in window.load.message.text()
     until(lambda: "red arrow" not in window.display.notice.text())  # there is none
     window.actions_by_name["simulate"].trigger()
-    until(lambda: not window.panels.load.message.text())
+    until(lambda: not window.load.message.text())
     assert window.session.simulating
 
 
@@ -58,16 +58,16 @@ def test_a_ready_scene_becomes_the_load_case(opened, until, name: str) -> None:
 @pytest.mark.parametrize("name", ["nonsense", "disc"])
 def test_an_unknown_scene_is_refused_with_those_there_are(opened, until, name: str) -> None:
     window = opened(f"sim:{name}")
-    until(lambda: window.badge.state == "LOST")
-    assert f"got '{name}'" in window.panels.connection.message.text()
+    until(lambda: window.display.badge.state == "LOST")
+    assert f"got '{name}'" in window.connection.message.text()
     for known in SCENES:
-        assert known in window.panels.connection.message.text()
+        assert known in window.connection.message.text()
     assert window.history.settings.load_case == "circle"
 
 
 def test_disconnecting_is_said(window: MainWindow, until) -> None:
     window.actions_by_name["disconnect"].trigger()
-    until(lambda: window.badge.state == "OFF")
+    until(lambda: window.display.badge.state == "OFF")
 
 
 def test_a_killed_engine_is_started_again_and_what_was_chosen_simulated(
@@ -76,7 +76,7 @@ def test_a_killed_engine_is_started_again_and_what_was_chosen_simulated(
     window.history.change("Point", -1, load_case="point", x=0.03, y=0.06)
     os.kill(window.session.engine.pid, 9)
     until(lambda: "was started again" in window.happenings.list.toPlainText())
-    until(lambda: window.badge.state == "SIM")
+    until(lambda: window.display.badge.state == "SIM")
     until(lambda: window.session.estimate.true_contact.tolist() == [0.03, 0.06])
     drawn = len(window.membrane.ages)
     until(lambda: len(window.membrane.ages) > drawn + 5)

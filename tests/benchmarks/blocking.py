@@ -9,6 +9,7 @@ import time
 
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
 
+from kappaskin_app.features import FEATURES
 from kappaskin_app.shell.window import MainWindow
 
 _SPARED = ("quit",)
@@ -37,7 +38,7 @@ def main(turns: int) -> None:
     application.setStyle("Fusion")
     for ask in ("getOpenFileName", "getSaveFileName"):
         setattr(QFileDialog, ask, lambda *_: ("", ""))
-    window = MainWindow("sim:")
+    window = MainWindow([made() for made in FEATURES], "sim:")
     window.show()
     _live(application, 4.0)
     times: dict[str, float] = {}
@@ -46,7 +47,7 @@ def main(turns: int) -> None:
             if name not in _SPARED:
                 taken = 1e3 * _blocked(application, window, name)
                 times[name] = min(taken, times.get(name, taken))
-        window.presenting.leave()
+        window.layouts.leave_full_screen()
     window.close()
     print(json.dumps(times))
 

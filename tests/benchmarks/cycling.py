@@ -15,15 +15,16 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
 from kappaskin.studies.drills.held import Held
+from kappaskin_app.features import FEATURES
 from kappaskin_app.shell.window import MainWindow
 
 _DRAWN = 5  # pictures of the skin, of each window
 
 
 def _cycle(application: QApplication) -> None:
-    window = MainWindow("sim:")
+    window = MainWindow([made() for made in FEATURES], "sim:")
     window.show()
-    while len(window.membrane.ages) < _DRAWN:
+    while len(window.features["membrane"].membrane.ages) < _DRAWN:
         application.processEvents()
         time.sleep(0.001)
     window.close()

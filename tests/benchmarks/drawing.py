@@ -19,6 +19,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Engine
+from kappaskin_app.features import FEATURES
 from kappaskin_app.shell.layouts.layout import BOTTOM, LEFT, RIGHT, Layout, Place
 from kappaskin_app.shell.settings.shown import COLOURS
 from kappaskin_app.shell.window import MainWindow
@@ -64,7 +65,7 @@ def app(
     application: QApplication, source: str, seconds: float, everything: bool = False
 ) -> dict[str, float]:
     """The whole window at 1280 x 800."""
-    window = MainWindow(source)
+    window = MainWindow([made() for made in FEATURES], source)
     window.show()
     if everything:
         # Once it has met the skin, of which it then tells an element.
@@ -72,7 +73,7 @@ def app(
     QTimer.singleShot(round((SETTLE + seconds) * 1e3), application.quit)
     application.exec()
     now = time.monotonic()
-    ages = [age for when, age in window.membrane.ages if when > now - seconds]
+    ages = [age for when, age in window.features["membrane"].membrane.ages if when > now - seconds]
     status = window.session.status
     window.close()
     return {
@@ -88,7 +89,7 @@ def _show_everything(window: MainWindow) -> None:
     shown = dict.fromkeys((f"show_{name}" for name in _DRAWN), True)
     maps = tuple(name for name, _ in COLOURS)
     window.history.change("Everything", -1, maps=maps, traced=(33, 44, 55), **shown)
-    window.picking.pick(44)
+    window.features["traces"].picking.pick(44)
     window.layouts.apply(_SHOWN)
 
 

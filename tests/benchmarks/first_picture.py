@@ -21,7 +21,7 @@ def _watched(source: str, kept: Path | None = None) -> Any:
     application, window = opened(source, kept)
 
     def look() -> None:
-        if any(math.isfinite(age) for _, age in window.membrane.ages):
+        if any(math.isfinite(age) for _, age in window.features["membrane"].membrane.ages):
             timer.stop()
             print(time.monotonic() - started, time.process_time())
             window.close()

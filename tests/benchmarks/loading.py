@@ -9,6 +9,7 @@ import psutil
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
+from kappaskin_app.features import FEATURES
 from kappaskin_app.shell.window import MainWindow
 
 SETTLE = 8.0
@@ -16,7 +17,7 @@ SETTLE = 8.0
 
 def held(application: QApplication, port: str, seconds: float) -> dict[str, float]:
     """Drawings and frames per second, losses, worst gaps, and how much memory grew."""
-    window = MainWindow(port)
+    window = MainWindow([made() for made in FEATURES], port)
     window.show()
     gaps: list[float] = []
     memory: list[list[int]] = []
@@ -39,7 +40,7 @@ def held(application: QApplication, port: str, seconds: float) -> dict[str, floa
     timer.stop()
     came = status.accounting.accepted - before.accounting.accepted
     lasted, watched = now - begun - SETTLE, min(seconds, 60.0)
-    drawn = sum(when > now - watched for when, _ in window.membrane.ages)
+    drawn = sum(when > now - watched for when, _ in window.features["membrane"].membrane.ages)
     window.close()
     quarter = max(1, len(memory) // 4)
     grown = np.subtract(*(np.mean(part, axis=0) for part in (memory[-quarter:], memory[:quarter])))

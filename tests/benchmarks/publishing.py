@@ -53,7 +53,7 @@ def published(port: str, seconds: float, deaf: bool, targets: list[str]) -> dict
     application.exec()
     timer.stop()
     now, status, before = time.monotonic(), window.session.status, begun[0]
-    drawn = sum(when > now - seconds for when, _ in window.membrane.ages)
+    drawn = sum(when > now - seconds for when, _ in window.features["membrane"].membrane.ages)
     window.close()
     for each in made:
         each.close()

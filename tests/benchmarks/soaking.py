@@ -17,6 +17,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app import guard
+from kappaskin_app.features import FEATURES
 from kappaskin_app.shell.window import MainWindow
 
 SETTLE = 70.0  # s: by then each change was made four times, and each panel shown
@@ -63,7 +64,7 @@ def _changing(window: MainWindow) -> Iterator[None]:
             window.history.stack.undo()
             yield
         window.docks.reveal(("element", "traces", "numbers", "health")[turn % 4])
-        window.picking.pick(turn % 100)
+        window.features["traces"].picking.pick(turn % 100)
         yield
 
 
@@ -77,7 +78,7 @@ def _recording(window: MainWindow, folder: Path) -> Iterator[None]:
 def soaked(
     application: QApplication, source: str, seconds: float, folder: Path
 ) -> dict[str, float]:
-    window = MainWindow(source)
+    window = MainWindow([made() for made in FEATURES], source)
     window.show()
     begun, seen = time.monotonic(), []
     accepted: list[int] = []

@@ -1,7 +1,7 @@
 """Every action a person can take, registered once: menus, shortcuts and palette come from here."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from PySide6.QtGui import QAction, QKeySequence
@@ -30,12 +30,14 @@ class Entry:
 class Actions:
     """The registry, by name; adding an action also puts it into its menu."""
 
-    def __init__(self, window: QMainWindow) -> None:
+    def __init__(self, window: QMainWindow, menus: Sequence[str] = ()) -> None:
         self._window = window
         self.entries: dict[str, Entry] = {}
         self._menus: dict[str, QMenu] = {}
         self._why_not: dict[str, str] = {}
         self._tips = KeyTips(window)
+        for title in menus:  # in this order, whoever is first to have an action in one
+            self._menu(title)
 
     def add(
         self,
@@ -90,6 +92,11 @@ class Actions:
             bar = self._menu(around) if around else self._window.menuBar()
             self._menus[title] = bar.addMenu(own)
         return self._menus[title]
+
+    def drop_empty_menus(self) -> None:
+        """Leave out menus in which nothing stands."""
+        for menu in self._menus.values():
+            menu.menuAction().setVisible(not menu.isEmpty())
 
     def __getitem__(self, name: str) -> QAction:
         return self.entries[name].action

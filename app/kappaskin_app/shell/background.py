@@ -1,20 +1,14 @@
-"""What takes longer than a moment, wherever it is done: told in one place, and ended from there."""
+"""Background tasks: what takes longer than a moment, shown in one place and ended from there."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.live import Status
 
-if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
-
 _MOMENT = 0.3  # s that needs no words
-_STOPPED = "Cancelled while it was computed; what was taken is forgotten."
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +20,8 @@ class Task:
     cancel: Callable[[], object] | None = None
 
 
-class Doing(QObject):
-    """Follows `tasks`; `told` says what is done for longer than a moment, or nothing.
+class Tasks(QObject):
+    """Follows the tasks that were added; `told` says what goes on for longer than a moment.
 
     Of several it is the one that goes on longest, `task`, which `cancel` ends.
     """
@@ -35,16 +29,20 @@ class Doing(QObject):
     told = Signal(str)
 
     def __init__(
-        self,
-        tasks: Sequence[Task],
-        parent: QObject | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        self, parent: QObject | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
         super().__init__(parent)
-        self._tasks, self._clock = tasks, clock
+        self._tasks: list[Task] = []
+        self._clock = clock
         self._since: dict[Task, float] = {}
         self._words = ""
         self.task: Task | None = None
+
+    def add(
+        self, words: str, goes_on: Callable[[], bool], cancel: Callable[[], object] | None = None
+    ) -> None:
+        """Follow something that may take long."""
+        self._tasks.append(Task(words, goes_on, cancel))
 
     def follow(self, _: Status) -> None:
         """Look what goes on now."""
@@ -68,33 +66,3 @@ class Doing(QObject):
         """End what is told of."""
         if self.task is not None and self.task.cancel is not None:
             self.task.cancel()
-
-
-def tasks_of(window: "MainWindow") -> list[Task]:
-    """All in a window that may take long."""
-    session, gallery = window.session, window.scene.gallery
-    export, repair = window.exports.dialog, window.taping.repairs
-    planning, costing, seeing = window.planning, window.costing, window.seeing
-    replaying, calibrating = window.replaying, window.calibrating
-    designing = window.designing
-    return [
-        Task("Making the scene; Ctrl+Z takes it back", lambda: session.making),
-        Task(
-            "Computing the new settings; Ctrl+Z takes them back", lambda: session.status.computing
-        ),
-        Task("Reading the recording", lambda: replaying.reading, replaying.stop_reading),
-        Task("Writing the export", lambda: export.busy, export.cancel),
-        Task("Repairing the recording", lambda: repair.busy, repair.cancel),
-        Task(
-            "Computing the calibration",
-            lambda: calibrating.computing,
-            partial(calibrating.cancel, _STOPPED),
-        ),
-        Task("Sizing and timing effects", lambda: planning.waiting, planning.cancel),
-        Task("Measuring what accuracy costs", lambda: costing.running, costing.cancel),
-        Task("Computing how shapes are seen", lambda: seeing.computing, seeing.cancel),
-        Task("Placing the design's elements", lambda: designing.predicting, designing.cancel),
-        Task("Simulating the design", lambda: designing.checking, designing.cancel),
-        Task("Painting the scenes", lambda: gallery.painting, gallery.rest),
-        Task("Learning what objects read like", lambda: window.naming.learning),
-    ]

@@ -37,6 +37,7 @@ class Docks:
         self._shown: dict[str, QWidget] = {}
         self._keys: dict[str, str] = {}
         self._above: dict[str, str] = {}
+        self._right: list[str] = []
 
     def __getitem__(self, name: str) -> Dock:
         return self._docks[name]
@@ -52,6 +53,20 @@ class Docks:
     def below(self) -> list[QDockWidget]:
         """Those that share the place below the skin."""
         return [self._docks[name] for name in self._keys if name not in self._above]
+
+    @property
+    def right(self) -> list[Dock]:
+        """Those that stood right of the skin at first."""
+        return [self._docks[name] for name in self._right]
+
+    def put_left(self, name: str, title: str, widget: QWidget) -> None:
+        """Show a widget in a column left of the skin."""
+        self.put_beside(name, title, widget, Qt.DockWidgetArea.LeftDockWidgetArea)
+
+    def put_right(self, name: str, title: str, widget: QWidget) -> None:
+        """Show a widget in a column right of the skin."""
+        self.put_beside(name, title, widget, Qt.DockWidgetArea.RightDockWidgetArea)
+        self._right.append(name)
 
     def put_beside(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
         """Show a widget in a column beside the skin."""

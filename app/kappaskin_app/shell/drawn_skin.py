@@ -1,6 +1,7 @@
 """A skin as it is drawn: its points at rest, moved in and out along its normals, in mm."""
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +18,22 @@ _NEAREST = 0.7  # of the base radius, so that no skin is drawn through its own a
 
 
 _SEAM = 1e-9  # of a side: or a line passes between two triangles
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A way to look at the skin: from where, as shares of its longer side, and what is up."""
+
+    words: str
+    towards: tuple[float, float, float]
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def sees(self, axis: int) -> bool:
+        """Whether what runs along `axis` is not seen end-on."""
+        return any(share for other, share in enumerate(self.towards) if other != axis)
+
+
+FROM_THE_LEFT = Direction("from the front, a little from the left", (-0.45, -1.1, 1.1))
 
 
 class DrawnSkin:

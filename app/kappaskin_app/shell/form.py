@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin.live import Status
 from kappaskin_app.shell.keys import for_the_window
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings, ask_of
@@ -33,6 +34,7 @@ from kappaskin_app.shell.several import SeveralButton
 _AT_FIRST = Settings()
 _BEGUN = re.compile(r"[+-]?\d*\.?(\d*|\d+e[+-]?)", re.IGNORECASE)  # what may become a number
 _LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
+_OTHER = "Only for the simulated skin of these panels (Ctrl+M)."
 
 
 class WholeBox(QSpinBox):
@@ -292,3 +294,19 @@ class Form(Panel):
             with QSignalBlocker(box):
                 box.setMaximum(most * how.scale)
             box.setToolTip(_tip_of(how, most))
+
+
+class SimulationForm(Form):
+    """A form that belongs to the simulation, and says so while a real sensor is connected."""
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        for editor in self.editors():
+            editor.setEnabled(simulating)
+        if simulating:
+            self.show_message(self.alarm(status))
+        else:
+            self.show_message(_OTHER, hint=True)
+
+    def alarm(self, status: Status) -> str:
+        """What is wrong with what is asked for here, while it is simulated."""
+        return ""

@@ -1,27 +1,29 @@
-"""The badge and the numbers across the whole window, and between them what is recorded."""
+"""The header across the whole window: the badge, and what features show beside it."""
 
-from PySide6.QtWidgets import QToolBar
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QToolBar, QWidget
 
-from kappaskin.recording import Written
-from kappaskin_app.features.contact.readouts import Readouts
-from kappaskin_app.features.recording.recording_mark import RecordingMark
 from kappaskin_app.shell.badge import Badge
 
 
 class Header(QToolBar):
-    """Holds `badge`, `mark` and `readouts`."""
+    """Begins with the `badge`."""
 
-    def __init__(self, badge: Badge, mark: RecordingMark, readouts: Readouts) -> None:
+    def __init__(self, badge: Badge) -> None:
         super().__init__("Header")
         self.setObjectName("header")
         self.setMovable(False)
         self.toggleViewAction().setEnabled(False)
+        self._first: QAction | None = None
         self.addWidget(badge)
-        self._mark, self._shown = mark, self.addWidget(mark)
-        self._shown.setVisible(False)
-        self.addWidget(readouts)
 
-    def show_written(self, written: Written, ended: str) -> None:
-        """Show that something is recorded, or that it ended by itself."""
-        self._shown.setVisible(written.active or bool(ended))
-        self._mark.show_written(written, ended)
+    def add(self, widget: QWidget) -> None:
+        """Show a widget after all others."""
+        shown = self.addWidget(widget)
+        self._first = self._first or shown
+
+    def add_mark(self, widget: QWidget) -> QAction:
+        """Show a widget right after the badge; the action shows and hides it."""
+        if self._first is None:
+            return self.addWidget(widget)
+        return self.insertWidget(self._first, widget)

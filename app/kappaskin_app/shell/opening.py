@@ -1,57 +1,66 @@
 """Files that a person opens, whatever is in them, and the last of them in a menu."""
 
 from collections.abc import Callable
-from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QMenu
+from PySide6.QtCore import QEvent, QMimeData, QObject, Signal
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeyEvent
+from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
-from kappaskin_app.features.presenter.objects import may_choose
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.folders import newest, recordings_folder
-from kappaskin_app.shell.session import RECORDED
-from kappaskin_app.shell.touching import touches_at
-
-if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.work_dialog import with_ending
 
 MOST_RECENT = 12
-_KINDS = {
-    "recording": (".mcap", ".part"),
-    "scene or calibration": (".toml",),
-    "mesh": (".stl", ".ply", ".obj"),
-}
-_SUFFIXES = tuple(suffix for suffixes in _KINDS.values() for suffix in suffixes)
-_MILLIMETRE = 1e-3  # m, the unit of what is drawn for a printer
-_CHECKSUM = "sha256"  # the line that a calibration has and a scene has not
-_HEAD = 4096  # characters, among which it is
+SCENES = "Scene (*.toml)"
 
 
-def opens(file: Path) -> bool:
-    """Whether this is a kind of file that can be opened."""
-    return file.suffix.lower() in _SUFFIXES
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """Files that can be opened: in words, their `suffixes`, and what opens one.
+
+    Of several kinds with one suffix, `is_one` says which a file is; the last that says nothing is
+    any other. One that `needs_sensor` waits for it.
+    """
+
+    words: str
+    suffixes: tuple[str, ...]
+    open: Callable[[Path], object]
+    is_one: Callable[[Path], bool] | None = None
+    needs_sensor: bool = False
 
 
-def is_calibration(file: Path) -> bool:
-    """Whether a TOML file is a calibration; refused where it cannot be read."""
-    try:
-        with file.open(encoding="utf-8", errors="replace") as text:
-            return any(line.startswith(_CHECKSUM) for line in text.read(_HEAD).splitlines())
-    except OSError as error:
-        raise Refusal(
-            f"{file}: cannot be read ({error.strerror}); check its name and who may read it"
-        ) from error
+class Drops(QObject):
+    """Watches `window`; a file dropped there is opened, a key left over is taken."""
 
+    def __init__(self, window: QWidget, opening: "Opening") -> None:
+        super().__init__(window)
+        self._opening = opening
+        self.take_key: Callable[[QKeyEvent], bool] = lambda _: False
+        window.setAcceptDrops(True)
+        window.installEventFilter(self)
 
-def _waits(file: Path) -> bool:
-    """Whether a file is of use only where there is a sensor."""
-    with suppress(Refusal):
-        return file.suffix.lower() == ".toml" and is_calibration(file)
-    return False
+    def dropped_on(self, data: QMimeData) -> Path | None:
+        """The file among what is dragged that can be opened, if there is one."""
+        files = [Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()]
+        return next((file for file in files if self._opening.opens(file)), None)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if isinstance(event, QDropEvent):  # which one that enters is too
+            path = self.dropped_on(event.mimeData())
+            if path is None:
+                return False
+            event.acceptProposedAction()
+            if not isinstance(event, QDragEnterEvent) and event.type() == QEvent.Type.Drop:
+                guarded(self._opening.open)(path)
+            return True
+        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
+            return self.take_key(event)
+        return False
 
 
 class Opening(QObject):
@@ -60,35 +69,62 @@ class Opening(QObject):
     told = Signal(str)
     changed = Signal()
 
-    def __init__(self, window: "MainWindow") -> None:
+    def __init__(self, window: QWidget, history: History, session: Session) -> None:
         super().__init__(window)
-        self._replaying, self._staging = window.replaying, window.staging
-        self._calibrating, self._history = window.calibrating, window.history
-        self._session, self._wishes = window.session, window.wishes
+        self._history, self._session = history, session
+        self._kinds: list[Kind] = []
+        self.others: Callable[[], list[Path]] = list
+        """Files to offer besides the last ones."""
         self.recent: list[Path] = []
         self._first: Path | None = None
         self.menu = QMenu(window)
         self.menu.setToolTipsVisible(True)
         self.menu.aboutToShow.connect(guarded(self._list))
-        self._replaying.opened.connect(guarded(self._note_recording))
-        self._staging.used.connect(guarded(self.note))
-        self._calibrating.used.connect(guarded(self.note))
+        session.reported.connect(guarded(self.follow))
+        self.drops = Drops(window, self)
+
+    def add(self, kind: Kind) -> None:
+        """Open files of this `kind` too."""
+        self._kinds.append(kind)
+
+    def opens(self, file: Path) -> bool:
+        """Whether this is a kind of file that can be opened."""
+        return any(file.suffix.lower() in kind.suffixes for kind in self._kinds)
 
     def open(self, file: Path) -> None:
-        """Play a recording or a scene, use a calibration, or let a mesh touch the skin."""
+        """Do with a file what its kind is for, or say why that cannot be."""
         try:
-            self._way(file)(file)
+            self._kind(file).open(file)
         except Refusal as refusal:
             self.told.emit(str(refusal))
 
     def begin_with(self, file: Path) -> None:
-        """Open `file` in a new window; a calibration once it is known which sensor there is."""
+        """Open `file` in a new window; what needs a sensor once it is known which there is."""
         if self._session.engine.adopted:
             self.told.emit(f"{file.name} is not opened: the recording that was left goes on")
-        elif self._session.status.sensor is None and _waits(file):
+        elif self._session.status.sensor is None and self._waits(file):
             self._first = file
         else:
             self.open(file)
+
+    def _waits(self, file: Path) -> bool:
+        try:
+            return self._kind(file).needs_sensor
+        except Refusal:
+            return False
+
+    def save_scene(self, name: str, write: Callable[[Path], object]) -> None:
+        """Ask for a file, `name` to begin with, and `write` a scene there."""
+        window = self.menu.parentWidget()
+        file, _ = QFileDialog.getSaveFileName(window, "Save the scene", name, SCENES)
+        if file:
+            try:
+                path = with_ending(file, ".toml")
+                write(path)
+                self.note(path)
+                self.told.emit(f"Saved {path}")
+            except (OSError, Refusal) as error:
+                self.told.emit(f"Could not write {file}: {error}")
 
     def follow(self, status: Status) -> None:
         """Open what waited for a sensor."""
@@ -96,36 +132,14 @@ class Opening(QObject):
             file, self._first = self._first, None
             self.open(file)
 
-    def _way(self, file: Path) -> Callable[[Path], None]:
-        suffix = file.suffix.lower()
-        if suffix in _KINDS["recording"]:
-            return self._replaying.open_file
-        if suffix in _KINDS["mesh"]:
-            return self._touch_with
-        if suffix == ".toml":
-            return self._use if is_calibration(file) else self._staging.play
-        kinds = ", ".join(f"a {kind} ({' '.join(ends)})" for kind, ends in _KINDS.items())
+    def _kind(self, file: Path) -> Kind:
+        """The kind of a file; refused where it is none, or cannot be read."""
+        alike = [kind for kind in self._kinds if file.suffix.lower() in kind.suffixes]
+        for kind in sorted(alike, key=lambda kind: kind.is_one is None):
+            if kind.is_one is None or kind.is_one(file):
+                return kind
+        kinds = ", ".join(f"a {kind.words} ({' '.join(kind.suffixes)})" for kind in self._kinds)
         raise Refusal(f"{file}: expected {kinds}; choose such a file")
-
-    def _use(self, file: Path) -> None:
-        self._calibrating.load(file)
-        self.told.emit(self._calibrating.file_refused or f"Using the calibration {file.name}")
-
-    def _touch_with(self, file: Path) -> None:
-        """Let the object in a mesh file press where the load is, in millimetres as it is drawn."""
-        session = self._session
-        touches = touches_at(session.scene, session.time) if session.inside else []
-        if not touches or not may_choose(session.scene):
-            raise Refusal(
-                f"{file}: expected a simulated skin that one object at rest touches, to take its "
-                "place; choose such a scene (F2), or run `kappaskin demo`"
-            )
-        load = touches[0].load
-        x, y = (float(value) for value in load.centre())
-        said = {"what": "mesh", "file": str(file.absolute()), "unit": _MILLIMETRE}
-        self._wishes.touch_with(said, x, y, load.force)
-        self.note(file)
-        self.told.emit(f"{file.name} touches the skin, its numbers taken as millimetres")
 
     # The last ones.
 
@@ -134,9 +148,6 @@ class Opening(QObject):
         file = file.absolute()
         self.recent = [file, *(other for other in self.recent if other != file)][:MOST_RECENT]
         self.changed.emit()
-
-    def _note_recording(self, source: str) -> None:
-        self.note(Path(source.removeprefix(RECORDED)))
 
     def clear(self) -> None:
         """Forget the last ones."""
@@ -147,8 +158,8 @@ class Opening(QObject):
         self.changed.emit()
 
     def last_ones(self) -> list[Path]:
-        """The files opened last, and the newest recordings besides."""
-        others = [file for file in newest(recordings_folder()) if file not in self.recent]
+        """The files opened last, and others besides."""
+        others = [file for file in self.others() if file not in self.recent]
         return [*self.recent, *others]
 
     def _list(self) -> None:

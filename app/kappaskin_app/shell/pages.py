@@ -1,4 +1,4 @@
-"""All panels on their pages: a panel is added by one line, and shows whatever all are shown."""
+"""The pages of settings: features add panels to them; all show settings, status and theme."""
 
 from typing import TypeVar
 
@@ -6,17 +6,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QScrollArea, QTabWidget, QWidget
 
 from kappaskin.live import Status
-from kappaskin_app.features.calibration.in_use import InUsePanel
-from kappaskin_app.features.calibration.panel import CalibratePanel
-from kappaskin_app.features.calibration.tare import TarePanel
-from kappaskin_app.features.connection.panel import ConnectionPanel
-from kappaskin_app.features.estimator.panel import BasisPanel
-from kappaskin_app.features.membrane.panel import ViewPanel
-from kappaskin_app.features.publish.panel import PublishPanel
-from kappaskin_app.features.recording.panel import RecordingPanel
-from kappaskin_app.features.scene.load_panel import LoadPanel, NoisePanel
-from kappaskin_app.features.sensor.panel import ElectronicsPanel, RegionPanel, SpoilsPanel
-from kappaskin_app.features.sensor.skin import ElementsPanel, ShapePanel, SupportPanel
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings
@@ -24,73 +13,60 @@ from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.columns import scrolled
 
 _Some = TypeVar("_Some", bound=Panel)
-_LIVE, _SKIN, _SENSOR, _CALIBRATE = "&Live", "S&kin", "Se&nsor", "C&alibrate"
+LIVE, SKIN, SENSOR, CALIBRATE = "&Live", "S&kin", "Se&nsor", "C&alibrate"
+"""The titles of the pages, in their order."""
+_PAGES = (LIVE, SKIN, SENSOR, CALIBRATE)
 
 
-class Panels(QTabWidget):
-    """The panels by name; `wished` says which setting is to be what.
+class Pages(QTabWidget):
+    """`requested` says which setting is to be what.
 
-    `reset_wanted` says of which panel, and which, are to be as they are at first.
+    `reset_requested` says of which panel, and which, are to be as they are at first, and
+    `read_wanted` which page of the guide a person wants to read.
     """
 
-    wished = Signal(str, object)
-    reset_wanted = Signal(str, tuple)
+    requested = Signal(str, object)
+    reset_requested = Signal(str, tuple)
+    read_wanted = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._pages: dict[str, list[Panel]] = {}
-        self.connection = self._add(_LIVE, ConnectionPanel())
-        self.recording = self._add(_LIVE, RecordingPanel())
-        self.tare = self._add(_LIVE, TarePanel())
-        self.load = self._add(_LIVE, LoadPanel())
-        self.noise = self._add(_LIVE, NoisePanel())
-        self.basis = self._add(_LIVE, BasisPanel())
-        self.view = self._add(_LIVE, ViewPanel())
-        self.publish = self._add(_LIVE, PublishPanel())
-        self.shape = self._add(_SKIN, ShapePanel())
-        self.elements = self._add(_SKIN, ElementsPanel())
-        self.support = self._add(_SKIN, SupportPanel())
-        self.electronics = self._add(_SENSOR, ElectronicsPanel())
-        self.spoils = self._add(_SENSOR, SpoilsPanel())
-        self.region = self._add(_SENSOR, RegionPanel())
-        self.in_use = self._add(_CALIBRATE, InUsePanel())
-        self.calibrate = self._add(_CALIBRATE, CalibratePanel())
-        for title, panels in self._pages.items():
-            self.addTab(scrolled(*panels), title)
+
+    def add(self, page: str, panel: _Some) -> _Some:
+        """A panel at the end of the page with this title."""
+        self._pages.setdefault(page, []).append(panel)
+        self.join(panel)
+        return panel
+
+    def join(self, panel: Panel) -> None:
+        """Pass on what is asked for in a panel, be it on a page or elsewhere."""
+        panel.wished.connect(self.requested)
+        panel.read_wanted.connect(self.read_wanted)
+        if isinstance(panel, Form):
+            panel.reset_wanted.connect(self.reset_requested)
+
+    def build(self) -> None:
+        """Make the pages, once all panels are there."""
+        for title in _PAGES:
+            if title in self._pages:
+                self.addTab(scrolled(*self._pages[title]), title)
         self.setUsesScrollButtons(False)  # every title is to be seen
         self.tabBar().setElideMode(Qt.TextElideMode.ElideNone)
 
-    def _add(self, page: str, panel: _Some) -> _Some:
-        """A panel at the end of the page with this title."""
-        self._pages.setdefault(page, []).append(panel)
-        panel.wished.connect(self.wished)
-        if isinstance(panel, Form):
-            panel.reset_wanted.connect(self.reset_wanted)
-        return panel
-
     def all(self) -> list[Panel]:
-        return [panel for panels in self._pages.values() for panel in panels]
+        return [panel for page in _PAGES for panel in self._pages.get(page, ())]
 
     def turn(self, pages: int) -> None:
         """Show the page so many further on, round and round."""
         self.setCurrentIndex((self.currentIndex() + pages) % self.count())
         self.tabBar().setFocus(Qt.FocusReason.TabFocusReason)
 
-    def show_calibration(self) -> None:
-        """Show the page that guides through a calibration."""
-        self.setCurrentIndex(list(self._pages).index(_CALIBRATE))
-
-    def show_recording(self) -> None:
-        """Show the panel on recordings."""
-        self._show_live(self.recording)
-
-    def show_connection(self) -> None:
-        """Show the panel on connections, ready to choose a source."""
-        self._show_live(self.connection)
-        self.connection.sources.setFocus(Qt.FocusReason.OtherFocusReason)
-
-    def _show_live(self, panel: Panel) -> None:
-        self.setCurrentIndex(list(self._pages).index(_LIVE))
+    def reveal(self, panel: Panel) -> None:
+        """Show the page of a panel, scrolled to it."""
+        titles = [title for title in _PAGES if title in self._pages]
+        [of] = [title for title in titles if panel in self._pages[title]]
+        self.setCurrentIndex(titles.index(of))
         page = self.currentWidget()
         if isinstance(page, QScrollArea):
             page.ensureWidgetVisible(panel)

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
+from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import says_kind, with_ending
 
 _MARGIN, _TEXT = 8, 11  # px
@@ -30,6 +31,13 @@ def caption_of(status: Status, at: float, now: datetime) -> str:
             if kept is not None:
                 parts.append(f"{name} of {kept.date:%Y-%m-%d %H:%M} ({kept.digest[:8]})")
     return "  \N{MIDDLE DOT}  ".join(parts)
+
+
+def caption_now(session: Session) -> str:
+    """What the window shows now, in words."""
+    estimate = session.estimate
+    at = estimate.device_time if estimate is not None else float("nan")
+    return caption_of(session.status, at, datetime.now())
 
 
 def write_png(image: QImage, path: Path) -> None:

@@ -15,7 +15,6 @@ from PySide6.QtCore import QLockFile, QObject
 
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
-from kappaskin_app.features.log.mishaps import REPORT_TIP
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.banner import Offered
 from kappaskin_app.shell.settings import Settings
@@ -121,14 +120,17 @@ class Recovering(QObject):
         window = self._window
         offered = [Offered("Its se&ttings", _SETTINGS, partial(self._use, last))]
         if last.source and not last.source.startswith("sim:"):
-            connect = partial(window.connect_to, last.source)
+            connect = partial(window.session.request_source, last.source)
             offered.append(Offered("Its s&ource", f"Connect {last.source} again.", connect))
         if (recording := _left(last.recording)) is not None:
-            play = partial(window.replaying.open_file, recording)
+            play = partial(window.opening.open, recording)
             offered.append(Offered("Its recordin&g", f"Play {recording}.", play))
-        report = window.mishaps.report.ask
-        offered.append(Offered("Re&port\N{HORIZONTAL ELLIPSIS}", REPORT_TIP, report))
-        window.offer.show_offer("The last session ended unexpectedly. Take up:", _TIP, offered)
+        if (report := window.actions_by_name.entries.get("report")) is not None:
+            words, act = report.action.text(), report.action.trigger
+            offered.append(Offered(words, report.action.toolTip(), act))
+        window.display.centre.offer.show_offer(
+            "The last session ended unexpectedly. Take up:", _TIP, offered
+        )
 
     def _use(self, last: Last) -> None:
         names = (f.name for f in fields(Settings) if f.name not in OF_SENSORS)

@@ -7,27 +7,12 @@ from numpy.typing import NDArray
 
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.shades import SHADES
+from kappaskin_app.widgets.numbers import round_up
 
 Array = NDArray[np.float64]
 
 _CLEARLY = 1.5  # times as far out as in, or in as out, before the colours change sides
 _PATIENCE = 2.0  # s that the values must stay small before the range narrows
-
-
-def round_up(value: float) -> float:
-    """The least of 1, 1.5, 2, 3, 5, 7 times a power of ten that is at least `value`."""
-    if not value > 0:
-        return 0.0
-    power = 10.0 ** math.floor(math.log10(value))
-    return next(m * power for m in (1, 1.5, 2, 3, 5, 7, 10) if m * power >= value * (1 - 1e-12))
-
-
-def in_digits(value: float, span: float) -> str:
-    """A number of a scale, with the digits that tell it from another a hundredth of `span` off."""
-    if not span > 0:
-        return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
-    rounded = round(value, max(0, 2 - math.floor(math.log10(span)))) + 0.0  # no minus before a zero
-    return f"{rounded:g}".replace("-", "\N{MINUS SIGN}")
 
 
 class SteadyRange:

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 
@@ -74,13 +75,16 @@ class Session(QObject):
     becomes another one, `refused` and `refusal` why it is not the one the settings describe now,
     with nothing to say when it is, and `preparing` whether that takes a while to be computed.
     `unsent` says why nothing is published, with nothing to say when it is.
-    `turning` tells that another source is about to be taken, or none; a recording that is one is
-    computed as `base` says, but for what the settings do.
+    `turning` tells that another source is about to be taken, or none, `source_changed` which one
+    is taken; a recording that is one is computed as `base` says, but for what the settings do.
+    `pausing` tells that a person pauses what is played, or lets it go on.
     """
 
     refused = Signal(str)
     preparing = Signal(bool)
     turning = Signal()
+    source_changed = Signal(str)
+    pausing = Signal()
     playing = Signal(Scene)
     unsent = Signal(str)
     estimated = Signal(Estimate)
@@ -109,12 +113,16 @@ class Session(QObject):
         self._lost_since, self._turned_at = math.inf, 0.0
         self.estimate: Estimate | None = None
         self.source = ""
+        self.takers: list[Callable[[str], bool]] = []
+        """Who is asked first whether they take a source that is requested."""
+        self.may_close: list[Callable[[], bool]] = []
+        """Who is asked, when a person closes the window, whether it may be."""
         self._next_status, self.closed = 0.0, False
         self._shown: tuple[int, int] = (0, -1)
         history.changed.connect(guarded(self._follow))
-        self._timer = QTimer(self, interval=_TICK, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
-        self._timer.timeout.connect(self.tick)
-        self._timer.start()
+        self.timer = QTimer(self, interval=_TICK, timerType=Qt.TimerType.PreciseTimer)  # pyright: ignore[reportCallIssue]
+        self.timer.timeout.connect(self.tick)
+        self.timer.start()
 
     @property
     def inside(self) -> bool:
@@ -136,6 +144,20 @@ class Session(QObject):
         """Whether a recording is what is read."""
         return self.source.startswith(RECORDED)
 
+    def request_source(self, source: str) -> None:
+        """Read from `source` from now on, as a person asks."""
+        if not any(takes(source) for takes in self.takers):
+            self.connect_to(source)
+
+    def simulate(self) -> None:
+        """Simulate the panels' skin, whatever was read or written."""
+        self._history.change("Simulated skin", -1, written=None)
+        self.request_source("sim:")
+
+    def pause(self) -> None:
+        """Let what is played stand, or go on."""
+        self.pausing.emit()
+
     def connect_to(self, source: str, already: bool = False) -> None:
         """Take frames from `source`, unless the engine does `already`.
 
@@ -145,6 +167,7 @@ class Session(QObject):
         self.turning.emit()
         self.source, self.estimate = source.strip(), None
         self._turned_at = time.monotonic()
+        self.source_changed.emit(self.source)
         if not already:
             self.engine.connect(self.source)
         if self.inside:
@@ -155,6 +178,7 @@ class Session(QObject):
     def go_on(self, left: Left) -> None:
         """Go on with what the engine was left with, whose settings are the history's."""
         self.source, self.running = left.asked.source or "", bool(left.asked.speed)
+        self.source_changed.emit(self.source)
         self.engine.compare(None)
         if self.inside:
             self._play()
@@ -338,7 +362,7 @@ class Session(QObject):
         return state_of(self.status, computed, time.monotonic(), paused)
 
     def close(self) -> None:
-        self._timer.stop()
+        self.timer.stop()
         self.closed = True
         self._ahead.close()
         self.engine.close()

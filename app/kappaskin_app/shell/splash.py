@@ -52,7 +52,7 @@ class Splash(QWidget):
         """Wait for the first reading to be drawn in a `window`, and go."""
         self.say(_READING)
         # The connection holds this splash, which nothing else does, until it goes.
-        self._watching = window.membrane.drawn.connect(
+        self._watching = window.display.drawn.connect(
             lambda: self._go() if window.display.estimate_shown() is not None else None
         )
         QTimer.singleShot(_MOST, self, self._go)

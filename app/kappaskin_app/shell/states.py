@@ -5,6 +5,8 @@ import math
 from kappaskin.live import Status
 from kappaskin.recording import Replay
 from kappaskin_app.shell.badge import LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, is_now
+from kappaskin_app.shell.settings.shown import METHOD_SHORT
+from kappaskin_app.widgets.parts import sentence
 
 _STALE_AFTER = 0.5  # s without a frame
 
@@ -38,3 +40,15 @@ def _replayed(replay: Replay, saturated: bool) -> str:
     gap = any(begin < replay.at < end for begin, end in replay.gaps)
     over = replay.at >= replay.length and not replay.looped
     return is_now(REPLAY, gap=gap, saturated=saturated, paused=over or not replay.speed)
+
+
+def in_use(status: Status) -> str:
+    """Why the fit is not the one asked for, and which it is; nothing when it is."""
+    if not status.refusal:
+        return ""
+    if status.slot is None:
+        return f"Nothing is in use. {sentence(status.refusal)}"
+    setup, sensor = status.setup, status.sensor
+    across = 1 if sensor is not None and sensor.layout.patch.strip else setup.Nj
+    method = METHOD_SHORT.get(setup.method, setup.method)
+    return f"In use: {method}, {setup.Ni} x {across} functions. {sentence(status.refusal)}"

@@ -122,3 +122,12 @@ def _check_inside(scene: Scene, stimulus: Stimulus) -> None:
         pose, what = stimulus.pose_at(time), stimulus.what
         if isinstance(what, Indenter):
             PointLoad(what.x + pose.dx, what.y + pose.dy, 1.0).check(scene.plate.patch)
+
+
+def may_choose(scene: Scene) -> bool:
+    """Whether another object can take the place of what touches: one alone, and at rest.
+
+    A strip is alike along y, as only a load can be.
+    """
+    alone = len(scene.stimuli) == 1 and not scene.moves
+    return alone and not scene.plate.patch.strip

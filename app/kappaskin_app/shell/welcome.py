@@ -1,84 +1,67 @@
-"""Ways to begin, offered above the skin when a window opens."""
+"""Welcome: what one may begin with, offered above the skin when a window opens."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QMenu
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.banner import Offered
-
-if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.shell.banner import Offer, Offered
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.requests import Requests
+from kappaskin_app.shell.session import Session
 
 _LASTS = 60.0  # s, unless somebody is at it
-_DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _TIP = (
     "What moves below is a simulated skin: drag the red arrow. All of this is in the menus "
-    "too, and Help > Ways to begin shows it again."
+    "too, and Help > Welcome shows it again."
 )
 
 
-class Beginning(QObject):
-    """Offers in a `window` what one may begin with, until something is begun."""
+class Welcome(QObject):
+    """Offers in a banner what features added, until something is begun."""
 
-    def __init__(self, window: "MainWindow") -> None:
-        super().__init__(window)
-        self._window = window
+    def __init__(
+        self,
+        offer: Offer,
+        history: History,
+        session: Session,
+        requests: Requests,
+        recent: QMenu,
+        parent: QObject,
+    ) -> None:
+        super().__init__(parent)
+        self._offer, self._history, self._session = offer, history, session
         self._offering = False
-        begun = (window.replaying.opened, window.staging.played, window.history.stack.indexChanged)
-        for signal in begun:
-            signal.connect(guarded(lambda *_: self._end()))
+        self._ways: list[Offered] = []
+        self._last = [
+            Offered("Recentl&y opened", "What was opened or recorded last.", recent),
+            Offered(
+                "Do not sho&w again",
+                "Begin without this line from now on; Welcome, under View, brings it back.",
+                lambda: requests.set("show_start", False),
+            ),
+        ]
+        session.source_changed.connect(guarded(lambda *_: self._end()))
+        history.stack.indexChanged.connect(guarded(lambda *_: self._end()))
+
+    def add(self, words: str, tip: str, act: Callable[[], object]) -> None:
+        """Offer this too."""
+        self._ways.append(Offered(words, tip, act))
 
     def begin(self) -> None:
-        """Offer them where a person wants it, and has not begun with something already."""
-        window, session = self._window, self._window.session
-        begun = window.presenting.on or not session.inside or session.engine.adopted is not None
-        if window.history.settings.show_start and not begun:
+        """Offer all where a person wants it, and has not begun with something already."""
+        begun = not self._session.inside or self._session.engine.adopted is not None
+        if self._history.settings.show_start and not begun:
             self.offer()
 
     def offer(self) -> None:
-        """Offer them, unless something else is offered."""
-        window = self._window
-        if not window.offer.isVisible():
+        """Offer all, unless something else is offered."""
+        if not self._offer.isVisible():
             self._offering = True
-            window.offer.show_offer("To begin:", _TIP, self._ways(), _LASTS)
-
-    def _ways(self) -> list[Offered]:
-        window = self._window
-        return [
-            Offered(
-                f"&Open a scene{_DOTS}",
-                "Simulate what a file says (Ctrl+O); ready ones with pictures: Scene (F2).",
-                window.staging.open,
-            ),
-            Offered(
-                "Connec&t a sensor",
-                "Choose the port of a real sensor under Connection, and connect it.",
-                self._show_connection,
-            ),
-            Offered(
-                "&Begin a lesson",
-                "Eleven of ten to fifteen minutes: from what a gage feels to mending a sensor.",
-                lambda: window.docks.reveal("lesson"),
-            ),
-            Offered(
-                f"&Play a recording{_DOTS}",
-                "Show what was recorded; a file dropped on the window does too.",
-                window.replaying.open,
-            ),
-            Offered("Recentl&y opened", "What was opened or recorded last.", window.opening.menu),
-            Offered(
-                "Do not sho&w again",
-                "Begin without this line from now on; Ways to begin, under View, brings it back.",
-                lambda: window.wishes.wish("show_start", False),
-            ),
-        ]
-
-    def _show_connection(self) -> None:
-        self._window.docks.reveal("settings")
-        self._window.panels.show_connection()
+            self._offer.show_offer("To begin:", _TIP, [*self._ways, *self._last], _LASTS)
 
     def _end(self) -> None:
         if self._offering:
             self._offering = False
-            self._window.offer.hide()
+            self._offer.hide()

@@ -1,88 +1,69 @@
-"""The window: builds the panels and views, wires them to the session, and nothing else."""
+"""The window: the shell's parts, and the features that are installed into them."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QPixmap, QResizeEvent
-from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QMainWindow,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import QApplication, QMainWindow
 
-from kappaskin.calibration import Tares, data_folder
-from kappaskin.live import Engine
-from kappaskin_app.features.accuracy.costing import Costing
-from kappaskin_app.features.accuracy.panel import CostPanel
-from kappaskin_app.features.calibration.calibrating import Calibrating
-from kappaskin_app.features.calibration.taring import Taring
-from kappaskin_app.features.compare.comparing import Comparing
-from kappaskin_app.features.compare.panel import ComparePanel
-from kappaskin_app.features.connection.events import Happenings
-from kappaskin_app.features.connection.plugs import Plugs
-from kappaskin_app.features.contact.naming import Naming
-from kappaskin_app.features.contact.numbers import NumbersPanel
-from kappaskin_app.features.design.designing import Designing
-from kappaskin_app.features.design.panel import DesignPanel
-from kappaskin_app.features.export.exports import Exports
-from kappaskin_app.features.guide.pages import Page
-from kappaskin_app.features.guide.panel import GuidePanel
-from kappaskin_app.features.health.map_testing import MapTesting
-from kappaskin_app.features.health.panel import HealthPanel
-from kappaskin_app.features.health.resting import Resting
-from kappaskin_app.features.lessons.panel import LessonPanel
-from kappaskin_app.features.lessons.pointing import Pointing
-from kappaskin_app.features.lessons.reading import DOCKS
-from kappaskin_app.features.lessons.teaching import Teaching
-from kappaskin_app.features.log.logged import Logged
-from kappaskin_app.features.log.mishaps import Mishaps
-from kappaskin_app.features.log.panel import LogPanel
-from kappaskin_app.features.membrane.looking import Looking
-from kappaskin_app.features.presenter.presenting import Presenting
-from kappaskin_app.features.presenter.stage import Stage
-from kappaskin_app.features.recording.recording_mark import RecordingMark
-from kappaskin_app.features.recording.replaying import Replaying
-from kappaskin_app.features.recording.taping import Taping
-from kappaskin_app.features.recording.transport import Transport
-from kappaskin_app.features.scene.panel import ScenePanel
-from kappaskin_app.features.scene.planning import Planning
-from kappaskin_app.features.scene.staging import Staging
-from kappaskin_app.features.scene.timeline import Timeline
-from kappaskin_app.features.stability.panel import StabilityPanel
-from kappaskin_app.features.stability.seeing import Seeing
-from kappaskin_app.features.traces.picking import Picking
-from kappaskin_app.guard import log
-from kappaskin_app.shell.background import Doing, tasks_of
-from kappaskin_app.shell.banner import Offer
+from kappaskin.live import Engine, Left, Status
+from kappaskin_app.guard import guarded, log
+from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import Docks
-from kappaskin_app.shell.drops import Drops
-from kappaskin_app.shell.form import Form
-from kappaskin_app.shell.header import Header
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.layouts.choosing import Layouts
 from kappaskin_app.shell.layouts.keeping import Keeping
-from kappaskin_app.shell.menus import Menus
-from kappaskin_app.shell.news import News
+from kappaskin_app.shell.menus import ORDER, Menus
 from kappaskin_app.shell.opening import Opening
-from kappaskin_app.shell.pages import Panels
+from kappaskin_app.shell.pages import Pages
+from kappaskin_app.shell.requests import Requests
 from kappaskin_app.shell.resume import settings_left
+from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import settings_for
-from kappaskin_app.shell.status_bar import Foot
-from kappaskin_app.shell.welcome import Beginning
-from kappaskin_app.shell.wiring import wire
-from kappaskin_app.shell.wishes import Wishes
+from kappaskin_app.theme import THEMES, Theme, bar_palette, letters, palette
 from kappaskin_app.widgets.columns import widen
 
 _PACKED = 80  # of a picture: packs a fifth less well than Qt does, in half the time
 
 
-class MainWindow(QMainWindow):
-    """The desktop app's one window."""
+class Feature(Protocol):
+    """One thing that a person does; its parts are its attributes."""
 
-    def __init__(self, source: str = "sim:", engine: Engine | None = None) -> None:
+    name: str
+
+    def install(self, shell: "MainWindow") -> None:
+        """Put its docks, panels, views and actions into the shell, and listen to it."""
+        ...
+
+
+class MainWindow(QMainWindow):
+    """The shell that features are installed into.
+
+    `settings_shown` and `theme_changed` bring what all views follow. `begun` tells, once all is
+    there, what an engine was left with by another window (or None) and which source is read;
+    `read_wanted` which page of the guide a person wants to read. `closing` lets go of what runs
+    before the session ends, `closed` of what draws after it.
+    """
+
+    settings_shown = Signal(Settings)
+    theme_changed = Signal(object)
+    begun = Signal(object, str)
+    read_wanted = Signal(str)
+    closing = Signal()
+    closed = Signal()
+
+    def __init__(
+        self,
+        features: Sequence[Feature],
+        source: str = "sim:",
+        engine: Engine | None = None,
+    ) -> None:
         super().__init__()
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
@@ -92,197 +73,132 @@ class MainWindow(QMainWindow):
         begun = settings_left(handed) if handed else settings_for(source)
         self.history = History(begun, self)
         self.session = Session(self.history, engine or Engine(), self)
-        self.wishes = Wishes(self.history, self.session)
-        self.calibrating = Calibrating(self.history, self)
-        self.taring = Taring(self.history, self.session.engine, Tares(data_folder()), self)
-        self.seeing = Seeing(self.history, self)
-        self.costing = Costing(self.history, self.session, self.wishes, self)
-        self.panels, self.display = Panels(), Display(self.session)
-        self.plugs = Plugs(self.panels.connection.sources, self)
-        self.happenings = Happenings(self)
-        self.planning = Planning(self.session, self)
-        self.cost, self.stability, self.scene = CostPanel(), StabilityPanel(), ScenePanel()
-        self.health, self.testing = HealthPanel(), MapTesting(self)
-        self.numbers = NumbersPanel()
-        self.logged = Logged()
-        self.log, self.guide = LogPanel(self.logged), GuidePanel()
-        self.compare = ComparePanel()
-        self.comparing = Comparing(self.history, self.session, self)
-        self.design, self.designing = DesignPanel(), Designing(self.history, self)
-        self.timeline, self.transport, self.mark = Timeline(), Transport(), RecordingMark()
-        self.offer = Offer()
-        self.taping = Taping(self.session.engine, self)
-        self.replaying = Replaying(self.history, self.session, self.transport, self)
-        self.staging = Staging(
-            *(self.history, self.session, self.wishes, self.planning),
-            *(self.scene, self.timeline, self),
-        )
-        self.opening = Opening(self)
-        self.drops = Drops(self, self.opening.open, self.transport.take_key)
-        self.picking = Picking(self.history, self.session, self.display)
-        self.membrane, self.heatmaps = self.display.membrane, self.display.heatmaps
-        self.badge, self.readouts = self.display.badge, self.display.readouts
-        self.mishaps = Mishaps(self)
-        foot = Foot(self.display.notice, self.mishaps.count)
-        self.setStatusBar(foot)
-        self.object, self.activity = foot.object, foot.activity
-        stage = Stage(self._centre())
-        self.setCentralWidget(stage)
-        self.presenting = Presenting(self, stage, self.session, self.display, self.wishes)
-        self.header = Header(self.badge, self.mark, self.readouts)
-        self.addToolBar(self.header)
-        self.lesson = LessonPanel()
-        self.docks, self.naming = self._surround(), Naming(self)
-        self.exports = Exports(self.session, self.membrane, self)
-        self.teaching = Teaching(
-            *(self.history, self.session, self.seeing, self),
-            *(self.connect_to, self._seen, self.exports.caption),
-        )
-        self.pointing = self._pointing()
-        self.looking = Looking(self.history, self.wishes, self.display)
+        self.requests = Requests(self.history, self.session)
+        self.selection = Selection(self)
+        self.display = Display(self.session, self)
+        self.actions_by_name = Actions(self, ORDER)
+        self.docks, self.panels = Docks(self), Pages()
+        self.tasks = Tasks(self)
+        self.opening = Opening(self, self.history, self.session)
         self.layouts = Layouts(self)
-        self.beginning = Beginning(self)
-        self.menus, self.keeping = Menus(self), Keeping(self)
-        self.actions_by_name = self.menus.actions
-        self.doing = Doing(tasks_of(self), self)
-        self.resting, self.news = Resting(self.session, self.testing), News(self)
-        wire(self)
-        self.news.follow_settings(self.history.settings)
-        self.plugs.look()
+        self.menus = Menus(self)
+        self.keeping = Keeping(self)
+        self.features: dict[str, Feature] = {}
+        self._lay_out()
+        self._wire()
+        for feature in features:
+            self.features[feature.name] = feature
+            feature.install(self)
+        self._finish(source, handed, already=engine is not None)
+
+    def _lay_out(self) -> None:
+        self.setCentralWidget(self.display.centre)
+        self.setStatusBar(self.display.foot)
+        self.addToolBar(self.display.header)
+        self.docks.put_left("settings", "Settings", self.panels)
+
+    def _wire(self) -> None:
+        session, tasks, activity = self.session, self.tasks, self.display.foot.activity
+        self.panels.requested.connect(guarded(self.requests.set))
+        self.panels.reset_requested.connect(guarded(self.requests.reset_panel))
+        self.panels.read_wanted.connect(self.read_wanted)
+        self.history.changed.connect(guarded(self._show_settings))
+        session.reported.connect(guarded(self._show_status))
+        session.reported.connect(guarded(tasks.follow))
+        tasks.told.connect(guarded(lambda words: activity.show_work(words, tasks.may_cancel)))
+        activity.cancel_wanted.connect(guarded(tasks.cancel))
+        tasks.add("Making the scene; Ctrl+Z takes it back", lambda: session.making)
+        tasks.add(
+            "Computing the new settings; Ctrl+Z takes them back", lambda: session.status.computing
+        )
+        for part in (self.opening, self.layouts):
+            part.told.connect(guarded(self.tell))
+
+    def _finish(self, source: str, handed: Left | None, already: bool) -> None:
+        self.panels.build()
+        self.menus.finish()
+        self.layouts.begin()
+        self.display.centre.offer.offered.connect(guarded(self.actions_by_name.retell))
+        self._show_settings(self.history.settings, anew=True)
         self.resize(1280, 800)
-        self.panels.connection.show_source(source)
         if handed:
             self.session.go_on(handed)
-            self.taping.go_on(handed, source)
         else:
-            self.session.connect_to(source, already=engine is not None)
-            self.taping.offer_repair()
-        self.replaying.adopt(self.session.source)
+            self.session.connect_to(source, already=already)
+        self.begun.emit(handed, source)
 
-    def _centre(self) -> QWidget:
-        centre = QWidget()
-        beside, above = QHBoxLayout(), QVBoxLayout(centre)
-        above.setContentsMargins(0, 0, 0, 0)
-        for layout in (beside, above):
-            layout.setSpacing(0)
-        beside.addWidget(self.membrane, 1)
-        beside.addWidget(self.display.scale)
-        above.addWidget(self.offer)
-        above.addLayout(beside, 1)
-        above.addWidget(self.timeline)
-        above.addWidget(self.transport)
-        return centre
+    def _show_settings(self, settings: Settings, anew: bool = False) -> None:
+        before = None if anew else self.display.settings
+        self.panels.show_settings(settings)
+        self.display.show_settings(settings)
+        self.settings_shown.emit(settings)
+        look = settings.theme, settings.letters
+        if before is None or look != (before.theme, before.letters):
+            self._show_look(settings)
 
-    def _surround(self) -> Docks:
-        docks, area = Docks(self), Qt.DockWidgetArea
-        docks.put_beside("settings", "Settings", self.panels, area.LeftDockWidgetArea)
-        docks.put_above("lesson", "Lessons", self.lesson, "settings", "Shift+F1")
-        docks.put_beside("curvature", "By element", self.display.maps, area.RightDockWidgetArea)
-        docks.put_below("cost", "Cost of accuracy", self.cost, "F9")
-        docks.put_below("stability", "Stability", self.stability, "F10")
-        docks.put_below("scene", "Scene", self.scene, "F2")
-        docks.put_below("health", "Health", self.health, "F3")
-        docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
-        docks.put_below("log", "Log", self.log, "Ctrl+Alt+G")
-        docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
-        docks.put_below("design", "Design", self.design, "Ctrl+Alt+N")
-        docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
-        docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
-        docks.put_below("guide", "Guide", self.guide, "Ctrl+F1")
-        return docks
+    def _show_look(self, settings: Settings) -> None:
+        theme: Theme = THEMES[settings.theme]
+        application = QApplication.instance()
+        if isinstance(application, QApplication):
+            application.setPalette(palette(theme))
+            application.setPalette(
+                bar_palette(theme),
+                "QScrollBar",  # pyright: ignore[reportArgumentType]
+            )
+            if (font := letters(settings.letters)) != application.font():
+                application.setFont(font)
+        self.panels.show_theme(theme)
+        self.display.show_theme(theme)
+        self.theme_changed.emit(theme)
 
-    def _pointing(self) -> Pointing:
-        docks = {name: [self.docks.widget(name)] for name in DOCKS}
-        numbers = {f"readout-{name}": parts for name, parts in self.readouts.parts.items()}
-        forms = [panel for panel in self.panels.all() if isinstance(panel, Form)]
-        return Pointing(forms, docks | numbers, self.docks.reveal, self)
+    def _show_status(self, status: Status) -> None:
+        self.panels.show_status(status, self.session.simulating and status.state == "streaming")
 
-    # Wishes that are no settings, or need what is shown.
-
-    def connect_to(self, source: str) -> None:
-        """Read from `source` from now on."""
-        if self.replaying.takes(source):
-            return
-        self.panels.connection.show_source(source)
-        self.session.connect_to(source)
-
-    def simulate(self) -> None:
-        """Simulate the panels' skin, whatever was read or written."""
-        self.history.change("Simulated skin", -1, written=None)
-        self.connect_to("sim:")
-
-    def pause(self) -> None:
-        """Let what is played stand, or go on: a recording, or else a scene."""
-        (self.replaying.toggle if self.session.replaying else self.staging.pause)()
-
-    def connect_chosen(self) -> None:
-        """Connect what is named in the panel."""
-        self.connect_to(self.panels.connection.source())
-
-    # Small things.
-
-    def read(self, page: Page, heading: str = "") -> None:
-        """Show a page of the guide, from a heading in it on."""
-        self.docks.reveal("guide")
-        self.guide.read(page, heading)
+    # What features ask of the window.
 
     def tell(self, text: str) -> None:
-        """Say something in passing."""
+        """Show a message for some seconds."""
         self.statusBar().showMessage(text, 10_000)
         if text:
             log.info("%s", text)
-
-    def _seen(self) -> list[QPixmap]:
-        """Pictures of the numbers, and of the skin with the maps and what is shown below them."""
-        docks = [self.docks["curvature"], *self.docks.below]
-        whole = self.presenting.stage.geometry()
-        for dock in docks:
-            if not dock.visibleRegion().isEmpty():
-                whole = whole.united(dock.geometry())
-        return [self.readouts.grab(), self.grab(whole)]
 
     def picture(self, path: Path) -> bool:
         """Save the window, 3-D picture included, as a PNG; whether it could be written."""
         return self.grab().save(str(path), "PNG", _PACKED)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Escape and self.presenting.on:
-            self.presenting.leave()
-        elif event.key() == Qt.Key.Key_Escape and self.offer.isVisible():
-            self.offer.hide()
+        offer = self.display.centre.offer
+        if event.key() == Qt.Key.Key_Escape and self.layouts.filled:
+            self.layouts.leave_full_screen()
+        elif event.key() == Qt.Key.Key_Escape and offer.isVisible():
+            offer.hide()
         else:
             super().keyPressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        widen(self, self.docks["curvature"], event)
+        for dock in self.docks.right:
+            widen(self, dock, event)
 
     def quit(self) -> None:
-        """Close, unless a recording is to go on."""
-        if self.taping.may_close():
+        """Close, unless something is to go on."""
+        if self.may_close():
             self.close()
+
+    def may_close(self) -> bool:
+        """Whether no feature keeps the window open."""
+        return all(may() for may in self.session.may_close)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         # Only of a person: a run of so many seconds ends, and so does one that gets a signal.
-        if event.spontaneous() and not self.session.closed and not self.taping.may_close():
+        if event.spontaneous() and not self.session.closed and not self.may_close():
             event.ignore()
             return
         if not self.session.closed:
             self.keeping.write()
-            self.mishaps.close()
-            self.presenting.close()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
-            self.exports.close()
-            self.plugs.close()
-            self.replaying.close()
-            self.taping.close()
-            self.costing.close()
-            self.planning.close()
-            self.designing.close()
-            self.scene.gallery.close()
-            self.seeing.close()
+            self.closing.emit()
             self.session.close()
-            self.naming.close()
+            self.closed.emit()
             self.display.close()
-            self.logged.close()
         super().closeEvent(event)

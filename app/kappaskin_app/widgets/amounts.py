@@ -1,8 +1,12 @@
-"""Lengths and times in the unit that people read them in."""
+"""Lengths, times and dates in the unit that people read them in."""
 
 import math
+import re
+from datetime import datetime
 
 NONE = "\N{EN DASH}"
+COMMAND = re.compile("`([^`]+)`")
+"""What a message tells to type."""
 _LENGTHS = ((1e-6, 1e-3, "mm"), (1e-9, 1e-6, "\N{MICRO SIGN}m"), (0.0, 1e-9, "nm"))
 _TIMES = ((1.0, 1.0, "s"), (1e-3, 1e-3, "ms"), (0.0, 1e-6, "\N{MICRO SIGN}s"))
 
@@ -26,3 +30,8 @@ def _said(value: float, units: tuple[tuple[float, float, str], ...]) -> str:
     shown = value / scale
     digits = max(0, 1 - math.floor(math.log10(shown))) if shown > 0 else 0
     return f"{shown:.{digits}f} {unit}"
+
+
+def day(time: float) -> str:
+    """A time in s since 1970 to the minute."""
+    return f"{datetime.fromtimestamp(time):%Y-%m-%d %H:%M}"

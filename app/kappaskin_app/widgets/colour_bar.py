@@ -5,10 +5,10 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
-from kappaskin_app.shell.scale import in_digits
-from kappaskin_app.shell.shades import Tint
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
 from kappaskin_app.widgets.lettering import read_from_afar
+from kappaskin_app.widgets.numbers import in_digits
+from kappaskin_app.widgets.tint import Tint
 
 _COLOURS, _GAP = 22, 4  # px of the bar without its numbers, and right of them
 _WIDEST = "\N{MINUS SIGN}0.005"  # of the numbers, more or less

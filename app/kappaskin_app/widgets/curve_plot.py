@@ -10,8 +10,8 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin_app.shell.scale import in_digits, round_up
 from kappaskin_app.theme import DARK, LIGHT, SERIES, Theme
+from kappaskin_app.widgets.numbers import in_digits, round_up
 
 Array = NDArray[np.float64]
 

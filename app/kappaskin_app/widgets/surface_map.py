@@ -6,10 +6,10 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from kappaskin_app.shell.shades import Tint
 from kappaskin_app.theme import DARK_INK, LIGHT, LIGHT_INK, SEQUENTIAL, Colours, Theme
 from kappaskin_app.widgets.colour_bar import ColourBar
 from kappaskin_app.widgets.line import Line
+from kappaskin_app.widgets.tint import Tint
 
 Array = NDArray[np.float64]
 

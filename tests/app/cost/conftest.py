@@ -22,10 +22,10 @@ def few() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def shared(qapp: QApplication, few: None, until) -> Iterator[MainWindow]:
+def shared(qapp: QApplication, few: None, until, window_class) -> Iterator[MainWindow]:
     """One window for all that only look at it, once everything is measured."""
     qapp.setStyle("Fusion")
-    window = MainWindow("sim:")
+    window = window_class("sim:")
     window.show()
     until(lambda: window.session.estimate is not None)
     window.actions_by_name["dock-cost"].trigger()

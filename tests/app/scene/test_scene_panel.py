@@ -23,12 +23,12 @@ def test_a_scene_of_the_gallery_plays_from_its_beginning_until_it_is_undone(
     panel.gallery.chosen.emit("fingertip")
     until(lambda: plays(window, "fingertip"))
     until(lambda: window.session.status.sensor.layout.patch.strip)
-    assert not window.panels.load.editor("load_case").isEnabled()
-    until(lambda: window.badge.text() == "SIM")
+    assert not window.load.editor("load_case").isEnabled()
+    until(lambda: window.display.badge.text() == "SIM")
     window.history.stack.undo()
     until(lambda: plays(window, "circle"))
     until(lambda: not window.session.status.sensor.layout.patch.strip)
-    until(lambda: window.panels.load.editor("load_case").isEnabled())
+    until(lambda: window.load.editor("load_case").isEnabled())
 
 
 def test_the_simulated_skin_comes_back_to_the_panels(window, panel, until, qtbot) -> None:
@@ -48,7 +48,7 @@ def test_a_scene_named_as_the_source_is_played_as_it_is_written(opened, until, n
 
 def test_a_scene_that_there_is_not_is_said(opened, until) -> None:
     window = opened("sim:sphear")
-    until(lambda: "sphear" in window.panels.connection.message.text())
+    until(lambda: "sphear" in window.connection.message.text())
     assert window.history.settings == Settings()
 
 
@@ -238,14 +238,14 @@ def test_on_another_source_only_the_gallery_leads_back(window, panel, until) -> 
     until(lambda: plays(window, "tapping"))
     until(lambda: panel.gallery.items["tapping"].data(PLAYING))
     panel.setCurrentIndex(EFFECTS_PAGE)
-    window.panels.connection.connect_wanted.emit("socket://127.0.0.1:9")
+    window.connection.connect_wanted.emit("socket://127.0.0.1:9")
     until(lambda: panel.currentIndex() == GALLERY)
     assert not panel.isTabEnabled(EDIT)
     assert not panel.isTabEnabled(EFFECTS_PAGE)
     assert not panel.gallery.items["tapping"].data(PLAYING)
     panel.gallery.chosen.emit("hum")
     until(lambda: plays(window, "hum"))
-    assert window.panels.connection.source() == "sim:"
+    assert window.connection.source() == "sim:"
     until(lambda: panel.isTabEnabled(EDIT) and panel.isTabEnabled(EFFECTS_PAGE))
     window.history.stack.undo()
     until(lambda: plays(window, "tapping"))

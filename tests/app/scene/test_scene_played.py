@@ -137,9 +137,9 @@ def test_connecting_again_goes_on_with_the_scene_that_was_played(window, panel, 
     os.kill(killed, signal.SIGTERM)
     until(lambda: window.session.engine.pid not in (killed, None))  # LOST may not have been drawn
     window.actions_by_name["connect"].trigger()
-    until(lambda: window.badge.text() == "SIM" and plays(window, "tapping"))
+    until(lambda: window.display.badge.text() == "SIM" and plays(window, "tapping"))
     assert window.history.settings.written.file == scene_file("tapping")
     window.actions_by_name["disconnect"].trigger()
-    until(lambda: window.badge.text() == "OFF")
+    until(lambda: window.display.badge.text() == "OFF")
     panel.gallery.chosen.emit("hum")  # which is to play it
-    until(lambda: window.badge.text() == "SIM" and plays(window, "hum"))
+    until(lambda: window.display.badge.text() == "SIM" and plays(window, "hum"))

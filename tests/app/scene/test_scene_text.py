@@ -9,14 +9,15 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import SCENES, Refusal, load_scene, planned, read_scene, scene_file
+from kappaskin_app.features.scene.editing import SceneEditing
 from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import OFF, ON, PLANNED, forced
 from kappaskin_app.features.scene.scene_text.places import shifted
 from kappaskin_app.shell.history import History
+from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.touching import Held, touches_at
-from kappaskin_app.shell.wishes import Wishes
 
 READY = [name for name in SCENES if load_scene(name).stimuli]
 
@@ -153,12 +154,12 @@ def test_a_touch_is_not_dragged_in_a_text_that_is_not_seen_yet(
     session = SimpleNamespace(
         scene=scene, time=0.5 * scene.duration, refusal="", making=making, move=lambda _: None
     )
-    wishes = Wishes(history, cast("Any", session))
+    editing = SceneEditing(history, cast("Any", session), LoadHandle())
     touch = touches_at(scene, session.time)[0]
     x, y = touch.load.centre()
-    wishes.grab(x, y)
-    wishes.drag(x + 1e-3, y)
-    wishes.release()
+    editing.grab(x, y)
+    editing.drag(x + 1e-3, y)
+    editing.release()
     assert (history.settings.written != written) == dragged
 
 

@@ -1,1 +1,24 @@
-"""What accuracy costs in time."""
+"""What accuracy costs in time, measured on the skin that is shown."""
+
+from kappaskin_app.features.accuracy.costing import Costing
+from kappaskin_app.features.accuracy.panel import CostPanel
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.window import MainWindow
+
+
+class Accuracy:
+    name = "accuracy"
+
+    def install(self, shell: MainWindow) -> None:
+        session = shell.session
+        self.costing, self.cost = Costing(shell.history, session, shell), CostPanel()
+        shell.docks.put_below("cost", "Cost of accuracy", self.cost, "F9")
+        shell.docks["cost"].visibilityChanged.connect(guarded(self.costing.watch))
+        session.reported.connect(guarded(self.costing.follow))
+        session.estimated.connect(guarded(self.costing.receive))
+        self.cost.attend(self.costing)
+        shell.theme_changed.connect(guarded(self.cost.show_theme))
+        shell.tasks.add(
+            "Measuring what accuracy costs", lambda: self.costing.running, self.costing.cancel
+        )
+        shell.closing.connect(guarded(self.costing.close))

@@ -16,8 +16,7 @@ from kappaskin.studies import Cost, Effects, Measuring, Refused, Setting, fronti
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
-from kappaskin_app.shell.simulation import elements_of, scene_of_sensor
-from kappaskin_app.shell.wishes import Wishes
+from kappaskin_app.shell.simulation import NO_ELEMENTS, elements_of, scene_of_sensor
 from kappaskin_app.widgets.amounts import duration, length
 
 FUNCTIONS = (4, 6, 8, 12)
@@ -67,11 +66,9 @@ class Costing(QObject):
 
     changed = Signal()
 
-    def __init__(
-        self, history: History, session: Session, wishes: Wishes, parent: QObject | None = None
-    ) -> None:
+    def __init__(self, history: History, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._history, self._session, self._wishes = history, session, wishes
+        self._history, self._session = history, session
         self.scene: Scene | None = None
         self.costs: dict[Setting, Cost | Refused] = {}
         self.effects: dict[Setting, Effects] = {}
@@ -133,8 +130,18 @@ class Costing(QObject):
 
     def choose(self, cost: Cost) -> None:
         """Switch to the setting of `cost`."""
-        self._wishes.take(cost.setting)
+        self._take(cost.setting)
         self._next = 0.0
+
+    def _take(self, setting: Setting) -> None:
+        """Fit as `setting` says, on as many elements."""
+        along_x, along_y = setting.functions
+        changed = {"method": setting.method, "functions_x": along_x, "functions_y": along_y}
+        elements = setting.elements
+        another = elements != elements_of(self._history.settings)
+        if elements is not None and another and self._session.simulating:
+            changed |= {"elements_x": elements[0], "elements_y": elements[1], **NO_ELEMENTS}
+        self._history.change("Choice by its cost", -1, **changed)
 
     def close(self) -> None:
         self.watch(False)

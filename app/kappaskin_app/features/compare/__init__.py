@@ -1,1 +1,25 @@
-"""Two setups on the same readings."""
+"""Two setups on the same readings, side by side."""
+
+from kappaskin_app.features.compare.comparing import Comparing
+from kappaskin_app.features.compare.panel import ComparePanel
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.window import MainWindow
+
+
+class Compare:
+    name = "compare"
+
+    def install(self, shell: MainWindow) -> None:
+        session, display = shell.session, shell.display
+        self.comparing = Comparing(shell.history, session, shell)
+        self.compare = ComparePanel()
+        shell.docks.put_below("compare", "Compare A and B", self.compare, "Ctrl+B")
+        shell.docks["compare"].visibilityChanged.connect(guarded(self.comparing.watch))
+        session.reported.connect(guarded(self.comparing.follow))
+        display.status_shown.connect(
+            guarded(lambda status: self.compare.show_status(status, display.old))
+        )
+        shell.panels.join(self.compare.form)
+        self.compare.attend(self.comparing)
+        shell.settings_shown.connect(guarded(self.compare.show_settings))
+        shell.theme_changed.connect(guarded(self.compare.show_theme))

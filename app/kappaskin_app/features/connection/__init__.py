@@ -1,1 +1,49 @@
-"""Connection: which source is read, and the events on its line."""
+"""Connection: which source is read."""
+
+from kappaskin.live import Left
+from kappaskin_app.features.connection.panel import ConnectionPanel
+from kappaskin_app.features.connection.plugs import Plugs
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.menus import SOURCE
+from kappaskin_app.shell.pages import LIVE
+from kappaskin_app.shell.window import MainWindow
+
+
+class Connection:
+    name = "connection"
+
+    def install(self, shell: MainWindow) -> None:
+        self._session = session = shell.session
+        add = shell.actions_by_name.add
+        self.connection = shell.panels.add(LIVE, ConnectionPanel())
+        self.plugs = Plugs(self.connection.sources, shell)
+        self.connection.connect_wanted.connect(guarded(session.request_source))
+        self.connection.disconnect_wanted.connect(guarded(session.disconnect_from))
+        self.connection.ports_wanted.connect(guarded(self.plugs.look))
+        self.plugs.found.connect(guarded(self.connection.show_ports))
+        session.source_changed.connect(guarded(self.connection.show_source))
+        add("simulate", SOURCE, "&Simulated skin", session.simulate, "Ctrl+M")
+        add("connect", SOURCE, "&Connect", self._connect, "Ctrl+Return")
+        add("disconnect", SOURCE, "&Disconnect", session.disconnect_from, "Ctrl+D")
+        add("ports", SOURCE, "Re&fresh ports", self.plugs.look, "F5")
+        shell.menus.welcome.add(
+            "Connec&t a sensor",
+            "Choose the port of a real sensor under Connection, and connect it.",
+            lambda: self._show(shell),
+        )
+        shell.begun.connect(guarded(self._begin))
+        shell.closing.connect(guarded(self.plugs.close))
+
+    def _begin(self, _: Left | None, source: str) -> None:
+        """Show the source that was asked for, which is not read where another one goes on."""
+        self.connection.show_source(source)
+        self.plugs.look()
+
+    def _connect(self) -> None:
+        self._session.request_source(self.connection.source())
+
+    def _show(self, shell: MainWindow) -> None:
+        """Show the panel, ready to choose a source."""
+        shell.docks.reveal("settings")
+        shell.panels.reveal(self.connection)
+        self.connection.sources.setFocus()

@@ -1,6 +1,5 @@
 """Where the readings come from."""
 
-import re
 import time
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
@@ -18,9 +17,9 @@ from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Port
-from kappaskin_app.features.recording.landmarks import day
 from kappaskin_app.shell.form import well_behaved
 from kappaskin_app.shell.panel import Panel
+from kappaskin_app.widgets.amounts import COMMAND, day
 from kappaskin_app.widgets.parts import said
 
 _SIMULATED = ("sim:", "Simulated skin")
@@ -28,7 +27,6 @@ _TIP = (
     "The simulated skin, a serial port found on this machine, or a port or URL typed here, such as "
     "/dev/ttyACM0, COM3 or socket://host:port."
 )
-COMMAND = re.compile("`([^`]+)`")  # what a message tells to type
 _LONGEST, _TAIL = 56, 18  # characters of a port in the list, and of these at the end
 _MARGIN = 16  # px
 _LOSSES = 1.0  # s between two looks at what was lost
@@ -183,7 +181,7 @@ def _recorded(status: Status) -> str:
     if replay is None:
         return ""
     whole = "" if replay.whole else ", never ended"
-    return f"\nRecorded {day(replay)}, {replay.length:.1f} s{whole}"
+    return f"\nRecorded {day(replay.begun)}, {replay.length:.1f} s{whole}"
 
 
 def _said(sensor: Sensor, calibration: Calibration | None) -> str:

@@ -1,1 +1,67 @@
-"""The contact in numbers and words."""
+"""The contact in numbers and words: readouts, the object that touches, tables."""
+
+import time
+
+import numpy as np
+
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
+from kappaskin_app.features.contact.naming import Naming
+from kappaskin_app.features.contact.numbers import NumbersPanel
+from kappaskin_app.features.contact.readouts import Health, Readouts
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.window import MainWindow
+
+_OFTEN, _SELDOM = 0.25, 1.0  # s between two looks at what touches: while it is felt, and else
+_OBJECT = (
+    "What the readings say touches the skin, with 95 % interval and the second guess's "
+    "probability; and the principal curvatures of the skin at the contact."
+)
+
+
+class Contact:
+    name = "contact"
+
+    def install(self, shell: MainWindow) -> None:
+        self._shell, self._next = shell, 0.0
+        display = shell.display
+        self.readouts, self.numbers = Readouts(), NumbersPanel()
+        self.naming = Naming(shell)
+        display.header.add(self.readouts)
+        shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
+        display.foot.object.setToolTip(_OBJECT)
+        for name, parts in self.readouts.parts.items():
+            display.places[f"readout-{name}"] = parts
+        display.places["readouts"] = [self.readouts]
+        display.numbers.connect(guarded(self._show))
+        display.status_shown.connect(guarded(self._follow))
+        self.naming.named.connect(guarded(display.foot.object.show_text))
+        self.naming.found.connect(display.object_found)
+        shell.theme_changed.connect(guarded(self.readouts.show_theme))
+        shell.tasks.add("Learning what objects read like", lambda: self.naming.learning)
+        shell.closed.connect(guarded(self.naming.close))
+
+    def _follow(self, status: Status) -> None:
+        shell, now = self._shell, time.monotonic()
+        shown = shell.display.estimate_shown()
+        if now >= self._next:
+            self._next = now + (_OFTEN if shell.layouts.filled else _SELDOM)
+            self.naming.look(status, shown)
+        self.numbers.show_estimate(shown, status.sensor, shell.display.foot.object.text())
+
+    def _show(self, estimate: Estimate | None) -> None:
+        display, status = self._shell.display, self._shell.session.status
+        recent = [] if display.old else display.ages()
+        counts = status.accounting
+        self.readouts.show_health(
+            Health(
+                status.rate,
+                len(recent),
+                float(np.median(recent)) if recent else float("nan"),
+                display.age_sd,
+                counts.lost,
+                counts.bytes_discarded,
+                status.skipped,
+            )
+        )
+        self.readouts.show_estimate(estimate)

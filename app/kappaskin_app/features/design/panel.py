@@ -15,7 +15,6 @@ from kappaskin.studies import Prospect
 from kappaskin_app.features.design.designing import Designing
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form, well_behaved
-from kappaskin_app.shell.scale import round_up
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.shell.settings.designed import Designed
@@ -23,6 +22,7 @@ from kappaskin_app.shell.skins import SHAPES
 from kappaskin_app.theme import SEQUENTIAL, Theme
 from kappaskin_app.widgets.columns import row, scrolled
 from kappaskin_app.widgets.curve_plot import Curve, CurvePlot
+from kappaskin_app.widgets.numbers import round_up
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.widgets.surface_map import SurfaceMap
 

@@ -1,1 +1,68 @@
-"""Files for other programs: tables, pictures, films, figures, scripts."""
+"""Files for other programs: recordings as tables, pictures, films, figures, scripts."""
+
+import time
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtGui import QGuiApplication
+
+from kappaskin.calibration import data_folder
+from kappaskin.errors import Refusal
+from kappaskin.studies import FIGURES
+from kappaskin_app.features.export.exports import Exports
+from kappaskin_app.features.export.figures import TITLES, FigureWindow
+from kappaskin_app.features.export.scripting import script_of
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell import menus
+from kappaskin_app.shell.window import MainWindow
+
+_PYTHON = "A script that does what the window does now: source, scene, setup; it prints the contact"
+
+
+class Export:
+    name = "export"
+
+    def install(self, shell: MainWindow) -> None:
+        self._shell, add = shell, shell.actions_by_name.add
+        self.exports = Exports(shell.session, shell.display.centre, shell)
+        add("picture", menus.FILE, "Save &picture", self._save_picture, "Ctrl+S")
+        copy = self._copy_python
+        add("copy-python", menus.EDIT, "Copy as P&ython", copy, "Ctrl+Shift+C", _PYTHON)
+        for name in FIGURES:
+            add(name, menus.FIGURES, TITLES.get(name, name), partial(self._draw, name))
+        self._register(shell)
+        self.exports.told.connect(guarded(shell.tell))
+        dialog = self.exports.dialog
+        shell.tasks.add("Writing the export", lambda: dialog.busy, dialog.cancel)
+        shell.closing.connect(guarded(self.exports.close))
+
+    def _register(self, shell: MainWindow) -> None:
+        """Have pictures of all views and docks that there are."""
+        solid = {"the window": shell, "the skin": shell.centralWidget()}
+        docks = {
+            dock.windowTitle(): shell.docks.widget(dock.objectName()) for dock in shell.docks.below
+        }
+        flat = shell.display.views | {"Picture of a &panel": docks}
+        self.exports.register(shell.actions_by_name, solid, flat)
+
+    def _save_picture(self) -> None:
+        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png")).resolve()
+        self.exports.save(self._shell.grab().toImage(), path)
+
+    def _copy_python(self) -> None:
+        """Put a script on the clipboard, and what it reads into a folder."""
+        shell, folder = self._shell, data_folder().parent / "scripts"
+        try:
+            script = script_of(shell.session, shell.history.settings, folder)
+            for name, content in script.files.items():
+                folder.mkdir(parents=True, exist_ok=True)
+                (folder / name).write_bytes(content)
+        except (Refusal, OSError) as error:
+            shell.tell(f"Nothing was copied: {error}")
+            return
+        QGuiApplication.clipboard().setText(script.text)
+        shell.tell(f"Copied a script of {script.text.count(chr(10))} lines: paste it into a file")
+
+    def _draw(self, name: str) -> None:
+        """Draw a figure of the paper from a run of its own, in a window beside this one."""
+        FigureWindow(name, self._shell).show()

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 
@@ -14,11 +13,11 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.features.export.exporting import ExportDialog
-from kappaskin_app.features.export.filming import Filming
-from kappaskin_app.features.membrane.membrane import MembraneView
+from kappaskin_app.features.export.filming import Filmed, Filming
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
-from kappaskin_app.shell.pictures import caption_of, chosen_file, save_view, write_png
+from kappaskin_app.shell.centre import Centre
+from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view, write_png
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import ended
 
@@ -31,12 +30,14 @@ class Exports(QObject):
 
     told = Signal(str)
 
-    def __init__(self, session: Session, membrane: MembraneView, window: QWidget) -> None:
+    def __init__(self, session: Session, centre: Centre, window: QWidget) -> None:
         super().__init__(window)
         self._session, self._window = session, window
         self.dialog = ExportDialog(window)
-        self.filming = Filming(membrane, self)
-        self.filming.told.connect(guarded(self.told.emit))
+        self.filming: Filming | None = None
+        if isinstance(centre.view, Filmed):
+            self.filming = Filming(centre.view, self)
+            self.filming.told.connect(guarded(self.told.emit))
         self._thread = ThreadPoolExecutor(1, "picture-writer")
         self._written: list[tuple[Path, Future[None]]] = []
         session.reported.connect(guarded(self._follow))
@@ -53,7 +54,9 @@ class Exports(QObject):
         """
         more = "\N{HORIZONTAL ELLIPSIS}"
         actions.add("export", _MENU, f"&Recording{more}", self.ask, "Ctrl+Shift+E")
-        actions.add("film", _MENU, "&Film of the skin, begin or end", self.film, "Ctrl+Shift+F")
+        if self.filming is not None:
+            film = self.film
+            actions.add("film", _MENU, "&Film of the skin, begin or end", film, "Ctrl+Shift+F")
         menus = {_MENU: solid} | {f"{_MENU}{WITHIN}{title}": flat[title] for title in flat}
         for menu, views in menus.items():
             for name, view in views.items():
@@ -65,18 +68,12 @@ class Exports(QObject):
         session, replay = self._session, self._session.status.replay
         self.dialog.ask_of(session.source, replay.at if replay else 0.0, session.status.setup)
 
-    def caption(self) -> str:
-        """What the window shows now, in words."""
-        estimate = self._session.estimate
-        at = estimate.device_time if estimate is not None else float("nan")
-        return caption_of(self._session.status, at, datetime.now())
-
     def picture(self, view: QWidget, title: str, flat: bool) -> None:
         """Ask for a file, and write a picture of a view to it."""
         if not view.isVisible():
             self.told.emit(f"Show {title} first: what is hidden has no picture")
             return
-        caption = self.caption()  # of now, and not of when the file is chosen
+        caption = caption_now(self._session)  # of now, and not of when the file is chosen
         try:
             path = chosen_file(self._window, title, flat)
             if path is None:
@@ -102,6 +99,8 @@ class Exports(QObject):
 
     def film(self) -> None:
         """Ask for a file and film into it; or end the film that is made."""
+        if self.filming is None:
+            return
         if self.filming.running:
             self.filming.end()
             return
@@ -109,12 +108,13 @@ class Exports(QObject):
         file, _ = QFileDialog.getSaveFileName(self._window, "Film the skin", proposed, _FILM)
         if file:
             try:
-                self.filming.begin(ended(file, ".mp4"), self.caption())
+                self.filming.begin(ended(file, ".mp4"), caption_now(self._session))
             except Refusal as refusal:
                 self.told.emit(str(refusal))
 
     def close(self) -> None:
         """End what is being written: films and pictures are whole, an export is not there."""
-        self.filming.end()
+        if self.filming is not None:
+            self.filming.end()
         self.dialog.close()
         self._thread.shutdown(wait=True)

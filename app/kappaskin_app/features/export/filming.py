@@ -4,17 +4,23 @@ import time
 from collections.abc import Generator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from kappaskin.errors import Refusal, lacking
-from kappaskin_app.features.membrane.membrane import MembraneView
 from kappaskin_app.guard import guarded
 
 _RATE = 25  # pictures a second
 _EVEN = 2  # px: what the film's colours need sides to be a multiple of
+
+
+@runtime_checkable
+class Filmed(Protocol):
+    """A view that is drawn by a plotter."""
+
+    plotter: Any
 
 
 class Filming(QObject):
@@ -22,7 +28,7 @@ class Filming(QObject):
 
     told = Signal(str)
 
-    def __init__(self, view: MembraneView, parent: QObject | None = None) -> None:
+    def __init__(self, view: Filmed, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._view = view
         self._film: Generator[None, Any, None] | None = None

@@ -1,1 +1,34 @@
-"""The guide."""
+"""The guide, to read in the window."""
+
+from collections.abc import Iterator
+from functools import partial
+
+from kappaskin_app.features.guide.pages import Page, page_called, pages
+from kappaskin_app.features.guide.panel import GuidePanel
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.finder.things import Thing
+from kappaskin_app.shell.window import MainWindow
+
+
+class Guide:
+    name = "guide"
+
+    def install(self, shell: MainWindow) -> None:
+        self._shell, self.guide = shell, GuidePanel()
+        shell.docks.put_below("guide", "Guide", self.guide, "Ctrl+F1")
+        shell.read_wanted.connect(guarded(lambda name: self.read(page_called(name))))
+        shell.theme_changed.connect(guarded(self.guide.show_theme))
+        shell.menus.things.append(self._things)
+
+    def read(self, page: Page, heading: str = "") -> None:
+        """Show a page of the guide, from a heading in it on."""
+        self._shell.docks.reveal("guide")
+        self.guide.read(page, heading)
+
+    def _things(self) -> Iterator[Thing]:
+        for page in pages():
+            for heading in ("", *page.headings):
+                name = f"guide:{page.file.stem}{'#' if heading else ''}{heading}"
+                place = f"Guide, {page.title}" if heading else "Guide"
+                read = partial(self.read, page, heading)
+                yield Thing(name, heading or page.title, place, read)

@@ -1,1 +1,29 @@
 """Health of the channels, and a test of their map."""
+
+from kappaskin_app.features.health.map_testing import MapTesting
+from kappaskin_app.features.health.panel import HealthPanel
+from kappaskin_app.features.health.resting import Resting
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.window import MainWindow
+
+
+class Health:
+    name = "health"
+
+    def install(self, shell: MainWindow) -> None:
+        session, selection = shell.session, shell.selection
+        self.health, self.testing = HealthPanel(), MapTesting(shell)
+        self.resting = Resting(session, self.testing)
+        shell.docks.put_below("health", "Health", self.health, "F3")
+        session.reported.connect(guarded(self.testing.follow))
+        session.reported.connect(
+            guarded(lambda status: self.health.show_status(status, session.inside))
+        )
+        session.estimated.connect(guarded(self.testing.receive))
+        self.testing.begun.connect(guarded(self.resting.hold))
+        session.playing.connect(guarded(lambda *_: self.testing.running and self.resting.hold()))
+        self.testing.changed.connect(guarded(self.resting.let_go))
+        self.testing.asked.connect(guarded(selection.ask_for))
+        self.health.pointed.connect(guarded(selection.point))
+        self.health.attend(self.testing)
+        shell.theme_changed.connect(guarded(self.health.show_theme))

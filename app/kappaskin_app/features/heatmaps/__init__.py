@@ -1,1 +1,95 @@
 """Heatmaps: a quantity of every element, not interpolated."""
+
+from functools import partial
+
+import numpy as np
+
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
+from kappaskin_app.features.heatmaps.maps import Maps
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.display import Display, Shown, of_row
+from kappaskin_app.shell.scale import locked_at
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.shown import COLOURS
+from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.theme import Theme
+
+_EACH = 0.06  # s between two drawings
+
+
+class Heatmaps:
+    name = "heatmaps"
+
+    def install(self, shell: MainWindow) -> None:
+        self._display: Display = shell.display
+        self._settings = Settings()
+        self._next = 0.0
+        self.maps = Maps()
+        self.heatmaps = self.maps.heatmaps
+        shell.docks.put_right("curvature", "By element", self.maps)
+        words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
+        shell.display.views["Picture of a &map"] = {
+            f"the map of {words[name]}": heatmap for name, heatmap in self.heatmaps.items()
+        }
+        display, selection = shell.display, shell.selection
+        display.limits.append(self._limits)
+        display.restarted.connect(guarded(self._restart))
+        display.status_shown.connect(guarded(self._show_status))
+        display.numbers.connect(guarded(self._show_readings))
+        display.shown.connect(guarded(self._show))
+        shell.settings_shown.connect(guarded(self._show_settings))
+        shell.theme_changed.connect(guarded(self._show_theme))
+        for name, heatmap in self.heatmaps.items():
+            heatmap.pointed.connect(guarded(selection.point))
+            heatmap.pointed.connect(guarded(lambda *_: display.show_numbers_soon()))
+            heatmap.chosen.connect(selection.chosen)
+            heatmap.lock_wanted.connect(guarded(partial(shell.requests.set, f"range_{name}")))
+            selection.pointed.connect(guarded(heatmap.show_element))
+            selection.asked.connect(guarded(heatmap.show_wanted))
+
+    def _show_settings(self, settings: Settings) -> None:
+        self._settings = settings
+        self.maps.show_those(settings.maps)
+        for name, heatmap in self.heatmaps.items():
+            heatmap.show_lock(locked_at(name, settings) > 0)
+
+    def _show_theme(self, theme: Theme) -> None:
+        for heatmap in self.heatmaps.values():
+            heatmap.show_theme(theme)
+
+    def _limits(self) -> dict[str, float]:
+        """How far the colours of those that are seen reach, in SI units."""
+        seen = [name for name in self._settings.maps if self.heatmaps[name].isVisible()]
+        return {name: self.heatmaps[name].limit for name in seen}
+
+    def _restart(self, status: Status) -> None:
+        if status.sensor is not None:
+            for heatmap in self.heatmaps.values():
+                heatmap.show_layout(status.sensor.layout)
+
+    def _show_status(self, _: Status) -> None:
+        for heatmap in self.heatmaps.values():
+            heatmap.show_lost(self._display.old)
+
+    def _show_readings(self, estimate: Estimate | None) -> None:
+        for name in self._settings.maps:
+            values = np.empty(0)
+            if estimate is not None:
+                kinds = self._display.kinds(estimate)
+                values = self._display.of_elements(name, estimate, kinds)
+            self.heatmaps[name].show_reading(values)
+
+    def _show(self, shown: Shown) -> None:
+        if shown.now < self._next:
+            return
+        self._next = shown.now + _EACH
+        display, estimate = self._display, shown.estimate
+        crossed, dotted = display.marks(estimate.curvature)
+        for name in self._settings.maps:
+            heatmap = self.heatmaps[name]
+            if heatmap.isVisible():
+                values = display.of_elements(name, estimate, shown.kinds)
+                heatmap.show_marks(crossed, dotted, of_row(name, shown.kinds))
+                tint = display.tint(name, estimate, values, shown.now)
+                heatmap.show_values(values, tint, of_row(name, shown.railed))

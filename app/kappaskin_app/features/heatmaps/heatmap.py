@@ -10,10 +10,11 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 from kappaskin.estimation import WHY
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.features.heatmaps.flat_cells import FlatCells
-from kappaskin_app.shell.shades import SHADES, Tint
+from kappaskin_app.shell.shades import SHADES
 from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
 from kappaskin_app.widgets.line import Line
+from kappaskin_app.widgets.tint import Tint
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -1,1 +1,58 @@
-"""Lessons."""
+"""Lessons: read, taken on the window, judged by what it shows."""
+
+from functools import partial
+
+from PySide6.QtGui import QPixmap
+from PySide6.QtWidgets import QWidget
+
+from kappaskin_app.features.lessons.panel import LessonPanel
+from kappaskin_app.features.lessons.pointing import Pointing
+from kappaskin_app.features.lessons.reading import DOCKS
+from kappaskin_app.features.lessons.teaching import Teaching
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.window import MainWindow
+
+
+class Lessons:
+    name = "lessons"
+
+    def install(self, shell: MainWindow) -> None:
+        self._shell, self.lesson = shell, LessonPanel()
+        session, docks = shell.session, shell.docks
+        docks.put_above("lesson", "Lessons", self.lesson, "settings", "Shift+F1")
+        self.teaching = Teaching(
+            *(shell.history, session, shell.display, shell),
+            *(session.request_source, self._seen),
+        )
+        self.pointing = Pointing(self._forms, self._places, docks.reveal, shell)
+        self.lesson.attend(self.teaching)
+        docks["lesson"].closed.connect(guarded(self.teaching.leave))
+        self.teaching.pointed.connect(guarded(self.pointing.point))
+        self.teaching.taken_up.connect(guarded(partial(docks.reveal, "lesson")))
+        self.teaching.told.connect(guarded(shell.tell))
+        for part in (self.lesson, self.pointing):
+            shell.theme_changed.connect(guarded(part.show_theme))
+        shell.menus.welcome.add(
+            "&Begin a lesson",
+            "Eleven of ten to fifteen minutes: from what a gage feels to mending a sensor.",
+            lambda: docks.reveal("lesson"),
+        )
+
+    def _forms(self) -> list[Form]:
+        return [panel for panel in self._shell.panels.all() if isinstance(panel, Form)]
+
+    def _places(self) -> dict[str, list[QWidget]]:
+        docks = self._shell.docks
+        shown = {name: [docks.widget(name)] for name in DOCKS if name in docks.by_name()}
+        return {**shown, **self._shell.display.places}
+
+    def _seen(self) -> list[QPixmap]:
+        """Pictures of the numbers, and of the skin with what is shown beside and below it."""
+        shell = self._shell
+        whole = shell.display.centre.geometry()
+        for dock in [*shell.docks.right, *shell.docks.below]:
+            if not dock.visibleRegion().isEmpty():
+                whole = whole.united(dock.geometry())
+        numbers = [widget.grab() for widget in shell.display.places.get("readouts", [])]
+        return [*numbers, shell.grab(whole)]

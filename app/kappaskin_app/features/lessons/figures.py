@@ -2,9 +2,8 @@
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,6 @@ from kappaskin.live import Status
 from kappaskin_app.features.lessons.expression import NUMBER, WORD
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.asks import Choice, Several, Text
-
-if TYPE_CHECKING:
-    from kappaskin_app.features.stability.seeing import Spectrum
 
 _RECENT = 24  # estimates of which the median is taken: one alone jumps with the noise
 
@@ -55,11 +51,8 @@ OF_THE_STATUS: dict[str, Callable[[Status], float]] = {
     "refused": lambda s: float(bool(s.refusal)),
     "findings": lambda s: float(len(s.health.findings)),
 }
-OF_THE_SPECTRUM: dict[str, Callable[["Spectrum"], float]] = {
-    "silent": lambda s: float(s.silent),
-    "condition": lambda s: math.inf if s.silent else float(s.values[0] / s.values[-1]),
-}
-"""Figures that are there while Stability is shown."""
+OF_FEATURES = ("silent", "condition")
+"""Figures that a feature may show: those of Stability."""
 
 
 def _kind_of(how: object) -> str:
@@ -71,7 +64,7 @@ SETTINGS = {
     for field in fields(Settings)
     if "ask" in field.metadata and not isinstance(field.metadata["ask"], Several)
 }
-KINDS = dict.fromkeys((*OF_AN_ESTIMATE, *OF_THE_STATUS, *OF_THE_SPECTRUM), NUMBER) | SETTINGS
+KINDS = dict.fromkeys((*OF_AN_ESTIMATE, *OF_THE_STATUS, *OF_FEATURES), NUMBER) | SETTINGS
 """Every name that an expression may have, with whether it is a number or a word."""
 
 
@@ -89,7 +82,7 @@ class Watch:
         self._recent.clear()
 
     def figures(
-        self, settings: Settings, status: Status, spectrum: "Spectrum | None"
+        self, settings: Settings, status: Status, others: Mapping[str, Callable[[], float]]
     ) -> dict[str, float | str]:
         """Every figure as it is now; NaN where there is none."""
         found: dict[str, float | str] = {
@@ -100,6 +93,6 @@ class Watch:
             values = [value for e in self._recent if math.isfinite(value := of(e))]
             found[name] = float(np.median(values)) if values else math.nan
         found |= {name: of(status) for name, of in OF_THE_STATUS.items()}
-        for name, seen in OF_THE_SPECTRUM.items():
-            found[name] = math.nan if spectrum is None else seen(spectrum)
+        for name in OF_FEATURES:
+            found[name] = others[name]() if name in others else math.nan
         return found

@@ -58,8 +58,8 @@ class Pointing(QObject):
 
     def __init__(
         self,
-        forms: list[Form],
-        others: Mapping[str, list[QWidget]],
+        forms: Callable[[], list[Form]],
+        others: Callable[[], Mapping[str, list[QWidget]]],
         show_dock: Callable[[str], None],
         parent: QObject,
     ) -> None:
@@ -71,9 +71,9 @@ class Pointing(QObject):
 
     def targets(self, name: str) -> list[QWidget]:
         """The widgets that `name` means: a control with its label, a dock or a number."""
-        if name in self._others:
-            return self._others[name]
-        for form in self._forms:
+        if name in (others := self._others()):
+            return others[name]
+        for form in self._forms():
             if name in form.names:
                 editor = form.editor(name)
                 label = form.form.labelForField(editor)

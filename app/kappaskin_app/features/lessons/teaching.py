@@ -17,10 +17,10 @@ from kappaskin_app.features.lessons.lesson import Task, whole
 from kappaskin_app.features.lessons.progress import Progress
 from kappaskin_app.features.lessons.reading import READY, read_lesson
 from kappaskin_app.features.lessons.sheet import sheet
-from kappaskin_app.features.stability.seeing import Seeing
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.pictures import chosen_file, save_view
+from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 
@@ -46,7 +46,7 @@ class Teaching(QObject):
     `progress` is that of the lesson that is taken, None while none is; `message` says why an answer
     could not be judged, or a file not be read. `told` says what came of a wish, `pointed` at what
     to point, `taken_up` that a lesson which was left is taken again. It is told how to `connect`
-    to a source, and gets pictures of what is seen and the words below them.
+    to a source, and gets pictures of what is seen.
     """
 
     changed = Signal()
@@ -58,16 +58,15 @@ class Teaching(QObject):
         self,
         history: History,
         session: Session,
-        seeing: Seeing,
+        display: Display,
         window: QWidget,
         connect: Callable[[str], None],
         views: Callable[[], list[QPixmap]],
-        caption: Callable[[], str],
     ) -> None:
         super().__init__(window)
-        self._history, self._session, self._seeing = history, session, seeing
+        self._history, self._session, self._display = history, session, display
         self._window, self._connect = window, connect
-        self._views, self._caption = views, caption
+        self._views = views
         self.taken: dict[str, Progress] = {}
         self.progress: Progress | None = None
         self.message = ""
@@ -193,7 +192,8 @@ class Teaching(QObject):
         progress, now = self.progress, datetime.now()
         if progress is None:
             return
-        settings, views, caption = self._history.settings, self._views(), self._caption()
+        settings, views = self._history.settings, self._views()
+        caption = caption_now(self._session)
         try:
             path = chosen_file(self._window, "the figure", flat=True)
         except Refusal as refusal:
@@ -232,4 +232,4 @@ class Teaching(QObject):
     def figures(self) -> dict[str, float | str]:
         """What the window shows now, by name."""
         session = self._session
-        return self._watch.figures(self._history.settings, session.status, self._seeing.seen)
+        return self._watch.figures(self._history.settings, session.status, self._display.figures)

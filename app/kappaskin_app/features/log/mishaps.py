@@ -6,10 +6,11 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QToolButton
 
 from kappaskin_app import guard
-from kappaskin_app.features.log.logbook import log_folder
+from kappaskin_app.features.log.events import Happenings
 from kappaskin_app.features.log.reporting import ReportDialog, Told
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.logbook import log_folder
 from kappaskin_app.shell.settings_text import settings_text
 from kappaskin_app.theme import Theme
 
@@ -26,9 +27,9 @@ _TIP = (
 class Mishaps(QObject):
     """Counts what a `window` caught: `count` shows it, `report` saves what helps to mend it."""
 
-    def __init__(self, window: "MainWindow") -> None:
+    def __init__(self, window: "MainWindow", events: Happenings) -> None:
         super().__init__(window)
-        self._window = window
+        self._window, self.events = window, events
         self.failures = 0
         self.count = QToolButton()
         self.count.setToolTip(_TIP)
@@ -49,7 +50,7 @@ class Mishaps(QObject):
         self.count.setText(f"{self.failures} failure{'s' if self.failures > 1 else ''}")
         self.count.setAccessibleName(f"{self.count.text()}: read them")
         self.count.show()
-        self._window.happenings.note("failure", words)
+        self.events.note("failure", words)
         self._window.tell(words)
 
     def _tell(self, with_readings: bool) -> Told:
@@ -64,7 +65,7 @@ class Mishaps(QObject):
         }
         texts = {
             "settings.json": settings_text(window.history.settings),
-            "happened.txt": window.happenings.list.toPlainText(),
+            "happened.txt": self.events.list.toPlainText(),
             "state.txt": "".join(f"{name}: {value}\n" for name, value in state.items()),
         }
         return Told(texts, session.estimate if with_readings else None)

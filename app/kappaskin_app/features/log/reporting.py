@@ -16,9 +16,9 @@ from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QLineEdit, QWidget
 from kappaskin.cli.machine import examine
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
-from kappaskin_app.features.log.logbook import CRASHES, LOG
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.folders import recordings_folder
+from kappaskin_app.shell.logbook import CRASHES, LOG
 from kappaskin_app.shell.work_dialog import WorkDialog, beside, choosing, ended, named, path_in
 
 _CONTENTS = (

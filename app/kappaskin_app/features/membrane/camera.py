@@ -1,13 +1,12 @@
 """Where to look at a skin from, so that all of it and what is written beside it is seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
+from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, MM, Direction, DrawnSkin
 
 Array = NDArray[np.float64]
 
@@ -15,20 +14,6 @@ _LOW = 0.2  # of the shorter side: how far in the view reaches below the skin at
 _MARGIN = 0.06  # of the longer side: room for the labels beside the edges and the arrow above
 
 
-@dataclass(frozen=True)
-class Direction:
-    """A way to look at the skin: from where, as shares of its longer side, and what is up."""
-
-    words: str
-    towards: tuple[float, float, float]
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-
-    def sees(self, axis: int) -> bool:
-        """Whether what runs along `axis` is not seen end-on."""
-        return any(share for other, share in enumerate(self.towards) if other != axis)
-
-
-FROM_THE_LEFT = Direction("from the front, a little from the left", (-0.45, -1.1, 1.1))
 DIRECTIONS = {
     "left": FROM_THE_LEFT,
     "above": Direction("from above", (0.0, 0.0, 1.6), (0.0, 1.0, 0.0)),

@@ -6,12 +6,13 @@ from functools import partial
 from PySide6.QtGui import QKeySequence, QShortcut
 
 from kappaskin_app.features.membrane.camera import DIRECTIONS
+from kappaskin_app.features.membrane.skin_view import SkinView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
+from kappaskin_app.shell.requests import Requests
 from kappaskin_app.shell.settings.shown import COLOURS
-from kappaskin_app.shell.wishes import Wishes
 
 _MENU = "Sk&in"
 _COLOURS = f"{_MENU}{WITHIN}&Colour"
@@ -35,43 +36,46 @@ _DIGITS = 9  # actions that may have a digit for a shortcut
 class Looking:
     """Turns what a person asks of the `display` into wishes, or moves the camera."""
 
-    def __init__(self, history: History, wishes: Wishes, display: Display) -> None:
-        self._history, self._wishes, self._display = history, wishes, display
+    def __init__(
+        self, history: History, requests: Requests, display: Display, view: SkinView
+    ) -> None:
+        self._history, self._requests = history, requests
+        self._display, self._view = display, view
 
     def add_actions(self, actions: Actions) -> None:
-        add, wishes = actions.add, self._wishes
+        add, requests = actions.add, self._requests
         for number, (value, words) in enumerate(COLOURS, 1):
-            colour = partial(wishes.wish, "colour_by", value)
+            colour = partial(requests.set, "colour_by", value)
             key = f"Ctrl+{number}" if number <= _DIGITS else ""
             add(f"colour-{value}", _COLOURS, f"Colour by {words.lower()}", colour, key)
         add("lock-ranges", _MENU, "&Lock or free all ranges", self.lock_all, "Ctrl+Alt+L")
-        add("higher", _MENU, "Draw &higher", partial(wishes.exaggerate, 1), "Ctrl++")
-        add("lower", _MENU, "Draw &lower", partial(wishes.exaggerate, -1), "Ctrl+-")
+        add("higher", _MENU, "Draw &higher", partial(self.exaggerate, 1), "Ctrl++")
+        add("lower", _MENU, "Draw &lower", partial(self.exaggerate, -1), "Ctrl+-")
         for name, words, key in _TOGGLES:
-            toggle = partial(wishes.toggle, f"show_{name}")
+            toggle = partial(requests.toggle, f"show_{name}")
             add(name, _MENU, f"Show or hide {words}", toggle, key)
         add("camera", _MENU, "Reset &camera", self._look("Reset camera", "left"), "Ctrl+R")
         for key, look in _LOOKS:
             words = f"Look {DIRECTIONS[look].words}"
             add(words.lower().replace(" ", "-"), _MENU, words, self._look(words, look), key)
-        self._display.membrane.gaze.turned.connect(guarded(self._turned))
+        self._view.membrane.gaze.turned.connect(guarded(self._turned))
 
-        measuring = self._display.measuring
+        measuring = self._view.measuring
         self._measure = add("measure", _MENU, "&Measure", measuring.turn, "Ctrl+Alt+M", _TIP)
         self._measure.setCheckable(True)
-        self._escape = QShortcut(QKeySequence("Esc"), self._display.membrane.window())
+        self._escape = QShortcut(QKeySequence("Esc"), self._view.membrane.window())
         self._escape.setEnabled(False)
         self._escape.activated.connect(guarded(measuring.end))
         measuring.changed.connect(guarded(self._show_measuring))
-        self._display.membrane.pointing.clicked.connect(guarded(self._click))
 
     def _show_measuring(self, on: bool) -> None:
         self._measure.setChecked(on)
         self._escape.setEnabled(on)
 
-    def _click(self, x: float, y: float) -> None:
-        if self._display.measuring.on:
-            self._display.measuring.take(x, y)
+    def exaggerate(self, step: int) -> None:
+        """Draw the displacement larger by so many times."""
+        wanted = self._history.settings.exaggeration + step
+        self._requests.set("exaggeration", float(min(max(wanted, 1), 50)))
 
     def _look(self, words: str, look: str) -> Callable[[], None]:
         return partial(self._history.change, words, -1, look=look, camera=())
@@ -85,8 +89,8 @@ class Looking:
 
     def lock(self, locked: bool) -> None:
         """Keep the range of the skin's colours as it is, or let it follow what is shown."""
-        limit = self._display.limit_shown() if locked else 0.0
-        self._wishes.wish(f"range_{self._history.settings.colour_by}", limit)
+        limit = self._view.limit_shown() if locked else 0.0
+        self._requests.set(f"range_{self._history.settings.colour_by}", limit)
 
     def lock_all(self) -> None:
         """Keep all ranges of colours that are shown as they are, or let them go if all are kept."""

@@ -43,12 +43,3 @@ THINGS = (
     ),
     Thing("Point", "A point: it has no radius.", {"what": "point"}),
 )
-
-
-def may_choose(scene: Scene) -> bool:
-    """Whether another object can take the place of what touches: one alone, and at rest.
-
-    A strip is alike along y, as only a load can be.
-    """
-    alone = len(scene.stimuli) == 1 and not scene.moves
-    return alone and not scene.plate.patch.strip

@@ -12,7 +12,7 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.presenter.banner import REMEDIES
 from kappaskin_app.features.presenter.cue import Cue, Found, cue_of
-from kappaskin_app.features.presenter.objects import THINGS, may_choose
+from kappaskin_app.features.presenter.objects import THINGS
 from kappaskin_app.features.presenter.pad import Hand
 from kappaskin_app.features.presenter.sound import Sound
 from kappaskin_app.features.presenter.stage import Stage
@@ -22,14 +22,13 @@ from kappaskin_app.shell.badge import GAP, SIM, origin
 from kappaskin_app.shell.banner import Offer
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.drawn_once import drawn_once
+from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.touching import touches_at
-from kappaskin_app.shell.wishes import Wishes
+from kappaskin_app.shell.touching import may_choose, touches_at
 from kappaskin_app.theme import Theme
 
 TIP = "Fill the screen with what is felt, to be read from three metres; Escape leaves"
 SOUND_TIP = "A tone that rises and swells with the force, while the presenter is shown"
-NAMED = 0.25  # s between two looks at what touches, while it is felt
 _READ = 0.15  # s between two readings of the figures: faster cannot be read
 _FELT = 0.03  # s between two drawings of the bar
 _OLD = 1.0  # s after which an object that was found is no longer one that touches
@@ -48,11 +47,16 @@ class Presenting(QObject):
     """Fills the screen with the `stage` and leaves it again; shows there what comes in."""
 
     def __init__(
-        self, window: QMainWindow, stage: Stage, session: Session, display: Display, wishes: Wishes
+        self,
+        window: QMainWindow,
+        stage: Stage,
+        session: Session,
+        display: Display,
+        load: LoadHandle,
     ) -> None:
         super().__init__(window)
         self._window, self.stage, self._session = window, stage, session
-        self._display, self._wishes = display, wishes
+        self._display, self._load = display, load
         self._before: _Before | None = None
         self.cue: Cue | None = None
         self.sound = Sound(self)
@@ -60,11 +64,11 @@ class Presenting(QObject):
         self._found_at = -math.inf
         self._next_figures = self._next_felt = 0.0
         pad = stage.operator.pad
-        pad.grabbed.connect(guarded(wishes.grab))
-        pad.dragged.connect(guarded(wishes.drag))
-        pad.pressed.connect(guarded(wishes.press))
-        pad.released.connect(guarded(wishes.release))
-        pad.given_up.connect(guarded(wishes.give_up))
+        pad.grabbed.connect(load.grabbed)
+        pad.dragged.connect(load.dragged)
+        pad.pressed.connect(load.pressed)
+        pad.released.connect(load.released)
+        pad.given_up.connect(load.given_up)
         stage.operator.chosen.connect(guarded(self._choose))
 
     @property
@@ -85,7 +89,6 @@ class Presenting(QObject):
         with drawn_once(window):
             for part in self._around():
                 part.hide()
-            self._display.alarming = False
             self.stage.present(True)
             self._show_hand()
             window.showFullScreen()
@@ -98,7 +101,6 @@ class Presenting(QObject):
         window, before = self._window, self._before
         self._before = None
         self.stage.operator.pad.let_go()
-        self._display.alarming = True
         self.sound.follow(math.nan)
         with drawn_once(window):
             self.stage.present(False)
@@ -181,7 +183,7 @@ class Presenting(QObject):
     def _choose(self, number: int) -> None:
         hand = self.stage.operator.pad.hand
         if hand is not None:
-            self._wishes.touch_with(THINGS[number].said, *hand)
+            self._load.replaced.emit(THINGS[number].said, *hand)
 
     def show_theme(self, theme: Theme) -> None:
         self.stage.show_theme(theme)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from datetime import datetime
 from html import escape
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
@@ -30,11 +29,6 @@ def minutes(seconds: float) -> str:
     """A time as m:ss.mmm."""
     ms = round(1e3 * seconds)
     return f"{ms // 60_000}:{ms // 1000 % 60:02d}.{ms % 1000:03d}"
-
-
-def day(replay: Replay) -> str:
-    """When a recording was begun, to the minute."""
-    return f"{datetime.fromtimestamp(replay.begun):%Y-%m-%d %H:%M}"
 
 
 class Landmarks(Course):

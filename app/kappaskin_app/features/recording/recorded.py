@@ -7,8 +7,9 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Event
 from kappaskin.pipeline import Setup
 from kappaskin.recording import Recording, Replay, setups_of
-from kappaskin_app.features.recording.landmarks import day, minutes
+from kappaskin_app.features.recording.landmarks import minutes
 from kappaskin_app.shell.folders import repairing
+from kappaskin_app.widgets.amounts import day
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Recorded:
 
     def title(self, replay: Replay) -> str:
         """What the window is called while it is played."""
-        return f"{self.path.name}, recorded {day(replay)} \N{EN DASH} Kappaskin"
+        return f"{self.path.name}, recorded {day(replay.begun)} \N{EN DASH} Kappaskin"
 
     def changes(self) -> list[Event]:
         """Where another setup came into use, in words."""

@@ -3,7 +3,7 @@
 from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
 from kappaskin.live import Status
-from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.form import SimulationForm
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.load import (
     FREE_CASES,
@@ -14,24 +14,6 @@ from kappaskin_app.shell.settings.load import (
     TWO_ENDED,
 )
 from kappaskin_app.shell.simulation import is_table_1
-
-_OTHER = "Only for the simulated skin of these panels (Ctrl+M)."
-
-
-class SimulationForm(Form):
-    """A form that belongs to the simulation, and says so while a real sensor is connected."""
-
-    def show_status(self, status: Status, simulating: bool) -> None:
-        for editor in self.editors():
-            editor.setEnabled(simulating)
-        if simulating:
-            self.show_message(self.alarm(status))
-        else:
-            self.show_message(_OTHER, hint=True)
-
-    def alarm(self, status: Status) -> str:
-        """What is wrong with what is asked for here, while it is simulated."""
-        return ""
 
 
 class LoadPanel(SimulationForm):

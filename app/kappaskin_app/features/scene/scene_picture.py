@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPen, QPolygonF
 
-from kappaskin_app.features.membrane.camera import FROM_THE_LEFT
 from kappaskin_app.features.scene.relief import Marks, Relief
+from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, Theme
 
 Array = NDArray[np.float64]

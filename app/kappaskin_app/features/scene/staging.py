@@ -1,6 +1,5 @@
 """The scene between the session that plays it and where it is chosen, edited, planned, scrubbed."""
 
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -9,53 +8,49 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
-from kappaskin.scenes import SCENES, Scene, scene_file
+from kappaskin.scenes import SCENES as READY
+from kappaskin.scenes import Scene, scene_file
+from kappaskin_app.features.scene.editing import SceneEditing
 from kappaskin_app.features.scene.panel import ScenePanel
 from kappaskin_app.features.scene.planning import Planning
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.history import History
+from kappaskin_app.shell.opening import SCENES, Opening
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import OWN, text_of, written
-from kappaskin_app.shell.wishes import Wishes
-from kappaskin_app.shell.work_dialog import with_ending
 
-_FILES = "Scene (*.toml)"
 _PLANNING = "Each effect is sized and timed\N{HORIZONTAL ELLIPSIS}"
 
 
 class Staging(QObject):
-    """Shows in `panel`, `timeline` and plan what is played; `told` says what came of a wish.
-
-    `played` names the source when a scene in a file is played, `used` the file of a person's own.
-    """
+    """Shows in `panel`, `timeline` and plan what is played; `told` says what came of a wish."""
 
     told = Signal(str)
-    played = Signal(str)
-    used = Signal(object)
 
     def __init__(
         self,
         history: History,
         session: Session,
-        wishes: Wishes,
+        editing: SceneEditing,
         planning: Planning,
         panel: ScenePanel,
         timeline: Timeline,
+        opening: Opening,
         window: QWidget,
     ) -> None:
         super().__init__(window)
-        self._history, self._session, self._wishes = history, session, wishes
+        self._history, self._session, self._editing = history, session, editing
         self._planning, self._panel, self._timeline = planning, panel, timeline
-        self._window = window
+        self._opening, self._window = opening, window
         self._wire()
 
     def _wire(self) -> None:
         panel, session, planning = self._panel, self._session, self._planning
         panel.gallery.chosen.connect(guarded(lambda name: self.play(scene_file(name))))
         panel.gallery.open_wanted.connect(guarded(self.open))
-        panel.editor.edited.connect(guarded(self._wishes.write))
+        panel.editor.edited.connect(guarded(self._editing.write))
         panel.editor.save_wanted.connect(guarded(self.save))
         panel.effects.forced.connect(guarded(self._force))
         panel.seen.connect(guarded(planning.watch))
@@ -72,28 +67,15 @@ class Staging(QObject):
 
     def open(self) -> None:
         """Ask for a file, and play the scene in it."""
-        file, _ = QFileDialog.getOpenFileName(self._window, "Open a scene", "", _FILES)
+        file, _ = QFileDialog.getOpenFileName(self._window, "Open a scene", "", SCENES)
         if file:
             self.play(Path(file))
 
     def save(self) -> None:
         """Ask for a file, and write the scene as it is there."""
         settings = self._history.settings
-        self.save_as(
-            settings.written.file.name if settings.written else OWN.name, self._wishes.save
-        )
-
-    def save_as(self, name: str, write: Callable[[Path], object]) -> None:
-        """Ask for a file, `name` to begin with, and `write` a scene there."""
-        file, _ = QFileDialog.getSaveFileName(self._window, "Save the scene", name, _FILES)
-        if file:
-            try:
-                path = with_ending(file, ".toml")
-                write(path)
-                self.used.emit(path)
-                self.told.emit(f"Saved {path}")
-            except (OSError, Refusal) as error:
-                self.told.emit(f"Could not write {file}: {error}")
+        name = settings.written.file.name if settings.written else OWN.name
+        self._opening.save_scene(name, self._editing.save)
 
     def pause(self) -> None:
         """Let the scene stand still, or go on."""
@@ -102,16 +84,15 @@ class Staging(QObject):
     def play(self, file: Path) -> None:
         """Play the scene in a file, from its beginning."""
         try:
-            self._wishes.play(written(file))
-            self.played.emit(self._session.source)
+            self._editing.play(written(file))
             if not _ready(file):
-                self.used.emit(file)
+                self._opening.note(file)
         except Refusal as refusal:
             self.told.emit(str(refusal))
 
     def _force(self, effect: str, how: str) -> None:
         try:
-            self._wishes.force(effect, how)
+            self._editing.force(effect, how)
         except Refusal as refusal:
             self.told.emit(str(refusal))
             self._show_plan()  # or what was asked would look as if it were so
@@ -164,4 +145,4 @@ class Staging(QObject):
 
 def _ready(file: Path) -> bool:
     """Whether a file is that of a ready scene."""
-    return file.stem in SCENES and file == scene_file(file.stem)
+    return file.stem in READY and file == scene_file(file.stem)

@@ -7,8 +7,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from kappaskin.estimation import Bargain
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
-from kappaskin_app.features.scene.load_panel import SimulationForm
-from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.form import Form, SimulationForm
 from kappaskin_app.shell.settings import Settings
 
 _CHOOSE = "Click elements on a heatmap to choose them."

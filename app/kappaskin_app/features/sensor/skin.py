@@ -8,11 +8,11 @@ from PySide6.QtWidgets import QLabel, QWidget
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
-from kappaskin_app.features.estimator.panel import in_use
-from kappaskin_app.features.scene.load_panel import SimulationForm
+from kappaskin_app.shell.form import SimulationForm
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import patch_of
 from kappaskin_app.shell.skins import SHAPES
+from kappaskin_app.shell.states import in_use
 
 _PREPARING = "Computing this skin; the last one stays until then."
 _NUMBERS = ("side_x", "side_y", "base_radius", "rim_radius")

@@ -7,8 +7,8 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from kappaskin.sensing import SensorLayout
-from kappaskin_app.shell.shades import Tint
 from kappaskin_app.theme import DIVERGING, LIGHT, Theme
+from kappaskin_app.widgets.tint import Tint
 
 Array = NDArray[np.float64]
 

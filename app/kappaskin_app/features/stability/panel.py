@@ -12,13 +12,13 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.live import Status
-from kappaskin_app.features.estimator.panel import in_use
 from kappaskin_app.features.stability.demonstrations import DEMONSTRATIONS
 from kappaskin_app.features.stability.mode_map import ModeMap
 from kappaskin_app.features.stability.seeing import Seeing
 from kappaskin_app.features.stability.spectrum import SpectrumPlot
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.states import in_use
 from kappaskin_app.theme import Theme, grown
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 

@@ -1,1 +1,20 @@
-"""One element in detail, and traces over time."""
+"""One element in detail, and traces of several over time."""
+
+from kappaskin_app.features.traces.picking import Picking
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.window import MainWindow
+
+
+class Traces:
+    name = "traces"
+
+    def install(self, shell: MainWindow) -> None:
+        self.picking = Picking(shell.history, shell.session, shell.display, shell.selection)
+        shell.docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
+        shell.docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
+        shell.theme_changed.connect(guarded(self.picking.show_theme))
+        self.picking.picked.connect(guarded(lambda *_: self._show_element(shell)))
+
+    def _show_element(self, shell: MainWindow) -> None:
+        shell.docks.reveal("element")
+        shell.layouts.note()  # a step of its own, before that of the element

@@ -13,6 +13,7 @@ from kappaskin_app.features.traces.past import SECONDS, Past
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
+from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import Theme
@@ -32,8 +33,11 @@ class Picking(QObject):
 
     picked = Signal(int)
 
-    def __init__(self, history: History, session: Session, display: Display) -> None:
-        super().__init__(display.membrane)
+    def __init__(
+        self, history: History, session: Session, display: Display, selection: Selection
+    ) -> None:
+        super().__init__(display)
+        self._selection = selection
         self._history, self._session, self._display = history, session, display
         self.card, self.traces = ElementCard(), Traces()
         self.element = -1
@@ -42,13 +46,12 @@ class Picking(QObject):
         self._next_plots = self._next_words = self._next_spectrum = 0.0
         session.estimated.connect(guarded(self.receive))
         history.changed.connect(guarded(self._follow))
-        display.membrane.pointing.moved.connect(guarded(self._point))
-        display.membrane.pointing.clicked.connect(guarded(self._click))
+        selection.over.connect(guarded(self._point))
+        selection.clicked.connect(guarded(self._click))
         self.card.traced.connect(guarded(self._trace))
-        self.traces.pointed.connect(guarded(display.point))
-        display.pointed.connect(self.traces.mark)
-        for heatmap in display.heatmaps.values():
-            heatmap.chosen.connect(guarded(self._choose))
+        self.traces.pointed.connect(guarded(selection.point))
+        selection.pointed.connect(self.traces.mark)
+        selection.chosen.connect(guarded(self._choose))
 
     def pick(self, element: int) -> None:
         """Tell all about an element."""
@@ -70,11 +73,10 @@ class Picking(QObject):
             self.pick(element)
 
     def _click(self, x: float, y: float) -> None:
-        if not self._display.measuring.on:
-            self.pick(self._nearest((x, y)))
+        self.pick(self._nearest((x, y)))
 
     def _point(self, place: "np.ndarray[tuple[int], np.dtype[np.float64]] | None") -> None:
-        self._display.point(-1 if place is None else self._nearest(place))
+        self._selection.point(-1 if place is None else self._nearest(place))
 
     def _nearest(self, place: object) -> int:
         """The element next to a place (2,) in m; -1 without a sensor."""

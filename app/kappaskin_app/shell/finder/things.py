@@ -1,6 +1,6 @@
 """What can be found in a window: actions, settings, scenes, panels, files, pages of the guide."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -9,8 +9,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QStandardItemModel
 from PySide6.QtWidgets import QComboBox, QDockWidget, QTabWidget, QWidget
 
-from kappaskin.scenes import scene_file
-from kappaskin_app.features.guide.pages import pages
 from kappaskin_app.shell.actions import plain
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.panel import Panel
@@ -36,16 +34,18 @@ class Thing:
     why_not: str = ""
 
 
+Things = Callable[[], Iterable[Thing]]
+
+
 def things_in(window: "MainWindow") -> list[Thing]:
     """All that can be found in the window now."""
     return [
         *_actions(window),
         *_panels(window),
         *_settings(window),
-        *_scenes(window),
         *_layouts(window),
         *_files(window),
-        *_guide(window),
+        *(thing for things in window.menus.things for thing in things()),
     ]
 
 
@@ -102,16 +102,10 @@ def _actions(window: "MainWindow") -> Iterator[Thing]:
 def _panels(window: "MainWindow") -> Iterator[Thing]:
     for panel in window.findChildren(Panel):
         title = panel.title()
-        yield Thing(f"panel:{title}", f"{title} panel", _where(panel), partial(_enter, panel))
-    pages = window.scene
-    for page in (pages.gallery, pages.editor, pages.effects):
-        index = pages.indexOf(page)
-        title = plain(pages.tabText(index))
-        why_not = "" if pages.isTabEnabled(index) else "no scene is played"
-        yield Thing(f"page:{title}", f"Scene: {title}", "Scene", partial(_enter, page), "", why_not)
+        yield Thing(f"panel:{title}", f"{title} panel", _where(panel), partial(enter, panel))
 
 
-def _enter(panel: QWidget) -> None:
+def enter(panel: QWidget) -> None:
     """Show a panel, with the focus on the first of its widgets that takes it."""
     reveal(panel)
     takes = (w for w in panel.findChildren(QWidget) if w.focusPolicy() & Qt.FocusPolicy.TabFocus)
@@ -137,7 +131,7 @@ def _setting(window: "MainWindow", form: Form, editor: QWidget) -> Iterator[Thin
     if isinstance(how, Choice):
         for value, words in how.options:
             refused = why_not or _refused(editor, value)
-            wish = partial(window.wishes.wish, name, value)
+            wish = partial(window.requests.set, name, value)
             yield Thing(f"setting:{name}={value}", f"{title}: {words}", place, wish, "", refused)
 
 
@@ -149,25 +143,11 @@ def _refused(box: QWidget, value: str) -> str:
     return ""
 
 
-def _scenes(window: "MainWindow") -> Iterator[Thing]:
-    for name, card in window.scene.gallery.items.items():
-        play = partial(window.staging.play, scene_file(name))
-        yield Thing(f"scene:{name}", f"Play the scene {card.text()}", "Scene, Gallery", play)
-
-
 def _files(window: "MainWindow") -> Iterator[Thing]:
     for file in window.opening.last_ones():
         why_not = "" if file.is_file() else "not there any more: moved or deleted"
         act = partial(window.opening.open, file)
         yield Thing(f"file:{file}", f"Open {file.name}", f"{file.parent}", act, "", why_not)
-
-
-def _guide(window: "MainWindow") -> Iterator[Thing]:
-    for page in pages():
-        for heading in ("", *page.headings):
-            name = f"guide:{page.file.stem}{'#' if heading else ''}{heading}"
-            place = f"Guide, {page.title}" if heading else "Guide"
-            yield Thing(name, heading or page.title, place, partial(window.read, page, heading))
 
 
 def _layouts(window: "MainWindow") -> Iterator[Thing]:

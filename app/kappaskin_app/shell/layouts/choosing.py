@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QInputDialog, QMenu
+from PySide6.QtWidgets import QDockWidget, QInputDialog, QMenu, QTabWidget
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
@@ -28,6 +28,17 @@ _TIPS = {
 }
 
 
+class FullScreen(Protocol):
+    """A view that fills the screen while it is `on`."""
+
+    @property
+    def on(self) -> bool: ...
+
+    def enter(self) -> None: ...
+
+    def leave(self) -> None: ...
+
+
 class Layouts(QObject):
     """Arranges the docks of a `window`; `own` are those saved, `changed` tells that they did."""
 
@@ -36,18 +47,36 @@ class Layouts(QObject):
 
     def __init__(self, window: "MainWindow") -> None:
         super().__init__(window)
-        self._window, self._docks, self._panels = window, window.docks.by_name(), window.panels
-        self._presenting, self._history = window.presenting, window.history
-        self._noting = Noting(window, self)
-        self.note = self._noting.note
+        self._window, self._panels = window, window.panels
+        self._history = window.history
+        self.full_screen: FullScreen | None = None
+        """A view that may fill the screen, once a feature has one."""
+        self.pages: list[QTabWidget] = []
+        """Pages elsewhere in the window, whose turning can be undone too."""
+        self._noting: Noting | None = None
         self.own: dict[str, Layout] = {}
         self._menu = QMenu(window)
         self._menu.aboutToShow.connect(guarded(self._list))
+
+    def begin(self) -> None:
+        """Watch the docks and pages, once all are there."""
+        self._noting = Noting(self._window, self)
+
+    def note(self) -> None:
+        """Make a step of what a person did to the window, if anything was done."""
+        if self._noting is not None:
+            self._noting.note()
+
+    @property
+    def _docks(self) -> dict[str, QDockWidget]:
+        return self._window.docks.by_name()
 
     def add_actions(self, actions: Actions) -> None:
         """Register what a person can do."""
         add = partial(actions.add, menu=_MENU)
         for name in READY:
+            if name == PRESENTER and self.full_screen is None:
+                continue
             act = partial(self.choose, name)
             add(f"layout-{name.lower()}", text=f"&{name}", act=act, tip=_TIPS[name])
         own = add("layout-own", text="Your &own", act=lambda: None, tip="Layouts you saved")
@@ -60,18 +89,28 @@ class Layouts(QObject):
         ):
             add(f"layout-{name}", text=text, act=act, tip=tip)
 
+    @property
+    def filled(self) -> bool:
+        """Whether a view fills the screen."""
+        return self.full_screen is not None and self.full_screen.on
+
+    def leave_full_screen(self) -> None:
+        if self.full_screen is not None:
+            self.full_screen.leave()
+
     # What is so.
 
     @property
     def now(self) -> Layout:
         """How the window is arranged, or was before it was presented."""
-        self._presenting.leave()
+        self.leave_full_screen()
         return layout_of(self._window, self._docks, self._panels)
 
     def apply(self, layout: Layout) -> None:
         """Arrange the window so, which is no step by itself."""
-        self._noting.settle()
-        self._presenting.leave()
+        if self._noting is not None:
+            self._noting.settle()
+        self.leave_full_screen()
         arrange(self._window, self._docks, self._panels, layout)
 
     # What a person wishes.
@@ -81,8 +120,8 @@ class Layouts(QObject):
         layout = self.own[name] if name in self.own else READY[name]
         if (before := self.now) != layout:
             self._history.step(f"layout {name}", self.apply, before, layout)
-        if name == PRESENTER:
-            self._presenting.enter()
+        if name == PRESENTER and self.full_screen is not None:
+            self.full_screen.enter()
 
     def reset(self) -> None:
         """Arrange the window as it is at first."""

@@ -20,10 +20,10 @@ _HELD = 50  # ms between two looks whether the mouse has let go
 
 @dataclass(frozen=True)
 class Seen:
-    """How the window is arranged, and the `page` of the scene's panel."""
+    """How the window is arranged, and which of its other `pages` are turned to."""
 
     layout: Layout
-    page: int
+    pages: tuple[int, ...]
 
     def differs(self, other: "Seen") -> bool:
         """Whether it is another but for the sizes of docks."""
@@ -39,7 +39,11 @@ class Noting(QObject):
     def __init__(self, window: "MainWindow", layouts: "Layouts") -> None:
         super().__init__(layouts)
         self._window, self._layouts = window, layouts
-        self._docks, self._panels, self._pages = window.docks.by_name(), window.panels, window.scene
+        self._docks, self._panels, self._pages = (
+            window.docks.by_name(),
+            window.panels,
+            layouts.pages,
+        )
         self._known: Seen | None = None
         self._settles, self._sized = True, False
         self._timer = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
@@ -47,7 +51,7 @@ class Noting(QObject):
         for dock in self._docks.values():
             for news in (dock.visibilityChanged, dock.topLevelChanged, dock.dockLocationChanged):
                 news.connect(guarded(self._later))
-        for pages in (self._panels, self._pages):
+        for pages in (self._panels, *self._pages):
             pages.currentChanged.connect(guarded(self._later))
         window.history.stack.indexChanged.connect(guarded(self.settle))
         window.installEventFilter(self)
@@ -58,7 +62,7 @@ class Noting(QObject):
         self._timer.stop()
         if held:
             self._timer.start(_HELD)
-        elif window.isVisible() and not window.isMinimized() and not window.presenting.on:
+        elif window.isVisible() and not window.isMinimized() and not self._layouts.filled:
             self._look()
 
     def _look(self) -> None:
@@ -66,20 +70,27 @@ class Noting(QObject):
         settles, sized = self._settles, self._sized
         self._known, self._settles, self._sized = now, False, False
         # A page that cannot be seen any more is left without anybody's doing.
-        if before is None or settles or not self._pages.isTabEnabled(before.page):
+        if before is None or settles or not self._can_turn_to(before):
             return
         if now.differs(before) or (sized and now != before):
             self._window.history.step(self._told(before, now), self._have, before, now)
 
+    def _can_turn_to(self, seen: Seen) -> bool:
+        """Whether the pages of then can be seen now."""
+        return all(
+            tabs.isTabEnabled(page) for tabs, page in zip(self._pages, seen.pages, strict=True)
+        )
+
     def _now(self) -> Seen:
         layout = layout_of(self._window, self._docks, self._panels)
-        return Seen(layout, self._pages.currentIndex())
+        return Seen(layout, tuple(tabs.currentIndex() for tabs in self._pages))
 
     def _have(self, seen: Seen) -> None:
         """Have the window so, unless it is."""
         if seen != self._known:
-            if self._pages.isTabEnabled(seen.page):
-                self._pages.setCurrentIndex(seen.page)
+            for tabs, page in zip(self._pages, seen.pages, strict=True):
+                if tabs.isTabEnabled(page):
+                    tabs.setCurrentIndex(page)
             self._layouts.apply(seen.layout)
             self._known = seen
 
@@ -116,10 +127,11 @@ class Noting(QObject):
                 return f"{how} {self._docks[of[0]].windowTitle()}"
         if before.layout.page != after.layout.page:
             return f"page {plain(self._panels.tabText(after.layout.page))}"
-        if before.page != after.page:
-            return f"page {plain(self._pages.tabText(after.page))}"
+        for tabs, was_on, now_on in zip(self._pages, before.pages, after.pages, strict=True):
+            if was_on != now_on:
+                return f"page {plain(tabs.tabText(now_on))}"
         return "arrange the panels"
 
 
 def _in_words(seen: Seen) -> object:
-    return seen.page, seen.layout.page, words_of(seen.layout)
+    return seen.pages, seen.layout.page, words_of(seen.layout)

@@ -200,7 +200,7 @@ class View:
     show_start: bool = asked(
         True,
         Switch(
-            "Ways to begin",
+            "Welcome",
             "Offer above the skin, whenever the window opens, what one may begin with: a scene, a "
             "sensor, a lesson, a recording.",
         ),

@@ -1,121 +1,41 @@
-"""What a person wants, as undoable changes of the settings."""
+"""Scenes and loads as a person changes them: played, written, forced, dragged."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kappaskin.live import Status
 from kappaskin.mechanics import Load
-from kappaskin.studies import Setting
 from kappaskin_app.features.scene.scene_text.changes import forced
 from kappaskin_app.features.scene.scene_text.places import instead, pressed, shifted
-from kappaskin_app.features.stability.demonstrations import DEMONSTRATIONS, Demonstration
+from kappaskin_app.guard import guarded
 from kappaskin_app.shell.effects import called
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import dragged
+from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.publishing import Sending
 from kappaskin_app.shell.settings.scene import Written
-from kappaskin_app.shell.simulation import (
-    NO_ELEMENTS,
-    OWN,
-    elements_of,
-    patch_of,
-    text_of,
-    with_consequences,
-)
+from kappaskin_app.shell.simulation import OWN, text_of
 from kappaskin_app.shell.touching import Held, most_times
 
-_TITLES = {name[:1].lower() + name[1:] for name in (d.title for d in DEMONSTRATIONS)}
 
+class SceneEditing:
+    """Turns what a person does to the scene into commands of the history."""
 
-class Wishes:
-    """Turns wishes of panels, menus and views into commands of the history."""
-
-    def __init__(self, history: History, session: Session) -> None:
+    def __init__(self, history: History, session: Session, load: LoadHandle) -> None:
         self._history, self._session = history, session
         self._gesture, self._grabbed_end = -1, False
         self._held: Held | None = None
         self._grabbed_load: Load | None = None
         self._place = (0.0, 0.0)
         self._grabbed_in: Written | None = None
-        self._begun: tuple[Demonstration, int, Settings] | None = None
-
-    def wish(self, name: str, value: Any) -> None:
-        """Make the setting `name` what is wished, and what follows from it."""
-        changed = with_consequences(self._history.settings, self._session.scene, name, value)
-        self._history.wish(name, **changed)
-
-    def choose(self, element: int) -> None:
-        """Take an element into the region of those chosen, or out of it."""
-        settings = self._history.settings
-        if settings.region == "elements":
-            chosen = set(settings.region_elements) ^ {element}
-            self._history.change("Choose elements", region_elements=tuple(sorted(chosen)))
-
-    def take(self, setting: Setting) -> None:
-        """Fit as `setting` says, on as many elements."""
-        along_x, along_y = setting.functions
-        changed = {"method": setting.method, "functions_x": along_x, "functions_y": along_y}
-        elements = setting.elements
-        another = elements != elements_of(self._history.settings)
-        if elements is not None and another and self._session.simulating:
-            changed |= {"elements_x": elements[0], "elements_y": elements[1], **NO_ELEMENTS}
-        self._history.change("Choice by its cost", -1, **changed)
-
-    def demonstrate(self, demonstration: Demonstration) -> None:
-        """Bring a hard case about, as one step."""
-        gesture = self._history.new_gesture()
-        self._history.change(demonstration.title, gesture, **demonstration.changes())
-        if demonstration.then:
-            self._begun = demonstration, gesture, self._history.settings
-
-    @property
-    def demonstrates(self) -> bool:
-        """Whether the last step, which undoing takes back, brought a hard case about."""
-        # By its words: Qt's own commands, asked for at every step, come and go with their wrappers.
-        return self._history.stack.undoText() in _TITLES
-
-    def follow(self, status: Status) -> None:
-        """Go on with the hard case that was begun, once its skin is there."""
-        if self._begun is None:
-            return
-        demonstration, gesture, settings = self._begun
-        if self._history.settings != settings:
-            self._begun = None  # something else was wished meanwhile
-            return
-        there = status.sensor is not None and status.sensor.plate.patch == patch_of(settings)
-        if there and status.slot is not None and not status.computing:
-            self._begun = None
-            self._history.change(demonstration.title, gesture, **demonstration.then)
-
-    def toggle(self, name: str) -> None:
-        self.wish(name, not getattr(self._history.settings, name))
-
-    def switch_theme(self) -> None:
-        self.wish("theme", "light" if self._history.settings.theme == "dark" else "dark")
-
-    def exaggerate(self, step: int) -> None:
-        wanted = self._history.settings.exaggeration + step
-        self.wish("exaggeration", float(min(max(wanted, 1), 50)))
-
-    def reset(self) -> None:
-        now = self._history.settings
-        kept = Settings(calibration=now.calibration, tare=now.tare)  # no matter of taste
-        sending = {field.name: getattr(now, field.name) for field in fields(Sending)}  # nor this
-        self._history.change("Reset settings", -1, **vars(kept) | sending)
-
-    def reset_panel(self, title: str, names: Sequence[str]) -> None:
-        """Have some settings as they are at first, with what follows from each."""
-        now, first = self._history.settings, Settings()
-        for name in names:
-            if getattr(now, name) != (value := getattr(first, name)):
-                now = replace(now, **with_consequences(now, self._session.scene, name, value))
-        changed = {field.name: getattr(now, field.name) for field in fields(Settings)}
-        self._history.change(f"Reset {title}", -1, **changed)
+        load.grabbed.connect(guarded(self.grab))
+        load.dragged.connect(guarded(self.drag))
+        load.pressed.connect(guarded(self.press))
+        load.released.connect(guarded(self.release))
+        load.given_up.connect(guarded(self.give_up))
+        load.replaced.connect(guarded(self.touch_with))
 
     # Scenes as they are written.
 

@@ -1,0 +1,170 @@
+"""The skin in three dimensions as the settings want it: in which colours, how high, what beside."""
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject
+
+from kappaskin.contact import ContactObject
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
+from kappaskin_app.features.membrane.measuring import Measuring
+from kappaskin_app.features.membrane.membrane import MembraneView
+from kappaskin_app.features.membrane.overlaying import Overlaying
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.display import Display, Shown, of_row
+from kappaskin_app.shell.scale import locked_at
+from kappaskin_app.shell.selection import Selection
+from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.shades import SHADES
+from kappaskin_app.shell.touching import touches_at
+from kappaskin_app.theme import DIVERGING, Theme
+from kappaskin_app.widgets.colour_bar import SkinScale
+from kappaskin_app.widgets.tint import Tint
+
+_MARKS = 0.06  # s between two drawings of the marks
+_UNKNOWN = {
+    "difference": "No simulation: the true surface is not known",
+    "error_bar": "Computing how sure the surface is\N{HORIZONTAL ELLIPSIS}",
+}
+
+Array = NDArray[np.float64]
+
+
+class SkinView(QObject):
+    """Shows on the `membrane`, with its `scale`, what the `display` brings.
+
+    `alarming` says whether the picture says why nothing comes in, as nothing else does.
+    """
+
+    def __init__(self, display: Display, session: Session, selection: Selection) -> None:
+        super().__init__(display)
+        self._display, self._session, self._selection = display, session, selection
+        self.membrane, self.scale = MembraneView(), SkinScale()
+        self.measuring = Measuring(self.membrane)
+        self.overlays = Overlaying(self.membrane, display.colouring, session)
+        self.alarming = True
+        self._settings = Settings()
+        self._colours: object = None
+        self._out = np.empty(0, np.intp)  # elements that are left out
+        self._next_marks = 0.0
+        display.ages, display.limits = self._ages, [*display.limits, self._limits]
+        display.restarted.connect(guarded(self._restart))
+        display.status_shown.connect(guarded(self._show_status))
+        display.shown.connect(guarded(self._show))
+        display.object_found.connect(guarded(self._find))
+        selection.pointed.connect(guarded(self.membrane.point))
+        selection.asked.connect(guarded(lambda *_: self._show_marked()))
+        selection.mode_changed.connect(guarded(self._show_mode))
+
+    def _find(self, what: ContactObject, _: Estimate) -> None:
+        self.overlays.find(what)
+
+    def show_settings(self, settings: Settings) -> None:
+        self._settings = settings
+        self.scale.lock.show_locked(locked_at(settings.colour_by, settings) > 0)
+        self._allow_lock()
+        s = settings
+        self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y, s.from_z, s.to_z))
+        self.membrane.show_options(settings.show_elements, settings.show_truth)
+        self.membrane.gaze.show(settings.look, settings.camera)
+
+    def show_theme(self, theme: Theme) -> None:
+        self.measuring.ruler.show_theme(theme)
+        self.membrane.show_theme(theme)
+
+    def limit_shown(self) -> float:
+        """How far the colours of the skin reach, in SI units."""
+        return self.scale.bar.reach / SHADES[self._settings.colour_by].scale
+
+    def _limits(self) -> dict[str, float]:
+        """How far the colours reach, by what is coloured."""
+        if self._selection.mode is not None:
+            return {}
+        return {self._settings.colour_by: self.limit_shown()}
+
+    def _show_mode(self) -> None:
+        self.membrane.show_caption(self._selection.mode_words)
+        self._allow_lock()
+
+    def _allow_lock(self) -> None:
+        """Some colours have no range to keep."""
+        keeps = self._selection.mode is None and self._settings.colour_by != "health"
+        self.scale.lock.setEnabled(keeps)
+
+    def _restart(self, status: Status) -> None:
+        if status.sensor is not None:
+            self._selection.point(-1)
+            self._out = np.empty(0, np.intp)
+            self.membrane.show_skin(status.sensor, status.setup.nx, status.setup.ny)
+
+    def _show_status(self, _: Status) -> None:
+        self._display.age_sd = self.membrane.age_sd
+        self.membrane.alarm.show(self._session.alarm() if self.alarming else "")
+        self.membrane.show_lost(self._display.old)
+        if self._display.old:
+            self.overlays.hide()
+
+    def _ages(self) -> list[float]:
+        """How old in s what was drawn within the last second was."""
+        now = time.monotonic()
+        return [age for when, age in self.membrane.ages if when > now - 1.0]
+
+    def _show(self, shown: Shown) -> None:
+        if not self.membrane.ready:
+            return  # a picture is due; the next tick brings a newer estimate
+        estimate, settings, now = shown.estimate, self._settings, shown.now
+        self._display.ranges.limit("displacement", 1e3 * estimate.surface, settings, now)
+        self._colour(shown)
+        self._show_loads(estimate)
+        self.overlays.show(estimate, settings, self._times())
+        self.measuring.show(estimate)
+        if now >= self._next_marks:
+            self._next_marks = now + _MARKS
+            self._out = np.flatnonzero(shown.kinds.any(axis=0))
+            self._show_marked()
+
+    def _show_marked(self) -> None:
+        self.membrane.show_marked(self._out, self._selection.asked_for)
+
+    def _colour(self, shown: Shown) -> None:
+        name, times, display = self._settings.colour_by, self._times(), self._display
+        estimate, mode, shade, beside = shown.estimate, self._selection.mode, SHADES[name], ()
+        if mode is not None and mode.shape == estimate.surface.shape:
+            tint, values = Tint(DIVERGING, (-1.0, 1.0), "shape"), mode
+        elif shade.surface and self._settings.colour_from == "smooth":
+            values = display.colouring.on_surface(name, estimate)
+            tint = display.tint(name, estimate, values, shown.now)
+        else:
+            of_elements = display.of_elements(name, estimate, shown.kinds)
+            tint = display.tint(name, estimate, of_elements, shown.now)
+            on_rail = of_row(name, shown.railed)
+            values = tint.rgb(of_elements, display.missing, on_rail)
+            beside = tint.legend(of_elements, display.missing, on_rail)
+        if tint.colours is not self._colours:
+            self._colours = tint.colours
+            self.membrane.show_colours(tint.colours, tint.ink)
+        self._say_unknown(name, values)
+        self.membrane.show_estimate(estimate, values, tint.limits, times)
+        self.scale.bar.show_tint(tint, beside)
+        self.scale.show_what("" if tint.unit == "shape" else shade.symbol, shade.tip)
+        self.scale.show_times(times)
+
+    def _say_unknown(self, name: str, values: NDArray[np.generic]) -> None:
+        """Say in the picture why there are no colours."""
+        known = name == "health" or values.dtype == np.uint8 or bool(np.isfinite(values).any())
+        if self._selection.mode is None:
+            self.membrane.show_caption("" if known else _UNKNOWN.get(name, ""))
+
+    def _times(self) -> float:
+        """How many times the displacement is drawn larger: as wanted, or as much as fits."""
+        fits = self.membrane.skin.deepest / self._display.ranges.deepest()
+        return min(self._settings.exaggeration, fits)
+
+    def _show_loads(self, estimate: Estimate) -> None:
+        session = self._session
+        at = session.status.playing.time(estimate.device_time)
+        touches = touches_at(session.scene, at) if session.inside else ()
+        self.membrane.show_loads([touch.load for touch in touches])

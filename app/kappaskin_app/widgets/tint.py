@@ -1,0 +1,63 @@
+"""Numbers to colours: a colour map between limits, or a colour for each whole number."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, SATURATED, Colours
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def rgb_of(*colours: str) -> Colours:
+    return np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in colours], np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class Tint:
+    """How numbers become colours now: of a map of 256 `colours`, between `limits` in `unit`.
+
+    `limit` is how far they reach, as a range is locked to it. A tint of `kinds` has one colour
+    for each whole number instead.
+    """
+
+    colours: Colours
+    limits: tuple[float, float]
+    unit: str
+    limit: float = 1.0
+    kinds: tuple[str, ...] = ()
+
+    @property
+    def ink(self) -> str:
+        """What is seen against every one of the colours."""
+        return DARK_INK if self.colours is DIVERGING else LIGHT_INK
+
+    def rgb(self, values: Array, missing: str, railed: Mask | None = None) -> Colours:
+        """Colours (..., 3) of `values` (...); NaN is `missing`, what is `railed` has its own."""
+        gone = ~np.isfinite(values)
+        known = np.where(gone, 0.0, values)
+        low, high = self.limits
+        if self.kinds:
+            index = known.astype(np.intp)
+        else:
+            share = (known - low) / (high - low) if high > low else np.full_like(known, 0.5)
+            index = (np.clip(share, 0, 1) * 255).astype(np.intp)
+        rgb = self.colours[index]
+        rgb[gone] = rgb_of(missing)[0]
+        if railed is not None and railed.any():
+            rgb[railed] = rgb_of(SATURATED)[0]
+        return rgb
+
+    def legend(
+        self, values: Array, missing: str, railed: Mask | None = None
+    ) -> tuple[tuple[str, str], ...]:
+        """What is seen beside the scale's own colours, or without a scale: colours and words."""
+        if self.kinds:
+            seen = np.unique(values[np.isfinite(values)].astype(int))
+            return tuple((f"#{self.colours[k].tobytes().hex()}", self.kinds[k]) for k in seen)
+        gone = ~np.isfinite(values)
+        on_rail = np.zeros(len(values), bool) if railed is None else railed
+        beside = (on_rail.any(), SATURATED, "on rail"), ((gone & ~on_rail).any(), missing, "none")
+        return tuple((colour, words) for there, colour, words in beside if there)

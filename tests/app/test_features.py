@@ -1,0 +1,60 @@
+"""Each feature can be taken out: the rest starts, draws, changes a setting and closes."""
+
+import ast
+import math
+from pathlib import Path
+
+import pytest
+
+import kappaskin_app
+from kappaskin_app.features import FEATURES
+from kappaskin_app.features.membrane import Membrane
+
+APP = Path(kappaskin_app.__file__).parent
+
+
+def _imports(folder: Path) -> set[str]:
+    """What the modules in a folder import of the app."""
+    return {
+        node.module
+        for file in folder.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module
+    }
+
+
+@pytest.mark.parametrize("left_out", FEATURES, ids=lambda feature: feature.name)
+def test_the_app_works_without(left_out, qapp, window_class, until) -> None:
+    rest = [feature for feature in FEATURES if feature is not left_out]
+    window = window_class("sim:", features=rest)
+    window.show()
+    try:
+        if left_out is Membrane:
+            until(lambda: window.session.estimate is not None)
+        else:
+            until(lambda: any(math.isfinite(age) for age in window.display.ages()))
+        before = window.session.estimate.generation
+        window.requests.set("functions_x", 5)
+        window.requests.set("theme", "light")
+        until(lambda: window.session.estimate.generation > before)
+        assert window.session.estimate.coefficients.shape[-2:] == (5, 8)
+        assert set(window.features) == {feature.name for feature in rest}
+    finally:
+        window.close()
+        window.deleteLater()
+        qapp.processEvents()
+
+
+@pytest.mark.parametrize("feature", FEATURES, ids=lambda feature: feature.name)
+def test_a_feature_imports_no_other(feature) -> None:
+    own = f"kappaskin_app.features.{feature.name}"
+    others = {name for name in _imports(APP / "features" / feature.name) if ".features" in name}
+    assert {name for name in others if name != own and not name.startswith(f"{own}.")} == set()
+
+
+def test_every_folder_is_a_feature_and_the_shell_knows_none() -> None:
+    folders = {file.parent.name for file in (APP / "features").glob("*/__init__.py")}
+    assert folders == {feature.name for feature in FEATURES}
+    for part in ("shell", "widgets"):
+        assert not {name for name in _imports(APP / part) if ".features" in name}
+    assert not {name for name in _imports(APP / "widgets") if ".shell" in name}
