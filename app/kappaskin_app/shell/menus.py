@@ -1,23 +1,17 @@
 """Menus: the order in which they stand, the shell's own actions, the finder and the shortcuts."""
 
 from functools import partial
-from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
 
 from kappaskin_app.shell.finder.finder import Finder
 from kappaskin_app.shell.finder.sheet import CheatSheet
 from kappaskin_app.shell.finder.things import Things, things_in
+from kappaskin_app.shell.parts import EDIT, FILE, HELP, VIEW, Parts
 from kappaskin_app.shell.undoing import Undoing
 from kappaskin_app.shell.welcome import Welcome
 
-if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
-
 DOTS = "\N{HORIZONTAL ELLIPSIS}"
-FILE, EDIT, SOURCE, RECORDING, SKIN = "&File", "&Edit", "&Source", "&Recording", "Sk&in"
-VIEW, LAYOUT, FIGURES, EXPORT, HELP = "&View", "Layo&ut", "Fi&gures", "E&xport", "&Help"
-ORDER = (FILE, EDIT, SOURCE, RECORDING, SKIN, VIEW, LAYOUT, FIGURES, EXPORT, HELP)
 _FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, files"
 _SHEET = "Every shortcut, to look up and to change"
 _WELCOME = "Offer above the skin what one may begin with: a scene, a sensor, a lesson, a recording"
@@ -28,9 +22,12 @@ class Menus(QObject):
     """Registers the shell's own actions before and after those of features.
 
     `things` are what features have to be found besides actions, panels and settings.
+    `quit_wanted` tells that a person wants to close the window.
     """
 
-    def __init__(self, window: "MainWindow") -> None:
+    quit_wanted = Signal()
+
+    def __init__(self, window: Parts) -> None:
         super().__init__(window)
         self._window = window
         self.things: list[Things] = []
@@ -42,7 +39,7 @@ class Menus(QObject):
             window.opening.menu,
             window,
         )
-        self.finder = Finder(partial(things_in, window), window)
+        self.finder = Finder(lambda: things_in(window, self.things), window)
         add = window.actions_by_name.add
         self.undoing = Undoing(
             window.history.stack, window.layouts.note, window.actions_by_name, EDIT
@@ -58,7 +55,7 @@ class Menus(QObject):
         window, add = self._window, self._window.actions_by_name.add
         recent = add("recent", FILE, "Open r&ecent", lambda: None, "", _RECENT)
         recent.setMenu(window.opening.menu)
-        add("quit", FILE, "&Quit", window.quit, "Ctrl+Q")
+        add("quit", FILE, "&Quit", self.quit_wanted.emit, "Ctrl+Q")
         add("next-panels", VIEW, "&Next panels", partial(window.panels.turn, 1), "Ctrl+PgDown")
         add("last-panels", VIEW, "&Previous panels", partial(window.panels.turn, -1), "Ctrl+PgUp")
         window.docks.add_actions(window.actions_by_name, VIEW)

@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import platformdirs
 from PySide6.QtCore import QLockFile, QObject
@@ -17,11 +16,9 @@ from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.banner import Offered
+from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings_text import OF_SENSORS, settings_in, settings_text
-
-if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
 
 _FILES = "window-*.json"
 _EVERY = 1.0  # s between two looks at what is to be kept
@@ -98,7 +95,7 @@ def _lock(file: Path) -> QLockFile:
 class Recovering(QObject):
     """Keeps in a `folder` what a `window` is at, and offers what one was at that crashed."""
 
-    def __init__(self, window: "MainWindow", folder: Path) -> None:
+    def __init__(self, window: Parts, folder: Path) -> None:
         super().__init__(window)
         self._window, last = window, crashed(folder)
         self._running, self._next = Running(folder), 0.0

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 from kappaskin_app.theme import Theme
 
 if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
+    from kappaskin_app.shell.parts import Parts
 
 _WIDTH = 66  # letters wide
 _MOST = 2500  # ms that it stands before a window into which nothing comes
@@ -48,7 +48,7 @@ class Splash(QWidget):
         self.words.setAccessibleName(self.words.text())
         QApplication.processEvents()
 
-    def finish(self, window: "MainWindow") -> None:
+    def finish(self, window: "Parts") -> None:
         """Wait for the first reading to be drawn in a `window`, and go."""
         self.say(_READING)
         # The connection holds this splash, which nothing else does, until it goes.

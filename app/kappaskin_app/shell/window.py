@@ -4,26 +4,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QMainWindow
+from PySide6.QtWidgets import QApplication
 
 from kappaskin.live import Engine, Left, Status
-from kappaskin_app.guard import guarded, log
-from kappaskin_app.shell.actions import Actions
-from kappaskin_app.shell.background import Tasks
-from kappaskin_app.shell.display import Display
-from kappaskin_app.shell.docks import Docks
-from kappaskin_app.shell.history import History
-from kappaskin_app.shell.layouts.choosing import Layouts
+from kappaskin_app.guard import guarded
 from kappaskin_app.shell.layouts.keeping import Keeping
-from kappaskin_app.shell.menus import ORDER, Menus
-from kappaskin_app.shell.opening import Opening
-from kappaskin_app.shell.pages import Pages
-from kappaskin_app.shell.requests import Requests
+from kappaskin_app.shell.menus import Menus
+from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.resume import settings_left
-from kappaskin_app.shell.selection import Selection
-from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import settings_for
 from kappaskin_app.theme import THEMES, Theme, bar_palette, letters, palette
@@ -42,21 +32,8 @@ class Feature(Protocol):
         ...
 
 
-class MainWindow(QMainWindow):
-    """The shell that features are installed into.
-
-    `settings_shown` and `theme_changed` bring what all views follow. `begun` tells, once all is
-    there, what an engine was left with by another window (or None) and which source is read;
-    `read_wanted` which page of the guide a person wants to read. `closing` lets go of what runs
-    before the session ends, `closed` of what draws after it.
-    """
-
-    settings_shown = Signal(Settings)
-    theme_changed = Signal(object)
-    begun = Signal(object, str)
-    read_wanted = Signal(str)
-    closing = Signal()
-    closed = Signal()
+class MainWindow(Parts):
+    """The shell that features are installed into."""
 
     def __init__(
         self,
@@ -64,25 +41,15 @@ class MainWindow(QMainWindow):
         source: str = "sim:",
         engine: Engine | None = None,
     ) -> None:
-        super().__init__()
-        self.setObjectName("kappaskin")
-        self.setWindowTitle("Kappaskin")
         handed = engine.adopted if engine else None
         if handed and source == "sim:":  # nothing else was asked for
             source = handed.asked.source or source
-        begun = settings_left(handed) if handed else settings_for(source)
-        self.history = History(begun, self)
-        self.session = Session(self.history, engine or Engine(), self)
-        self.requests = Requests(self.history, self.session)
-        self.selection = Selection(self)
-        self.display = Display(self.session, self)
-        self.actions_by_name = Actions(self, ORDER)
-        self.docks, self.panels = Docks(self), Pages()
-        self.tasks = Tasks(self)
-        self.opening = Opening(self, self.history, self.session)
-        self.layouts = Layouts(self)
+        super().__init__(settings_left(handed) if handed else settings_for(source), engine)
+        self.setObjectName("kappaskin")
+        self.setWindowTitle("Kappaskin")
         self.menus = Menus(self)
-        self.keeping = Keeping(self)
+        self.keeping = Keeping(self, self.menus)
+        self.menus.quit_wanted.connect(guarded(self.quit))
         self.features: dict[str, Feature] = {}
         self._lay_out()
         self._wire()
@@ -155,12 +122,6 @@ class MainWindow(QMainWindow):
         self.panels.show_status(status, self.session.simulating and status.state == "streaming")
 
     # What features ask of the window.
-
-    def tell(self, text: str) -> None:
-        """Show a message for some seconds."""
-        self.statusBar().showMessage(text, 10_000)
-        if text:
-            log.info("%s", text)
 
     def picture(self, path: Path) -> bool:
         """Save the window, 3-D picture included, as a PNG; whether it could be written."""

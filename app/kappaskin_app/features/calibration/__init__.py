@@ -11,9 +11,9 @@ from kappaskin_app.features.calibration.panel import CalibratePanel
 from kappaskin_app.features.calibration.tare import TarePanel
 from kappaskin_app.features.calibration.taring import Taring
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.menus import SOURCE
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import CALIBRATE, LIVE
+from kappaskin_app.shell.parts import SOURCE
 from kappaskin_app.shell.window import MainWindow
 
 _CHECKSUM = "sha256"  # the line that a calibration has and a scene has not

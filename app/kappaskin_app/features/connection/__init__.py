@@ -4,8 +4,8 @@ from kappaskin.live import Left
 from kappaskin_app.features.connection.panel import ConnectionPanel
 from kappaskin_app.features.connection.plugs import Plugs
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.menus import SOURCE
 from kappaskin_app.shell.pages import LIVE
+from kappaskin_app.shell.parts import SOURCE
 from kappaskin_app.shell.window import MainWindow
 
 

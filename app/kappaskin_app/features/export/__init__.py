@@ -13,7 +13,7 @@ from kappaskin_app.features.export.exports import Exports
 from kappaskin_app.features.export.figures import TITLES, FigureWindow
 from kappaskin_app.features.export.scripting import script_of
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell import menus
+from kappaskin_app.shell import parts as menus
 from kappaskin_app.shell.window import MainWindow
 
 _PYTHON = "A script that does what the window does now: source, scene, setup; it prints the contact"

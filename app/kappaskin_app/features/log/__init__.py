@@ -5,7 +5,7 @@ from kappaskin_app.features.log.logged import Logged
 from kappaskin_app.features.log.mishaps import Mishaps
 from kappaskin_app.features.log.panel import LogPanel
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.menus import HELP, SOURCE
+from kappaskin_app.shell.parts import HELP, SOURCE
 from kappaskin_app.shell.window import MainWindow
 
 

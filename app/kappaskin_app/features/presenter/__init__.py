@@ -3,7 +3,7 @@
 from kappaskin_app.features.presenter.presenting import SOUND_TIP, TIP, Presenting
 from kappaskin_app.features.presenter.stage import Stage
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.menus import VIEW
+from kappaskin_app.shell.parts import VIEW
 from kappaskin_app.shell.window import MainWindow
 
 

@@ -15,9 +15,10 @@ from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
 from kappaskin_app.shell.finder.things import Thing, enter
-from kappaskin_app.shell.menus import DOTS, FILE
+from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
+from kappaskin_app.shell.parts import FILE
 from kappaskin_app.shell.touching import may_choose, touches_at
 from kappaskin_app.shell.window import MainWindow
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QStandardItemModel
@@ -12,12 +11,10 @@ from PySide6.QtWidgets import QComboBox, QDockWidget, QTabWidget, QWidget
 from kappaskin_app.shell.actions import plain
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.panel import Panel
+from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import ask_of
 from kappaskin_app.shell.settings.asks import Choice
 from kappaskin_app.widgets.columns import scroll_to
-
-if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
 
 _NOT_NOW = "not with what is chosen now"
 
@@ -37,15 +34,15 @@ class Thing:
 Things = Callable[[], Iterable[Thing]]
 
 
-def things_in(window: "MainWindow") -> list[Thing]:
-    """All that can be found in the window now."""
+def things_in(window: Parts, others: Iterable[Things]) -> list[Thing]:
+    """All that can be found in the window now, with what `others` tell."""
     return [
         *_actions(window),
         *_panels(window),
         *_settings(window),
         *_layouts(window),
         *_files(window),
-        *(thing for things in window.menus.things for thing in things()),
+        *(thing for things in others for thing in things()),
     ]
 
 
@@ -86,7 +83,7 @@ def _where(widget: QWidget) -> str:
     return around.windowTitle()
 
 
-def _actions(window: "MainWindow") -> Iterator[Thing]:
+def _actions(window: Parts) -> Iterator[Thing]:
     for name, entry in window.actions_by_name.entries.items():
         if entry.action.menu() is None:
             yield Thing(
@@ -99,7 +96,7 @@ def _actions(window: "MainWindow") -> Iterator[Thing]:
             )
 
 
-def _panels(window: "MainWindow") -> Iterator[Thing]:
+def _panels(window: Parts) -> Iterator[Thing]:
     for panel in window.findChildren(Panel):
         title = panel.title()
         yield Thing(f"panel:{title}", f"{title} panel", _where(panel), partial(enter, panel))
@@ -113,13 +110,13 @@ def enter(panel: QWidget) -> None:
         reveal(first)
 
 
-def _settings(window: "MainWindow") -> Iterator[Thing]:
+def _settings(window: Parts) -> Iterator[Thing]:
     for form in window.findChildren(Form):
         for editor in form.editors():
             yield from _setting(window, form, editor)
 
 
-def _setting(window: "MainWindow", form: Form, editor: QWidget) -> Iterator[Thing]:
+def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[Thing]:
     """The setting that `editor` is for, and each value of a choice."""
     name = editor.objectName()
     how, place = ask_of(name), f"{_where(form)}, {form.title()}"
@@ -143,14 +140,14 @@ def _refused(box: QWidget, value: str) -> str:
     return ""
 
 
-def _files(window: "MainWindow") -> Iterator[Thing]:
+def _files(window: Parts) -> Iterator[Thing]:
     for file in window.opening.last_ones():
         why_not = "" if file.is_file() else "not there any more: moved or deleted"
         act = partial(window.opening.open, file)
         yield Thing(f"file:{file}", f"Open {file.name}", f"{file.parent}", act, "", why_not)
 
 
-def _layouts(window: "MainWindow") -> Iterator[Thing]:
+def _layouts(window: Parts) -> Iterator[Thing]:
     for name in window.layouts.own:
         yield Thing(
             f"layout:{name}", name, "Layout menu, Your own", partial(window.layouts.choose, name)

@@ -2,19 +2,19 @@
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtWidgets import QDockWidget, QInputDialog, QMenu, QTabWidget
+from PySide6.QtWidgets import QDockWidget, QInputDialog, QMainWindow, QMenu, QTabWidget
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.docks import Docks
+from kappaskin_app.shell.history import History
 from kappaskin_app.shell.layouts.arranging import arrange, layout_of
 from kappaskin_app.shell.layouts.layout import LIVE, PRESENTER, READY, Layout
 from kappaskin_app.shell.layouts.noting import Noting
-
-if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.shell.pages import Pages
 
 _MENU = "Layo&ut"
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
@@ -45,10 +45,10 @@ class Layouts(QObject):
     told = Signal(str)
     changed = Signal()
 
-    def __init__(self, window: "MainWindow") -> None:
+    def __init__(self, window: QMainWindow, docks: Docks, panels: Pages, history: History) -> None:
         super().__init__(window)
-        self._window, self._panels = window, window.panels
-        self._history = window.history
+        self._window, self._all, self._panels = window, docks, panels
+        self._history = history
         self.full_screen: FullScreen | None = None
         """A view that may fill the screen, once a feature has one."""
         self.pages: list[QTabWidget] = []
@@ -60,7 +60,11 @@ class Layouts(QObject):
 
     def begin(self) -> None:
         """Watch the docks and pages, once all are there."""
-        self._noting = Noting(self._window, self)
+        pages = [self._panels, *self.pages]
+        self._noting = Noting(
+            *(self._window, self._docks, pages, self._history),
+            *(self.apply, lambda: self.filled),
+        )
 
     def note(self) -> None:
         """Make a step of what a person did to the window, if anything was done."""
@@ -69,7 +73,7 @@ class Layouts(QObject):
 
     @property
     def _docks(self) -> dict[str, QDockWidget]:
-        return self._window.docks.by_name()
+        return self._all.by_name()
 
     def add_actions(self, actions: Actions) -> None:
         """Register what a person can do."""

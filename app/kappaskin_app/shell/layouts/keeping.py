@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QRect
 from PySide6.QtGui import QGuiApplication
@@ -11,17 +10,16 @@ from PySide6.QtGui import QGuiApplication
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.layouts.file import KeptFile
 from kappaskin_app.shell.layouts.kept import Kept
-
-if TYPE_CHECKING:
-    from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.shell.menus import Menus
+from kappaskin_app.shell.parts import Parts
 
 
 class Keeping(QObject):
     """Of a `window`; until it has begun, nothing is read and nothing is written."""
 
-    def __init__(self, window: "MainWindow") -> None:
+    def __init__(self, window: Parts, menus: Menus) -> None:
         super().__init__(window)
-        self._window = window
+        self._window, self._menus = window, menus
         self._file: KeptFile | None = None
         self._kept = Kept()
 
@@ -31,7 +29,7 @@ class Keeping(QObject):
         kept, wrong = file.read()
         refused = self._restore(kept)
         self._file, self._kept = file, self._now()
-        for changed in (window.menus.sheet.changed, window.layouts.changed, window.opening.changed):
+        for changed in (self._menus.sheet.changed, window.layouts.changed, window.opening.changed):
             changed.connect(guarded(self.write))
         if wrong or refused:
             window.tell("; ".join([*([wrong] if wrong else []), *refused]))
@@ -56,7 +54,7 @@ class Keeping(QObject):
         chosen |= {"theme": kept.theme} if kept.theme else {}
         window.history.apply(replace(window.history.settings, **chosen))
         window.opening.recent = [Path(file) for file in kept.files]
-        window.menus.finder.recent = list(kept.done)
+        self._menus.finder.recent = list(kept.done)
         window.layouts.own = dict(kept.own)
         window.layouts.apply(kept.now)
         return window.actions_by_name.take_keys(dict(kept.keys))
@@ -71,7 +69,7 @@ class Keeping(QObject):
             place=(place.x(), place.y(), place.width(), place.height()),
             full=window.isMaximized(),
             keys=window.actions_by_name.changed_keys(),
-            done=tuple(window.menus.finder.recent),
+            done=tuple(self._menus.finder.recent),
             files=tuple(str(file) for file in window.opening.recent),
             now=layout,
             own=dict(window.layouts.own),

@@ -1,19 +1,16 @@
 """What a person does to the docks of a window and its pages, as steps that can be undone."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, QTimer
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QDockWidget, QMainWindow, QTabWidget
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
+from kappaskin_app.shell.history import History
 from kappaskin_app.shell.layouts.arranging import layout_of, words_of
 from kappaskin_app.shell.layouts.layout import Layout
-
-if TYPE_CHECKING:
-    from kappaskin_app.shell.layouts.choosing import Layouts
-    from kappaskin_app.shell.window import MainWindow
 
 _HELD = 50  # ms between two looks whether the mouse has let go
 
@@ -31,19 +28,26 @@ class Seen:
 
 
 class Noting(QObject):
-    """Watches a `window`, whose `layouts` are asked to bring back what was.
+    """Watches the docks and `tabs` of a `window`; `apply` brings back a layout that was.
+
+    `filled` says whether a view fills the screen, which is no arrangement.
 
     What docks do in the turn of another step belongs to that one.
     """
 
-    def __init__(self, window: "MainWindow", layouts: "Layouts") -> None:
-        super().__init__(layouts)
-        self._window, self._layouts = window, layouts
-        self._docks, self._panels, self._pages = (
-            window.docks.by_name(),
-            window.panels,
-            layouts.pages,
-        )
+    def __init__(
+        self,
+        window: QMainWindow,
+        docks: Mapping[str, QDockWidget],
+        tabs: Sequence[QTabWidget],
+        history: History,
+        apply: Callable[[Layout], object],
+        filled: Callable[[], bool],
+    ) -> None:
+        super().__init__(window)
+        self._window, self._docks, self._history = window, docks, history
+        self._panels, *self._pages = tabs
+        self._apply, self._filled = apply, filled
         self._known: Seen | None = None
         self._settles, self._sized = True, False
         self._timer = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
@@ -53,7 +57,7 @@ class Noting(QObject):
                 news.connect(guarded(self._later))
         for pages in (self._panels, *self._pages):
             pages.currentChanged.connect(guarded(self._later))
-        window.history.stack.indexChanged.connect(guarded(self.settle))
+        history.stack.indexChanged.connect(guarded(self.settle))
         window.installEventFilter(self)
 
     def note(self) -> None:
@@ -62,7 +66,7 @@ class Noting(QObject):
         self._timer.stop()
         if held:
             self._timer.start(_HELD)
-        elif window.isVisible() and not window.isMinimized() and not self._layouts.filled:
+        elif window.isVisible() and not window.isMinimized() and not self._filled():
             self._look()
 
     def _look(self) -> None:
@@ -73,7 +77,7 @@ class Noting(QObject):
         if before is None or settles or not self._can_turn_to(before):
             return
         if now.differs(before) or (sized and now != before):
-            self._window.history.step(self._told(before, now), self._have, before, now)
+            self._history.step(self._told(before, now), self._have, before, now)
 
     def _can_turn_to(self, seen: Seen) -> bool:
         """Whether the pages of then can be seen now."""
@@ -91,7 +95,7 @@ class Noting(QObject):
             for tabs, page in zip(self._pages, seen.pages, strict=True):
                 if tabs.isTabEnabled(page):
                     tabs.setCurrentIndex(page)
-            self._layouts.apply(seen.layout)
+            self._apply(seen.layout)
             self._known = seen
 
     def _later(self, *_: object) -> None:

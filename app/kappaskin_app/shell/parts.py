@@ -1,0 +1,60 @@
+"""The shell's parts, as one window: what features are installed into."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QMainWindow
+
+from kappaskin.live import Engine
+from kappaskin_app.guard import log
+from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.background import Tasks
+from kappaskin_app.shell.display import Display
+from kappaskin_app.shell.docks import Docks
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.layouts.choosing import Layouts
+from kappaskin_app.shell.opening import Opening
+from kappaskin_app.shell.pages import Pages
+from kappaskin_app.shell.requests import Requests
+from kappaskin_app.shell.selection import Selection
+from kappaskin_app.shell.session import Session
+from kappaskin_app.shell.settings import Settings
+
+FILE, EDIT, SOURCE, RECORDING, SKIN = "&File", "&Edit", "&Source", "&Recording", "Sk&in"
+VIEW, LAYOUT, FIGURES, EXPORT, HELP = "&View", "Layo&ut", "Fi&gures", "E&xport", "&Help"
+MENUS = (FILE, EDIT, SOURCE, RECORDING, SKIN, VIEW, LAYOUT, FIGURES, EXPORT, HELP)
+"""The titles of the menus, in their order."""
+
+
+class Parts(QMainWindow):
+    """A window with settings and their history, a session, a display, docks and actions.
+
+    `settings_shown` and `theme_changed` bring what all views follow. `begun` tells, once all is
+    there, what an engine was left with by another window (or None) and which source is read;
+    `read_wanted` which page of the guide a person wants to read. `closing` lets go of what runs
+    before the session ends, `closed` of what draws after it.
+    """
+
+    settings_shown = Signal(Settings)
+    theme_changed = Signal(object)
+    begun = Signal(object, str)
+    read_wanted = Signal(str)
+    closing = Signal()
+    closed = Signal()
+
+    def __init__(self, settings: Settings, engine: Engine | None = None) -> None:
+        super().__init__()
+        self.history = History(settings, self)
+        self.session = Session(self.history, engine or Engine(), self)
+        self.requests = Requests(self.history, self.session)
+        self.selection = Selection(self)
+        self.display = Display(self.session, self)
+        self.actions_by_name = Actions(self, MENUS)
+        self.docks, self.panels = Docks(self), Pages()
+        self.tasks = Tasks(self)
+        self.opening = Opening(self, self.history, self.session)
+        self.layouts = Layouts(self, self.docks, self.panels, self.history)
+
+    def tell(self, text: str) -> None:
+        """Show a message for some seconds."""
+        self.statusBar().showMessage(text, 10_000)
+        if text:
+            log.info("%s", text)
