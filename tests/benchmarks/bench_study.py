@@ -9,8 +9,8 @@ import psutil
 from kappaskin import LeastSquares, Simulator, SineBasis, load_scene
 from kappaskin.pipeline import reconstruct
 from kappaskin.studies import Folder, processes, run_study
+from kappaskin.studies.design.results import Task, run, version
 from kappaskin.studies.design.study import read_study
-from kappaskin.studies.design.task import Task, run, version
 
 TEXT = """
 format = 1

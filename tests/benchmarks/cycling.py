@@ -14,7 +14,7 @@ from pathlib import Path
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
-from kappaskin.studies.drills.held import Held
+from kappaskin.studies.drills.stand import Held
 from kappaskin_app.window import MainWindow
 
 _DRAWN = 5  # pictures of the skin, of each window

@@ -14,12 +14,9 @@ from kappaskin import GaussianLoad, Patch, Plate, SineBasis, load_scene
 from kappaskin.cli import main
 from kappaskin.cli.common import REFUSED
 from kappaskin.studies import compared, compared_text
-from kappaskin.studies.compare.elements import bent
-from kappaskin.studies.compare.slopes import integrated
-from kappaskin.studies.compare.solvers import iterated, lstsq, pinv
-from kappaskin.studies.compare.table import errors_text
-from kappaskin.studies.compare.works import WITHIN
-from kappaskin.studies.tables import Case, table_1
+from kappaskin.studies.compare.ways import bent, integrated, iterated, lstsq, pinv
+from kappaskin.studies.compare.works import WITHIN, errors_text
+from kappaskin.studies.paper import Case, table_1
 
 pytestmark = pytest.mark.slow
 

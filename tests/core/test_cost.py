@@ -36,8 +36,8 @@ from kappaskin.cli.common import FAILED, REFUSED
 from kappaskin.scenes import SCENES
 from kappaskin.studies import costs_text, length_of, rows, verdict, write_plot
 from kappaskin.studies.cost.bench import Bench
-from kappaskin.studies.cost.choice import ALIKE
-from kappaskin.studies.tables import fingertip_scene, table_1
+from kappaskin.studies.cost.settings import ALIKE
+from kappaskin.studies.paper import fingertip_scene, table_1
 
 pytestmark = pytest.mark.slow
 

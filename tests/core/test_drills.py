@@ -17,15 +17,10 @@ from kappaskin.cli import main
 from kappaskin.sources import BAUD_RATES, Information, Operation, Reply, Samples, information
 from kappaskin.sources.wire import Fault
 from kappaskin.studies import drills_text, run_drills
-from kappaskin.studies.drills.devices import DRILLS as OF_DEVICES
-from kappaskin.studies.drills.drill import Drill
-from kappaskin.studies.drills.held import Held
-from kappaskin.studies.drills.outcome import Outcome, judged
-from kappaskin.studies.drills.rewrite import Says, Times, untold
+from kappaskin.studies.drills.line import DEVICE_DRILLS as OF_DEVICES
+from kappaskin.studies.drills.relay import Cut, Flips, Garbage, Says, Times, heard, untold
 from kappaskin.studies.drills.run import DRILLS, row_of
-from kappaskin.studies.drills.spoil import Cut, Flips, Garbage
-from kappaskin.studies.drills.stand import Device, Stand, opened
-from kappaskin.studies.drills.uart import heard
+from kappaskin.studies.drills.stand import Device, Drill, Held, Outcome, Stand, judged, opened
 
 pytestmark = pytest.mark.slow
 

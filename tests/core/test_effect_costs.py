@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import kappaskin.cli.cost
-import kappaskin.studies.plan
+import kappaskin.studies.simulation
 from kappaskin import (
     Cost,
     EffectCost,
@@ -39,7 +39,7 @@ FIGURES = ("rms_with", "rms_without")
 @pytest.fixture(autouse=True)
 def quick(monkeypatch) -> None:
     """Times are not what is tested here."""
-    monkeypatch.setattr(kappaskin.studies.plan, "_FRAMES", 1)
+    monkeypatch.setattr(kappaskin.studies.simulation, "_FRAMES", 1)
 
 
 def told(scene: Scene, setting: Setting | None = None) -> dict[str, EffectCost]:

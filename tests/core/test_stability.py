@@ -25,12 +25,10 @@ from kappaskin import (
 )
 from kappaskin.estimation import METHODS
 from kappaskin.estimation.fit import DenseSpread
-from kappaskin.studies import stability as study
-from kappaskin.studies.stability.case import Kind
-from kappaskin.studies.stability.gallery import gallery
-from kappaskin.studies.stability.precise import least_squares
-from kappaskin.studies.stability.reference import reference_of
-from kappaskin.studies.stability.run import rows_of
+from kappaskin.studies import run_stability
+from kappaskin.studies.stability.gallery import Kind, gallery
+from kappaskin.studies.stability.reference import least_squares, reference_of
+from kappaskin.studies.stability.verdicts import rows_of
 
 pytestmark = pytest.mark.slow
 
@@ -41,7 +39,7 @@ SEEK_LEAST_SQUARES = ("least-squares", "direct")
 
 @pytest.fixture(scope="module")
 def rows():
-    return study.run_stability()
+    return run_stability()
 
 
 def verdicts(rows, **wanted):

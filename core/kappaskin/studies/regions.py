@@ -158,3 +158,23 @@ def run_regions(seconds: float = 1.0) -> list[dict[str, Any]]:
     return [
         measured(period, region, seconds, method) for period in PERIODS for region, method in ROWS
     ]
+
+
+def regions_text(rows: list[dict[str, Any]]) -> str:
+    """The rows of `regions` under a heading."""
+    lines = [
+        "A contact on a circle, 20 us per channel; RMS errors of contact and shape in mm,",
+        "of each frame in the middle of its scan, and while its answer is the newest there is",
+        f"{'mm/s':>6}  {'method':<14}{'around':<10}{'radius':>6}{'share':>7}{'channels':>10}"
+        f"{'frames/s':>10}{'contact':>9}{'newest':>8}{'shape':>8}{'newest':>8}",
+    ]
+    for row in rows:
+        radius = "" if row["radius_mm"] is None else format(row["radius_mm"], ".1f")
+        share = "" if row["share"] is None else format(row["share"], ".0%")
+        lines.append(
+            f"{row['speed_mm_s']:>6.0f}  {row['method']:<14}{row['around']:<10}{radius:>6}"
+            f"{share:>7}{row['channels']:>10.0f}{row['rate']:>10.0f}{row['contact_mm']:>9.3f}"
+            f"{row['newest_contact_mm']:>8.3f}{row['shape_mm']:>8.3f}"
+            f"{row['newest_shape_mm']:>8.3f}"
+        )
+    return "\n".join(lines)

@@ -11,9 +11,18 @@ import pytest
 
 from kappaskin import PLACEMENTS, Refusal
 from kappaskin.studies import load_study
-from kappaskin.studies.design.draws import KINDS, LogUniform, Normal, Some, Uniform, Whole
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.setup import Measuring, Placing, Reconstruction
+from kappaskin.studies.design.setup import (
+    KINDS,
+    LogUniform,
+    Measuring,
+    Normal,
+    Placing,
+    Reconstruction,
+    Some,
+    Uniform,
+    Whole,
+)
 from kappaskin.studies.design.study import STUDIES, Stop
 
 TWO = """

@@ -8,8 +8,7 @@ import pytest
 from scipy import stats
 
 from kappaskin import Refusal
-from kappaskin.studies.design.known import Known, Mean
-from kappaskin.studies.design.task import Moments
+from kappaskin.studies.design.results import Known, Mean, Moments
 
 
 @pytest.mark.parametrize("large", [np.inf, 1e200])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kappaskin import METHODS, Refusal
-from kappaskin.studies.design.task import Task, run, version
+from kappaskin.studies.design.results import Task, run, version
 
 POINT = 'what = "point"\nx = 0.05\ny = 0.03\nforce = 0.1'
 SPHERE = 'what = "sphere"\nradius = 0.02\nx = 0.05\ny = 0.05\nforce = 0.6'

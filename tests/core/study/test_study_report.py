@@ -9,9 +9,9 @@ import pytest
 
 from kappaskin.cli.common import FAILED
 from kappaskin.studies import Folder, known_of, table_text
-from kappaskin.studies.design.known import Mean
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.table import mean_text, value_text
+from kappaskin.studies.design.report import mean_text, value_text
+from kappaskin.studies.design.results import Mean
 
 from .conftest import TEXT
 

@@ -13,8 +13,7 @@ import scipy
 
 from kappaskin import LeastSquares, Patch, Refusal, Simulator, SineBasis
 from kappaskin.studies import Folder, known_of, run_study
-from kappaskin.studies.design.known import Mean
-from kappaskin.studies.design.task import Task, run, version
+from kappaskin.studies.design.results import Mean, Task, run, version
 
 NOISES = '[[vary]]\n"effects.uniform-noise.rms" = [0.1, 0.4]\n'
 DRAWN = NOISES + '[[draw]]\nwhat = "touch[1].x"\nkind = "uniform"\nlow = 0.03\nhigh = 0.07\n'

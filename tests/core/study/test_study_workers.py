@@ -14,8 +14,8 @@ import pytest
 
 from kappaskin import Refusal
 from kappaskin.studies import Folder, cluster, processes, run_study
-from kappaskin.studies.design.task import Task, run, version
-from kappaskin.studies.design.workers import kind
+from kappaskin.studies.design.results import Task, run, version
+from kappaskin.studies.design.run import kind
 
 pytestmark = pytest.mark.slow
 

@@ -1,8 +1,11 @@
-"""What is compared: load cases of a skin, and a plate under a load."""
+"""The comparison: works with known answers, each done every way, with errors, time and memory."""
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+import statistics
+import time
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import cycle, groupby
 from typing import Any
 
 import numpy as np
@@ -13,11 +16,18 @@ from kappaskin.mechanics import GaussianLoad, Plate
 from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.studies.compare.elements import bent
-from kappaskin.studies.compare.slopes import integrated
-from kappaskin.studies.compare.solvers import iterated, lstsq, ours, pinv
-from kappaskin.studies.compare.way import Way
-from kappaskin.studies.tables import Case, fingertip_scene
+from kappaskin.studies.compare.ways import (
+    Way,
+    bent,
+    integrated,
+    iterated,
+    library,
+    lstsq,
+    ours,
+    pinv,
+)
+from kappaskin.studies.cost.bench import seconds, traced
+from kappaskin.studies.paper import Case, fingertip_scene
 
 WITHIN = 1e-2
 """RMS error of a plate's deflection that every way is to reach, as a share of the deflection's."""
@@ -139,3 +149,135 @@ def works() -> Generator[Work]:
     name = "Table 2, 0.63 mm: 10 elements on half a circle, 8 functions"
     yield _read(name, fingertip_scene(0.63), 8, _SOLVERS)
     yield _pressed()
+
+
+_TURNS, _BUDGET = (7, 201), 0.1  # least and most that are timed of a work, and about how long in s
+
+
+# Every way through a work: how far off it comes out, how long it takes, what it holds
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One way through one work; lengths in mm, times in s, memory in bytes.
+
+    `error_bars` tells whether the answers come with some, None where there is nothing to err about.
+    `e_mm` and `rms_mm` are means over draws with noise of the signed error at the load and of the
+    RMS error over the skin, `e_sd_mm` is that error's standard deviation; None where there is no
+    noise. Those of exact readings are `exact`. `setup_s` goes to the first answer, `frame_s` is the
+    median of the next ones, and `ratio` is that over the median of our first way. `memory_bytes` is
+    the most that the set-up and an answer held at once.
+    """
+
+    work: str
+    by: str
+    unknowns: int
+    error_bars: bool | None
+    e_exact_mm: float
+    rms_exact_mm: float
+    e_mm: float | None
+    e_sd_mm: float | None
+    rms_mm: float | None
+    setup_s: float
+    frame_s: float
+    ratio: float
+    memory_bytes: int
+
+
+def compared() -> list[Compared]:
+    """All works by all ways; raises a `Refusal` when what they need is not installed."""
+    library()  # at once, not after half of the work
+    return [row for work in works() for row in _through(work)]
+
+
+def _through(work: Work) -> list[Compared]:
+    made = [_made(make, work.asked) for make in work.ways.values()]
+    medians = _medians([way for way, _, _ in made], work.draws)
+    return [
+        Compared(
+            work.name,
+            by,
+            way.count,
+            way.error_bars if work.noisy else None,
+            *_errors(work, way),
+            setup,
+            median,
+            median / medians[0],
+            memory,
+        )
+        for by, (way, setup, memory), median in zip(work.ways, made, medians, strict=True)
+    ]
+
+
+def _errors(work: Work, way: Way) -> tuple[float, float, float | None, float | None, float | None]:
+    found = way.solve(work.asked)[None]
+    if not work.noisy:
+        (e,), (rms,) = work.errors(way, found)
+        return float(e), float(rms), None, None, None
+    e, rms = work.errors(way, np.vstack([found, way.solve(work.draws)]))
+    noisy = float(e[1:].mean()), float(e[1:].std(ddof=1)), float(rms[1:].mean())
+    return float(e[0]), float(rms[0]), *noisy
+
+
+def _made(make: Callable[[], Way], asked: Any) -> tuple[Way, float, int]:
+    """A way that has answered once, the seconds until then and the bytes."""
+
+    def answered() -> Way:
+        way = make()
+        way.solve(asked)
+        return way
+
+    way, memory = traced(answered)
+    return way, seconds(answered), memory + way.kept
+
+
+def _medians(ways: Sequence[Way], draws: Iterable[Any]) -> list[float]:
+    """Median seconds of each way's answers to the `draws`, in turn with the others."""
+    each, (least, most) = cycle(draws), _TURNS
+    taken: list[list[float]] = []
+    end = time.perf_counter() + _BUDGET
+    while len(taken) < least or (len(taken) < most and time.perf_counter() < end):
+        one = next(each)
+        taken.append([seconds(way.solve, one) for way in ways])
+    return [statistics.median(times) for times in zip(*taken, strict=True)]
+
+
+# The comparison as text for people
+
+_HEAD = (
+    f"{'':<26}{'N':>5}{'exact E':>8}{'RMS':>8}{'noisy E':>15}{'RMS':>8}{'bars':>5}"
+    f"{'set-up':>7}{'answer':>7}{'/ours':>6}{'held':>6}\n"
+    f"{'':<26}{'':>5}{'mm':>8}{'mm':>8}{'mm':>15}{'mm':>8}{'':>5}{'ms':>7}{'us':>7}{'':>6}{'KiB':>6}"
+)
+_SAID = """\
+The same work by Kappaskin and by what one would use instead
+N        unknowns that are solved for
+E        signed error at the load; with noise the mean +- standard deviation of 200 draws
+RMS      error over the skin; with noise the mean of the draws
+bars     whether the answer comes with error bars
+set-up   until the first answer; answer: median of the next ones, and over that of our first way
+held     most memory at once in both, with what SuperLU holds"""
+
+
+def errors_text(row: Compared) -> str:
+    """A row as far as it is the same on every machine."""
+    noisy = f"{'':>28}"
+    if row.e_mm is not None:
+        drawn = f"{row.e_mm:+z.3f} +-{row.e_sd_mm:.3f}"
+        noisy = f"{drawn:>15}{row.rms_mm:>8.4f}{'yes' if row.error_bars else 'no':>5}"
+    return f"{row.by:<26}{row.unknowns:>5}{row.e_exact_mm:>+z8.3f}{row.rms_exact_mm:>8.4f}{noisy}"
+
+
+def _line(row: Compared) -> str:
+    return (
+        f"{errors_text(row)}{1e3 * row.setup_s:>7.1f}{1e6 * row.frame_s:>7.0f}{row.ratio:>6.1f}"
+        f"{row.memory_bytes / 1024:>6.0f}"
+    )
+
+
+def compared_text(rows: Sequence[Compared]) -> str:
+    """A table of each work, and what its columns are."""
+    lines = [_SAID]
+    for work, its in groupby(rows, lambda row: row.work):
+        lines += ["", work, _HEAD, *(_line(row) for row in its)]
+    return "\n".join(lines)

@@ -18,7 +18,7 @@ from kappaskin.frames import Array
 from kappaskin.scenes import Pressed, Pressing, Scene, Simulator, moments_of, planned
 from kappaskin.sensing import Scan, Sensor, SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.setting import SCANS, Cost, Refused, Setting
+from kappaskin.studies.cost.settings import SCANS, Cost, Refused, Setting
 
 SETTLING, DRAWS = 8, 40
 """Frames that methods with a memory are given to settle, and those that are judged after them."""

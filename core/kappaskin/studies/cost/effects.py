@@ -24,8 +24,8 @@ from kappaskin.scenes import (
 )
 from kappaskin.sensing import SensorLayout
 from kappaskin.studies.cost.bench import SETTLING, Bench, points_on, with_elements
-from kappaskin.studies.cost.setting import SCANS, Setting, own_elements
-from kappaskin.studies.plan import costs_of
+from kappaskin.studies.cost.settings import SCANS, Setting, own_elements
+from kappaskin.studies.simulation import costs_of
 
 _PLACES, _EACH = 20, 2  # moments of the scene, and frames that are judged at each of them
 FRAMES = _PLACES * _EACH

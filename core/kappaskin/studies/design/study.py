@@ -1,22 +1,169 @@
-"""A study's file to its points: a scene, what of it is varied, and when that is known enough."""
+"""A study's file: a scene, what of it is varied, and when a point is known well enough."""
 
+import copy
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from itertools import pairwise, product
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.scenes import Lines, Table, parsed, read_scene_text
-from kappaskin.studies.design.draws import Distribution
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.places import parts_of, with_values
-from kappaskin.studies.design.setup import Setup, read_setup, setup_of
-from kappaskin.studies.design.vary import Axis, check_product, points_of, read_axis
+from kappaskin.studies.design.setup import Distribution, Setup, read_setup, setup_of
+
+# Dotted places of values in a file
+
+_PART = re.compile(r"([\w-]+)(?:\[([1-9]\d{0,8})\])?")
+
+
+def parts_of(place: str) -> list[str | int]:
+    """The keys of a place such as touch[1].x, tables of an array counted from one there."""
+    found = list[str | int]()
+    for part in place.split("."):
+        if not (match := _PART.fullmatch(part)):
+            raise Refusal(
+                f"expected a place in this file such as elements.grid or touch[1].x, got {place!r}"
+            )
+        found.append(match[1])
+        if match[2]:
+            found.append(int(match[2]) - 1)
+    return found
+
+
+def put(said: dict[str, Any], place: str, value: Any) -> None:
+    """Have `said` say `value` at `place`; tables on the way there are made."""
+    parts, at = parts_of(place), cast("Any", said)
+    for part, following in pairwise(parts):
+        at = _inside(at, part, place, isinstance(following, int))
+    if isinstance(last := parts[-1], int):
+        raise Refusal(f"expected the name of a value at the end of {place!r}")
+    if not isinstance(at, dict):
+        raise Refusal(f"expected a table around {place!r}, got {at!r:.60}")
+    at[last] = value
+
+
+def _inside(at: Any, part: str | int, place: str, array: bool) -> Any:
+    """What stands at `part`, which may be an `array` of tables."""
+    if isinstance(part, int):
+        many = cast("list[Any]", at)
+        if not part < len(many):
+            raise Refusal(f"expected one of {len(many)} tables in {place!r}, got number {part + 1}")
+        return many[part]
+    if not isinstance(at, dict):
+        raise Refusal(f"expected a table around {part!r} of {place!r}, got {at!r:.60}")
+    found = cast("dict[str, Any]", at).setdefault(part, [] if array else {})
+    if isinstance(found, list) != array:
+        raise Refusal(
+            f"expected {part}[1] or another number in {place!r}, for there are several"
+            if isinstance(found, list)
+            else f"expected no number after {part} in {place!r}, for there is one alone"
+        )
+    return found
+
+
+def with_values(said: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """A copy of `said` with these `values` at their places."""
+    changed = copy.deepcopy(said)
+    for place, value in values.items():
+        put(changed, place, value)
+    return changed
+
+
+# Tables [[vary]]: the values that a study goes through
+
+_SPACING = {"even": np.linspace, "log": np.geomspace}
+
+
+@dataclass(frozen=True)
+class _Range:
+    """`count` numbers from `first` to `last`, evenly or by the same factor (log)."""
+
+    first: float
+    last: float
+    count: int
+    spacing: str = "even"
+
+    def __post_init__(self) -> None:
+        if self.spacing not in _SPACING:
+            raise Refusal(f"expected a spacing among {', '.join(_SPACING)}, got {self.spacing!r}")
+        if not np.isfinite([self.first, self.last]).all():
+            raise Refusal(f"expected a finite range, got {self.first:g} to {self.last:g}")
+        if self.spacing == "log" and not min(self.first, self.last) > 0:
+            raise Refusal(f"expected a range above zero, got {self.first:g} to {self.last:g}")
+        if self.count < 1:
+            raise Refusal(f"expected a range of at least one value, got {self.count}")
+
+    def values(self, most: int) -> list[float]:
+        if self.count > most:
+            raise Refusal(f"expected at most {most} values, got {self.count}")
+        return _SPACING[self.spacing](self.first, self.last, self.count).tolist()
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Values that go together: at each of `places` in the file as many."""
+
+    places: dict[str, list[Any]]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.places.values())))
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        for values in zip(*self.places.values(), strict=True):
+            yield dict(zip(self.places, values, strict=True))
+
+
+def read_axis(table: Table, most: int) -> Axis:
+    """What a table [[vary]] goes through, `most` values of each thing at most."""
+    places = {place: _values(table, place, most) for place in table}
+    counts = {place: len(values) for place, values in places.items()}
+    if not places or not all(counts.values()):
+        raise table.refusal("expected values to go through, got none")
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"{count} of {place}" for place, count in counts.items())
+        raise table.refusal(f"expected as many values of each, since they go together, got {told}")
+    return Axis(places)
+
+
+def _values(table: Table, place: str, most: int) -> list[Any]:
+    if not table.is_table(place):
+        return table.listed(place)
+    said = table.table(place)
+    if "first" not in said and "last" not in said:
+        raise said.refusal(
+            "expected a list or a range such as { first = 1, last = 9, count = 5 }; write a place "
+            'with dots in quotes, as "elements.grid"'
+        )
+    made = said.make(_Range)
+    said.done()
+    with said.blamed():
+        return made.values(most)
+
+
+def points_of(axes: tuple[Axis, ...]) -> Iterator[dict[str, Any]]:
+    """Every combination of the axes' values by place, the last axis's in turn."""
+    for each in product(*axes):
+        yield {place: value for part in each for place, value in part.items()}
+
+
+def check_product(axes: tuple[Axis, ...], most: int) -> None:
+    """Refuse more than `most` points."""
+    if (points := prod(map(len, axes))) > most:
+        factors = " x ".join(str(len(axis)) for axis in axes)
+        raise Refusal(
+            f"expected at most {most} points, got {factors} = {points:.4g}; take fewer values, or "
+            "allow as many by points = ... in [stop]"
+        )
+
+
+# The file
 
 _FOLDER = Path(str(files("kappaskin_resources"))) / "studies"
 _ENDING = ".toml"

@@ -1,4 +1,4 @@
-"""Drills on the live process and the one that shows: they are killed, or stand still."""
+"""Drills on the live process and on the one that shows: killed, or suspended."""
 
 import os
 import signal
@@ -11,9 +11,7 @@ from pathlib import Path
 
 from kappaskin.live import LOST, STREAMING, Engine
 from kappaskin.sources import Accounting
-from kappaskin.studies.drills.drill import Drill
-from kappaskin.studies.drills.outcome import Outcome
-from kappaskin.studies.drills.stand import Stand
+from kappaskin.studies.drills.stand import Drill, Outcome, Stand
 
 _START = 20.0  # s that a process may take until it computes
 _NOTICED = 1.0  # s
@@ -22,7 +20,7 @@ _WITHIN = 1.0  # s
 _DRAINED = 20.0  # s
 _SAME = 5  # reports in a row
 _MEMORY = "/dev/shm"
-_PARENT = "kappaskin.studies.drills.parent"
+_PARENT = "kappaskin.studies.drills.processes"
 
 
 def _pumped(stand: Stand, done: Callable[[], object], within: float) -> bool:
@@ -167,8 +165,16 @@ def _blocks_of(pid: int) -> list[Path]:
     return []
 
 
-DRILLS = [
+PROCESS_DRILLS = [
     Drill("engine suspended", "the live process stands still and goes on", _suspend, _WITHIN),
     Drill("engine killed", "kill -9 of the live process: another takes over", _killed, _RESTARTED),
     Drill("app killed", "kill -9 of what shows: the live process ends too", _orphaned, _WITHIN),
 ]
+
+
+if __name__ == "__main__":
+    with Engine() as engine:
+        engine.connect(sys.argv[1])
+        print(engine.pid, flush=True)
+        while engine.alive:
+            time.sleep(0.1)

@@ -1,11 +1,13 @@
-"""A device, the relay before it and what reads through that: what a drill is done on."""
+"""The test stand of a drill: a device, the relay before it and the source that reads through it."""
 
 import json
 import math
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -17,8 +19,78 @@ import numpy as np
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.sources import Line, SerialSource
-from kappaskin.studies.drills.outcome import NeedsSimulated, Outcome
 from kappaskin.studies.drills.relay import Relay, clean, unchanged
+
+_PAGE = 4096
+
+
+@dataclass(frozen=True)
+class Held:
+    """Threads, open descriptors, child processes and resident bytes; 0 where it cannot be told."""
+
+    threads: int
+    descriptors: int
+    processes: int
+    memory: int
+
+    @classmethod
+    def now(cls) -> "Held":
+        """Of this process."""
+        own = Path("/proc/self")
+        if not (own / "fd").exists():
+            return cls(threading.active_count(), 0, 0, 0)
+        children = (own / "task" / str(os.getpid()) / "children").read_text().split()
+        resident = int((own / "statm").read_text().split()[1])
+        return cls(
+            threading.active_count(), len(os.listdir(own / "fd")), len(children), resident * _PAGE
+        )
+
+    def leaked(self, since: "Held", memory: int) -> list[tuple[bool, str]]:
+        """Claims that nothing was added, but for so many bytes of `memory`."""
+        grown = self.memory - since.memory
+        return [
+            (self.threads <= since.threads, f"{self.threads - since.threads} threads leaked"),
+            (
+                self.descriptors <= since.descriptors,
+                f"{self.descriptors - since.descriptors} descriptors leaked",
+            ),
+            (self.processes <= since.processes, "a process leaked"),
+            (grown <= memory, f"memory grew by {grown / 2**20:.1f} MiB"),
+        ]
+
+
+class NeedsSimulated(Exception):
+    """The fault needs the process that plays a device."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Figures of a drill: messages `sent`, `accepted` and `lost`, and bytes `discarded`.
+
+    `wrong` counts frames that were accepted but never sent so. `recovered` is the time from the end
+    of the fault to the first good frame sent after it in s, NaN where nothing had to recover.
+    `failures` are the claims that did not hold.
+    """
+
+    sent: int = 0
+    accepted: int = 0
+    lost: int = 0
+    discarded: int = 0
+    wrong: int = 0
+    recovered: float = math.nan
+    failures: tuple[str, ...] = ()
+
+
+def judged(outcome: Outcome, within: float) -> list[str]:
+    """Why a drill failed: its own claims, a wrong frame, or no recovery `within` so many s."""
+    reasons = list(outcome.failures)
+    if outcome.wrong:
+        reasons.append(f"{outcome.wrong} wrong frames were accepted")
+    if within < math.inf and not outcome.recovered <= within:
+        after = "at all" if math.isnan(outcome.recovered) else f"for {outcome.recovered:.2f} s"
+        reasons.append(f"did not recover within {within:g} s; not {after}")
+    return reasons
+
 
 RATE = 200  # frames/s of the simulated device
 _TICK = 0.002  # s that a read waits
@@ -216,3 +288,13 @@ class Stand:
             self._source.close()
         self.relay.unplug()
         shutil.rmtree(self._folder)
+
+
+@dataclass(frozen=True)
+class Drill:
+    """A fault: `does` says which, `run` inflicts it, and it must be over `within` so many s."""
+
+    name: str
+    does: str
+    run: Callable[[Stand], Outcome]
+    within: float = math.inf

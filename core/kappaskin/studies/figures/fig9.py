@@ -8,7 +8,7 @@ from kappaskin.bases import basis_for
 from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
 from kappaskin.studies.figures import style
-from kappaskin.studies.tables import APPLIED, RADIUS, fingertip_scene
+from kappaskin.studies.paper import APPLIED, RADIUS, fingertip_scene
 
 NOISE = 4.5
 """RMS of a reading's noise in 1/m (Table 2)."""

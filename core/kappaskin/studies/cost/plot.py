@@ -1,4 +1,4 @@
-"""What accuracy costs: error against time of every setting, and those that no other beats."""
+"""The plot of error against time of every setting, and of those that no other beats."""
 
 import io
 import math
@@ -8,10 +8,9 @@ from pathlib import Path
 
 from kappaskin.errors import Refusal
 from kappaskin.scenes import Scene
-from kappaskin.studies.cost.choice import frontier
-from kappaskin.studies.cost.setting import ALL, Cost, Refused
+from kappaskin.studies.cost.settings import ALL, Cost, Refused, frontier
 from kappaskin.studies.figures import style
-from kappaskin.studies.figures.registry import KINDS
+from kappaskin.studies.figures.style import KINDS
 
 _COLOURS = (style.BLUE, style.GREY, style.FAINT, "#63a878", style.ORANGE, "#7a4b9a", "#3f9aa5",
             "#c9a227", "#c2487a")  # fmt: skip

@@ -1,4 +1,4 @@
-"""Costs measured in a process of their own, so that nobody waits and nothing else is timed."""
+"""Costs measured in a background process of one thread."""
 
 from collections.abc import Generator, Iterable, Sequence
 from itertools import islice
@@ -8,7 +8,7 @@ from kappaskin.errors import Refusal
 from kappaskin.scenes import Scene
 from kappaskin.studies.cost.bench import Bench, costs
 from kappaskin.studies.cost.effects import EffectCost, effect_costs
-from kappaskin.studies.cost.setting import Cost, Refused, Setting
+from kappaskin.studies.cost.settings import Cost, Refused, Setting
 
 Effects = tuple[EffectCost, ...] | Refused
 """What a scene's effects cost with a setting, or why that setting cannot tell."""

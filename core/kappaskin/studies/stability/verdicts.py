@@ -17,19 +17,27 @@ least-squares answer have no digits to lose: the truth and the error bar judge t
 their own answer in float64 is the reference.
 """
 
-from collections.abc import Callable, Iterator
+import math
+import os
+import textwrap
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from functools import partial
+from itertools import groupby, repeat
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from kappaskin._processes import beginning_processes
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Estimator, Fit, gathered
+from kappaskin.estimation import METHODS, Estimator, Fit, gathered
 from kappaskin.frames import Array
-from kappaskin.studies.stability.case import Case, Kind
-from kappaskin.studies.stability.reference import Reference
+from kappaskin.studies.stability.gallery import Case, Kind, gallery
+from kappaskin.studies.stability.reference import Reference, reference_of
 
 COVERED = 0.85
 """How much of the truth must lie in bars of 95 %: three standard errors less, over 40 frames."""
@@ -161,3 +169,160 @@ def _at_truth(case: Case, reference: Reference, answer: Answer, eps: float) -> b
     if len(case.curvature) > 1 or not case.in_reach or not np.isfinite(reference.condition):
         return False
     return reference.near(answer.coefficients, case.truth.ravel(), eps)
+
+
+_USUAL = frozenset({Kind.ANY, Kind.LINEAR, Kind.DENSE})
+_CLAIMS: Mapping[str, frozenset[Kind]] = {
+    "least-squares": _USUAL | {Kind.SEQUENCE},
+    "fast": _USUAL | {Kind.SEQUENCE, Kind.LARGE},
+    "finite-slope": frozenset({Kind.ANY, Kind.SLOPES}),
+    "robust": _USUAL - {Kind.DENSE},
+    "tracking": _USUAL - {Kind.DENSE} | {Kind.SEQUENCE},
+}
+"""Which cases a method claims; any other claims the usual ones."""
+
+_SEEK_LEAST_SQUARES = frozenset({"least-squares", "as-printed", "direct", "fast"})
+_PRINTED = "as-printed"
+_PRECISIONS = np.dtype(np.float64), np.dtype(np.float32)
+
+
+def run_stability(
+    long: bool = False, progress: Callable[[str], object] = lambda _: None
+) -> list[dict[str, Any]]:
+    """One row for each case of the gallery, method that claims it, and precision.
+
+    `condition_scaled` is that of `LeastSquares.condition`, `condition_unscaled` that of M as Eq. 6
+    has it, None where a coefficient is not determined. `digits_lost` of the first frame, None where
+    the least-squares answer is not sought or does not exist. `error_mm` and `bar_mm` (95 %) are
+    root mean squares over the skin and all frames; `covered` is the share of the truth that lies
+    within the bar. `progress` is told each case when it is done. Cases are shared among processes
+    of one thread each: on matrices of this size more threads only wait for each other.
+    """
+    names, rows = [case.name for case in gallery(long)], list[dict[str, Any]]()
+    with (
+        beginning_processes() as context,
+        ProcessPoolExecutor(os.cpu_count(), context) as pool,
+    ):
+        found = pool.map(_rows_of_the, names, repeat(long))
+        for name, its_own in zip(names, found, strict=True):
+            progress(name)
+            rows += its_own
+    return rows
+
+
+def _rows_of_the(name: str, long: bool) -> list[dict[str, Any]]:
+    """The rows of the case of this name."""
+    return rows_of(next(case for case in gallery(long) if case.name == name))
+
+
+def rows_of(case: Case, methods: Mapping[str, type[Estimator]] = METHODS) -> list[dict[str, Any]]:
+    """The rows of one case, for those of `methods` that claim it."""
+    claiming = [name for name in methods if case.kind in _CLAIMS.get(name, _USUAL)]
+    if not claiming:
+        return []
+    reference, rows = reference_of(case), list[dict[str, Any]]()
+    for method in claiming:
+        peer = reference.answer if method in _SEEK_LEAST_SQUARES else None
+        for precision in _PRECISIONS:
+            make = partial(methods[method], case.basis, case.layout, dtype=precision)
+            answer = answered(case, make)
+            rows.append(_row(case, reference, method, precision, answer, peer))
+            if peer is None and isinstance(answer, Answer):
+                peer = answer.coefficients
+    return rows
+
+
+def _row(
+    case: Case,
+    reference: Reference,
+    method: str,
+    precision: np.dtype[Any],
+    answer: Answer | Refusal,
+    peer: Array | None,
+) -> dict[str, Any]:
+    eps, (Ni, Nj) = float(np.finfo(precision).eps), case.basis.shape
+    row: dict[str, Any] = {
+        "case": case.name,
+        "hard": case.hard,
+        "functions": f"{Ni} x {Nj}",
+        "elements": str(case.layout).removesuffix(" elements"),
+        "frames": len(case.curvature),
+        "method": method,
+        "precision": precision.name,
+        "condition_scaled": _number(reference.condition),
+        "condition_unscaled": _number(reference.unscaled),
+        "digits_lost": None,
+        "error_mm": None,
+        "bar_mm": None,
+        "covered": None,
+        "announced": case.announced or None,
+    }
+    if isinstance(answer, Refusal):
+        return row | {"verdict": "refused", "reason": str(answer)}
+    found, why = verdict(case, reference, answer, eps, peer)
+    if method in _SEEK_LEAST_SQUARES:
+        row["digits_lost"] = reference.digits_lost(answer.coefficients, eps)
+    return row | {
+        "error_mm": _number(_rms_mm(answer.error)),
+        "bar_mm": _number(_rms_mm(answer.bar)),
+        "covered": answer.covered,
+        "verdict": "breaks" if found == "wrong" and method == _PRINTED else found,
+        "reason": why,
+    }
+
+
+def _rms_mm(values: Array) -> float:
+    return 1e3 * float(np.sqrt(np.mean(values**2)))
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+_KEY = (
+    "condition of M: columns scaled, and as Eq. 6 has it; lost: decimal digits; error and 95 % "
+    "bar: RMS in mm; -: none"
+)
+_WIDTH = 116
+
+
+def _of(value: float | None, width: int, form: str) -> str:
+    return format("-" if value is None else format(value, form), f">{width}")
+
+
+def _why(row: dict[str, Any]) -> str:
+    """The cause that a refusal names, without what it counts; anything else whole."""
+    reason = row["reason"]
+    if row["verdict"] == "refused":
+        reason = reason.partition("basis: ")[2] or reason
+    return textwrap.shorten(reason, 52, placeholder=" ...")
+
+
+def _line(row: dict[str, Any]) -> str:
+    return (
+        f"    {row['method']:<14}{row['precision']:<8}{_of(row['condition_scaled'], 8, '.2g')}"
+        f"{_of(row['condition_unscaled'], 9, '.2g')}{_of(row['digits_lost'], 6, '.1f')}"
+        f"{_of(row['error_mm'], 9, '.2g')}{_of(row['bar_mm'], 9, '.2g')}  {row['verdict']:<9}"
+        f"{_why(row)}"
+    )
+
+
+def stability_text(rows: list[dict[str, Any]]) -> str:
+    """Each case with what is hard about it and what every method made of it."""
+    lines = [
+        _KEY,
+        f"    {'method':<14}{'in':<8}{'scaled':>8}{'as is':>9}{'lost':>6}{'error':>9}{'bar':>9}"
+        "  verdict  why",
+    ]
+    for name, group in groupby(rows, lambda row: row["case"]):
+        own = list(group)
+        functions, elements = own[0]["functions"], own[0]["elements"]
+        head = f"{name} ({functions} functions, {elements} elements): {own[0]['hard']}"
+        lines += [*textwrap.wrap(head, _WIDTH, subsequent_indent="  "), *map(_line, own)]
+    counts = Counter((row["method"], row["verdict"]) for row in rows)
+    lines += [""] + [
+        f"{method:<14}"
+        + ", ".join(f"{n} {found}" for (one, found), n in counts.items() if one == method)
+        for method in dict.fromkeys(row["method"] for row in rows)
+    ]
+    return "\n".join(lines)
