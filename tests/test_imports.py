@@ -56,7 +56,7 @@ def test_a_command_that_is_typed_loads_what_it_needs_alone():
     loaded = loaded_by("from kappaskin.cli import main\nmain(['device', '--help'])")
 
     commands = {name.split(".")[2] for name in loaded if name.startswith("kappaskin.cli.")}
-    assert commands == {"common", "device"}
+    assert commands == {"common", "sensor"}
     assert "kappaskin_app" not in loaded
     assert "kappaskin.studies" not in loaded
 

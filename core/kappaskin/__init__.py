@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from kappaskin.calibration import elements_to_press as elements_to_press
     from kappaskin.calibration import load_calibration as load_calibration
     from kappaskin.calibration import save_calibration as save_calibration
-    from kappaskin.cli.machine import examine as examine
+    from kappaskin.cli.system import examine as examine
     from kappaskin.contact import NO_OBJECT as NO_OBJECT
     from kappaskin.contact import ContactObject as ContactObject
     from kappaskin.contact import ForceTorqueSensor as ForceTorqueSensor
@@ -204,7 +204,7 @@ else:
                 "Tare Tares Verdict calibrate data_folder elements_to_press load_calibration "
                 "save_calibration"
             ),
-            "cli.machine": "examine",
+            "cli.system": "examine",
             "contact": (
                 "ContactObject ForceTorqueSensor IntrinsicContact IntrinsicTouch NO_OBJECT "
                 "ObjectFinder PointContact Wrench local_geometry placed"

@@ -1,4 +1,4 @@
-"""The command `kappaskin`: a file for each subcommand, in a few lines."""
+"""The command `kappaskin`: its subcommands in groups, a module for each group."""
 
 import os
 import sys
@@ -21,34 +21,17 @@ app = App(
     help_format="markdown",
 )
 # Only names, until one is typed or all are listed: no command waits for what others need.
-for _command in (
-    "tables",
-    "reconstruct",
-    "calibrate",
-    "tare",
-    "press",
-    "regions",
-    "cost",
-    "compare",
-    "stability",
-    "study",
-    "report",
-    "plan",
-    "simulate",
-    "device",
-    "drill",
-    "export",
-    "monitor",
-    "record",
-    "info",
-    "verify",
-    "repair",
-    "publish",
-    "listen",
-    "figures",
-    "doctor",
-):
-    app.command(f"kappaskin.cli.{_command}:{_command}")
+_GROUPS = {
+    "live": "publish listen",
+    "record": "record info verify repair export reconstruct",
+    "sensor": "calibrate tare press monitor device",
+    "study": "plan simulate cost compare stability regions study report",
+    "paper": "tables figures",
+    "system": "doctor drill",
+}
+for _module, _names in _GROUPS.items():
+    for _name in _names.split():
+        app.command(f"kappaskin.cli.{_module}:{_name}")
 
 
 def _add_commands() -> None:

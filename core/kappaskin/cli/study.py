@@ -1,14 +1,257 @@
-"""A design study, on this machine or a cluster."""
+"""Commands of studies: plan, simulate, cost, compare, stability, regions, study, report."""
 
 import os
 import sys
 import time
 from contextlib import AbstractContextManager
+from dataclasses import asdict
 from pathlib import Path
 
-from kappaskin.cli.common import FAILED, Whole
+from kappaskin.cli.common import FAILED, Pair, Switch, Whole, print_json, save_arrays
 from kappaskin.errors import Refusal
-from kappaskin.studies import Folder, Workers, cluster, load_study, processes, run_study, table_text
+from kappaskin.scenes import Scene, load_scene
+from kappaskin.studies import (
+    Cost,
+    Folder,
+    Measuring,
+    Refused,
+    Workers,
+    check_plot,
+    cluster,
+    compared,
+    compared_text,
+    costs_text,
+    draw_study,
+    effect_costs,
+    effect_rows,
+    effects_text,
+    known_of,
+    length_of,
+    load_study,
+    page_of,
+    plan_rows,
+    plan_text,
+    processes,
+    regions_text,
+    rows,
+    run_regions,
+    run_stability,
+    run_study,
+    settings_to_try,
+    simulated_readings,
+    stability_text,
+    table_csv,
+    table_text,
+    usual_setting,
+    verdict,
+    write_plot,
+)
+
+
+def plan(scene: str = "", *, json: Switch = False) -> None:
+    """Tell which effects a scene calls for at the accuracy that it asks for, and why.
+
+    Example: `kappaskin plan tapping`
+
+    Parameters
+    ----------
+    scene
+        The name of a ready scene, or a file that ends in .toml; the default one when left out.
+    json
+        Print one JSON object, with an entry for every known effect, instead of a table.
+    """
+    on = load_scene(scene)
+    rows = plan_rows(on)
+    if json:
+        print_json({"scene": on.name, "accuracy": on.choice.accuracy, "effects": rows})
+    else:
+        print(plan_text(on, rows))
+
+
+def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None) -> None:
+    """Simulate a scene into an NPZ file.
+
+    It has `counts` and `curvature` (T, 3, P), the `truth` (T, Ni, Nj) in m, `time` (T,) in s, the
+    `contact` (T, 2) in m, NaN where nothing touches or a frame was lost, and the `plan` as JSON.
+    The same seed gives the same bytes.
+
+    Example: `kappaskin simulate tapping --frames 1000 --out taps.npz`
+
+    Parameters
+    ----------
+    scene
+        The name of a ready scene, or a file that ends in .toml; the default one when left out.
+    frames
+        How many frames.
+    seed
+        The seed of all that is random; the scene's own when left out.
+    out
+        The file to write.
+    """
+    found = simulated_readings(load_scene(scene), frames, seed)
+    save_arrays(out, found)
+    print(f"{out}: {frames} frames", file=sys.stderr)
+
+
+def _measured(scene: Scene) -> list[Cost | Refused]:
+    """What every setting costs; on a terminal, a line on standard error tells how far it is."""
+    settings, found = settings_to_try(scene), list[Cost | Refused]()
+    told = sys.stderr.isatty()
+    try:
+        with Measuring(scene, settings) as measuring:
+            for cost in measuring.wait():
+                found.append(cost)
+                done = 40 * len(found) // len(settings)
+                if told:
+                    bar = f"\r[{'#' * done:<40}] {len(found)} of {len(settings)}"
+                    print(bar, end="", file=sys.stderr, flush=True)
+    except KeyboardInterrupt:
+        raise Refusal("stopped before the last setting; nothing was written") from None
+    finally:
+        if told:
+            print(file=sys.stderr)
+    return found
+
+
+def _effects(scene: Scene, json: bool) -> None:
+    """Tell what the scene's effects cost."""
+    setting = usual_setting(scene)
+    found = effect_costs(scene, setting)
+    if json:
+        print_json(effect_rows(scene, setting, found))
+    else:
+        print(effects_text(scene, setting, found))
+
+
+def _settings(scene: Scene, found: list[Cost | Refused], json: bool) -> None:
+    """Tell what was found of settings; people are told of the effects too."""
+    if json:
+        print_json(rows(scene, found))
+        return
+    print(costs_text(scene, found), end="\n\n", flush=True)
+    try:
+        _effects(scene, json)
+    except Refusal as refusal:  # the settings' table is worth its minute all the same
+        print(f"What each effect costs cannot be told: {refusal}")
+
+
+def cost(
+    *,
+    scene: str = "",
+    effects: Switch = False,
+    within: Pair | None = None,
+    plot: Path | None = None,
+    json: Switch = False,
+) -> int:
+    """Measure what accuracy costs: error, time and memory of every method and setting.
+
+    Takes about a minute. Bases, elements, precisions and channels are combined with each method;
+    marked are the settings that no other one beats in both error and time. A second table tells
+    what each effect of the scene costs, and what leaving it out does to the shape.
+
+    Example: `kappaskin cost --within 0.02mm --plot cost.svg`
+
+    Parameters
+    ----------
+    scene
+        The scene to measure on; the default one when left out.
+    effects
+        Tell of the effects alone, which takes seconds.
+    within
+        Instead of a table, name the setting that reaches this RMS error in the least time,
+        conversion included, such as 0.02mm or 20um; or say what is missing, with exit code 1.
+    plot
+        The file, SVG or PNG, to draw error against time into.
+    json
+        Print one JSON list of rows instead of a table, of the settings, or with --effects of the
+        effects; with --within one object.
+    """
+    asked = None if within is None else length_of(within)
+    if effects and (asked is not None or plot is not None):
+        raise Refusal(
+            "expected --effects without --within and --plot, which are about settings; leave it or "
+            "them out"
+        )
+    on = load_scene(scene)
+    if effects:
+        _effects(on, json)
+        return 0
+    if plot is not None:
+        check_plot(plot)
+    found = _measured(on)
+    if plot is not None:
+        write_plot(plot, on, found)
+    if asked is None:
+        _settings(on, found, json)
+        return 0
+    answer = verdict(on, found, asked)
+    if json:
+        print_json(answer.to_json())
+    else:
+        print(*answer.said, sep="\n")
+    return 0 if answer.reached else FAILED
+
+
+def compare(*, json: Switch = False) -> None:
+    """Run the same work through what one would use instead: error, time and memory side by side.
+
+    NumPy's and SciPy's least squares and scikit-fem's finite elements, each set as well as it can
+    be. Needs `kappaskin[compare]`; takes some seconds.
+
+    Example: `kappaskin compare --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    """
+    rows = compared()
+    if json:
+        print_json([asdict(row) for row in rows])
+    else:
+        print(compared_text(rows))
+
+
+def stability(
+    *,
+    json: Switch = False,
+    long: Switch = False,
+) -> None:
+    """Run hard cases through every method that claims them, and judge each answer.
+
+    Example: `kappaskin stability --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    long
+        Run the longest cases too: a million frames, up to 512 functions a side.
+    """
+    told = sys.stderr.isatty()
+    rows = run_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
+    if json:
+        print_json(rows)
+    else:
+        print(stability_text(rows))
+
+
+def regions(*, json: Switch = False) -> None:
+    """Measure what scanning a region of interest buys and costs, on a contact that moves.
+
+    Example: `kappaskin regions --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    """
+    rows = run_regions()
+    if json:
+        print_json(rows)
+    else:
+        print(regions_text(rows))
+
 
 _EVERY = 10.0  # s between two lines of progress in a log
 
@@ -75,3 +318,30 @@ def study(
     print(table_text(asked, known))
     print(f"kappaskin report {path} makes a page of it", file=sys.stderr)
     return FAILED if any(one.failures for one in known) else 0
+
+
+def report(folder: Path) -> None:
+    """Make a page of a study's results: report.html, with a CSV and an SVG of each figure beside.
+
+    The page needs no network, and says all that it takes to repeat the study. What is not computed
+    yet is missing in it, and said to be.
+
+    Example: `kappaskin report elements`
+
+    Parameters
+    ----------
+    folder
+        The folder that `kappaskin study` made.
+    """
+    results = Folder(folder)
+    study = results.study()
+    known = known_of(study, results)
+    figures = draw_study(study, known)
+    files = {f"{name}.svg": svg for name, svg in figures.items()}
+    files |= {"report.csv": table_csv(study, known), "report.html": page_of(study, known, figures)}
+    try:
+        for name, text in files.items():
+            (folder / name).write_text(text, "utf-8")
+    except OSError as error:
+        raise Refusal(f"{folder}: cannot be written to ({error}); copy it elsewhere") from error
+    print(*(folder / name for name in files), sep="\n")

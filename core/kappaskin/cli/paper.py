@@ -1,8 +1,20 @@
-"""The paper's tables, computed."""
+"""Commands of the paper: tables, figures."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from kappaskin.cli.common import Pair, Switch, pair, print_json
 from kappaskin.estimation import METHODS
-from kappaskin.studies import misprints, misprints_text, paper_tables, tables_text
+from kappaskin.studies import (
+    FIGURES,
+    misprints,
+    misprints_text,
+    paper_tables,
+    tables_text,
+    write_figures,
+)
 
 
 def tables(
@@ -32,3 +44,31 @@ def tables(
         print_json(rows)
     else:
         print(misprints_text(rows) if as_printed else tables_text(rows))
+
+
+def figures(
+    *,
+    out: Path,
+    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = tuple(
+        FIGURES
+    ),
+    json: Switch = False,
+) -> None:
+    """Draw the paper's figures, from runs of our own, as SVG and PNG.
+
+    Example: `kappaskin figures --out figures --only fig6 fig9`
+
+    Parameters
+    ----------
+    out
+        The folder to write to; made when there is none.
+    only
+        The figures to draw; all when left out.
+    json
+        Print one JSON list of the files instead of one a line.
+    """
+    written = [str(path) for path in write_figures(out, only)]
+    if json:
+        print_json(written)
+        return
+    print(*written, sep="\n")
