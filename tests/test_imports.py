@@ -61,6 +61,19 @@ def test_a_command_that_is_typed_loads_what_it_needs_alone():
     assert "kappaskin.studies" not in loaded
 
 
+@pytest.mark.parametrize("arguments", [["--help"], [], ["study", "--help"], ["app", "--help"]])
+def test_the_help_loads_no_room(arguments):
+    loaded = loaded_by(f"from kappaskin.cli import main\nmain({arguments!r})")
+
+    ours = {name for name in loaded if name.startswith("kappaskin.")}
+    rooms = {name.split(".")[1] for name in ours} - {"cli", "errors", "_lazy"}
+    assert rooms <= {"studies"}  # for the names of the figures alone
+    assert {name for name in ours if name.startswith("kappaskin.studies.")} <= {
+        "kappaskin.studies.figures"
+    }
+    assert not {"numpy", "scipy", "matplotlib", "PySide6", "vtkmodules"} & loaded
+
+
 @pytest.mark.parametrize("face", [kappaskin, kappaskin.studies])
 def test_every_exported_name_is_what_type_checkers_see(face):
     [seen] = [

@@ -36,6 +36,16 @@ def test_importing_the_library_costs_little_more_than_numpy_and_scipy(figure, ra
     ratio(f"{ours}, against NumPy and SciPy", times, at_most=asked)
 
 
+def test_the_help_of_the_command_costs_little_more_than_numpy(figure, ratio) -> None:
+    helped = "from kappaskin.cli import main; main(['--help'])"
+    taken = [(_import(helped), _import("import numpy")) for _ in range(9)]
+    own, numpy = (statistics.median(times) for times in zip(*taken, strict=True))
+    figure(f"kappaskin --help: {own:.2f} s, {own / numpy:.2f} times import numpy")
+    # What a person does not notice is allowed on a machine where NumPy is there at once.
+    ratio("kappaskin --help, of 2.5 times import numpy or 0.35 s", own / max(2.5 * numpy, 0.35),
+          at_most=1)  # fmt: skip
+
+
 def _drawn(script: Path) -> tuple[float, float]:
     """Seconds from the start of a process until it has drawn, and of processor time until then."""
     command = [sys.executable, str(script), str(time.monotonic())]

@@ -250,6 +250,54 @@ def test_every_subcommand_shows_an_example_in_its_help(run) -> None:
         assert "Example" in text, name
 
 
+@pytest.mark.parametrize(
+    ("panel", "commands"),
+    [
+        ("Live", {"app", "demo", "replay", "publish", "listen"}),
+        ("Recordings", {"record", "info", "verify", "repair", "export", "reconstruct"}),
+        ("Sensor", {"calibrate", "tare", "press", "monitor", "device"}),
+        ("Studies", {"plan", "simulate", "cost", "compare", "stability", "regions", "study",
+                     "report"}),
+        ("Paper", {"tables", "figures"}),
+        ("System", {"doctor", "drill"}),
+    ],
+)  # fmt: skip
+def test_the_help_shows_the_commands_in_panels(run, panel, commands) -> None:
+    _, printed, _ = run("--help")
+
+    lines = printed.partition(f"─ {panel} ─")[2].partition("╰")[0].splitlines()[1:]
+    assert {line.split()[1] for line in lines if line[2:3] != " "} == commands
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_can_be_installed(tmp_path, shell) -> None:
+    home = {**os.environ, "HOME": str(tmp_path)}
+    for name in ("ZSH_CUSTOM", "XDG_DATA_HOME", "XDG_CONFIG_HOME", "ZDOTDIR"):
+        home.pop(name, None)
+
+    found = outside("--install-completion", "--shell", shell, env=home)
+
+    assert (found.returncode, found.stderr) == (0, "")
+    file, _, message = found.stdout.partition(": ")
+    assert message == "installed; open a new shell to use it\n"
+    assert Path(file).is_relative_to(tmp_path)
+    script = Path(file).read_text()
+    assert "stability" in script
+    assert "replay" in script
+    assert "--as-printed" in script or "as-printed" in script
+
+
+def test_a_home_that_cannot_be_written_gets_no_completion(tmp_path) -> None:
+    (tmp_path / ".local").write_text("in the way")
+
+    found = outside(
+        "--install-completion", "--shell", "bash", env={**os.environ, "HOME": str(tmp_path)}
+    )
+
+    assert found.returncode == REFUSED
+    assert found.stderr.startswith("kappaskin: completion cannot be written")
+
+
 def test_the_version_is_that_of_the_distribution(run) -> None:
     assert run("--version") == (0, metadata.version("kappaskin") + "\n", "")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import kappaskin.cli.study
+import kappaskin.studies
 import kappaskin_resources
 from kappaskin import GaussianLoad, Patch, Plate, SineBasis, load_scene
 from kappaskin.cli import main
@@ -137,7 +137,7 @@ def test_without_scikit_fem_it_says_what_to_install(monkeypatch, capsys):
 
 
 def test_the_command_prints_the_table_or_its_rows(rows, monkeypatch, capsys):
-    monkeypatch.setattr(kappaskin.cli.study, "compared", lambda: rows)
+    monkeypatch.setattr(kappaskin.studies, "compared", lambda: rows)
 
     assert main(["compare"]) == 0
     assert capsys.readouterr().out == compared_text(rows) + "\n"

@@ -3,6 +3,7 @@
 import json
 import math
 import multiprocessing
+import sys
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
@@ -10,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-import kappaskin.cli.study
+import kappaskin.studies
 from kappaskin import (
     Amplifier,
     Cost,
@@ -532,14 +533,14 @@ def test_what_was_measured_before_a_process_died_is_told_first() -> None:
 @pytest.fixture
 def few(monkeypatch) -> None:
     """The command tries little."""
-    monkeypatch.setattr(kappaskin.cli.study, "settings_to_try", lambda scene: [EIGHT, *SMALL[:2]])
+    monkeypatch.setattr(kappaskin.studies, "settings_to_try", lambda scene: [EIGHT, *SMALL[:2]])
 
 
 @pytest.mark.usefixtures("few")
 def test_the_command_prints_rows_and_draws_and_tells_how_far_it_is(
     run, tmp_path, monkeypatch
 ) -> None:
-    monkeypatch.setattr(kappaskin.cli.study.sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     plot = tmp_path / "cost.svg"
     code, printed, told = run("cost", "--scene", "centre", "--json", "--plot", plot)
     assert (code, told.count("\n")) == (0, 1)

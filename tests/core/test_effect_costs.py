@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-import kappaskin.cli.study
+import kappaskin.studies
 import kappaskin.studies.simulation
 from kappaskin import (
     Cost,
@@ -323,7 +323,7 @@ def test_the_command_tells_of_effects_alone(run) -> None:
 
 
 def test_the_command_tells_people_of_effects_below_the_settings(run, monkeypatch) -> None:
-    monkeypatch.setattr(kappaskin.cli.study, "settings_to_try", lambda scene: [EIGHT])
+    monkeypatch.setattr(kappaskin.studies, "settings_to_try", lambda scene: [EIGHT])
     code, printed, _ = run("cost")
     assert code == 0
     assert printed.index("1 settings tried") < printed.index("What each effect costs in the scene")
@@ -335,8 +335,8 @@ def test_effects_that_cannot_be_told_take_nothing_from_the_settings(run, monkeyp
     def refuse(scene: Scene) -> Setting:
         raise Refusal("expected more")
 
-    monkeypatch.setattr(kappaskin.cli.study, "settings_to_try", lambda scene: [EIGHT])
-    monkeypatch.setattr(kappaskin.cli.study, "usual_setting", refuse)
+    monkeypatch.setattr(kappaskin.studies, "settings_to_try", lambda scene: [EIGHT])
+    monkeypatch.setattr(kappaskin.studies, "usual_setting", refuse)
     code, printed, _ = run("cost")
     assert code == 0
     assert printed.endswith("What each effect costs cannot be told: expected more\n")

@@ -167,7 +167,7 @@ def test_the_hardest_cases_raise_no_warnings(rows, case):
 
 
 def test_the_command_prints_one_list_without_nan(rows, run, monkeypatch):
-    monkeypatch.setattr("kappaskin.cli.study.run_stability", lambda long, told: rows)
+    monkeypatch.setattr("kappaskin.studies.run_stability", lambda long, told: rows)
 
     code, out, err = run("stability", "--json")
 
@@ -176,7 +176,7 @@ def test_the_command_prints_one_list_without_nan(rows, run, monkeypatch):
 
 
 def test_the_table_has_every_case_with_what_is_hard_about_it(rows, run, monkeypatch):
-    monkeypatch.setattr("kappaskin.cli.study.run_stability", lambda long, told: rows)
+    monkeypatch.setattr("kappaskin.studies.run_stability", lambda long, told: rows)
 
     code, out, _ = run("stability")
 

@@ -39,7 +39,7 @@ def device_of(scene) -> Iterator[str]:
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr("kappaskin.cli.sensor.data_folder", lambda: tmp_path / "tares")
+    monkeypatch.setattr("kappaskin.calibration.data_folder", lambda: tmp_path / "tares")
     return tmp_path / "tares"
 
 

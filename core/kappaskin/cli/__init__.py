@@ -8,7 +8,7 @@ from importlib import metadata
 # for each other on busy cores took twenty times as long.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Group
 
 from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
@@ -19,25 +19,30 @@ app = App(
     help="Shape and contact from curvature-sensing tactile skins.",
     version=metadata.version("kappaskin"),
     help_format="markdown",
+    group_commands=Group("Options", sort_key=9),
 )
-# Only names, until one is typed or all are listed: no command waits for what others need.
-_GROUPS = {
-    "live": "publish listen",
-    "record": "record info verify repair export reconstruct",
-    "sensor": "calibrate tare press monitor device",
-    "study": "plan simulate cost compare stability regions study report",
-    "paper": "tables figures",
-    "system": "doctor drill",
+# A panel of the help for each group: its module, which holds its commands and loads no room before
+# one of them runs, and their names.
+_PANELS = {
+    "Live": ("live", "publish listen"),
+    "Recordings": ("record", "record info verify repair export reconstruct"),
+    "Sensor": ("sensor", "calibrate tare press monitor device"),
+    "Studies": ("study", "plan simulate cost compare stability regions study report"),
+    "Paper": ("paper", "tables figures"),
+    "System": ("system", "doctor drill"),
 }
-for _module, _names in _GROUPS.items():
+_GROUPS = {panel: Group(panel, sort_key=place) for place, panel in enumerate(_PANELS, 1)}
+for _panel, (_module, _names) in _PANELS.items():
     for _name in _names.split():
-        app.command(f"kappaskin.cli.{_module}:{_name}")
+        app.command(f"kappaskin.cli.{_module}:{_name}", name=_name, group=_GROUPS[_panel])
+app.command("kappaskin.cli.system:install_completion", name="--install-completion")
 
 
 def _add_commands() -> None:
+    """Add the commands of other packages, such as those that open the app."""
     for entry in metadata.entry_points(group="kappaskin.commands"):
         if entry.name not in app:
-            app.command(entry.value, name=entry.name)
+            app.command(entry.value, name=entry.name, group=_GROUPS["Live"])
 
 
 def _load_all() -> None:

@@ -5,13 +5,14 @@ import signal
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-import numpy as np
 from cyclopts import Parameter, Token
-from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _Kind = TypeVar("_Kind")
 
@@ -82,8 +83,10 @@ def print_json(value: Any) -> None:
     print(json.dumps(value, allow_nan=False))
 
 
-def save_arrays(out: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+def save_arrays(out: Path, arrays: "Mapping[str, NDArray[Any]]") -> None:
     """Write an NPZ; raises a `Refusal` where that cannot be."""
+    import numpy as np
+
     try:
         with out.open("wb") as file:
             np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]

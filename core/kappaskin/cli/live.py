@@ -2,16 +2,16 @@
 
 import math
 import time
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
 from kappaskin.errors import Refusal
-from kappaskin.live import Engine, Status
-from kappaskin.publish import Latency, Listener, Published, targets_of
-from kappaskin.scenes import load_scene
-from kappaskin.sources import SIMULATION
+
+if TYPE_CHECKING:
+    from kappaskin.live import Engine, Status
+    from kappaskin.publish import Latency, Published
 
 _EVERY = 1.0  # s between two lines
 _LOOK = 0.05  # s
@@ -42,6 +42,11 @@ def publish(
     seconds
         How long to publish; until stopped when left out.
     """
+    from kappaskin.live import Engine
+    from kappaskin.publish import targets_of
+    from kappaskin.scenes import load_scene
+    from kappaskin.sources import SIMULATION
+
     check_time(seconds, "publish")
     places = foxglove if foxglove != [] else [""]
     targets = [f"udp://{place}" for place in udp or ()]
@@ -59,7 +64,7 @@ def publish(
     return FAILED if math.isnan(told.publishing.latency.whole) else 0
 
 
-def _watched(engine: Engine, end: float, stopped: list[int]) -> Status:
+def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
     """Tell how it goes until the `end`; how it went."""
     said, line = time.monotonic(), ""
     status = engine.status()
@@ -78,7 +83,7 @@ def _watched(engine: Engine, end: float, stopped: list[int]) -> Status:
     return status
 
 
-def _line(status: Status) -> str:
+def _line(status: "Status") -> str:
     news = status.publishing
     told = [f"{status.state:9}", f"{status.rate:6.0f} frames/s", *map(_words, news.targets)]
     if math.isfinite(news.latency.whole):
@@ -86,7 +91,7 @@ def _line(status: Status) -> str:
     return "  ".join([*told, status.message])
 
 
-def _words(target: Published) -> str:
+def _words(target: "Published") -> str:
     told = f"{target.target}: {target.sent} sent, {target.dropped} dropped"
     if target.target.startswith("foxglove"):
         return f"{told}, {len(target.receivers)} connected"
@@ -94,7 +99,7 @@ def _words(target: Published) -> str:
     return f"{told} ({trouble})" if trouble else told
 
 
-def _late(latency: Latency) -> str:
+def _late(latency: "Latency") -> str:
     return f"99 % within {1e3 * latency.whole:.1f} ms"
 
 
@@ -118,6 +123,8 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
     json
         Print every message as it came, one a line.
     """
+    from kappaskin.publish import Listener
+
     check_time(seconds, "listen")
     stopped = stops()
     listener, end = Listener(udp), time.monotonic() + seconds

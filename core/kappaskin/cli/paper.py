@@ -6,20 +6,15 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from kappaskin.cli.common import Pair, Switch, pair, print_json
-from kappaskin.estimation import METHODS
-from kappaskin.studies import (
-    FIGURES,
-    misprints,
-    misprints_text,
-    paper_tables,
-    tables_text,
-    write_figures,
-)
+from kappaskin.studies import FIGURES
+
+Some = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")]
+"""One or more names after the option."""
 
 
 def tables(
     *,
-    method: str = next(iter(METHODS)),
+    method: str = "least-squares",
     basis: Pair = "8x8",
     json: Switch = False,
     as_printed: Switch = False,
@@ -39,6 +34,8 @@ def tables(
     as_printed
         Instead, tell what the paper misprints, what that would give and why it is not meant.
     """
+    from kappaskin.studies import misprints, misprints_text, paper_tables, tables_text
+
     rows = misprints() if as_printed else paper_tables(method, pair(basis, "a basis"))
     if json:
         print_json(rows)
@@ -49,9 +46,7 @@ def tables(
 def figures(
     *,
     out: Path,
-    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = tuple(
-        FIGURES
-    ),
+    only: Some = tuple(FIGURES),
     json: Switch = False,
 ) -> None:
     """Draw the paper's figures, from runs of our own, as SVG and PNG.
@@ -67,6 +62,8 @@ def figures(
     json
         Print one JSON list of the files instead of one a line.
     """
+    from kappaskin.studies import write_figures
+
     written = [str(path) for path in write_figures(out, only)]
     if json:
         print_json(written)

@@ -6,12 +6,10 @@ import time
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from kappaskin._background import Beside
-from kappaskin.calibration import Tares, data_folder
 from kappaskin.cli.common import (
     FAILED,
     Pair,
@@ -24,25 +22,11 @@ from kappaskin.cli.common import (
     stops,
 )
 from kappaskin.errors import Refusal
-from kappaskin.estimation import METHODS
-from kappaskin.live import LOST, STREAMING, Engine, Status
-from kappaskin.pipeline import Setup
-from kappaskin.pipeline import reconstruct as reconstructed
-from kappaskin.recording import (
-    REPLAY,
-    Exported,
-    Exporting,
-    Recording,
-    Repaired,
-    Verdict,
-    Wanted,
-    decode,
-    repairing,
-    verifying,
-)
-from kappaskin.recording import messages as m
-from kappaskin.sensing import Sensor
-from kappaskin.sources import from_json
+
+if TYPE_CHECKING:
+    from kappaskin.live import Engine, Status
+    from kappaskin.recording import Recording
+    from kappaskin.sensing import Sensor
 
 _LOOK = 0.05  # s
 _TELL = 1.0  # s
@@ -67,6 +51,9 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     seconds
         How long to record.
     """
+    from kappaskin.live import Engine
+    from kappaskin.recording import REPLAY
+
     check_time(seconds, "record")
     if source.startswith(REPLAY):
         raise Refusal(f"expected a live source to record, got {source}; copy its file")
@@ -95,8 +82,10 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     return FAILED if written.trouble or written.lost or not status.accounting.accepted else 0
 
 
-def _recorded(engine: Engine, seconds: float, stopped: list[int]) -> Status:
+def _recorded(engine: "Engine", seconds: float, stopped: list[int]) -> "Status":
     """Record until it is over; how the engine was then."""
+    from kappaskin.live import LOST, STREAMING
+
     began = told = time.monotonic()
     known: Sensor | None = None
     while True:
@@ -119,13 +108,16 @@ def _recorded(engine: Engine, seconds: float, stopped: list[int]) -> Status:
         time.sleep(_LOOK)
 
 
-def _use_tare(engine: Engine, sensor: Sensor) -> None:
+def _use_tare(engine: "Engine", sensor: "Sensor") -> None:
+    from kappaskin.calibration import Tares, data_folder
+    from kappaskin.pipeline import Setup
+
     if not sensor.simulated:
         tare = Tares(data_folder()).load(sensor.serial_number).fit_for(sensor)
         engine.set_up(replace(Setup(), tare=tare))
 
 
-def _line(status: Status) -> str:
+def _line(status: "Status") -> str:
     written = status.recording
     return (
         f"{written.seconds:7.1f} s  {written.size / 1e6:8.1f} MB  {status.rate:6.0f} frames/s  "
@@ -133,7 +125,7 @@ def _line(status: Status) -> str:
     )
 
 
-def _ended(engine: Engine) -> Status:
+def _ended(engine: "Engine") -> "Status":
     """End the recording; how the engine is once the file is whole."""
     engine.record(None)
     asked = time.monotonic()
@@ -159,6 +151,8 @@ def info(file: Path, *, json: Switch = False) -> None:
     json
         Print one JSON object instead.
     """
+    from kappaskin.recording import Recording
+
     with Recording(file) as recording:
         said = _said(recording)
     if json:
@@ -175,7 +169,10 @@ def info(file: Path, *, json: Switch = False) -> None:
         print(f"  {count:>10,}  {topic}")
 
 
-def _said(recording: Recording) -> dict[str, Any]:
+def _said(recording: "Recording") -> dict[str, Any]:
+    from kappaskin.recording import decode
+    from kappaskin.recording import messages as m
+
     def texts(topic: m.Topic) -> list[str]:
         return [decode(m.STRING, got.data)["data"] for got in recording.messages_on(topic)]
 
@@ -197,6 +194,8 @@ def _said(recording: Recording) -> dict[str, Any]:
 
 
 def _device(text: str) -> str:
+    from kappaskin.sources import from_json
+
     sensor = from_json(text)
     return f"{sensor.name} {sensor.serial_number}, {sensor.layout}, firmware {sensor.firmware}"
 
@@ -215,6 +214,9 @@ def verify(file: Path) -> int:
         The recording.
     """
     # As the engine does: products are summed in another order by more than one thread.
+    from kappaskin._background import Beside
+    from kappaskin.recording import Verdict, verifying
+
     with Beside[float | Verdict]("verify", verifying, file) as work:
         verdict = progress(work.wait(), Verdict)
     print(f"{file}: {verdict.words}")
@@ -239,6 +241,8 @@ def repair(file: Path, *, out: Path) -> int:
     out
         The new one, which must not be there yet.
     """
+    from kappaskin.recording import Repaired, repairing
+
     done = progress(repairing(file, out), Repaired)
     if not (done.total or done.attachments):
         print(f"{file}: {done.words}")
@@ -282,6 +286,8 @@ def export(
     at
         Seconds since the recording began, of the one surface that is wanted.
     """
+    from kappaskin.recording import Exported, Exporting, Wanted
+
     try:
         with Exporting(Wanted(recording, to, begin, until, every, at)) as exporting:
             done = progress(exporting.wait(), Exported)
@@ -298,7 +304,7 @@ def reconstruct(
     basis: Pair = "8x8",
     grid: Pair | None = None,
     edge: str = "hinged",
-    method: str = next(iter(METHODS)),
+    method: str = "least-squares",
     contact: Switch = False,
     objects: Switch = False,
 ) -> None:
@@ -332,6 +338,8 @@ def reconstruct(
     objects
         Write the contact and what it is: plane, cylinder, sphere or edge; some 50 ms a frame.
     """
+    from kappaskin.pipeline import reconstruct as reconstructed
+
     points = pair(grid, "a grid") if grid else None
     functions = pair(basis, "a basis")
     found = reconstructed(readings, functions, points, edge, method, contact, objects)

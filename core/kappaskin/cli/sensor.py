@@ -8,29 +8,15 @@ from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from kappaskin.calibration import (
-    Rest,
-    Tare,
-    Tares,
-    Taring,
-    check_place,
-    data_folder,
-    press_elements,
-    save_calibration,
-    summary,
-    take_sweep,
-)
-from kappaskin.calibration import calibrate as calibrated
 from kappaskin.cli.common import FAILED, Switch, check_time, print_json, stops
-from kappaskin.contact import LoadSeeker
 from kappaskin.errors import Refusal
-from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
-from kappaskin.scenes import load_scene
-from kappaskin.sensing import Sensor
-from kappaskin.sources import Monitor, Source, open_source
+
+if TYPE_CHECKING:
+    from kappaskin.calibration import Tare
+    from kappaskin.sensing import Sensor
+    from kappaskin.sources import Source
 
 
 def _millimetres(text: str) -> tuple[float, ...]:
@@ -85,6 +71,10 @@ def calibrate(
     json
         Print one JSON object with every channel instead of a summary.
     """
+    from kappaskin.calibration import calibrate as calibrated
+    from kappaskin.calibration import check_place, save_calibration, summary, take_sweep
+    from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
+
     check_place(out)
     try:
         sensor, sweep = take_sweep(
@@ -126,6 +116,10 @@ def tare(source: str, *, undo: Switch = False) -> None:
     undo
         Use no tare of this sensor any more, instead of taking one.
     """
+    from kappaskin.calibration import Tares, data_folder
+    from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
+    from kappaskin.sources import open_source
+
     tares = Tares(data_folder())
     with closing(open_source(source)) as opened:
         sensor = _met(opened)
@@ -143,7 +137,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
         print(f"kept in {tares.path(sensor.serial_number)}")
 
 
-def _met(source: Source) -> Sensor:
+def _met(source: "Source") -> "Sensor":
     while source.sensor is None:
         source.read(_READ)
         if source.trouble:
@@ -151,7 +145,12 @@ def _met(source: Source) -> Sensor:
     return source.sensor
 
 
-def _taken(source: Source, sensor: Sensor, used: Tare | None) -> Tare:
+def _taken(source: "Source", sensor: "Sensor", used: "Tare | None") -> "Tare":
+    import numpy as np
+
+    from kappaskin.calibration import Rest, Taring
+    from kappaskin.contact import LoadSeeker
+
     taring = Taring(sensor, time.monotonic())
     while not taring.done(time.monotonic()):
         for frame in source.read(_READ):
@@ -164,8 +163,10 @@ def _taken(source: Source, sensor: Sensor, used: Tare | None) -> Tare:
     return taring.tare(LoadSeeker(sensor), rest, now, source.temperature)
 
 
-def _tell(taken: Tare, before: Tare | None) -> None:
+def _tell(taken: "Tare", before: "Tare | None") -> None:
     """Print what was taken, beside the one in use before."""
+    import numpy as np
+
     offset, error = (math.sqrt(float(np.nanmean(x**2))) for x in (taken.offset, taken.offset_sd))
     warm = "" if taken.temperature is None else f" at {taken.temperature:.1f} degrees Celsius"
     print(
@@ -199,6 +200,9 @@ def press(
     json
         Print one JSON object with every press and the map that was found.
     """
+    from kappaskin.calibration import press_elements
+    from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
+
     try:
         test, verdict = press_elements(
             source,
@@ -247,6 +251,8 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
     reset
         Pulse DTR and RTS first, at which many boards start anew.
     """
+    from kappaskin.sources import Monitor
+
     check_time(seconds, "listen")
     stopped = stops()
     listening, end = Monitor(port), time.monotonic() + seconds
@@ -279,6 +285,7 @@ def device(scene: str = "", *, rate: float | None = None, dwell: float | None = 
     dwell
         Seconds on each cylinder, in the scene `calibration`; one when left out.
     """
+    from kappaskin.scenes import load_scene
     from kappaskin.sources import PseudoDevice
 
     played = load_scene(scene)

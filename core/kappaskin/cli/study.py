@@ -6,46 +6,14 @@ import time
 from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kappaskin.cli.common import FAILED, Pair, Switch, Whole, print_json, save_arrays
 from kappaskin.errors import Refusal
-from kappaskin.scenes import Scene, load_scene
-from kappaskin.studies import (
-    Cost,
-    Folder,
-    Measuring,
-    Refused,
-    Workers,
-    check_plot,
-    cluster,
-    compared,
-    compared_text,
-    costs_text,
-    draw_study,
-    effect_costs,
-    effect_rows,
-    effects_text,
-    known_of,
-    length_of,
-    load_study,
-    page_of,
-    plan_rows,
-    plan_text,
-    processes,
-    regions_text,
-    rows,
-    run_regions,
-    run_stability,
-    run_study,
-    settings_to_try,
-    simulated_readings,
-    stability_text,
-    table_csv,
-    table_text,
-    usual_setting,
-    verdict,
-    write_plot,
-)
+
+if TYPE_CHECKING:
+    from kappaskin.scenes import Scene
+    from kappaskin.studies import Cost, Refused, Workers
 
 
 def plan(scene: str = "", *, json: Switch = False) -> None:
@@ -60,6 +28,9 @@ def plan(scene: str = "", *, json: Switch = False) -> None:
     json
         Print one JSON object, with an entry for every known effect, instead of a table.
     """
+    from kappaskin.scenes import load_scene
+    from kappaskin.studies import plan_rows, plan_text
+
     on = load_scene(scene)
     rows = plan_rows(on)
     if json:
@@ -88,13 +59,18 @@ def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = 
     out
         The file to write.
     """
+    from kappaskin.scenes import load_scene
+    from kappaskin.studies import simulated_readings
+
     found = simulated_readings(load_scene(scene), frames, seed)
     save_arrays(out, found)
     print(f"{out}: {frames} frames", file=sys.stderr)
 
 
-def _measured(scene: Scene) -> list[Cost | Refused]:
+def _measured(scene: "Scene") -> "list[Cost | Refused]":
     """What every setting costs; on a terminal, a line on standard error tells how far it is."""
+    from kappaskin.studies import Cost, Measuring, Refused, settings_to_try
+
     settings, found = settings_to_try(scene), list[Cost | Refused]()
     told = sys.stderr.isatty()
     try:
@@ -113,8 +89,10 @@ def _measured(scene: Scene) -> list[Cost | Refused]:
     return found
 
 
-def _effects(scene: Scene, json: bool) -> None:
+def _effects(scene: "Scene", json: bool) -> None:
     """Tell what the scene's effects cost."""
+    from kappaskin.studies import effect_costs, effect_rows, effects_text, usual_setting
+
     setting = usual_setting(scene)
     found = effect_costs(scene, setting)
     if json:
@@ -123,8 +101,10 @@ def _effects(scene: Scene, json: bool) -> None:
         print(effects_text(scene, setting, found))
 
 
-def _settings(scene: Scene, found: list[Cost | Refused], json: bool) -> None:
+def _settings(scene: "Scene", found: "list[Cost | Refused]", json: bool) -> None:
     """Tell what was found of settings; people are told of the effects too."""
+    from kappaskin.studies import costs_text, rows
+
     if json:
         print_json(rows(scene, found))
         return
@@ -166,6 +146,9 @@ def cost(
         Print one JSON list of rows instead of a table, of the settings, or with --effects of the
         effects; with --within one object.
     """
+    from kappaskin.scenes import load_scene
+    from kappaskin.studies import check_plot, length_of, verdict, write_plot
+
     asked = None if within is None else length_of(within)
     if effects and (asked is not None or plot is not None):
         raise Refusal(
@@ -205,6 +188,8 @@ def compare(*, json: Switch = False) -> None:
     json
         Print one JSON list of rows instead of a table.
     """
+    from kappaskin.studies import compared, compared_text
+
     rows = compared()
     if json:
         print_json([asdict(row) for row in rows])
@@ -228,6 +213,8 @@ def stability(
     long
         Run the longest cases too: a million frames, up to 512 functions a side.
     """
+    from kappaskin.studies import run_stability, stability_text
+
     told = sys.stderr.isatty()
     rows = run_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
     if json:
@@ -246,6 +233,8 @@ def regions(*, json: Switch = False) -> None:
     json
         Print one JSON list of rows instead of a table.
     """
+    from kappaskin.studies import regions_text, run_regions
+
     rows = run_regions()
     if json:
         print_json(rows)
@@ -256,7 +245,9 @@ def regions(*, json: Switch = False) -> None:
 _EVERY = 10.0  # s between two lines of progress in a log
 
 
-def _workers(count: int | None, scheduler: str) -> AbstractContextManager[Workers]:
+def _workers(count: int | None, scheduler: str) -> "AbstractContextManager[Workers]":
+    from kappaskin.studies import cluster, processes
+
     if scheduler:
         if count is not None:
             raise Refusal("expected --workers or --scheduler, got both; a cluster has its own")
@@ -302,6 +293,8 @@ def study(
     out
         The folder of its results; named as the study when left out.
     """
+    from kappaskin.studies import Folder, load_study, run_study, table_text
+
     asked = load_study(file)
     path = out if out is not None else Path(asked.name)
     with _workers(workers, scheduler) as found:
@@ -333,6 +326,8 @@ def report(folder: Path) -> None:
     folder
         The folder that `kappaskin study` made.
     """
+    from kappaskin.studies import Folder, draw_study, known_of, page_of, table_csv
+
     results = Folder(folder)
     study = results.study()
     known = known_of(study, results)

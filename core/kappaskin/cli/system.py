@@ -1,4 +1,4 @@
-"""Commands on this machine and its ports: doctor, drill."""
+"""Commands on this machine and its ports: doctor, drill, and completion in a shell."""
 
 import ctypes
 import math
@@ -8,11 +8,13 @@ import shutil
 import sys
 from dataclasses import asdict
 from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
-from kappaskin.sources import Diagnosis, Port, diagnose, permission_line, serial_ports
+
+if TYPE_CHECKING:
+    from kappaskin.sources import Diagnosis
 
 PACKAGES = (
     "numpy",
@@ -80,6 +82,8 @@ def _display() -> str:
 
 def examine() -> dict[str, Any]:
     """Everything `kappaskin doctor` tells, as JSON values."""
+    from kappaskin.sources import serial_ports
+
     missing = _missing()
     line = f"apt-get install -y --no-install-recommends {' '.join(missing)}" if missing else ""
     return {
@@ -110,6 +114,8 @@ def doctor(port: str = "", *, json: Switch = False) -> int:
     json
         Print one JSON object instead of text.
     """
+    from kappaskin.sources import diagnose
+
     if not port:
         _tell_machine(json)
         return 0
@@ -121,7 +127,7 @@ def doctor(port: str = "", *, json: Switch = False) -> int:
     return FAILED if found.why else 0
 
 
-def _tell_port(found: Diagnosis) -> None:
+def _tell_port(found: "Diagnosis") -> None:
     _line("port", found.plug)
     if found.device:
         _line("device", found.device)
@@ -147,6 +153,8 @@ def _line(name: str, text: str) -> None:
 
 
 def _tell_machine(json: bool) -> None:
+    from kappaskin.sources import Port, permission_line
+
     found = examine()
     if json:
         print_json(found)
@@ -199,3 +207,30 @@ def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> in
     else:
         print(drills_text(rows))
     return FAILED if any(row["verdict"] == "failed" for row in rows) else 0
+
+
+def install_completion(
+    *, shell: Literal["bash", "zsh", "fish", "powershell"] | None = None
+) -> None:
+    """Install completion of commands and options for your shell.
+
+    Writes a file of the shell's own, and a line that loads it into the shell's start-up file.
+
+    Example: `kappaskin --install-completion --shell zsh`
+
+    Parameters
+    ----------
+    shell
+        The shell; the one that this is run from when left out.
+    """
+    from cyclopts.completion import ShellDetectionError
+
+    from kappaskin.cli import app
+
+    try:
+        file = app.install_completion(shell=shell)
+    except ShellDetectionError as error:
+        raise Refusal(f"expected to be run from a shell ({error}); name it by --shell") from error
+    except OSError as error:
+        raise Refusal(f"completion cannot be written ({error}); make the place writable") from error
+    print(f"{file}: installed; open a new shell to use it")

@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from kappaskin.studies.design.study import load_study as load_study
     from kappaskin.studies.drills.run import drills_text as drills_text
     from kappaskin.studies.drills.run import run_drills as run_drills
-    from kappaskin.studies.figures.style import FIGURES as FIGURES
-    from kappaskin.studies.figures.style import write_figures as write_figures
+    from kappaskin.studies.figures import FIGURES as FIGURES
+    from kappaskin.studies.figures import write_figures as write_figures
     from kappaskin.studies.paper import misprints as misprints
     from kappaskin.studies.paper import misprints_text as misprints_text
     from kappaskin.studies.paper import paper_tables as paper_tables
@@ -76,7 +76,7 @@ else:
             "design.run": "Workers cluster known_of processes run_study",
             "design.study": "load_study",
             "drills.run": "drills_text run_drills",
-            "figures.style": "FIGURES write_figures",
+            "figures": "FIGURES write_figures",
             "paper": "misprints misprints_text paper_tables tables_text",
             "regions": "regions_text run_regions",
             "simulation": "plan_rows plan_text plan_told simulated_readings",

@@ -1,6 +1,5 @@
 """The plot of error against time of every setting, and of those that no other beats."""
 
-import io
 import math
 from collections.abc import Sequence
 from itertools import chain, cycle, repeat
@@ -10,7 +9,6 @@ from kappaskin.errors import Refusal
 from kappaskin.scenes import Scene
 from kappaskin.studies.cost.settings import ALL, Cost, Refused, frontier
 from kappaskin.studies.figures import style
-from kappaskin.studies.figures.style import KINDS
 
 _COLOURS = (style.BLUE, style.GREY, style.FAINT, "#63a878", style.ORANGE, "#7a4b9a", "#3f9aa5",
             "#c9a227", "#c2487a")  # fmt: skip
@@ -21,9 +19,9 @@ _LABEL, _APART = 22.5, 2.6  # mm: room for a label, and from one to the next
 
 def check_plot(path: Path) -> None:
     """Refuse a `path` that a plot cannot be written to, before anything is measured."""
-    if path.suffix.lower()[1:] not in KINDS:
+    if path.suffix.lower()[1:] not in style.KINDS:
         raise Refusal(
-            f"{path}: expected a file that ends in {' or '.join(map('.{}'.format, KINDS))}"
+            f"{path}: expected a file that ends in {' or '.join(map('.{}'.format, style.KINDS))}"
         )
     if path.is_dir() or not path.parent.is_dir():
         raise Refusal(f"{path}: cannot be written (no such folder); choose another place")
@@ -33,12 +31,10 @@ def check_plot(path: Path) -> None:
 def write_plot(path: Path, scene: Scene, costs: Sequence[Cost | Refused]) -> None:
     """Draw `costs` into the file `path`, as SVG or PNG by its ending."""
     check_plot(path)
-    kind, drawn = path.suffix.lower()[1:], io.BytesIO()
-    with style.sheet() as figure:
-        draw(figure, scene, costs)
-        figure.savefig(drawn, format=kind, metadata=KINDS[kind])
+    kind = path.suffix.lower()[1:]
+    drawn = style.drawn(lambda figure: draw(figure, scene, costs), kind)
     try:
-        path.write_bytes(drawn.getvalue())
+        path.write_bytes(drawn[kind])
     except OSError as error:
         raise Refusal(f"{path}: cannot be written ({error}); choose another place") from error
 

@@ -6,6 +6,7 @@ import io
 import math
 import platform
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import cycle
 from typing import Any, cast
 
@@ -13,7 +14,6 @@ from kappaskin.studies.design.measures import MEASURES, Measure
 from kappaskin.studies.design.results import Known, Mean, version
 from kappaskin.studies.design.study import Axis, Study
 from kappaskin.studies.figures import style
-from kappaskin.studies.figures.style import KINDS
 
 _LONGEST_VALUE = 24  # characters of a value
 
@@ -197,15 +197,12 @@ def draw_study(study: Study, known: Sequence[Known]) -> dict[str, str]:
     """The SVG of a figure for every measure, by its name; none where nothing is varied."""
     drawn = dict[str, str]()
     for name in study.measures if study.axes else ():
-        made = io.StringIO()
-        with style.sheet() as figure:
-            _draw(figure, study, known, name)
-            figure.savefig(made, format="svg", metadata=KINDS["svg"])
-        drawn[name] = made.getvalue()
+        files = style.drawn(partial(_draw, study, known, name), "svg")
+        drawn[name] = files["svg"].decode()
     return drawn
 
 
-def _draw(figure: style.Figure, study: Study, known: Sequence[Known], name: str) -> None:
+def _draw(study: Study, known: Sequence[Known], name: str, figure: style.Figure) -> None:
     style.resize(figure, style.DOUBLE, 80)
     (first, *others), measure = study.axes, MEASURES[name]
     left, bottom, width, height = _PANEL

@@ -1,16 +1,14 @@
-"""How every figure looks, the list of the paper's figures, and figures to files."""
+"""How every figure looks: sizes for print, the app's colours, and the same bytes every time."""
 
+import io
 import re
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from importlib import import_module
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from kappaskin.errors import Refusal, lacking
+from kappaskin.errors import lacking
 from kappaskin.frames import Array
 
 Figure = Any
@@ -67,6 +65,11 @@ _RULES = {
 }
 
 
+# Neither a date nor a version: the same run gives the same bytes.
+KINDS = {"svg": {"Date": None, "Creator": "kappaskin"}, "png": {"Software": "kappaskin"}}
+"""What a figure can be written as, with the metadata of the file."""
+
+
 def loaded() -> Any:
     """Matplotlib, or a refusal where it is missing."""
     try:
@@ -84,6 +87,16 @@ def sheet() -> Generator[Figure]:
         mpl.rcdefaults()
         mpl.rcParams.update(_RULES)
         yield mpl.figure.Figure()
+
+
+def drawn(draw: Callable[[Figure], None], *kinds: str) -> dict[str, bytes]:
+    """What `draw` draws on an empty figure, as a file of each of some `KINDS`."""
+    files = {kind: io.BytesIO() for kind in kinds}
+    with sheet() as figure:
+        draw(figure)
+        for kind, file in files.items():
+            figure.savefig(file, format=kind, metadata=KINDS[kind])
+    return {kind: file.getvalue() for kind, file in files.items()}
 
 
 def resize(figure: Figure, width: float, height: float) -> None:
@@ -160,63 +173,3 @@ def mesh(axes: Axes, points: Array, value: Array, limits: tuple[float, float]) -
         facecolors=colour_map(SEQUENTIAL)(share),
         edgecolor=(1, 1, 1, 0.55), linewidth=0.3, shade=False, rstride=1, cstride=1,
     )  # fmt: skip
-
-
-# The list of figures, and figures to files
-
-Draw = Callable[[Figure], None]
-
-
-def _of(module: str) -> Draw:
-    """What draws the figure of that module, which is imported when it is first drawn."""
-    return lambda figure: import_module(f"kappaskin.studies.figures.{module}").draw(figure)
-
-
-FIGURES: dict[str, Draw] = {
-    "fig1": _of("fig1"),
-    "fig2": _of("fig2"),
-    "fig6": _of("fig6"),
-    "fig8": _of("fig8"),
-    "fig9": _of("fig9"),
-    "initial-curvature": _of("initial_curvature"),
-}
-"""What draws each figure on an empty matplotlib.figure.Figure; fig1 to fig9 are the paper's."""
-
-# Neither a date nor a version: the same run gives the same bytes.
-KINDS = {"svg": {"Date": None, "Creator": "kappaskin"}, "png": {"Software": "kappaskin"}}
-
-
-def _known(names: Iterable[str]) -> list[str]:
-    wanted = list(dict.fromkeys(names))
-    unknown = [name for name in wanted if name not in FIGURES]
-    if unknown or not wanted:
-        got = ", ".join(map(repr, unknown)) or "none"
-        raise Refusal(f"expected figures among {', '.join(FIGURES)}; got {got}")
-    return wanted
-
-
-def write_figures(out: Path, names: Iterable[str]) -> list[Path]:
-    """Draw the figures `names` into the folder `out`, each as SVG and as PNG: the files written.
-
-    The folder is made when there is none. Nothing in it is replaced before all are drawn.
-    """
-    wanted = _known(names)
-    loaded()  # or refused before a folder is made
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=".figures-", dir=out) as room:
-            made = [path for name in wanted for path in _draw_into(Path(room), name)]
-            return [path.replace(out / path.name) for path in made]
-    except OSError as error:
-        raise Refusal(
-            f"{out}: expected a folder that can be written to ({error}); choose another"
-        ) from error
-
-
-def _draw_into(room: Path, name: str) -> list[Path]:
-    paths = [room / f"{name}.{kind}" for kind in KINDS]
-    with sheet() as figure:
-        FIGURES[name](figure)
-        for path, metadata in zip(paths, KINDS.values(), strict=True):
-            figure.savefig(path, metadata=metadata)
-    return paths
