@@ -25,15 +25,17 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from kappaskin.cli import FAILED, REFUSED, _add_commands, app, main
+from kappaskin.cli import _add_commands, app, main
+from kappaskin.cli.common import FAILED, REFUSED
 from kappaskin.errors import Refusal
 from kappaskin.scenes import SCENES, load_scene, write_scene
-from kappaskin.studies import EffectCost, costs, effect_rows, rows, settings_to_try, verdict
-from kappaskin.studies.compare.works import Compared
+from kappaskin.studies import EffectCost, accuracy_verdict, cost_rows, effect_rows, settings_to_try
+from kappaskin.studies.compare.comparison import ComparisonRow
+from kappaskin.studies.cost.bench import costs
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.study import STUDIES
 from kappaskin.studies.drills.run import DRILLS, row_of
-from kappaskin.studies.drills.stand import Drill, Outcome, opened
+from kappaskin.studies.drills.stand import Drill, DrillOutcome, opened
 from kappaskin.studies.regions import REGIONS
 from kappaskin.studies.regions import measured as run_region
 from kappaskin.studies.stability.gallery import gallery
@@ -149,10 +151,10 @@ def printed() -> dict[str, list[str]]:
     return answers | {
         "doctor": sorted(machine),
         "tables --as-printed": sorted(json.loads(ran("tables", "--as-printed", "--json"))[0]),
-        "cost": keys(rows(scene, measured)),
-        "cost --within": keys(verdict(scene, measured, 1.0).to_json()),
+        "cost": keys(cost_rows(scene, measured)),
+        "cost --within": keys(accuracy_verdict(scene, measured, 1.0).to_json()),
         "cost --effects": keys(effect_rows(scene, measured[0].setting, [an_effect])),
-        "compare": [field.name for field in fields(Compared)],
+        "compare": [field.name for field in fields(ComparisonRow)],
         "regions": keys([run_region(0.25, REGIONS[0], 0.25)]),
         "stability": keys(rows_of(next(gallery()))),
     }
@@ -292,11 +294,11 @@ def studies() -> dict[str, list[str]]:
 def drill() -> dict[str, Any]:
     """The keys of a drill's row, and its verdicts."""
 
-    def failing(stand: object) -> Outcome:
-        return Outcome(failures=("it fails",))
+    def failing(stand: object) -> DrillOutcome:
+        return DrillOutcome(failures=("it fails",))
 
-    def done(stand: object) -> Outcome:
-        return Outcome()
+    def done(stand: object) -> DrillOutcome:
+        return DrillOutcome()
 
     with opened(None, 0) as device:
         held, failed = (row_of(Drill("a", "b", run), device) for run in (done, failing))

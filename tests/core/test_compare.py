@@ -14,9 +14,15 @@ from kappaskin import GaussianLoad, Patch, Plate, SineBasis, load_scene
 from kappaskin.cli import main
 from kappaskin.cli.common import REFUSED
 from kappaskin.studies import compared, compared_text
-from kappaskin.studies.compare.ways import bent, integrated, iterated, lstsq, pinv
-from kappaskin.studies.compare.works import WITHIN, errors_text
-from kappaskin.studies.paper import Case, table_1
+from kappaskin.studies.compare.comparison import WITHIN, errors_text
+from kappaskin.studies.compare.solvers import (
+    lsqr_solver,
+    lstsq_solver,
+    pinv_solver,
+    plate_solver,
+    slopes_solver,
+)
+from kappaskin.studies.paper import LoadCase, table_1
 
 pytestmark = pytest.mark.slow
 
@@ -64,9 +70,9 @@ def test_our_rows_are_table_1s(rows, name):
     assert ours.rms_mm == pytest.approx(noisy["rms_mm"], rel=1e-9)
 
 
-@pytest.mark.parametrize("make", [lstsq, pinv, iterated])
+@pytest.mark.parametrize("make", [lstsq_solver, pinv_solver, lsqr_solver])
 def test_others_have_our_coefficients_where_readings_decide_them(make):
-    case = Case.of(load_scene("centre"), "least-squares", (8, 8))
+    case = LoadCase.of(load_scene("centre"), "least-squares", (8, 8))
     noisy = case.noisy()[:3]
 
     one, many = (make(case).solve(readings) for readings in (noisy[0], noisy))
@@ -88,13 +94,13 @@ def test_others_leave_out_of_a_bent_skin_what_bends_nothing(rows):
 
 def test_slopes_are_integrated_to_the_surface_they_belong_to():
     scene = load_scene("centre")
-    case = Case.of(scene, "least-squares", (8, 8))
+    case = LoadCase.of(scene, "least-squares", (8, 8))
     basis = SineBasis(scene.plate.patch, 3, 2)
     c = np.array([[1.0, -0.4], [0.3, 0.2], [-0.1, 0.15]])
     readings = (scene.layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
     points = np.random.default_rng(0).uniform(0, 0.1, (50, 2))
 
-    way = integrated(case)
+    way = slopes_solver(case)
 
     np.testing.assert_allclose(
         way.at(points) @ way.solve(readings), basis.at(points) @ c.ravel(), atol=2e-3
@@ -108,7 +114,7 @@ def test_finite_elements_bend_a_plate_as_the_series_does():
     mine = basis.at(points) @ plate.deflection([load], basis).ravel()
 
     for element, cells, off in (("Argyris", 6, 2e-4), ("Morley", 24, 2e-2)):
-        way = bent(plate, element, cells)
+        way = plate_solver(plate, element, cells)
         np.testing.assert_allclose(way.at(points) @ way.solve(load), mine, rtol=off)
 
 

@@ -13,7 +13,6 @@ import kappaskin.studies.simulation
 from kappaskin import (
     Cost,
     EffectCost,
-    Measuring,
     Refusal,
     Refused,
     Scene,
@@ -26,7 +25,7 @@ from kappaskin import (
 from kappaskin.cli.common import REFUSED
 from kappaskin.scenes import Choice, CorruptedFrames, Creep, DroppedFrames, GaussianNoise, plan
 from kappaskin.scenes.effects.temperature import Temperature
-from kappaskin.studies import effect_rows, effects_text, usual_setting
+from kappaskin.studies import CostMeasurement, effect_rows, effects_text, usual_setting
 
 pytestmark = pytest.mark.slow
 
@@ -289,7 +288,7 @@ def test_the_table_says_each_effect_in_a_line() -> None:
 
 def test_a_process_of_its_own_tells_of_effects_after_the_first_cost() -> None:
     settings = EIGHT, replace(EIGHT, functions=(4, 4))
-    with Measuring(CENTRE, settings, EIGHT) as measuring:
+    with CostMeasurement(CENTRE, settings, EIGHT) as measuring:
         costs_there = measuring.wait()
         assert next(costs_there).setting == EIGHT
         assert not measuring.effects
@@ -303,7 +302,7 @@ def test_a_process_of_its_own_tells_of_effects_after_the_first_cost() -> None:
 
 def test_a_setting_that_cannot_judge_effects_leaves_the_others_alone() -> None:
     many = replace(EIGHT, functions=(12, 12))
-    with Measuring(CENTRE, [], many) as measuring:
+    with CostMeasurement(CENTRE, [], many) as measuring:
         assert list(measuring.wait()) == []
     assert isinstance(measuring.effects[many], Refused)
     assert "140 of the 144" in measuring.effects[many].reason

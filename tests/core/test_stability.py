@@ -26,7 +26,7 @@ from kappaskin import (
 from kappaskin.estimation import METHODS
 from kappaskin.estimation.fit import DenseSpread
 from kappaskin.studies import run_stability
-from kappaskin.studies.stability.gallery import Kind, gallery
+from kappaskin.studies.stability.gallery import CaseKind, gallery
 from kappaskin.studies.stability.reference import least_squares, reference_of
 from kappaskin.studies.stability.verdicts import rows_of
 
@@ -55,7 +55,9 @@ def test_there_is_a_row_for_every_case_method_and_precision(rows):
     assert max(Counter((r["case"], r["method"], r["precision"]) for r in rows).values()) == 1
     assert {r["method"] for r in rows} == set(METHODS)
     assert {r["precision"] for r in rows} == {"float64", "float32"}
-    assert {r["case"] for r in rows} >= {n for n, c in CASES.items() if c.kind is not Kind.LARGE}
+    assert {r["case"] for r in rows} >= {
+        n for n, c in CASES.items() if c.kind is not CaseKind.LARGE
+    }
 
 
 def test_no_method_of_ours_is_wrong(rows):
@@ -362,7 +364,7 @@ def test_there_is_no_reference_where_the_readings_decide_nothing():
 
 
 def test_the_reference_by_transforms_is_that_by_double_double():
-    case = replace(CASES["paper"], kind=Kind.LARGE)
+    case = replace(CASES["paper"], kind=CaseKind.LARGE)
     dense, fast = reference_of(CASES["paper"]), reference_of(case)
 
     g, h = dense.scaled(fast.answer), dense.scaled(dense.answer)

@@ -32,11 +32,11 @@ def plan(scene: str = "", *, json: Switch = False) -> None:
     from kappaskin.studies import plan_rows, plan_text
 
     on = load_scene(scene)
-    rows = plan_rows(on)
+    cost_rows = plan_rows(on)
     if json:
-        print_json({"scene": on.name, "accuracy": on.choice.accuracy, "effects": rows})
+        print_json({"scene": on.name, "accuracy": on.choice.accuracy, "effects": cost_rows})
     else:
-        print(plan_text(on, rows))
+        print(plan_text(on, cost_rows))
 
 
 def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None) -> None:
@@ -69,12 +69,12 @@ def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = 
 
 def _measured(scene: "Scene") -> "list[Cost | Refused]":
     """What every setting costs; on a terminal, a line on standard error tells how far it is."""
-    from kappaskin.studies import Cost, Measuring, Refused, settings_to_try
+    from kappaskin.studies import Cost, CostMeasurement, Refused, settings_to_try
 
     settings, found = settings_to_try(scene), list[Cost | Refused]()
     told = sys.stderr.isatty()
     try:
-        with Measuring(scene, settings) as measuring:
+        with CostMeasurement(scene, settings) as measuring:
             for cost in measuring.wait():
                 found.append(cost)
                 done = 40 * len(found) // len(settings)
@@ -103,10 +103,10 @@ def _effects(scene: "Scene", json: bool) -> None:
 
 def _settings(scene: "Scene", found: "list[Cost | Refused]", json: bool) -> None:
     """Tell what was found of settings; people are told of the effects too."""
-    from kappaskin.studies import costs_text, rows
+    from kappaskin.studies import cost_rows, costs_text
 
     if json:
-        print_json(rows(scene, found))
+        print_json(cost_rows(scene, found))
         return
     print(costs_text(scene, found), end="\n\n", flush=True)
     try:
@@ -147,9 +147,9 @@ def cost(
         effects; with --within one object.
     """
     from kappaskin.scenes import load_scene
-    from kappaskin.studies import check_plot, length_of, verdict, write_plot
+    from kappaskin.studies import accuracy_verdict, check_plot, parse_length, write_plot
 
-    asked = None if within is None else length_of(within)
+    asked = None if within is None else parse_length(within)
     if effects and (asked is not None or plot is not None):
         raise Refusal(
             "expected --effects without --within and --plot, which are about settings; leave it or "
@@ -167,7 +167,7 @@ def cost(
     if asked is None:
         _settings(on, found, json)
         return 0
-    answer = verdict(on, found, asked)
+    answer = accuracy_verdict(on, found, asked)
     if json:
         print_json(answer.to_json())
     else:
@@ -190,11 +190,11 @@ def compare(*, json: Switch = False) -> None:
     """
     from kappaskin.studies import compared, compared_text
 
-    rows = compared()
+    cost_rows = compared()
     if json:
-        print_json([asdict(row) for row in rows])
+        print_json([asdict(row) for row in cost_rows])
     else:
-        print(compared_text(rows))
+        print(compared_text(cost_rows))
 
 
 def stability(
@@ -216,11 +216,11 @@ def stability(
     from kappaskin.studies import run_stability, stability_text
 
     told = sys.stderr.isatty()
-    rows = run_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
+    cost_rows = run_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
     if json:
-        print_json(rows)
+        print_json(cost_rows)
     else:
-        print(stability_text(rows))
+        print(stability_text(cost_rows))
 
 
 def regions(*, json: Switch = False) -> None:
@@ -235,11 +235,11 @@ def regions(*, json: Switch = False) -> None:
     """
     from kappaskin.studies import regions_text, run_regions
 
-    rows = run_regions()
+    cost_rows = run_regions()
     if json:
-        print_json(rows)
+        print_json(cost_rows)
     else:
-        print(regions_text(rows))
+        print(regions_text(cost_rows))
 
 
 _EVERY = 10.0  # s between two lines of progress in a log
@@ -293,12 +293,12 @@ def study(
     out
         The folder of its results; named as the study when left out.
     """
-    from kappaskin.studies import Folder, load_study, run_study, table_text
+    from kappaskin.studies import StudyFolder, load_study, run_study, table_text
 
     asked = load_study(file)
     path = out if out is not None else Path(asked.name)
     with _workers(workers, scheduler) as found:
-        folder = Folder.opened(path, asked)
+        folder = StudyFolder.opened(path, asked)
         try:
             known = run_study(asked, folder, found, _Teller())
         except KeyboardInterrupt:
@@ -326,11 +326,11 @@ def report(folder: Path) -> None:
     folder
         The folder that `kappaskin study` made.
     """
-    from kappaskin.studies import Folder, draw_study, known_of, page_of, table_csv
+    from kappaskin.studies import StudyFolder, draw_study, page_of, stored_results, table_csv
 
-    results = Folder(folder)
+    results = StudyFolder(folder)
     study = results.study()
-    known = known_of(study, results)
+    known = stored_results(study, results)
     figures = draw_study(study, known)
     files = {f"{name}.svg": svg for name, svg in figures.items()}
     files |= {"report.csv": table_csv(study, known), "report.html": page_of(study, known, figures)}

@@ -5,22 +5,22 @@ from typing import TYPE_CHECKING
 from kappaskin._lazy import lazy_names
 
 if TYPE_CHECKING:
-    from kappaskin.studies.compare.works import compared as compared
-    from kappaskin.studies.compare.works import compared_text as compared_text
+    from kappaskin.studies.compare.comparison import compared as compared
+    from kappaskin.studies.compare.comparison import compared_text as compared_text
     from kappaskin.studies.cost.bench import costs as costs
     from kappaskin.studies.cost.effects import EffectCost as EffectCost
     from kappaskin.studies.cost.effects import effect_costs as effect_costs
     from kappaskin.studies.cost.effects import usual_setting as usual_setting
     from kappaskin.studies.cost.plot import check_plot as check_plot
     from kappaskin.studies.cost.plot import write_plot as write_plot
-    from kappaskin.studies.cost.process import Effects as Effects
-    from kappaskin.studies.cost.process import Measuring as Measuring
+    from kappaskin.studies.cost.process import CostMeasurement as CostMeasurement
+    from kappaskin.studies.cost.process import EffectCosts as EffectCosts
+    from kappaskin.studies.cost.report import accuracy_verdict as accuracy_verdict
+    from kappaskin.studies.cost.report import cost_rows as cost_rows
     from kappaskin.studies.cost.report import costs_text as costs_text
     from kappaskin.studies.cost.report import effect_rows as effect_rows
     from kappaskin.studies.cost.report import effects_text as effects_text
-    from kappaskin.studies.cost.report import length_of as length_of
-    from kappaskin.studies.cost.report import rows as rows
-    from kappaskin.studies.cost.report import verdict as verdict
+    from kappaskin.studies.cost.report import parse_length as parse_length
     from kappaskin.studies.cost.settings import Cost as Cost
     from kappaskin.studies.cost.settings import Refused as Refused
     from kappaskin.studies.cost.settings import Setting as Setting
@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     from kappaskin.studies.design.report import page_of as page_of
     from kappaskin.studies.design.report import table_csv as table_csv
     from kappaskin.studies.design.report import table_text as table_text
-    from kappaskin.studies.design.results import Folder as Folder
+    from kappaskin.studies.design.results import StudyFolder as StudyFolder
     from kappaskin.studies.design.run import Workers as Workers
     from kappaskin.studies.design.run import cluster as cluster
-    from kappaskin.studies.design.run import known_of as known_of
     from kappaskin.studies.design.run import processes as processes
     from kappaskin.studies.design.run import run_study as run_study
+    from kappaskin.studies.design.run import stored_results as stored_results
     from kappaskin.studies.design.study import load_study as load_study
     from kappaskin.studies.drills.run import drills_text as drills_text
     from kappaskin.studies.drills.run import run_drills as run_drills
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from kappaskin.studies.regions import run_regions as run_regions
     from kappaskin.studies.simulation import plan_rows as plan_rows
     from kappaskin.studies.simulation import plan_text as plan_text
-    from kappaskin.studies.simulation import plan_told as plan_told
+    from kappaskin.studies.simulation import plan_updates as plan_updates
     from kappaskin.studies.simulation import simulated_readings as simulated_readings
     from kappaskin.studies.stability.verdicts import run_stability as run_stability
     from kappaskin.studies.stability.verdicts import stability_text as stability_text
@@ -63,23 +63,25 @@ else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
-            "compare.works": "compared compared_text",
+            "compare.comparison": "compared compared_text",
             "cost.bench": "costs",
             "cost.effects": "EffectCost effect_costs usual_setting",
             "cost.plot": "check_plot write_plot",
-            "cost.process": "Effects Measuring",
-            "cost.report": "costs_text effect_rows effects_text length_of rows verdict",
+            "cost.process": "CostMeasurement EffectCosts",
+            "cost.report": (
+                "accuracy_verdict cost_rows costs_text effect_rows effects_text parse_length"
+            ),
             "cost.settings": "Cost Refused Setting cheapest frontier settings_to_try",
             "design.prospect": "Check Design Prospect check prospect",
             "design.report": "draw_study page_of table_csv table_text",
-            "design.results": "Folder",
-            "design.run": "Workers cluster known_of processes run_study",
+            "design.results": "StudyFolder",
+            "design.run": "Workers cluster processes run_study stored_results",
             "design.study": "load_study",
             "drills.run": "drills_text run_drills",
             "figures": "FIGURES write_figures",
             "paper": "misprints misprints_text paper_tables tables_text",
             "regions": "regions_text run_regions",
-            "simulation": "plan_rows plan_text plan_told simulated_readings",
+            "simulation": "plan_rows plan_text plan_updates simulated_readings",
             "stability.verdicts": "run_stability stability_text",
         },
     )

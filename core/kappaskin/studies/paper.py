@@ -45,7 +45,7 @@ EXPERIMENT = {"0.63": (1.13, 0.49), "1.27": (1.53, 0.26), "1.90": (1.79, -0.11)}
 
 
 @dataclass(frozen=True)
-class Case:
+class LoadCase:
     """A load case with everything that its rows share; displacements in mm."""
 
     scene: Scene
@@ -57,7 +57,7 @@ class Case:
     curvature: Array
 
     @classmethod
-    def of(cls, scene: Scene, method: str, functions: tuple[int, int]) -> "Case":
+    def of(cls, scene: Scene, method: str, functions: tuple[int, int]) -> "LoadCase":
         patch, reference = scene.plate.patch, scene.basis
         truth = scene.plate.deflection(scene.loads, reference)
         at_load = reference.at(scene.loads[0].centre()[None])[0] @ truth.ravel()
@@ -107,7 +107,7 @@ class Case:
         return noise.start(curvature.shape, rng)(curvature, 0.0)
 
 
-def _row(table: int, case: Case, noise: bool, paper: dict[str, float | None]) -> dict[str, Any]:
+def _row(table: int, case: LoadCase, noise: bool, paper: dict[str, float | None]) -> dict[str, Any]:
     fit = case.fit(case.noisy() if noise else case.curvature[None])
     e, rms = case.errors(fit)
     row: dict[str, Any] = {
@@ -141,7 +141,7 @@ def table_1(
     errors with gages that sense the curvature of the bent surface, as those of a real skin do.
     """
     names = ("centre", "off-centre", "line")
-    cases = [Case.of(load_scene(name), method, functions) for name in names]
+    cases = [LoadCase.of(load_scene(name), method, functions) for name in names]
     return [
         _row(1, case, noise, dict(zip(_COLUMNS, PAPER_1[case.scene.name, noise], strict=True)))
         for case in cases
@@ -183,7 +183,7 @@ def table_2(
     its_own = radius == RADIUS
     rows: list[dict[str, Any]] = []
     scenes = (fingertip_scene(applied, radius) for applied in APPLIED)
-    for case in (Case.of(scene, method, functions) for scene in scenes):
+    for case in (LoadCase.of(scene, method, functions) for scene in scenes):
         name = case.scene.name
         for noise in (False, True):
             simulated = PAPER_2.get((name, noise), none) if its_own else none

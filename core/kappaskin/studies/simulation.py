@@ -115,7 +115,7 @@ def costs_of(scene: Scene, plan: Plan) -> dict[str, float]:
     return {name: own if name in alone else max(own - whole, 0.0) for name, own in median.items()}
 
 
-def plan_told(scene: Scene) -> Generator[list[dict[str, Any]]]:
+def plan_updates(scene: Scene) -> Generator[list[dict[str, Any]]]:
     """One row for every known effect: its entry in the plan, and `microseconds` per frame.
 
     That is None for an effect that there is nothing of in the scene. The rows come twice: at once,
@@ -136,7 +136,7 @@ def _rows(plan: Plan, costs: dict[str, float]) -> list[dict[str, Any]]:
 
 def plan_rows(scene: Scene) -> list[dict[str, Any]]:
     """The rows of `plan_told` with all times."""
-    *_, rows = plan_told(scene)
+    *_, rows = plan_updates(scene)
     return rows
 
 

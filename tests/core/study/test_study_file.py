@@ -14,11 +14,11 @@ from kappaskin.studies import load_study
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.setup import (
     KINDS,
+    FitSettings,
     LogUniform,
-    Measuring,
+    MeasureSettings,
     Normal,
-    Placing,
-    Reconstruction,
+    PlacementSettings,
     Some,
     Uniform,
     Whole,
@@ -241,6 +241,6 @@ def test_the_guide_names_all_that_a_study_may_say():
 
     for name in (*MEASURES, *KINDS, *PLACEMENTS):
         assert f"`{name}`" in guide or name == "scene"
-    for kind in (Reconstruction, Placing, Measuring, Stop):
+    for kind in (FitSettings, PlacementSettings, MeasureSettings, Stop):
         for field in fields(kind):
             assert re.search(rf"\n    {field.name} = ", guide)

@@ -10,22 +10,22 @@ from kappaskin.studies.cost.bench import Bench, costs
 from kappaskin.studies.cost.effects import EffectCost, effect_costs
 from kappaskin.studies.cost.settings import Cost, Refused, Setting
 
-Effects = tuple[EffectCost, ...] | Refused
+EffectCosts = tuple[EffectCost, ...] | Refused
 """What a scene's effects cost with a setting, or why that setting cannot tell."""
 
-_Told = Cost | Refused | tuple[Setting, Effects]
+_Item = Cost | Refused | tuple[Setting, EffectCosts]
 
 
-def _effects(scene: Scene, setting: Setting) -> Effects:
+def _effects(scene: Scene, setting: Setting) -> EffectCosts:
     try:
         return effect_costs(scene, setting)
     except Refusal as refusal:
         return Refused(setting, str(refusal))
 
 
-def _told(
+def _measured(
     scene: Scene, settings: Sequence[Setting], effects_with: Setting | None
-) -> Generator[_Told]:
+) -> Generator[_Item]:
     found = costs(scene, settings)
     yield from islice(found, 1)  # the setting that is most waited for
     if effects_with is not None:
@@ -33,7 +33,7 @@ def _told(
     yield from found
 
 
-class Measuring:
+class CostMeasurement:
     """Measures `settings` on a `scene` in a process of one thread; no call here but `wait` waits.
 
     What the scene's effects cost with the setting `effects_with` comes after the first cost, and is
@@ -45,8 +45,8 @@ class Measuring:
         self, scene: Scene, settings: Sequence[Setting], effects_with: Setting | None = None
     ) -> None:
         Bench(scene)  # or refused here
-        self.effects: dict[Setting, Effects] = {}
-        self._beside = Beside("kappaskin-cost", _told, scene, settings, effects_with)
+        self.effects: dict[Setting, EffectCosts] = {}
+        self._beside = Beside("kappaskin-cost", _measured, scene, settings, effects_with)
 
     @property
     def done(self) -> bool:
@@ -63,7 +63,7 @@ class Measuring:
         """Each cost as soon as it is measured, to the end."""
         yield from self._costs(self._beside.wait())
 
-    def _costs(self, told: Iterable[_Told]) -> Generator[Cost | Refused]:
+    def _costs(self, told: Iterable[_Item]) -> Generator[Cost | Refused]:
         """The costs among what was told; what it was told of effects is kept."""
         for one in told:
             if isinstance(one, tuple):
@@ -75,7 +75,7 @@ class Measuring:
         """Stop measuring and end the process."""
         self._beside.close()
 
-    def __enter__(self) -> "Measuring":
+    def __enter__(self) -> "CostMeasurement":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -68,7 +68,7 @@ _FIGURES: dict[str, Callable[[Cost], float]] = {
 }
 
 
-def rows(scene: Scene, costs: Sequence[Cost | Refused]) -> list[dict[str, Any]]:
+def cost_rows(scene: Scene, costs: Sequence[Cost | Refused]) -> list[dict[str, Any]]:
     """`costs` as JSON values; the figures of a refused setting are None, `refused` says why.
 
     `frontier` says whether no other row beats it in both `rms_mm` and `frame_s`, where errors that
@@ -130,7 +130,7 @@ def costs_text(scene: Scene, costs: Sequence[Cost | Refused]) -> str:
 
     def line(cost: Cost | Refused) -> str:
         marks = ("*" if cost in by_frame else " ") + ("+" if cost in by_total else " ")
-        return f"{marks} {_named(cost)}{_told(cost)}"
+        return f"{marks} {_named(cost)}{_figures_text(cost)}"
 
     best = sorted({*by_frame, *by_total}, key=lambda cost: cost.time_per_frame)
     sections = {
@@ -170,7 +170,7 @@ def _named(cost: Cost | Refused) -> str:
     return f"{s.method:<14}{'x'.join(map(str, s.functions)):<6}{elements:<9}{s.precision[-2:]:>4}"
 
 
-def _told(cost: Cost | Refused) -> str:
+def _figures_text(cost: Cost | Refused) -> str:
     if isinstance(cost, Refused):
         reason = textwrap.shorten(cost.reason, 66, placeholder="...")
         return f"  {cost.setting.scanned}: refused, {reason}"
@@ -216,7 +216,7 @@ def _others(costs: Sequence[Cost | Refused]) -> list[Cost | Refused]:
 _UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6}
 
 
-def length_of(text: str) -> float:
+def parse_length(text: str) -> float:
     """Metres of a text such as 0.02mm, 20um or 2e-5m."""
     found = re.fullmatch(r"\s*([0-9.]+(?:e[-+]?[0-9]+)?)\s*(m|mm|[uµμ]m)\s*", text, re.ASCII | re.I)
     try:
@@ -232,7 +232,7 @@ def length_of(text: str) -> float:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class AccuracyVerdict:
     """Whether an accuracy is `reached`, the setting's `cost` and what to say about it.
 
     `cost` is that of the cheapest setting that reaches it; when none does, that of the most
@@ -252,7 +252,9 @@ class Verdict:
         }
 
 
-def verdict(scene: Scene, costs: Sequence[Cost | Refused], within: float) -> Verdict:
+def accuracy_verdict(
+    scene: Scene, costs: Sequence[Cost | Refused], within: float
+) -> AccuracyVerdict:
     """Which of the `costs` measured on `scene` reaches an RMS error of `within` m most cheaply.
 
     Cheapest is the one whose answer is there first: conversion and arithmetic together.
@@ -260,13 +262,13 @@ def verdict(scene: Scene, costs: Sequence[Cost | Refused], within: float) -> Ver
     found = cheapest(costs, within)
     if found is not None:
         said = (f"{_mm_text(within)} is reached; with the least time by", *described(found))
-        return Verdict(True, found, (*said, *_besides(scene, costs, within, found)))
+        return AccuracyVerdict(True, found, (*said, *_remarks(scene, costs, within, found)))
     known = [cost for cost in costs if isinstance(cost, Cost)]
     if not known:
-        return Verdict(False, None, ("No setting that was tried gives a shape.",))
+        return AccuracyVerdict(False, None, ("No setting that was tried gives a shape.",))
     best = min(known, key=lambda cost: cost.rms)
     said = f"{_mm_text(within)} is reached by none of {len(known)} settings; nearest is"
-    return Verdict(False, best, (said, *described(best), *_missing(scene, known, within)))
+    return AccuracyVerdict(False, best, (said, *described(best), *_missing(scene, known, within)))
 
 
 def _mm_text(length: float) -> str:
@@ -296,7 +298,7 @@ def described(cost: Cost) -> tuple[str, ...]:
     )
 
 
-def _besides(
+def _remarks(
     scene: Scene, costs: Sequence[Cost | Refused], within: float, found: Cost
 ) -> list[str]:
     """What else must be known of the setting `found`: other elements, a lower rate."""

@@ -19,7 +19,7 @@ from kappaskin.frames import Array, Touch, Truth
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import Hysteresis, Indenter, Scene, Simulator, kept_of
 from kappaskin.studies.cost.bench import points_on
-from kappaskin.studies.design.setup import Setup
+from kappaskin.studies.design.setup import PointSetup
 
 # Blocks of frames: what was true, what was read, what was fitted
 
@@ -47,7 +47,7 @@ def _object_finder(estimator: Estimator, plate: Plate, edge: str) -> ObjectFinde
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class FrameBlock:
     """T frames that a `simulator` made, and what `estimator` makes of them.
 
     `truths` are T, or one of a skin that nothing moves on; `curvature` (T, 3, P) in 1/m.
@@ -120,7 +120,7 @@ def _times(scene: Scene, frames: int) -> Array:
     return np.arange(frames) / scene.rate
 
 
-def block_of(setup: Setup, estimator: Estimator, seed: int) -> Block:
+def block_of(setup: PointSetup, estimator: Estimator, seed: int) -> FrameBlock:
     """`setup.measure.frames` frames, spoilt as `seed` decides."""
     scene = replace(setup.scene, layout=estimator.layout, seed=seed)
     simulator, times = Simulator(scene), _times(scene, setup.measure.frames)
@@ -129,7 +129,7 @@ def block_of(setup: Setup, estimator: Estimator, seed: int) -> Block:
         read = _compensated(scene, read)
     read[:, ~scene.layout.live.ravel()] = np.nan
     known = [truth for truth in truths if truth is not None]
-    return Block(simulator, estimator, known, read.reshape(len(times), 3, -1))
+    return FrameBlock(simulator, estimator, known, read.reshape(len(times), 3, -1))
 
 
 def _compensated(scene: Scene, read: Array) -> Array:
@@ -148,7 +148,7 @@ _SIDE = 21  # points along each side at which error bars are judged, less those 
 
 
 @dataclass(frozen=True)
-class Measure:
+class StudyMeasure:
     """Something to measure: values (T,) of a block's frames, NaN where a frame tells none.
 
     `title` is what it is called, `unit` what it is shown in, `scale` how many of those the value's
@@ -159,33 +159,33 @@ class Measure:
     title: str
     unit: str
     scale: float
-    of: Callable[[Block], Array]
+    of: Callable[[FrameBlock], Array]
     share: bool = False
 
 
-def _at_load(block: Block) -> Array:
+def _at_load(block: FrameBlock) -> Array:
     at = block.estimator.basis.at(block.contact)
     true = np.vecdot(block.scene.basis.at(block.contact), block.true)
     return np.vecdot(at, block.coefficients) - true
 
 
-def _contact(block: Block) -> Array:
+def _contact(block: FrameBlock) -> Array:
     found = np.array([touch.position for touch in block.touches])
     return np.hypot(*(found - block.contact).T)
 
 
-def _force(block: Block) -> Array:
+def _force(block: FrameBlock) -> Array:
     """As a share of the largest force in the block."""
     found, true = np.array([touch.force for touch in block.touches]), block.forces()
     largest = np.abs(true).max()
     return np.abs(found - true) / (largest if largest else np.nan)
 
 
-def _found(block: Block) -> Array:
+def _found(block: FrameBlock) -> Array:
     return np.array([float(touch.present) for touch in block.touches])
 
 
-def _radius_of(block: Block) -> float:
+def _radius_of(block: FrameBlock) -> float:
     stimulus = block.scene.indenter
     rigid = stimulus.what.rigid if stimulus and isinstance(stimulus.what, Indenter) else None
     if (radius := getattr(rigid, "radius", None)) is None:
@@ -193,13 +193,13 @@ def _radius_of(block: Block) -> float:
     return radius
 
 
-def _radius(block: Block) -> Array:
+def _radius(block: FrameBlock) -> Array:
     true = _radius_of(block)
     off = np.array([abs(found.radius / true - 1) for found in block.objects()])
     return np.where(np.isfinite(off), off, np.nan)
 
 
-def _covered(block: Block) -> Array:
+def _covered(block: FrameBlock) -> Array:
     """The share of the skin that lies within the 95 % bands, (T,)."""
     patch = block.scene.plate.patch
     x, y = (along[1:-1] for along in patch.grid(_SIDE, 3 if patch.strip else _SIDE))
@@ -223,17 +223,17 @@ def _predicted_rms(estimator: Estimator, noise: float) -> float:
     return float(np.sqrt(np.mean(sd**2)))
 
 
-def _predicted(block: Block) -> Array:
+def _predicted(block: FrameBlock) -> Array:
     if block.estimator.has_prior:  # which counts on other skins than one at rest
         return np.array([np.nan])
     return np.array([_predicted_rms(block.estimator, noise_of(block.scene))])
 
 
-def _rate(block: Block) -> Array:
+def _rate(block: FrameBlock) -> Array:
     return np.array([block.scene.sensor().scan().rate])
 
 
-def _time(block: Block) -> Array:
+def _time(block: FrameBlock) -> Array:
     taken, _ = list[float](), block.fit  # what remembers takes the frames in before
     for K in block.curvature[np.arange(_CALLS) % len(block.curvature)]:
         begun = time.perf_counter()
@@ -243,16 +243,16 @@ def _time(block: Block) -> Array:
 
 
 MEASURES = {
-    "rms": Measure("RMS error of the shape", "mm", 1e3, Block.apart),
-    "at-load": Measure("error at the load, signed", "mm", 1e3, _at_load),
-    "contact": Measure("distance of the contact found", "mm", 1e3, _contact),
-    "force": Measure("error of the force, of the largest", "%", 1e2, _force),
-    "found": Measure("frames with a contact found", "%", 1e2, _found, share=True),
-    "radius": Measure("error of the object's radius", "%", 1e2, _radius),
-    "covered": Measure("skin within the 95 % bands", "%", 1e2, _covered, share=True),
-    "predicted": Measure("RMS error by noise alone, predicted", "mm", 1e3, _predicted),
-    "rate": Measure("frame rate that the conversions allow", "frames/s", 1.0, _rate),
-    "time": Measure("time to fit a frame", "us", 1e6, _time),
+    "rms": StudyMeasure("RMS error of the shape", "mm", 1e3, FrameBlock.apart),
+    "at-load": StudyMeasure("error at the load, signed", "mm", 1e3, _at_load),
+    "contact": StudyMeasure("distance of the contact found", "mm", 1e3, _contact),
+    "force": StudyMeasure("error of the force, of the largest", "%", 1e2, _force),
+    "found": StudyMeasure("frames with a contact found", "%", 1e2, _found, share=True),
+    "radius": StudyMeasure("error of the object's radius", "%", 1e2, _radius),
+    "covered": StudyMeasure("skin within the 95 % bands", "%", 1e2, _covered, share=True),
+    "predicted": StudyMeasure("RMS error by noise alone, predicted", "mm", 1e3, _predicted),
+    "rate": StudyMeasure("frame rate that the conversions allow", "frames/s", 1.0, _rate),
+    "time": StudyMeasure("time to fit a frame", "us", 1e6, _time),
 }
 """What can be measured, by name; lengths in m, rates in 1/s, times in s, the others shares of 1.
 

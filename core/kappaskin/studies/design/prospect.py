@@ -18,7 +18,7 @@ from kappaskin.frames import Array, Mask
 from kappaskin.scenes import Scene, Simulator
 from kappaskin.skin import Patch
 from kappaskin.studies.design.measures import noise_of
-from kappaskin.studies.design.setup import Placing
+from kappaskin.studies.design.setup import PlacementSettings
 
 _APART = 0.4  # of the mean distance between elements: places that are tried
 _SIDE = 41  # points along each side of the maps
@@ -37,7 +37,7 @@ class Design:
     by: str = "scene"
 
     def __post_init__(self) -> None:
-        Placing(self.by)  # for its refusal
+        PlacementSettings(self.by)  # for its refusal
 
     def estimator(self) -> Estimator:
         """Tells shapes from the elements where they are placed; `Refusal` where they cannot be."""

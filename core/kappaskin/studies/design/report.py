@@ -10,8 +10,8 @@ from functools import partial
 from itertools import cycle
 from typing import Any, cast
 
-from kappaskin.studies.design.measures import MEASURES, Measure
-from kappaskin.studies.design.results import Known, Mean, version
+from kappaskin.studies.design.measures import MEASURES, StudyMeasure
+from kappaskin.studies.design.results import Mean, PointResults, version
 from kappaskin.studies.design.study import Axis, Study
 from kappaskin.studies.figures import style
 
@@ -29,7 +29,7 @@ def value_text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def mean_text(mean: Mean, measure: Measure) -> str:
+def mean_text(mean: Mean, measure: StudyMeasure) -> str:
     """A mean and its interval in the unit of the measure, to the digits that are known."""
     if not mean.count:
         return "-"
@@ -43,13 +43,13 @@ def mean_text(mean: Mean, measure: Measure) -> str:
     return f"{value:.{digits}f} ± {half:.{digits}f}"
 
 
-def heads_of(study: Study) -> list[str]:
+def header_of(study: Study) -> list[str]:
     """What stands above the columns of `rows_of`."""
     units = [f"{MEASURES[name].title} [{MEASURES[name].unit}]" for name in study.measures]
     return [*map(study.called, study.places), *units, "frames"]
 
 
-def rows_of(study: Study, known: Sequence[Known]) -> list[list[str]]:
+def rows_of(study: Study, known: Sequence[PointResults]) -> list[list[str]]:
     """A line for every point: its values, each mean with its 95 % interval, how many frames."""
     rows: list[list[str]] = []
     for one in known:
@@ -59,7 +59,7 @@ def rows_of(study: Study, known: Sequence[Known]) -> list[list[str]]:
     return rows
 
 
-def remarks_on(study: Study, known: Sequence[Known]) -> list[str]:
+def remarks_on(study: Study, known: Sequence[PointResults]) -> list[str]:
     """What a reader of the tables must know: what failed, what is missing, what is not exact."""
     remarks: list[str] = []
     for one in known:
@@ -80,7 +80,7 @@ def remarks_on(study: Study, known: Sequence[Known]) -> list[str]:
     return remarks
 
 
-def table_text(study: Study, known: Sequence[Known]) -> str:
+def table_text(study: Study, known: Sequence[PointResults]) -> str:
     """The table and the remarks on it, as text."""
     short = [*(place.rpartition(".")[2] for place in study.places)]
     short += [f"{name} [{MEASURES[name].unit}]" for name in study.measures] + ["frames"]
@@ -95,7 +95,7 @@ def table_text(study: Study, known: Sequence[Known]) -> str:
                       *remarks_on(study, known)])  # fmt: skip
 
 
-def table_csv(study: Study, known: Sequence[Known]) -> str:
+def table_csv(study: Study, known: Sequence[PointResults]) -> str:
     """The same as CSV, with all digits: of each measure mean, half of the interval, sd, frames."""
     text = io.StringIO()
     write = csv.writer(text, lineterminator="\n").writerow
@@ -136,7 +136,7 @@ pre { overflow-x: auto; padding: .8rem; border: 1px solid #9aa3ad88; border-radi
 """
 
 
-def page_of(study: Study, known: Sequence[Known], figures: Mapping[str, str]) -> str:
+def page_of(study: Study, known: Sequence[PointResults], figures: Mapping[str, str]) -> str:
     """The page, with `figures` as SVG by the name of what they show."""
     drawn = [
         f"<figure role='img' aria-label='{html.escape(MEASURES[name].title)}'>{_bare(svg)}</figure>"
@@ -174,12 +174,12 @@ def _bare(svg: str) -> str:
     return svg[svg.index("<svg") :]
 
 
-def _table(study: Study, known: Sequence[Known]) -> str:
+def _table(study: Study, known: Sequence[PointResults]) -> str:
     def line(cells: Sequence[str], kind: str) -> str:
         return "<tr>" + "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in cells) + "</tr>"
 
     rows = "\n".join(line(row, "td") for row in rows_of(study, known))
-    head = line(heads_of(study), "th")
+    head = line(header_of(study), "th")
     return f"<table><thead>{head}</thead><tbody>\n{rows}\n</tbody></table>"
 
 
@@ -193,7 +193,7 @@ _WIDE = 20.0  # from the least to the largest by such a factor: shown by factors
 _LONGEST_LABEL = 44  # characters of the name of a curve
 
 
-def draw_study(study: Study, known: Sequence[Known]) -> dict[str, str]:
+def draw_study(study: Study, known: Sequence[PointResults]) -> dict[str, str]:
     """The SVG of a figure for every measure, by its name; none where nothing is varied."""
     drawn = dict[str, str]()
     for name in study.measures if study.axes else ():
@@ -202,7 +202,7 @@ def draw_study(study: Study, known: Sequence[Known]) -> dict[str, str]:
     return drawn
 
 
-def _draw(study: Study, known: Sequence[Known], name: str, figure: style.Figure) -> None:
+def _draw(study: Study, known: Sequence[PointResults], name: str, figure: style.Figure) -> None:
     style.resize(figure, style.DOUBLE, 80)
     (first, *others), measure = study.axes, MEASURES[name]
     left, bottom, width, height = _PANEL
@@ -256,9 +256,11 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _curves(study: Study, known: Sequence[Known], first: Axis) -> dict[str, list[Known]]:
+def _curves(
+    study: Study, known: Sequence[PointResults], first: Axis
+) -> dict[str, list[PointResults]]:
     """The points of each curve: those that are alike in all but the `first` axis."""
-    curves = dict[str, list[Known]]()
+    curves = dict[str, list[PointResults]]()
     for one in known:
         label = ", ".join(
             f"{study.called(place).rpartition('.')[2]} {value_text(value)}"

@@ -18,7 +18,7 @@ import scipy
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.studies.design.measures import MEASURES, block_of
-from kappaskin.studies.design.setup import Setup, estimator_of, setup_of
+from kappaskin.studies.design.setup import PointSetup, estimator_of, setup_of
 from kappaskin.studies.design.study import Point, Study, read_study, with_values
 
 # Tasks
@@ -60,11 +60,11 @@ class Moments:
         return cls(len(known), mean, squares)
 
 
-Measured = dict[str, Moments]
+BlockMoments = dict[str, Moments]
 
 
 @dataclass(frozen=True)
-class Task:
+class BlockTask:
     """Block number `block` of the point that `document`, in JSON, says; `version` is who asks.
 
     Its numbers depend on nothing else, whoever computes it, and when.
@@ -90,11 +90,11 @@ class Task:
 
 
 @lru_cache(4)
-def _setup(document: str) -> Setup:
+def _setup(document: str) -> PointSetup:
     return setup_of(json.loads(document), MEASURES)
 
 
-def _drawn(task: Task) -> tuple[dict[str, Any], Setup]:
+def _drawn(task: BlockTask) -> tuple[dict[str, Any], PointSetup]:
     """What the task's point says, and its setup, with what is drawn of them."""
     said, setup = json.loads(task.document), _setup(task.document)
     if not setup.draws:
@@ -104,7 +104,7 @@ def _drawn(task: Task) -> tuple[dict[str, Any], Setup]:
     return said, setup_of(said, MEASURES)
 
 
-def run(task: Task) -> Measured:
+def run_task(task: BlockTask) -> BlockMoments:
     """What is measured in the block; raises a `Refusal` for one that cannot be computed."""
     if task.version != version():
         raise Refusal(
@@ -167,7 +167,7 @@ def _half(means: Array, weights: Array, mean: float) -> float:
 
 
 @dataclass(eq=False)
-class Known:
+class PointResults:
     """What is known of one `point`: how many blocks are `done`, and why some failed.
 
     Results are held until no more are wanted, and then what they come to alone: a study of many
@@ -177,7 +177,7 @@ class Known:
     point: Point
     study: Study
     done: int = 0
-    _results: dict[int, Measured | str] = field(default_factory=dict[int, "Measured | str"])
+    _results: dict[int, BlockMoments | str] = field(default_factory=dict[int, "BlockMoments | str"])
     _means: dict[str, Mean] = field(default_factory=dict[str, Mean])
     _failures: list[str] = field(default_factory=list[str])
     wanted: int = field(init=False)
@@ -185,7 +185,7 @@ class Known:
     def __post_init__(self) -> None:
         self.wanted = self.study.stop.least
 
-    def take(self, block: int, result: Measured | str) -> range:
+    def take(self, block: int, result: BlockMoments | str) -> range:
         """Numbers of the blocks to compute next, when `block` was the last of those wanted.
 
         They follow from the results of all before alone, whoever computed them in whatever order.
@@ -206,7 +206,7 @@ class Known:
         self._failures = self.failures
         self._results.clear()
 
-    def _in_order(self) -> list[Measured | str]:
+    def _in_order(self) -> list[BlockMoments | str]:
         return [self._results[block] for block in sorted(self._results)]
 
     @property
@@ -240,7 +240,7 @@ _ABOUT = "about.json"
 _TEXT = "study.toml"
 
 
-class Folder:
+class StudyFolder:
     """Results by task, at `path`; each file is written whole or not at all.
 
     A task whose parameters, block, measures and version are those of an earlier one finds its
@@ -251,7 +251,7 @@ class Folder:
         self.path = path
 
     @classmethod
-    def opened(cls, path: Path, study: Study) -> "Folder":
+    def opened(cls, path: Path, study: Study) -> "StudyFolder":
         """The folder for the results of `study`, made where there is none."""
         folder = cls(path)
         try:
@@ -288,10 +288,10 @@ class Folder:
         except OSError as error:
             raise Refusal(f"{file}: cannot be read ({error}); run the study again") from error
 
-    def _file(self, task: Task) -> Path:
+    def _file(self, task: BlockTask) -> Path:
         return self.path / "results" / task.key[:2] / f"{task.key}.json"
 
-    def result(self, task: Task) -> Measured | str | None:
+    def result(self, task: BlockTask) -> BlockMoments | str | None:
         """What the task measured, or why it failed; None where neither is known."""
         try:
             said: dict[str, Any] = json.loads(self._file(task).read_text("utf-8"))
@@ -301,7 +301,7 @@ class Folder:
         except (OSError, ValueError, KeyError, TypeError):
             return None  # to be computed anew
 
-    def keep(self, task: Task, result: Measured | str) -> None:
+    def keep(self, task: BlockTask, result: BlockMoments | str) -> None:
         """Write what the task measured, or why it failed."""
         failed = isinstance(result, str)
         found = (

@@ -22,7 +22,14 @@ from urllib.parse import urlsplit
 from kappaskin._background import end_with_parent
 from kappaskin._processes import Context, beginning_processes
 from kappaskin.errors import Refusal, lacking
-from kappaskin.studies.design.results import Folder, Known, Measured, Task, run, version
+from kappaskin.studies.design.results import (
+    BlockMoments,
+    BlockTask,
+    PointResults,
+    StudyFolder,
+    run_task,
+    version,
+)
 from kappaskin.studies.design.study import Study
 
 # Workers: processes of this machine, or those of a Dask cluster
@@ -37,10 +44,10 @@ class Workers(Protocol):
     @property
     def count(self) -> int: ...
 
-    def submit(self, task: Task) -> "Future[Measured]": ...
+    def submit(self, task: BlockTask) -> "Future[BlockMoments]": ...
 
 
-def gone() -> Refusal:
+def scheduler_lost() -> Refusal:
     """What to say once no scheduler answers any more."""
     return Refusal(
         "the scheduler is gone; what was computed is kept, and the same command goes on from there"
@@ -57,13 +64,13 @@ class _Processes:
     def _begun(self) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(self.count, self._context, end_with_parent)
 
-    def submit(self, task: Task) -> "Future[Measured]":
+    def submit(self, task: BlockTask) -> "Future[BlockMoments]":
         try:
-            return self._pool.submit(run, task)
+            return self._pool.submit(run_task, task)
         except BrokenExecutor:
             self._pool.shutdown()
             self._pool = self._begun()
-            return self._pool.submit(run, task)
+            return self._pool.submit(run_task, task)
 
     def close(self) -> None:
         self._pool.shutdown(cancel_futures=True)
@@ -95,12 +102,12 @@ class _Cluster:
             try:
                 self._count = max(sum(self._client.nthreads().values()), 1)
             except OSError as error:
-                raise gone() from error
+                raise scheduler_lost() from error
             self._counted = time.monotonic()
         return self._count
 
-    def submit(self, task: Task) -> "Future[Measured]":
-        return self._executor.submit(run, task)
+    def submit(self, task: BlockTask) -> "Future[BlockMoments]":
+        return self._executor.submit(run_task, task)
 
 
 @contextmanager
@@ -134,7 +141,7 @@ def _knock(address: str) -> None:
     socket.create_connection((place.hostname, place.port), _PATIENCE).close()
 
 
-def kind() -> str:
+def worker_kind() -> str:
     """What the last bits depend on of the worker that is asked: products add up by threads."""
     threads = os.environ.get("OPENBLAS_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "many"))
     return f"{version()}, threads of BLAS {threads}"
@@ -150,7 +157,7 @@ def _check_workers(client: Any, address: str) -> None:
             f"{address} --nthreads 1"
         ) from None
     try:
-        told: dict[str, str] = client.run(kind)
+        told: dict[str, str] = client.run(worker_kind)
     except Exception as error:  # whatever a worker without kappaskin, or with an old one, raises
         raise Refusal(
             f"{address}: expected workers with {version()}, got some that cannot tell theirs "
@@ -169,11 +176,11 @@ def _check_workers(client: Any, address: str) -> None:
 # The run
 
 _AHEAD = 3  # tasks in hand for each worker: one at work, the others on their way
-_TELL = 0.5  # s between two words about the progress, at least
+_PROGRESS_EVERY = 0.5  # s between two words about the progress, at least
 
 
 @dataclass
-class Progress:
+class StudyProgress:
     """How far a study is: blocks `done` of those `wanted` by now, some `found` in the folder."""
 
     wanted: int
@@ -194,19 +201,19 @@ class Progress:
 class _Run:
     """A study at work: what is known of its points, what is left to do and who does it."""
 
-    def __init__(self, study: Study, folder: Folder, workers: Workers) -> None:
+    def __init__(self, study: Study, folder: StudyFolder, workers: Workers) -> None:
         self._folder, self._workers = folder, workers
-        self.known = list[Known]()
+        self.known = list[PointResults]()
         self._first = self._begun(study)
-        self._next = deque[tuple[Known, int]]()
-        self._running = dict["Future[Measured]", tuple[Known, Task]]()
-        self._suspects, self._alone = set[str](), deque[tuple[Known, Task]]()
-        self.progress = Progress(study.count * study.stop.least, time.monotonic())
+        self._next = deque[tuple[PointResults, int]]()
+        self._running = dict["Future[BlockMoments]", tuple[PointResults, BlockTask]]()
+        self._suspects, self._alone = set[str](), deque[tuple[PointResults, BlockTask]]()
+        self.progress = StudyProgress(study.count * study.stop.least, time.monotonic())
 
-    def _begun(self, study: Study) -> Iterator[tuple[Known, int]]:
+    def _begun(self, study: Study) -> Iterator[tuple[PointResults, int]]:
         """Point by point what every one begins with."""
         for point in study.points():
-            self.known.append(Known(point, study))
+            self.known.append(PointResults(point, study))
             for block in range(study.stop.least):
                 yield self.known[-1], block
 
@@ -223,7 +230,7 @@ class _Run:
             known, block = self._next.popleft() if self._next else next(self._first, (None, 0))
             if known is None:
                 break
-            task = Task(known.point.document, block, version())
+            task = BlockTask(known.point.document, block, version())
             if isinstance(result := self._folder.result(task), dict):
                 self.progress.found += 1
                 self._take(known, block, result)
@@ -231,12 +238,12 @@ class _Run:
                 self._submit(known, task)
         return bool(self._running)
 
-    def _submit(self, known: Known, task: Task) -> None:
+    def _submit(self, known: PointResults, task: BlockTask) -> None:
         self._running[self._workers.submit(task)] = known, task
 
     def collect(self) -> None:
         """Take the results that are there within some time."""
-        for future in wait(self._running, _TELL, FIRST_COMPLETED).done:
+        for future in wait(self._running, _PROGRESS_EVERY, FIRST_COMPLETED).done:
             known, task = self._running.pop(future)
             result = self._result(future, task)
             if result is None:
@@ -246,14 +253,14 @@ class _Run:
                 self._folder.keep(task, result)
                 self._take(known, task.block, result)
 
-    def _take(self, known: Known, block: int, result: Measured | str) -> None:
+    def _take(self, known: PointResults, block: int, result: BlockMoments | str) -> None:
         following = known.take(block, result)
         self._next.extend((known, number) for number in following)
         self.progress.wanted += len(following)
         self.progress.done += 1
         self.progress.failed += isinstance(result, str)
 
-    def _result(self, future: "Future[Measured]", task: Task) -> Measured | str | None:
+    def _result(self, future: "Future[BlockMoments]", task: BlockTask) -> BlockMoments | str | None:
         """What the task measured, or why it failed; None where its worker died."""
         try:
             return future.result()
@@ -263,7 +270,7 @@ class _Run:
             again = task.key in self._suspects
             return "the process that computed it died, and so did a second one" if again else None
         except CancelledError:
-            raise gone() from None
+            raise scheduler_lost() from None
         except Exception as error:  # whatever there is wrong with one task, the others go on
             return f"{type(error).__name__}: {error}"
 
@@ -273,31 +280,31 @@ class _Run:
 
 
 def run_study(
-    study: Study, folder: Folder, workers: Workers, tell: Callable[[str], None]
-) -> list[Known]:
+    study: Study, folder: StudyFolder, workers: Workers, tell: Callable[[str], None]
+) -> list[PointResults]:
     """What is known of every point of `study` in the end; `tell` is told how far it is.
 
     Results go to the `folder` one by one, and what is there already is not computed again.
     """
-    run = _Run(study, folder, workers)
+    run_task = _Run(study, folder, workers)
     try:
-        while run.fill():
-            run.collect()
-            tell(run.progress.line(time.monotonic()))
+        while run_task.fill():
+            run_task.collect()
+            tell(run_task.progress.line(time.monotonic()))
     finally:
-        run.cancel()
-    tell(run.progress.line(time.monotonic()))
-    return run.known
+        run_task.cancel()
+    tell(run_task.progress.line(time.monotonic()))
+    return run_task.known
 
 
-def known_of(study: Study, folder: Folder) -> list[Known]:
+def stored_results(study: Study, folder: StudyFolder) -> list[PointResults]:
     """What is known of every point of `study` from the results in its `folder`."""
-    found = list[Known]()
+    found = list[PointResults]()
     for point in study.points():
-        known, blocks = Known(point, study), deque(range(study.stop.least))
+        known, blocks = PointResults(point, study), deque(range(study.stop.least))
         while blocks:
             block = blocks.popleft()
-            if (result := folder.result(Task(point.document, block, version()))) is not None:
+            if (result := folder.result(BlockTask(point.document, block, version()))) is not None:
                 blocks.extend(known.take(block, result))
         found.append(known)
     return found

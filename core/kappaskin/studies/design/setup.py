@@ -147,7 +147,7 @@ _ELSEWHERE = ("file", "recorded")  # keys of a touch that name files beside that
 
 
 @dataclass(frozen=True)
-class Reconstruction:
+class FitSettings:
     """How shapes are told: a `method` of `METHODS` for Ni x Nj `functions`.
 
     With `compensate`, the loops of the scene's hysteresis are undone first, as by a calibration
@@ -166,7 +166,7 @@ class Reconstruction:
 
 
 @dataclass(frozen=True)
-class Placing:
+class PlacementSettings:
     """Where the elements are: `by` one of `PLACEMENTS`, at least `apart` in m from each other."""
 
     by: str = "scene"
@@ -180,7 +180,7 @@ class Placing:
 
 
 @dataclass(frozen=True)
-class Measuring:
+class MeasureSettings:
     """`what` to measure, in `frames` of each block."""
 
     what: tuple[str, ...]
@@ -196,22 +196,22 @@ class Measuring:
 
 
 @dataclass(frozen=True)
-class Setup:
+class PointSetup:
     """One point: the scene, how its shapes are told, what is measured, what is drawn anew."""
 
     scene: Scene
-    fit: Reconstruction
-    place: Placing
-    measure: Measuring
+    fit: FitSettings
+    place: PlacementSettings
+    measure: MeasureSettings
     draws: tuple[tuple[str, Distribution], ...]
 
 
-def read_setup(top: Table, file: Path, known: Iterable[str]) -> Setup:
+def read_setup(top: Table, file: Path, known: Iterable[str]) -> PointSetup:
     """The setup that a file says at its `top`, which measures things that are `known`."""
     tables = fit, place, measure = [top.table(name) for name in ("fit", "place", "measure")]
     drawing = top.tables("draw")
     scene = _scene(top, file)
-    made = fit.make(Reconstruction), place.make(Placing), measure.make(Measuring)
+    made = fit.make(FitSettings), place.make(PlacementSettings), measure.make(MeasureSettings)
     for table in tables:
         table.done()
     among = {name: name for name in known}
@@ -225,7 +225,7 @@ def read_setup(top: Table, file: Path, known: Iterable[str]) -> Setup:
             f"of {3 * len(scene.layout)} = {readings}; take fewer frames and more blocks",
             "frames",
         )
-    return Setup(scene, *made, tuple(read_draw(table) for table in drawing))
+    return PointSetup(scene, *made, tuple(read_draw(table) for table in drawing))
 
 
 def _scene(top: Table, file: Path) -> Scene:
@@ -244,7 +244,7 @@ def _scene(top: Table, file: Path) -> Scene:
     return scene
 
 
-def setup_of(said: dict[str, Any], known: Iterable[str]) -> Setup:
+def setup_of(said: dict[str, Any], known: Iterable[str]) -> PointSetup:
     """The setup of what a point says; its refusals name no file."""
     try:
         return read_setup(Table(said, Lines(""), _NAME), Path("study.toml"), known)
@@ -252,28 +252,28 @@ def setup_of(said: dict[str, Any], known: Iterable[str]) -> Setup:
         raise Refusal(str(refusal).removeprefix(f"{_NAME}, line 1: ")) from refusal
 
 
-def estimator_of(said: dict[str, Any], setup: Setup) -> Estimator:
+def estimator_of(said: dict[str, Any], setup: PointSetup) -> Estimator:
     """What tells the shapes of a point, remembered for points with the same sensor and fit."""
     if METHODS[setup.fit.method].remembers:
         return _estimator(setup)
     alike = {key: said.get(key) for key in ("skin", "elements", "fit", "place")}
-    return _remembered(_Alike(json.dumps(alike, sort_keys=True), setup))
+    return _cached_estimator(_SameSensor(json.dumps(alike, sort_keys=True), setup))
 
 
 @dataclass(frozen=True)
-class _Alike:
+class _SameSensor:
     """A setup, equal to those of which the same is `told` of sensor and fit."""
 
     told: str
-    setup: Setup = field(compare=False)
+    setup: PointSetup = field(compare=False)
 
 
 @lru_cache(8)
-def _remembered(alike: _Alike) -> Estimator:
+def _cached_estimator(alike: _SameSensor) -> Estimator:
     return _estimator(alike.setup)
 
 
-def _estimator(setup: Setup) -> Estimator:
+def _estimator(setup: PointSetup) -> Estimator:
     scene, fit = setup.scene, setup.fit
     patch = scene.plate.patch
     Ni, Nj = fit.functions

@@ -16,7 +16,7 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.scenes import Lines, Table, parsed, read_scene_text
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.setup import Distribution, Setup, read_setup, setup_of
+from kappaskin.studies.design.setup import Distribution, PointSetup, read_setup, setup_of
 
 # Dotted places of values in a file
 
@@ -37,7 +37,7 @@ def parts_of(place: str) -> list[str | int]:
     return found
 
 
-def put(said: dict[str, Any], place: str, value: Any) -> None:
+def put_value(said: dict[str, Any], place: str, value: Any) -> None:
     """Have `said` say `value` at `place`; tables on the way there are made."""
     parts, at = parts_of(place), cast("Any", said)
     for part, following in pairwise(parts):
@@ -72,7 +72,7 @@ def with_values(said: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     """A copy of `said` with these `values` at their places."""
     changed = copy.deepcopy(said)
     for place, value in values.items():
-        put(changed, place, value)
+        put_value(changed, place, value)
     return changed
 
 
@@ -172,8 +172,8 @@ STUDIES = tuple(sorted(file.stem for file in _FOLDER.iterdir() if file.suffix ==
 """Names of the ready studies."""
 
 _AROUND = ("vary", "stop")
-_TOLD = ("title", "text")  # which change no number
-_NO_SCENE = (*_AROUND, *_TOLD, "measure")
+_TEXTS = ("title", "text")  # which change no number
+_NO_SCENE = (*_AROUND, *_TEXTS, "measure")
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ class Study:
     title: str
     description: str
     text: str
-    base: Setup
+    base: PointSetup
     axes: tuple[Axis, ...]
     stop: Stop
     said: dict[str, Any]
@@ -268,7 +268,7 @@ def read_study(text: str, file: Path) -> Study:
     base = read_setup(top, file, MEASURES)
     stop = _stop(stopping, base.measure.what)
     axes = tuple(read_axis(table, stop.points) for table in tables)
-    own = {key: value for key, value in said.items() if key not in (*_AROUND, *_TOLD)}
+    own = {key: value for key, value in said.items() if key not in (*_AROUND, *_TEXTS)}
     with top.blamed("vary"):
         check_product(axes, stop.points)
     _check_places(top, axes, base.draws)

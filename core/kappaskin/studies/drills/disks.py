@@ -17,7 +17,7 @@ from kappaskin.calibration import Calibration, save_calibration
 from kappaskin.errors import Refusal
 from kappaskin.recording import Disk, Recorder, Recording, Written
 from kappaskin.recording import messages as m
-from kappaskin.studies.drills.stand import Drill, Outcome, Stand
+from kappaskin.studies.drills.stand import Drill, DrillOutcome, Stand
 
 _FULL = Path("/dev/full")
 _FILE_ROOM = 512  # bytes of a file that are written before the disk is full
@@ -46,7 +46,7 @@ def _room(_: Path) -> Generator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, was)
 
 
-def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> Outcome:
+def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> DrillOutcome:
     """Replace a file while there is no room: the old one stays whole, and it is said."""
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
         path = Path(folder) / "skin.toml"
@@ -62,7 +62,7 @@ def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> 
             (path.read_bytes() == before, "the file that was there is spoilt"),
             (list(Path(folder).iterdir()) == [path], "half a file is left behind"),
         ]
-    return Outcome(failures=tuple(text for holds, text in claims if not holds))
+    return DrillOutcome(failures=tuple(text for holds, text in claims if not holds))
 
 
 CALIBRATION_DRILLS = [
@@ -110,7 +110,7 @@ class _Listener(Recorder):
         super().came(host_time, data)
 
 
-def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> Outcome:
+def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> DrillOutcome:
     """Record for a while to a bad disk: reads go on, the file is whole, and it is told."""
     stand.settle()
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:

@@ -9,18 +9,18 @@ from functools import partial
 
 from kappaskin.sources import BAUD_RATES, FromDevice
 from kappaskin.studies.drills.relay import (
-    Cut,
-    Flips,
+    ClockShift,
+    CutScans,
+    FlippedBits,
     Garbage,
-    OtherRate,
-    Says,
+    InformationChange,
+    OtherBaudRate,
     Spoil,
-    Times,
     clean,
     speed_code,
-    untold,
+    without_information,
 )
-from kappaskin.studies.drills.stand import Drill, Held, Outcome, Stand
+from kappaskin.studies.drills.stand import Drill, DrillOutcome, ProcessResources, Stand
 
 # The bytes under way
 
@@ -28,7 +28,7 @@ _WITHIN = 1.0  # s
 _SEARCH = 12.0  # s to find one of seven baud rates
 
 
-def _spoilt(make: Callable[[Stand], Spoil], stand: Stand) -> Outcome:
+def _spoilt(make: Callable[[Stand], Spoil], stand: Stand) -> DrillOutcome:
     """Spoil what passes for some time."""
     stand.settle()
     stand.relay.spoil = make(stand)
@@ -39,22 +39,22 @@ def _spoilt(make: Callable[[Stand], Spoil], stand: Stand) -> Outcome:
     return stand.outcome((spoilt > 0, "nothing was spoilt"))
 
 
-def _garbage(share: float, stand: Stand) -> Outcome:
+def _garbage(share: float, stand: Stand) -> DrillOutcome:
     return _spoilt(lambda stand: Garbage(share, stand.rng), stand)
 
 
-def _flips(stand: Stand) -> Outcome:
-    return _spoilt(lambda stand: Flips(20_000, stand.rng), stand)
+def _flips(stand: Stand) -> DrillOutcome:
+    return _spoilt(lambda stand: FlippedBits(20_000, stand.rng), stand)
 
 
-def _misread(rate: float, stand: Stand) -> Outcome:
-    return _spoilt(lambda _: OtherRate(BAUD_RATES[0], rate), stand)
+def _misread(rate: float, stand: Stand) -> DrillOutcome:
+    return _spoilt(lambda _: OtherBaudRate(BAUD_RATES[0], rate), stand)
 
 
-def _cuts(stand: Stand) -> Outcome:
+def _cuts(stand: Stand) -> DrillOutcome:
     """Break messages off at every byte of the longest, and let a whole one follow each."""
     stand.settle()
-    cut = Cut()
+    cut = CutScans()
 
     def many(message: FromDevice) -> list[FromDevice]:
         return [message] * 4
@@ -70,7 +70,7 @@ def _cuts(stand: Stand) -> Outcome:
     )
 
 
-def _speed(baud_rate: int, stand: Stand) -> Outcome:
+def _speed(baud_rate: int, stand: Stand) -> DrillOutcome:
     """A device that means something at one baud rate only."""
     relay, code = stand.relay, speed_code(baud_rate)
     rates = {speed_code(rate): rate for rate in BAUD_RATES}
@@ -78,7 +78,7 @@ def _speed(baud_rate: int, stand: Stand) -> Outcome:
     def as_heard(data: bytes) -> bytes:
         if relay.speed == code:
             return data
-        return OtherRate(baud_rate, rates.get(relay.speed, baud_rate / 2))(data)
+        return OtherBaudRate(baud_rate, rates.get(relay.speed, baud_rate / 2))(data)
 
     relay.spoil = as_heard
     stand.recover(_SEARCH)
@@ -134,7 +134,7 @@ _NUMBERED = 200  # messages after which a restart can be told from a late one
 _NOBODY = bytes(65536)
 
 
-def _nothing_lost(stand: Stand) -> Outcome:
+def _nothing_lost(stand: Stand) -> DrillOutcome:
     stand.drain()
     seen = stand.source.accounting()
     return stand.outcome(
@@ -143,7 +143,7 @@ def _nothing_lost(stand: Stand) -> Outcome:
     )
 
 
-def _stall(stand: Stand) -> Outcome:
+def _stall(stand: Stand) -> DrillOutcome:
     """Stop in the middle of a message, and go on with the rest of it."""
     stand.settle()
     stand.relay.held = True
@@ -155,7 +155,7 @@ def _stall(stand: Stand) -> Outcome:
     return _nothing_lost(stand)
 
 
-def _flood(stand: Stand) -> Outcome:
+def _flood(stand: Stand) -> DrillOutcome:
     stand.settle()
     stand.relay.rewrite = lambda message: [message] * 10
     stand.run(20.0 if stand.long else 1.5)
@@ -166,7 +166,7 @@ def _flood(stand: Stand) -> Outcome:
     return stand.outcome()
 
 
-def _not_read(stand: Stand) -> Outcome:
+def _not_read(stand: Stand) -> DrillOutcome:
     """Let nobody ask for frames; the thread that reads goes on."""
     stand.settle()
     end = time.monotonic() + (10.0 if stand.long else 1.5)
@@ -177,7 +177,7 @@ def _not_read(stand: Stand) -> Outcome:
     return _nothing_lost(stand)
 
 
-def _deaf(stand: Stand) -> Outcome:
+def _deaf(stand: Stand) -> DrillOutcome:
     """Let nobody read what the program writes, until there is no more room for it."""
     stand.settle()
     stand.relay.deaf = True
@@ -196,7 +196,7 @@ def _deaf(stand: Stand) -> Outcome:
     return stand.outcome((slowest < _BLOCKED, f"a read took {slowest:.2f} s"))
 
 
-def _twice(stand: Stand) -> Outcome:
+def _twice(stand: Stand) -> DrillOutcome:
     stand.settle()
     stand.relay.spoil = lambda data: data * 2
     stand.run(10.0 if stand.long else 0.5)
@@ -206,21 +206,21 @@ def _twice(stand: Stand) -> Outcome:
     return stand.outcome((twice > 0, "no message was told to have come twice"))
 
 
-def _untold(stand: Stand) -> Outcome:
+def _untold(stand: Stand) -> DrillOutcome:
     """Keep from the program who is there, for a while after it has begun to listen."""
-    stand.relay.rewrite = untold
+    stand.relay.rewrite = without_information
     stand.run(1.0)
     stand.heal()
     stand.recover(_BACK)
     return _nothing_lost(stand)
 
 
-def _restart(stand: Stand) -> Outcome:
+def _restart(stand: Stand) -> DrillOutcome:
     """Begin again with the first number, at the device's time 0."""
     stand.settle()
     stand.until(lambda: stand.relay.sequence > _NUMBERED, 5.0)
     began = stand.last.device_time if stand.last else 0.0
-    stand.relay.sequence, stand.relay.rewrite = 0, Times(-began)
+    stand.relay.sequence, stand.relay.rewrite = 0, ClockShift(-began)
     stand.recover(_WITHIN)
     stand.run(0.5)
     return stand.outcome(
@@ -228,32 +228,32 @@ def _restart(stand: Stand) -> Outcome:
     )
 
 
-def _other(key: str, event: str, stand: Stand) -> Outcome:
+def _other(key: str, event: str, stand: Stand) -> DrillOutcome:
     """Let it say something else of itself while it is plugged in."""
     stand.settle()
-    stand.relay.rewrite = Says(key, "drill")
+    stand.relay.rewrite = InformationChange(key, "drill")
     told = stand.until(lambda: stand.told(event), _BACK)
     stand.recover(_WITHIN)
     stand.heal()
     return stand.outcome((told, f"another {key.replace('_', ' ')} is not told"))
 
 
-def _other_plugged_in(stand: Stand) -> Outcome:
+def _other_plugged_in(stand: Stand) -> DrillOutcome:
     """Unplug it, and plug in another."""
     stand.settle()
     stand.relay.unplug()
     stand.run(0.3)
-    stand.relay.rewrite, stand.relay.sequence = Says("serial_number", "drill"), 0
+    stand.relay.rewrite, stand.relay.sequence = InformationChange("serial_number", "drill"), 0
     stand.relay.plug()
     stand.recover(_BACK)
     said = (stand.told("other"), "that it is another device is not told")
     return stand.outcome(said, cut_off=True, restarted=True)
 
 
-def _unplug(stand: Stand) -> Outcome:
+def _unplug(stand: Stand) -> DrillOutcome:
     """Unplug it again and again, each time in the middle of a message."""
     stand.settle()
-    cycles, worst, before = 100 if stand.long else 6, 0.0, Held.now()
+    cycles, worst, before = 100 if stand.long else 6, 0.0, ProcessResources.now()
     for _ in range(cycles):
         stand.relay.held = True
         stand.until(lambda: not stand.relay.empty, _WITHIN)
@@ -270,12 +270,12 @@ def _unplug(stand: Stand) -> Outcome:
     told = [sum(event.kind == kind for event in stand.events) for kind in ("gone", "back")]
     return stand.outcome(
         (told == [cycles, cycles], f"of {cycles} times, gone was told {told[0]}, back {told[1]}"),
-        *Held.now().leaked(before, _GROWTH),
+        *ProcessResources.now().leaked(before, _GROWTH),
         cut_off=True,
     )
 
 
-def _suspend(stand: Stand) -> Outcome:
+def _suspend(stand: Stand) -> DrillOutcome:
     """Stop the process that plays the device for a while."""
     stand.settle()
     stand.device.signal(signal.SIGSTOP)
@@ -293,18 +293,18 @@ def _in_step(stand: Stand) -> bool:
     return frame is not None and abs(frame.host_time - frame.taken) < 0.2
 
 
-def _device_clock(stand: Stand) -> Outcome:
+def _device_clock(stand: Stand) -> DrillOutcome:
     """Set the device's clock, forth and back."""
     stand.settle()
     followed: list[bool] = []
     for ahead in (100.0, 50.0):
-        stand.relay.rewrite = Times(ahead)
+        stand.relay.rewrite = ClockShift(ahead)
         stand.recover(_WITHIN)
         followed.append(stand.until(lambda: _in_step(stand), _BACK))
     return stand.outcome((all(followed), "times do not follow the device's clock"))
 
 
-def _host_clock(stand: Stand) -> Outcome:
+def _host_clock(stand: Stand) -> DrillOutcome:
     """Set this machine's clock, forth and back."""
     stand.settle()
     # A ping unanswered at first is sent again after seconds; before an answer no clock is known.

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from kappaskin.live import LOST, STREAMING, Engine
 from kappaskin.sources import Accounting
-from kappaskin.studies.drills.stand import Drill, Outcome, Stand
+from kappaskin.studies.drills.stand import Drill, DrillOutcome, Stand
 
 _START = 20.0  # s that a process may take until it computes
 _NOTICED = 1.0  # s
@@ -60,11 +60,13 @@ def _drained(stand: Stand, engine: Engine) -> Accounting:
     return seen
 
 
-def _outcome(stand: Stand, engine: Engine, recovered: float, *claims: tuple[bool, str]) -> Outcome:
+def _outcome(
+    stand: Stand, engine: Engine, recovered: float, *claims: tuple[bool, str]
+) -> DrillOutcome:
     seen = _drained(stand, engine)
     laws = ((seen.balanced, "the accounting does not balance"), *claims)
     failures = tuple(text for holds, text in laws if not holds)
-    return Outcome(
+    return DrillOutcome(
         stand.relay.spent, seen.accepted, seen.lost, seen.bytes_discarded, 0, recovered, failures
     )
 
@@ -74,7 +76,7 @@ def _streaming(stand: Stand, engine: Engine) -> bool:
     return _pumped(stand, lambda: _shows(engine, 0), _START)
 
 
-def _suspend(stand: Stand) -> Outcome:
+def _suspend(stand: Stand) -> DrillOutcome:
     """Stop the live process for a while, and let it go on."""
     with Engine() as engine:
         streaming = _streaming(stand, engine)
@@ -95,7 +97,7 @@ def _suspend(stand: Stand) -> Outcome:
         )
 
 
-def _killed(stand: Stand) -> Outcome:
+def _killed(stand: Stand) -> DrillOutcome:
     """Kill the live process: another takes over, and it is said."""
     with Engine() as engine:
         streaming, was = _streaming(stand, engine), engine.pid
@@ -115,7 +117,7 @@ def _killed(stand: Stand) -> Outcome:
         )
 
 
-def _orphaned(stand: Stand) -> Outcome:
+def _orphaned(stand: Stand) -> DrillOutcome:
     """Kill the process that shows: the live one ends, and leaves no memory."""
     command = [sys.executable, "-m", _PARENT, stand.relay.port]
     with subprocess.Popen(
@@ -134,7 +136,7 @@ def _orphaned(stand: Stand) -> Outcome:
         (ended, f"the live process is still there after {took:.1f} s"),
         (clean, f"left in {_MEMORY}: {', '.join(block.name for block in blocks)}"),
     ]
-    return Outcome(
+    return DrillOutcome(
         sent=stand.relay.spent,
         recovered=took,
         failures=tuple(text for holds, text in failures if not holds),

@@ -171,7 +171,7 @@ _ANSWER = struct.Struct("<Qh")  # as to a ping: when it came in us, how warm it 
 
 
 @dataclass
-class Times:
+class ClockShift:
     """As from a device whose clock shows `ahead` s more; nothing is before 0."""
 
     ahead: float
@@ -185,7 +185,7 @@ class Times:
 
 
 @dataclass
-class Says:
+class InformationChange:
     """As from a device that says `value` under `key` of what it is."""
 
     key: str
@@ -199,7 +199,7 @@ class Says:
         ]
 
 
-def untold(message: FromDevice) -> list[FromDevice]:
+def without_information(message: FromDevice) -> list[FromDevice]:
     """As from a device that does not say what it is."""
     return [] if isinstance(message, Information) else [message]
 
@@ -228,7 +228,7 @@ class Garbage:
 
 
 @dataclass
-class Flips:
+class FlippedBits:
     """One bit in `every` so many turned over, at random."""
 
     every: int
@@ -244,7 +244,7 @@ class Flips:
 
 
 @dataclass
-class Cut:
+class CutScans:
     """Every second scan is broken off, one byte later each time; `cuts` counts them."""
 
     cuts: int = 0
@@ -262,14 +262,14 @@ class Cut:
 
 
 @dataclass
-class OtherRate:
+class OtherBaudRate:
     """The line is read at another baud rate than it is sent at."""
 
     sent_at: float
     read_at: float
 
     def __call__(self, data: bytes) -> bytes:
-        return heard(data, self.sent_at, self.read_at)
+        return received_at(data, self.sent_at, self.read_at)
 
 
 # A receiver at another baud rate
@@ -283,7 +283,7 @@ def _levels(data: bytes) -> NDArray[np.uint8]:
     return framed.ravel()
 
 
-def heard(data: bytes, sent_at: float, read_at: float) -> bytes:
+def received_at(data: bytes, sent_at: float, read_at: float) -> bytes:
     """What a receiver at the baud rate `read_at` takes for bytes when `data` is sent at another.
 
     It waits for the line to fall, samples the middle of eight bits, lowest first, and of a stop

@@ -11,8 +11,8 @@ from kappaskin.studies.drills.processes import PROCESS_DRILLS
 from kappaskin.studies.drills.stand import (
     Device,
     Drill,
-    NeedsSimulated,
-    Outcome,
+    DrillOutcome,
+    NeedsSimulatedDevice,
     Stand,
     judged,
     opened,
@@ -67,14 +67,14 @@ def row_of(drill: Drill, device: Device, long: bool = False) -> dict[str, Any]:
     }
 
 
-def _done(drill: Drill, device: Device, long: bool) -> tuple[Outcome, list[str], str]:
+def _done(drill: Drill, device: Device, long: bool) -> tuple[DrillOutcome, list[str], str]:
     stand = Stand(device, long)
     try:
         outcome = drill.run(stand)
-    except NeedsSimulated:
-        return Outcome(), ["needs the simulated device"], "skipped"
+    except NeedsSimulatedDevice:
+        return DrillOutcome(), ["needs the simulated device"], "skipped"
     except SourceError as error:
-        return Outcome(), [str(error)], "failed"
+        return DrillOutcome(), [str(error)], "failed"
     finally:
         stand.close()
     reasons = judged(outcome, drill.within)

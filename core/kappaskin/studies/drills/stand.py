@@ -25,7 +25,7 @@ _PAGE = 4096
 
 
 @dataclass(frozen=True)
-class Held:
+class ProcessResources:
     """Threads, open descriptors, child processes and resident bytes; 0 where it cannot be told."""
 
     threads: int
@@ -34,7 +34,7 @@ class Held:
     memory: int
 
     @classmethod
-    def now(cls) -> "Held":
+    def now(cls) -> "ProcessResources":
         """Of this process."""
         own = Path("/proc/self")
         if not (own / "fd").exists():
@@ -45,7 +45,7 @@ class Held:
             threading.active_count(), len(os.listdir(own / "fd")), len(children), resident * _PAGE
         )
 
-    def leaked(self, since: "Held", memory: int) -> list[tuple[bool, str]]:
+    def leaked(self, since: "ProcessResources", memory: int) -> list[tuple[bool, str]]:
         """Claims that nothing was added, but for so many bytes of `memory`."""
         grown = self.memory - since.memory
         return [
@@ -59,12 +59,12 @@ class Held:
         ]
 
 
-class NeedsSimulated(Exception):
+class NeedsSimulatedDevice(Exception):
     """The fault needs the process that plays a device."""
 
 
 @dataclass(frozen=True)
-class Outcome:
+class DrillOutcome:
     """Figures of a drill: messages `sent`, `accepted` and `lost`, and bytes `discarded`.
 
     `wrong` counts frames that were accepted but never sent so. `recovered` is the time from the end
@@ -81,7 +81,7 @@ class Outcome:
     failures: tuple[str, ...] = ()
 
 
-def judged(outcome: Outcome, within: float) -> list[str]:
+def judged(outcome: DrillOutcome, within: float) -> list[str]:
     """Why a drill failed: its own claims, a wrong frame, or no recovery `within` so many s."""
     reasons = list(outcome.failures)
     if outcome.wrong:
@@ -111,7 +111,7 @@ class Device:
     def signal(self, number: int) -> None:
         """Send a signal to the process that plays the device."""
         if self.process is None:
-            raise NeedsSimulated
+            raise NeedsSimulatedDevice
         self.process.send_signal(number)
 
 
@@ -257,7 +257,7 @@ class Stand:
 
     def outcome(
         self, *claims: tuple[bool, str], cut_off: bool = False, restarted: bool = False
-    ) -> Outcome:
+    ) -> DrillOutcome:
         """What became of it all, once the line is drained; `claims` that are false are failures.
 
         Every byte and every number sent must be accounted for, but for bytes on a line that was
@@ -273,7 +273,7 @@ class Stand:
         if not restarted:
             text = f"{self.relay.sequence} messages were sent, {seen.span} accounted for"
             laws.append((seen.span == self.relay.sequence, text))
-        return Outcome(
+        return DrillOutcome(
             self.relay.spent,
             seen.accepted,
             seen.lost,
@@ -296,5 +296,5 @@ class Drill:
 
     name: str
     does: str
-    run: Callable[[Stand], Outcome]
+    run: Callable[[Stand], DrillOutcome]
     within: float = math.inf

@@ -15,7 +15,7 @@ from scipy import fft, linalg
 
 from kappaskin.estimation import column_lengths, singular_values
 from kappaskin.frames import Array
-from kappaskin.studies.stability.gallery import Case, Kind
+from kappaskin.studies.stability.gallery import CaseKind, HardCase
 
 # Least squares in extended precision.
 #
@@ -51,50 +51,52 @@ def _two_product(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pair:
+class DoubleDouble:
     """Numbers to 106 bits: `high`, the nearest float64, and `low`, what is missing from it."""
 
     high: Array
     low: Array
 
     @classmethod
-    def of(cls, values: Array) -> "Pair":
+    def of(cls, values: Array) -> "DoubleDouble":
         return cls(values, np.zeros_like(values))
 
     @classmethod
-    def _carried(cls, high: Array, low: Array) -> "Pair":
+    def _carried(cls, high: Array, low: Array) -> "DoubleDouble":
         s = high + low
         return cls(s, low - (s - high))
 
-    def __add__(self, other: "Pair") -> "Pair":
+    def __add__(self, other: "DoubleDouble") -> "DoubleDouble":
         s, e = _two_sum(self.high, other.high)
-        return Pair._carried(s, e + (self.low + other.low))
+        return DoubleDouble._carried(s, e + (self.low + other.low))
 
-    def __neg__(self) -> "Pair":
-        return Pair(-self.high, -self.low)
+    def __neg__(self) -> "DoubleDouble":
+        return DoubleDouble(-self.high, -self.low)
 
-    def __sub__(self, other: "Pair") -> "Pair":
+    def __sub__(self, other: "DoubleDouble") -> "DoubleDouble":
         return self + -other
 
-    def before(self, A: Array) -> "Pair":
+    def before(self, A: Array) -> "DoubleDouble":
         """A (R, N) times these numbers (N,)."""
         p, e = _two_product(A, self.high)
-        terms = Pair._carried(p, e + A * self.low)
+        terms = DoubleDouble._carried(p, e + A * self.low)
         while (count := terms.high.shape[1]) > 1:  # halved by adding, so that errors stay few
             half = count // 2
-            left = Pair(terms.high[:, :half], terms.low[:, :half])
-            added = left + Pair(terms.high[:, half : 2 * half], terms.low[:, half : 2 * half])
+            left = DoubleDouble(terms.high[:, :half], terms.low[:, :half])
+            added = left + DoubleDouble(
+                terms.high[:, half : 2 * half], terms.low[:, half : 2 * half]
+            )
             odd = terms.high[:, 2 * half :], terms.low[:, 2 * half :]
-            terms = Pair(np.hstack([added.high, odd[0]]), np.hstack([added.low, odd[1]]))
-        return Pair(terms.high[:, 0], terms.low[:, 0])
+            terms = DoubleDouble(np.hstack([added.high, odd[0]]), np.hstack([added.low, odd[1]]))
+        return DoubleDouble(terms.high[:, 0], terms.low[:, 0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
     """The unknowns g (F,) and what they leave of the readings, r = b - A g (R,)."""
 
-    unknowns: Pair
-    residual: Pair
+    unknowns: DoubleDouble
+    residual: DoubleDouble
 
 
 def least_squares(A: Array, free: Array | None, b: Array) -> Solution | None:
@@ -110,8 +112,8 @@ def least_squares(A: Array, free: Array | None, b: Array) -> Solution | None:
     Q, R = cast("tuple[Array, Array]", linalg.qr(product, mode="economic"))
     if not np.abs(np.diag(R)).min() > 0:
         return None
-    g = Pair.of(np.zeros_like(product[0]))
-    r, K = Pair.of(b), Pair.of(b)
+    g = DoubleDouble.of(np.zeros_like(product[0]))
+    r, K = DoubleDouble.of(b), DoubleDouble.of(b)
     last = np.inf
     for _ in range(_STEPS):
         f = K - r - _applied(factors, g)
@@ -119,7 +121,7 @@ def least_squares(A: Array, free: Array | None, b: Array) -> Solution | None:
         u = linalg.solve_triangular(R, h.high, trans="T")
         seen = Q.T @ f.high
         step = linalg.solve_triangular(R, seen - u)
-        g, r = g + Pair.of(step), r + Pair.of(f.high + Q @ (u - seen))
+        g, r = g + DoubleDouble.of(step), r + DoubleDouble.of(f.high + Q @ (u - seen))
         change, size = float(np.linalg.norm(step)), float(np.linalg.norm(g.high))
         if not change > _DONE * size:
             return Solution(g, r)
@@ -129,7 +131,7 @@ def least_squares(A: Array, free: Array | None, b: Array) -> Solution | None:
     return None
 
 
-def _applied(factors: list[Array], x: Pair) -> Pair:
+def _applied(factors: list[Array], x: DoubleDouble) -> DoubleDouble:
     for A in reversed(factors):
         x = x.before(A)
     return x
@@ -202,9 +204,9 @@ class Reference:
         return min(math.log10(off / (eps * size)), -math.log10(eps)) if size else -math.log10(eps)
 
 
-def reference_of(case: Case) -> Reference:
+def reference_of(case: HardCase) -> Reference:
     """The reference of the readings that the first frame has."""
-    if case.kind is Kind.LARGE:
+    if case.kind is CaseKind.LARGE:
         return _by_transforms(case)
     used = case.layout.live & np.isfinite(case.curvature[0])
     M = case.layout.curvature_operator(case.basis)[used.ravel()]
@@ -235,7 +237,7 @@ def _condition(values: Array, shape: tuple[int, int]) -> float:
     return float(values[0] / values[-1])
 
 
-def _by_transforms(case: Case) -> Reference:
+def _by_transforms(case: HardCase) -> Reference:
     """Of sines on a regular grid of more elements: M^T M is diagonal, M^T K three transforms.
 
     They are computed in extended precision, 64 bits where the machine has them.

@@ -36,7 +36,7 @@ from kappaskin._processes import beginning_processes
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator, Fit, gathered
 from kappaskin.frames import Array
-from kappaskin.studies.stability.gallery import Case, Kind, gallery
+from kappaskin.studies.stability.gallery import CaseKind, HardCase, gallery
 from kappaskin.studies.stability.reference import Reference, reference_of
 
 COVERED = 0.85
@@ -47,7 +47,7 @@ _BLOCK = 4000  # frames that are fitted together, and about as many of all are j
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class MethodAnswer:
     """What a method made of a case: the first frame's coefficients, and its shapes at places.
 
     `error` and `bar` (T, P) in m, the bar being the half width of 95 %; `flagged` (T,) frames that
@@ -60,7 +60,7 @@ class Answer:
     flagged: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, case: Case, fit: Fit, frames: NDArray[np.intp]) -> "Answer":
+    def of(cls, case: HardCase, fit: Fit, frames: NDArray[np.intp]) -> "MethodAnswer":
         """What `fit` says of these `frames` of a case at the middles of 9 x 9 cells."""
         x, y = case.layout.patch.cell_centres(_PLACES, 1 if case.layout.patch.strip else _PLACES)
         places = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
@@ -93,7 +93,7 @@ def _reach(fit: Fit) -> Array:
 
 
 @runtime_checkable
-class Remembers(Protocol):
+class Restartable(Protocol):
     """An estimator whose answers depend on earlier frames, until it is restarted."""
 
     def restart(self) -> None:
@@ -101,7 +101,7 @@ class Remembers(Protocol):
         ...
 
 
-def answered(case: Case, make: Callable[[], Estimator]) -> Answer | Refusal:
+def answer_of(case: HardCase, make: Callable[[], Estimator]) -> MethodAnswer | Refusal:
     """What an estimator answers, or why it does not.
 
     One that remembers answers each frame after the one before it, and knows no others: of forty
@@ -109,40 +109,40 @@ def answered(case: Case, make: Callable[[], Estimator]) -> Answer | Refusal:
     """
     try:
         estimator = make()
-        if isinstance(estimator, Remembers) and case.kind is not Kind.SEQUENCE:
+        if isinstance(estimator, Restartable) and case.kind is not CaseKind.SEQUENCE:
             return _joined(list(_after_another(case, estimator, estimator.restart)))
         return _joined(list(_in_blocks(case, estimator)))
     except Refusal as refusal:
         return refusal
 
 
-def _in_blocks(case: Case, estimator: Estimator) -> Iterator[Answer]:
+def _in_blocks(case: HardCase, estimator: Estimator) -> Iterator[MethodAnswer]:
     """One block of frames after the other."""
     every = max(1, len(case.curvature) // _BLOCK)
     for start in range(0, len(case.curvature), _BLOCK):
         fit = estimator(case.curvature[start : start + _BLOCK])
         chosen = np.arange(0, len(fit.curvature), every)
         kept = fit if every == 1 else gathered([fit], chosen)
-        yield Answer.of(case, kept, start + chosen)
+        yield MethodAnswer.of(case, kept, start + chosen)
 
 
 def _after_another(
-    case: Case, estimator: Estimator, restart: Callable[[], None]
-) -> Iterator[Answer]:
+    case: HardCase, estimator: Estimator, restart: Callable[[], None]
+) -> Iterator[MethodAnswer]:
     for t in range(len(case.curvature)):
         restart()
         fit = estimator(case.curvature[[t - 1, t]])
-        yield Answer.of(case, gathered([fit], np.array([1])), np.array([t]))
+        yield MethodAnswer.of(case, gathered([fit], np.array([1])), np.array([t]))
 
 
-def _joined(parts: list[Answer]) -> Answer:
+def _joined(parts: list[MethodAnswer]) -> MethodAnswer:
     error, bar, flagged = zip(*((p.error, p.bar, p.flagged) for p in parts), strict=True)
     whole = np.concatenate(error), np.concatenate(bar), np.concatenate(flagged)
-    return Answer(parts[0].coefficients, *whole)
+    return MethodAnswer(parts[0].coefficients, *whole)
 
 
-def verdict(
-    case: Case, reference: Reference, answer: Answer, eps: float, peer: Array | None
+def verdict_on(
+    case: HardCase, reference: Reference, answer: MethodAnswer, eps: float, peer: Array | None
 ) -> tuple[str, str]:
     """The verdict on an answer in a precision of `eps`, and why.
 
@@ -164,20 +164,20 @@ def verdict(
     return "exact", f"the bar covers {100 * covered:.0f} %"
 
 
-def _at_truth(case: Case, reference: Reference, answer: Answer, eps: float) -> bool:
+def _at_truth(case: HardCase, reference: Reference, answer: MethodAnswer, eps: float) -> bool:
     """Whether a single frame's answer is the truth to rounding."""
     if len(case.curvature) > 1 or not case.in_reach or not np.isfinite(reference.condition):
         return False
     return reference.near(answer.coefficients, case.truth.ravel(), eps)
 
 
-_USUAL = frozenset({Kind.ANY, Kind.LINEAR, Kind.DENSE})
-_CLAIMS: Mapping[str, frozenset[Kind]] = {
-    "least-squares": _USUAL | {Kind.SEQUENCE},
-    "fast": _USUAL | {Kind.SEQUENCE, Kind.LARGE},
-    "finite-slope": frozenset({Kind.ANY, Kind.SLOPES}),
-    "robust": _USUAL - {Kind.DENSE},
-    "tracking": _USUAL - {Kind.DENSE} | {Kind.SEQUENCE},
+_USUAL = frozenset({CaseKind.ANY, CaseKind.LINEAR, CaseKind.DENSE})
+_CLAIMS: Mapping[str, frozenset[CaseKind]] = {
+    "least-squares": _USUAL | {CaseKind.SEQUENCE},
+    "fast": _USUAL | {CaseKind.SEQUENCE, CaseKind.LARGE},
+    "finite-slope": frozenset({CaseKind.ANY, CaseKind.SLOPES}),
+    "robust": _USUAL - {CaseKind.DENSE},
+    "tracking": _USUAL - {CaseKind.DENSE} | {CaseKind.SEQUENCE},
 }
 """Which cases a method claims; any other claims the usual ones."""
 
@@ -215,7 +215,9 @@ def _rows_of_the(name: str, long: bool) -> list[dict[str, Any]]:
     return rows_of(next(case for case in gallery(long) if case.name == name))
 
 
-def rows_of(case: Case, methods: Mapping[str, type[Estimator]] = METHODS) -> list[dict[str, Any]]:
+def rows_of(
+    case: HardCase, methods: Mapping[str, type[Estimator]] = METHODS
+) -> list[dict[str, Any]]:
     """The rows of one case, for those of `methods` that claim it."""
     claiming = [name for name in methods if case.kind in _CLAIMS.get(name, _USUAL)]
     if not claiming:
@@ -225,19 +227,19 @@ def rows_of(case: Case, methods: Mapping[str, type[Estimator]] = METHODS) -> lis
         peer = reference.answer if method in _SEEK_LEAST_SQUARES else None
         for precision in _PRECISIONS:
             make = partial(methods[method], case.basis, case.layout, dtype=precision)
-            answer = answered(case, make)
+            answer = answer_of(case, make)
             rows.append(_row(case, reference, method, precision, answer, peer))
-            if peer is None and isinstance(answer, Answer):
+            if peer is None and isinstance(answer, MethodAnswer):
                 peer = answer.coefficients
     return rows
 
 
 def _row(
-    case: Case,
+    case: HardCase,
     reference: Reference,
     method: str,
     precision: np.dtype[Any],
-    answer: Answer | Refusal,
+    answer: MethodAnswer | Refusal,
     peer: Array | None,
 ) -> dict[str, Any]:
     eps, (Ni, Nj) = float(np.finfo(precision).eps), case.basis.shape
@@ -259,7 +261,7 @@ def _row(
     }
     if isinstance(answer, Refusal):
         return row | {"verdict": "refused", "reason": str(answer)}
-    found, why = verdict(case, reference, answer, eps, peer)
+    found, why = verdict_on(case, reference, answer, eps, peer)
     if method in _SEEK_LEAST_SQUARES:
         row["digits_lost"] = reference.digits_lost(answer.coefficients, eps)
     return row | {

@@ -16,25 +16,25 @@ from kappaskin.mechanics import GaussianLoad, Plate
 from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.studies.compare.ways import (
-    Way,
-    bent,
-    integrated,
-    iterated,
-    library,
-    lstsq,
-    ours,
-    pinv,
+from kappaskin.studies.compare.solvers import (
+    Solver,
+    kappaskin_solver,
+    lsqr_solver,
+    lstsq_solver,
+    pinv_solver,
+    plate_solver,
+    scikit_fem,
+    slopes_solver,
 )
 from kappaskin.studies.cost.bench import seconds, traced
-from kappaskin.studies.paper import Case, fingertip_scene
+from kappaskin.studies.paper import LoadCase, fingertip_scene
 
 WITHIN = 1e-2
 """RMS error of a plate's deflection that every way is to reach, as a share of the deflection's."""
 
 
 @dataclass(frozen=True, eq=False)
-class Work:
+class Comparison:
     """A question whose answer is known, and the `ways` to answer it, ours first.
 
     `points` (G, 2) in m are those of the surface and last the load's place, `truth` (G,) in m what
@@ -43,14 +43,14 @@ class Work:
     """
 
     name: str
-    ways: Mapping[str, Callable[[], Way]]
+    ways: Mapping[str, Callable[[], Solver]]
     asked: Any
     draws: Sequence[Any] | Array
     noisy: bool
     points: Array
     truth: Array
 
-    def errors(self, way: Way, unknowns: Array) -> tuple[Array, Array]:
+    def errors(self, way: Solver, unknowns: Array) -> tuple[Array, Array]:
         """Signed error at the load and RMS over the surface, (T,) each in mm, of (T, U)."""
         off = 1e3 * ((way.at(self.points) @ unknowns.T).T - self.truth)
         return off[:, -1], np.sqrt(np.mean(off[:, :-1] ** 2, axis=1))
@@ -58,26 +58,30 @@ class Work:
 
 # Readings to a shape
 
-_Maker = Callable[[Case], Way]
-_SOLVERS: dict[str, _Maker] = {
-    "Kappaskin, least squares": partial(ours, method="least-squares"),
-    "Kappaskin, with error bars": partial(ours, method="least-squares", error_bars=True),
-    "numpy.linalg.lstsq": lstsq,
-    "numpy.linalg.pinv, once": pinv,
-    "scipy.sparse.linalg.lsqr": iterated,
+_MakesSolver = Callable[[LoadCase], Solver]
+_SOLVERS: dict[str, _MakesSolver] = {
+    "Kappaskin, least squares": partial(kappaskin_solver, method="least-squares"),
+    "Kappaskin, with error bars": partial(
+        kappaskin_solver, method="least-squares", error_bars=True
+    ),
+    "numpy.linalg.lstsq": lstsq_solver,
+    "numpy.linalg.pinv, once": pinv_solver,
+    "scipy.sparse.linalg.lsqr": lsqr_solver,
 }
-_BAYES: dict[str, _Maker] = {
-    "Kappaskin, bayes, 15 x 15": partial(ours, method="bayes", functions=(15, 15), error_bars=True)
+_BAYES: dict[str, _MakesSolver] = {
+    "Kappaskin, bayes, 15 x 15": partial(
+        kappaskin_solver, method="bayes", functions=(15, 15), error_bars=True
+    )
 }
-_FAST: dict[str, _Maker] = {"Kappaskin, fast": partial(ours, method="fast")}
-_SLOPES: dict[str, _Maker] = {"scikit-fem, slopes route": integrated}
+_FAST: dict[str, _MakesSolver] = {"Kappaskin, fast": partial(kappaskin_solver, method="fast")}
+_SLOPES: dict[str, _MakesSolver] = {"scikit-fem, slopes route": slopes_solver}
 
 
-def _read(name: str, scene: Scene, N: int, makers: Mapping[str, _Maker]) -> Work:
+def _read(name: str, scene: Scene, N: int, makers: Mapping[str, _MakesSolver]) -> Comparison:
     """The shape of a scene from its readings, with N functions along each side."""
-    case = Case.of(scene, "least-squares", (N, N))
+    case = LoadCase.of(scene, "least-squares", (N, N))
     surface = np.stack(np.meshgrid(*case.grid), axis=-1).reshape(-1, 2)
-    return Work(
+    return Comparison(
         name,
         {by: partial(make, case) for by, make in makers.items()},
         case.curvature,
@@ -99,21 +103,21 @@ def _finer(scene: Scene, elements: int) -> Scene:
 _EXACT = 64  # functions along each side: under that load the series is summed to rounding
 
 
-def _series(plate: Plate, N: int) -> Way:
+def _series(plate: Plate, N: int) -> Solver:
     basis = SineBasis(plate.patch, N, N)
     compliance = plate.compliance(basis)
-    return Way(lambda load: compliance(load.modal(basis)).ravel(), basis.at, basis.size)
+    return Solver(lambda load: compliance(load.modal(basis)).ravel(), basis.at, basis.size)
 
 
-_PLATES: dict[str, tuple[Callable[[Plate, int], Way], range]] = {
+_PLATES: dict[str, tuple[Callable[[Plate, int], Solver], range]] = {
     "Kappaskin, {0} x {0}": (_series, range(2, 33)),
-    "scikit-fem Argyris, {0} x {0}": (lambda p, n: bent(p, "Argyris", n), range(2, 13)),
-    "scikit-fem Morley, {0} x {0}": (lambda p, n: bent(p, "Morley", n), range(20, 65, 4)),
+    "scikit-fem Argyris, {0} x {0}": (lambda p, n: plate_solver(p, "Argyris", n), range(2, 13)),
+    "scikit-fem Morley, {0} x {0}": (lambda p, n: plate_solver(p, "Morley", n), range(20, 65, 4)),
 }
 """Ours by its functions along each side, theirs by their squares; the coarser ones first."""
 
 
-def _pressed() -> Work:
+def _pressed() -> Comparison:
     """A plate that a fingertip presses in by 1 mm, by the coarsest of each way that is enough."""
     patch = Patch(0.1, 0.1)
     plate, load = Plate(patch), GaussianLoad(0.04, 0.055, 5e-3)
@@ -124,11 +128,11 @@ def _pressed() -> Work:
     truth = exact.at(points) @ exact.solve(load)
     draws = [load.shifted(dx, 0.0) for dx in np.linspace(-0.01, 0.01, 8).tolist()]
     name = f"A plate under a fingertip, within {WITHIN:.0%}"
-    work = Work(name, {}, load, draws, False, points, truth)
+    work = Comparison(name, {}, load, draws, False, points, truth)
     return replace(work, ways=dict(_coarsest(work, plate)))
 
 
-def _coarsest(work: Work, plate: Plate) -> Generator[tuple[str, Callable[[], Way]]]:
+def _coarsest(work: Comparison, plate: Plate) -> Generator[tuple[str, Callable[[], Solver]]]:
     enough = WITHIN * 1e3 * float(np.sqrt(np.mean(work.truth[:-1] ** 2)))
     for name, (make, sizes) in _PLATES.items():
         for size in sizes:
@@ -138,7 +142,7 @@ def _coarsest(work: Work, plate: Plate) -> Generator[tuple[str, Callable[[], Way
                 break
 
 
-def works() -> Generator[Work]:
+def comparisons() -> Generator[Comparison]:
     """All that is compared, one after the other."""
     centre, off_centre = load_scene("centre"), load_scene("off-centre")
     for scene in (centre, off_centre):
@@ -158,7 +162,7 @@ _TURNS, _BUDGET = (7, 201), 0.1  # least and most that are timed of a work, and 
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparisonRow:
     """One way through one work; lengths in mm, times in s, memory in bytes.
 
     `error_bars` tells whether the answers come with some, None where there is nothing to err about.
@@ -184,17 +188,17 @@ class Compared:
     memory_bytes: int
 
 
-def compared() -> list[Compared]:
+def compared() -> list[ComparisonRow]:
     """All works by all ways; raises a `Refusal` when what they need is not installed."""
-    library()  # at once, not after half of the work
-    return [row for work in works() for row in _through(work)]
+    scikit_fem()  # at once, not after half of the work
+    return [row for work in comparisons() for row in _through(work)]
 
 
-def _through(work: Work) -> list[Compared]:
-    made = [_made(make, work.asked) for make in work.ways.values()]
+def _through(work: Comparison) -> list[ComparisonRow]:
+    made = [_first_answer(make, work.asked) for make in work.ways.values()]
     medians = _medians([way for way, _, _ in made], work.draws)
     return [
-        Compared(
+        ComparisonRow(
             work.name,
             by,
             way.count,
@@ -209,7 +213,9 @@ def _through(work: Work) -> list[Compared]:
     ]
 
 
-def _errors(work: Work, way: Way) -> tuple[float, float, float | None, float | None, float | None]:
+def _errors(
+    work: Comparison, way: Solver
+) -> tuple[float, float, float | None, float | None, float | None]:
     found = way.solve(work.asked)[None]
     if not work.noisy:
         (e,), (rms,) = work.errors(way, found)
@@ -219,10 +225,10 @@ def _errors(work: Work, way: Way) -> tuple[float, float, float | None, float | N
     return float(e[0]), float(rms[0]), *noisy
 
 
-def _made(make: Callable[[], Way], asked: Any) -> tuple[Way, float, int]:
+def _first_answer(make: Callable[[], Solver], asked: Any) -> tuple[Solver, float, int]:
     """A way that has answered once, the seconds until then and the bytes."""
 
-    def answered() -> Way:
+    def answered() -> Solver:
         way = make()
         way.solve(asked)
         return way
@@ -231,7 +237,7 @@ def _made(make: Callable[[], Way], asked: Any) -> tuple[Way, float, int]:
     return way, seconds(answered), memory + way.kept
 
 
-def _medians(ways: Sequence[Way], draws: Iterable[Any]) -> list[float]:
+def _medians(ways: Sequence[Solver], draws: Iterable[Any]) -> list[float]:
     """Median seconds of each way's answers to the `draws`, in turn with the others."""
     each, (least, most) = cycle(draws), _TURNS
     taken: list[list[float]] = []
@@ -249,7 +255,7 @@ _HEAD = (
     f"{'set-up':>7}{'answer':>7}{'/ours':>6}{'held':>6}\n"
     f"{'':<26}{'':>5}{'mm':>8}{'mm':>8}{'mm':>15}{'mm':>8}{'':>5}{'ms':>7}{'us':>7}{'':>6}{'KiB':>6}"
 )
-_SAID = """\
+_LEGEND = """\
 The same work by Kappaskin and by what one would use instead
 N        unknowns that are solved for
 E        signed error at the load; with noise the mean +- standard deviation of 200 draws
@@ -259,7 +265,7 @@ set-up   until the first answer; answer: median of the next ones, and over that 
 held     most memory at once in both, with what SuperLU holds"""
 
 
-def errors_text(row: Compared) -> str:
+def errors_text(row: ComparisonRow) -> str:
     """A row as far as it is the same on every machine."""
     noisy = f"{'':>28}"
     if row.e_mm is not None:
@@ -268,16 +274,16 @@ def errors_text(row: Compared) -> str:
     return f"{row.by:<26}{row.unknowns:>5}{row.e_exact_mm:>+z8.3f}{row.rms_exact_mm:>8.4f}{noisy}"
 
 
-def _line(row: Compared) -> str:
+def _line(row: ComparisonRow) -> str:
     return (
         f"{errors_text(row)}{1e3 * row.setup_s:>7.1f}{1e6 * row.frame_s:>7.0f}{row.ratio:>6.1f}"
         f"{row.memory_bytes / 1024:>6.0f}"
     )
 
 
-def compared_text(rows: Sequence[Compared]) -> str:
+def compared_text(rows: Sequence[ComparisonRow]) -> str:
     """A table of each work, and what its columns are."""
-    lines = [_SAID]
+    lines = [_LEGEND]
     for work, its in groupby(rows, lambda row: row.work):
         lines += ["", work, _HEAD, *(_line(row) for row in its)]
     return "\n".join(lines)

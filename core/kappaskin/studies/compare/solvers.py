@@ -15,11 +15,11 @@ from kappaskin.errors import lacking
 from kappaskin.estimation import column_lengths, estimator_for
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import GaussianLoad, Plate
-from kappaskin.studies.paper import Case
+from kappaskin.studies.paper import LoadCase
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class Solver:
     """A way to a shape, made once for what does not change from one question to the next.
 
     `solve` takes a question, readings (..., 3, P) in 1/m or a load, to `count` unknowns (..., U);
@@ -37,9 +37,9 @@ class Way:
 # Readings to coefficients, by our estimators and by what NumPy and SciPy have for it
 
 
-def ours(
-    case: Case, method: str, functions: tuple[int, int] | None = None, error_bars: bool = False
-) -> Way:
+def kappaskin_solver(
+    case: LoadCase, method: str, functions: tuple[int, int] | None = None, error_bars: bool = False
+) -> Solver:
     """One of our methods, with the case's functions or so many others."""
     scene = case.scene
     basis = basis_for(scene.plate.patch, scene.edge, *(functions or case.fit.basis.shape))
@@ -51,29 +51,29 @@ def ours(
             _ = found.sd  # made when asked for
         return found.coefficients.reshape(*curvature.shape[:-2], -1)
 
-    return Way(solve, basis.at, basis.size, error_bars)
+    return Solver(solve, basis.at, basis.size, error_bars)
 
 
 # The others are given our operator and functions, which their user would have to write first.
 
 
-def _operator(case: Case) -> tuple[Array, Mask]:
+def _operator(case: LoadCase) -> tuple[Array, Mask]:
     """M (R, N), and which readings (3, P) are its rows."""
     layout = case.scene.layout
     return layout.curvature_operator(case.fit.basis)[layout.live.ravel()], layout.live
 
 
-def lstsq(case: Case) -> Way:
+def lstsq_solver(case: LoadCase) -> Solver:
     """LAPACK's least squares, anew in each frame."""
     M, live = _operator(case)
 
     def solve(curvature: Array) -> Array:
         return cast("Array", np.linalg.lstsq(M, curvature[..., live].T)[0]).T
 
-    return Way(solve, case.fit.basis.at, M.shape[1])
+    return Solver(solve, case.fit.basis.at, M.shape[1])
 
 
-def pinv(case: Case) -> Way:
+def pinv_solver(case: LoadCase) -> Solver:
     """The pseudo-inverse, made once, and a product per frame."""
     M, live = _operator(case)
     inverse = np.linalg.pinv(M, rcond=max(M.shape) * np.finfo(float).eps).T  # as lstsq has it
@@ -81,10 +81,10 @@ def pinv(case: Case) -> Way:
     def solve(curvature: Array) -> Array:
         return curvature[..., live] @ inverse
 
-    return Way(solve, case.fit.basis.at, M.shape[1])
+    return Solver(solve, case.fit.basis.at, M.shape[1])
 
 
-def iterated(case: Case) -> Way:
+def lsqr_solver(case: LoadCase) -> Solver:
     """LSQR with its usual tolerances, on columns of unit length."""
     M, live = _operator(case)
     length = column_lengths(M)
@@ -95,13 +95,13 @@ def iterated(case: Case) -> Way:
             return np.stack([solve(frame) for frame in curvature])
         return cast("Array", lsqr(A, curvature[live])[0]) / length
 
-    return Way(solve, case.fit.basis.at, M.shape[1])
+    return Solver(solve, case.fit.basis.at, M.shape[1])
 
 
 # Finite elements: a hinged plate's deflection, and what their other uses here share
 
 
-def library() -> Any:
+def scikit_fem() -> Any:
     """scikit-fem; raises a `Refusal` where it is not installed."""
     try:
         return importlib.import_module("skfem")
@@ -114,7 +114,7 @@ def axes(sides: tuple[float, float], cells: int) -> list[Array]:
     return [np.linspace(0.0, side, cells + 1) for side in sides]
 
 
-class Held:
+class ConstrainedSystem:
     """Unknowns of which some are `held` at zero, with their matrix K (N, N) factored once."""
 
     def __init__(self, K: Any, held: NDArray[np.intp]) -> None:
@@ -130,12 +130,12 @@ class Held:
         return found
 
 
-def bent(plate: Plate, element: str, cells: int) -> Way:
+def plate_solver(plate: Plate, element: str, cells: int) -> Solver:
     """A plate hinged all round, of Argyris or Morley elements on cells x cells squares, halved.
 
     Its energy is D/2 ((1 - nu) w_ij w_ij + nu w_ii w_jj), integrated.
     """
-    skfem, sides, nu = library(), (plate.patch.a, plate.patch.b), plate.poisson
+    skfem, sides, nu = scikit_fem(), (plate.patch.a, plate.patch.b), plate.poisson
     mesh = skfem.MeshTri.init_tensor(*axes(sides, cells))
     basis = skfem.Basis(mesh, getattr(skfem, f"ElementTri{element}")(), intorder=8)
 
@@ -154,13 +154,13 @@ def bent(plate: Plate, element: str, cells: int) -> Way:
         return basis.get_dofs(mesh.facets_satisfying(on_edge)).all(zero)
 
     rim = np.union1d(held(0, sides[0], "y"), held(1, sides[1], "x"))
-    still = Held(skfem.BilinearForm(energy).assemble(basis), rim)
+    still = ConstrainedSystem(skfem.BilinearForm(energy).assemble(basis), rim)
     work, places = skfem.LinearForm(_work), np.asarray(basis.global_coordinates())
 
     def solve(load: GaussianLoad) -> Array:
         return still(work.assemble(basis, pressure=_pressure(load, places)))
 
-    return Way(solve, lambda points: basis.probes(points.T), int(basis.N), kept=still.kept)
+    return Solver(solve, lambda points: basis.probes(points.T), int(basis.N), kept=still.kept)
 
 
 def _work(v: Any, at: Any) -> Any:
@@ -182,9 +182,9 @@ def _pressure(load: GaussianLoad, places: Array) -> Array:
 # What a hinged rim holds is zero: w all round, p where y is 0 or b, q where x is 0 or a.
 
 
-def integrated(case: Case) -> Way:
+def slopes_solver(case: LoadCase) -> Solver:
     """The surface of a flat hinged skin with elements on a regular grid."""
-    skfem, layout = library(), case.scene.layout
+    skfem, layout = scikit_fem(), case.scene.layout
     shape, sides = cast("tuple[int, int]", layout.shape), (layout.patch.a, layout.patch.b)
     # As many cells as elements: twice as many take thrice the time for a tenth of the error.
     mesh = skfem.MeshQuad.init_tensor(*axes(sides, max(shape)))
@@ -196,7 +196,11 @@ def integrated(case: Case) -> Way:
         np.flatnonzero(np.isclose(along * (side - along), 0))
         for along, side in zip(places, sides, strict=True)
     )
-    for_p, for_q, for_w = Held(K, at_y), Held(K, at_x), Held(K, np.union1d(at_x, at_y))
+    for_p, for_q, for_w = (
+        ConstrainedSystem(K, at_y),
+        ConstrainedSystem(K, at_x),
+        ConstrainedSystem(K, np.union1d(at_x, at_y)),
+    )
     odd, even = (_splines(shape, sides, places, mirror) for mirror in (-1, 1))
 
     def solve(curvature: Array) -> Array:
@@ -206,7 +210,7 @@ def integrated(case: Case) -> Way:
         return for_w(on_x @ p + on_y @ q).T
 
     kept = for_p.kept + for_q.kept + for_w.kept
-    return Way(solve, lambda points: basis.probes(points.T), int(basis.N), kept=kept)
+    return Solver(solve, lambda points: basis.probes(points.T), int(basis.N), kept=kept)
 
 
 def _stiffness(u: Any, v: Any, _: Any) -> Any:
