@@ -372,7 +372,7 @@ def test_what_reaches_an_accuracy_is_named_with_its_figures(small) -> None:
     assert found.reached
     assert found.cost == cheapest(small, 0.02e-3)
     assert found.cost.setting.elements == (10, 10)
-    said = "\n".join(found.said)
+    said = "\n".join(found.lines)
     assert said.startswith("0.02 mm is reached; with the least time by")
     assert "8 x 8 functions, float64, 10 x 10 elements, all 300 channels scanned" in said
     assert "1.5 ms of conversion" in said
@@ -381,18 +381,18 @@ def test_what_reaches_an_accuracy_is_named_with_its_figures(small) -> None:
 def test_of_another_sensor_it_is_said_that_it_is_one() -> None:
     own, other = cost_of(3e-5), cost_of(1e-5, setting=replace(EIGHT, elements=(16, 16)))
     slow = replace(other, conversion_time=3.84e-3, channels=768)
-    said = "\n".join(accuracy_verdict(CENTRE, [own, slow], 2e-5).said)
+    said = "\n".join(accuracy_verdict(CENTRE, [own, slow], 2e-5).lines)
     assert "The scene's own elements do not reach it; nearest is" in said
     assert "may take 2 ms, not 3.84 ms: it needs a converter that takes 2.6 us" in said
     assert "at most 260 frames/s" in said
     few = replace(EIGHT, elements=(6, 6))
     cheap = cost_of(1.9e-5, conversion=1e-4, setting=few)
-    said = "\n".join(accuracy_verdict(CENTRE, [replace(own, rms=1e-5), cheap], 2e-5).said)
+    said = "\n".join(accuracy_verdict(CENTRE, [replace(own, rms=1e-5), cheap], 2e-5).lines)
     assert "That is another sensor; with the scene's own elements" in said
 
 
 def test_arithmetic_that_is_too_slow_needs_a_faster_computer() -> None:
-    said = "\n".join(accuracy_verdict(CENTRE, [cost_of(1e-5, time=4e-3)], 2e-5).said)
+    said = "\n".join(accuracy_verdict(CENTRE, [cost_of(1e-5, time=4e-3)], 2e-5).lines)
     assert "computing a frame may take 2 ms, not 4 ms: it needs a faster computer" in said
     assert "at most 250 frames/s" in said
 
@@ -401,7 +401,7 @@ def test_where_noise_is_the_limit_readings_are_missing() -> None:
     # (5^2 - 0) / (1^2 - 0) = 25 times the readings: 5 times as many along each side.
     cost = cost_of(5e-5, rms_exact=0.0)
     found = accuracy_verdict(CENTRE, [cost], 1e-5)
-    said = "\n".join(found.said)
+    said = "\n".join(found.lines)
     assert (found.reached, found.cost) == (False, cost)
     assert "Missing are readings" in said
     assert "25 times as many" in said
@@ -412,7 +412,7 @@ def test_where_noise_is_the_limit_readings_are_missing() -> None:
 def test_more_readings_do_bring_the_accuracy_that_was_told() -> None:
     (cost,) = measured(CENTRE, EIGHT)
     within = 0.6 * cost.rms
-    said = "\n".join(accuracy_verdict(CENTRE, [cost], within).said)
+    said = "\n".join(accuracy_verdict(CENTRE, [cost], within).lines)
     m = int(said.split("more elements: about ")[1].split(" x ")[0])
     (more,) = measured(CENTRE, replace(EIGHT, elements=(m, m)))
     assert more.rms == pytest.approx(within, rel=0.15)
@@ -420,9 +420,9 @@ def test_more_readings_do_bring_the_accuracy_that_was_told() -> None:
 
 def test_where_functions_are_the_limit_they_are_missing() -> None:
     found = accuracy_verdict(CENTRE, [cost_of(5e-5, rms_exact=4e-5)], 1e-5)
-    said = "\n".join(found.said)
+    said = "\n".join(found.lines)
     assert not found.reached
-    assert "Missing are functions, and elements that tell them apart" in said
+    assert "Missing are functions, and elements that distinguish them" in said
     assert "0.04 mm" in said
     assert "Neither a faster conversion nor more time helps" in said.replace("\n", " ")
 
@@ -430,7 +430,7 @@ def test_where_functions_are_the_limit_they_are_missing() -> None:
 def test_where_nothing_gives_a_shape_that_is_said() -> None:
     found = accuracy_verdict(CENTRE, [Refused(EIGHT, "no")], 1e-5)
     assert (found.reached, found.cost) == (False, None)
-    assert "No setting" in found.said[0]
+    assert "No setting" in found.lines[0]
 
 
 # Rows, text, picture

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from kappaskin.publish import Latency, Published
 
 _EVERY = 1.0  # s between two lines
-_LOOK = 0.05  # s
+_POLL = 0.05  # s
 
 Many = Annotated[list[str] | None, Parameter(negative="")]
 Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=True)]
@@ -23,11 +23,12 @@ Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=Tr
 def publish(
     source: str, *, udp: Many = None, foxglove: Perhaps = None, seconds: float = math.inf
 ) -> int:
-    """Send contact, shape and error bars of every estimate to others, until stopped (Ctrl+C).
+    """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
 
     Prints a line a second: frames/s, messages sent and dropped, and the 99th percentile of the
     time from the arrival of a frame until it was sent. The messages are explained in
-    `publishing/messages.md` among the resources. Exit code 1 if there was nothing to send.
+    `publishing/messages.md` among the resources. Exit code 1 if there was nothing
+    to send.
 
     Example: `kappaskin publish /dev/ttyACM0 --udp 192.168.1.20:9870 --foxglove`
 
@@ -36,9 +37,9 @@ def publish(
     source
         `sim:`, `sim:SCENE`, or a port or URL for pyserial.
     udp
-        HOST:PORT that gets a datagram of JSON each; may be given several times.
+        HOST:PORT to send JSON datagrams to; may be given several times.
     foxglove
-        Serve Foxglove, at HOST:PORT if given, otherwise at 127.0.0.1:8765; after the source.
+        Serve Foxglove at HOST:PORT, or without one at 127.0.0.1:8765; give it after the source.
     seconds
         How long to publish; until stopped when left out.
     """
@@ -60,23 +61,23 @@ def publish(
     with Engine() as engine:
         engine.publish(targets)
         engine.connect(source)
-        told = _watched(engine, time.monotonic() + seconds, stopped)
-    return FAILED if math.isnan(told.publishing.latency.whole) else 0
+        status = _watched(engine, time.monotonic() + seconds, stopped)
+    return FAILED if math.isnan(status.publishing.latency.whole) else 0
 
 
 def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
-    """Tell how it goes until the `end`; how it went."""
-    said, line = time.monotonic(), ""
+    """Print a line a second until the `end`; the last status."""
+    printed, line = time.monotonic(), ""
     status = engine.status()
     while not stopped and time.monotonic() < end:
-        time.sleep(_LOOK)
+        time.sleep(_POLL)
         engine.revive()
         status = engine.status()
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)
-        if time.monotonic() - said >= _EVERY:
-            said, line = time.monotonic(), _line(status)
+        if time.monotonic() - printed >= _EVERY:
+            printed, line = time.monotonic(), _line(status)
             print(line, flush=True)
     if (last := _line(status)) != line:
         print(last)
@@ -84,19 +85,19 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
 
 
 def _line(status: "Status") -> str:
-    news = status.publishing
-    told = [f"{status.state:9}", f"{status.rate:6.0f} frames/s", *map(_words, news.targets)]
-    if math.isfinite(news.latency.whole):
-        told.append(_late(news.latency))
-    return "  ".join([*told, status.message])
+    publishing = status.publishing
+    parts = [f"{status.state:9}", f"{status.rate:6.0f} frames/s", *map(_words, publishing.targets)]
+    if math.isfinite(publishing.latency.whole):
+        parts.append(_late(publishing.latency))
+    return "  ".join([*parts, status.message])
 
 
 def _words(target: "Published") -> str:
-    told = f"{target.target}: {target.sent} sent, {target.dropped} dropped"
+    text = f"{target.target}: {target.sent} sent, {target.dropped} dropped"
     if target.target.startswith("foxglove"):
-        return f"{told}, {len(target.receivers)} connected"
+        return f"{text}, {len(target.receivers)} connected"
     trouble = target.receivers[0].trouble if target.receivers else "opening"
-    return f"{told} ({trouble})" if trouble else told
+    return f"{text} ({trouble})" if trouble else text
 
 
 def _late(latency: "Latency") -> str:
@@ -110,7 +111,7 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
     """Print what is published to a UDP port of this machine, until stopped (Ctrl+C).
 
     Contacts (ten a second) with their error bars and their age when sent, every loss on the
-    network, how the source is doing, and a summary. Exit code 1 if no contact came.
+    network, the state of the source, and a summary. Exit code 1 if no contact came.
 
     Example: `kappaskin listen --udp 9870`
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from kappaskin.cli.common import Pair, Switch, pair, print_json
+from kappaskin.cli.common import Pair, Switch, pair, print_result
 from kappaskin.studies import FIGURES
 
 Some = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")]
@@ -32,15 +32,13 @@ def tables(
     json
         Print one JSON list of rows instead of tables.
     as_printed
-        Instead, tell what the paper misprints, what that would give and why it is not meant.
+        Instead, list the paper's misprints, what they would give and why they are not meant.
     """
     from kappaskin.studies import misprints, misprints_text, paper_tables, tables_text
 
     rows = misprints() if as_printed else paper_tables(method, pair(basis, "a basis"))
-    if json:
-        print_json(rows)
-    else:
-        print(misprints_text(rows) if as_printed else tables_text(rows))
+    text = misprints_text if as_printed else tables_text
+    print_result(rows, json, lambda: text(rows))
 
 
 def figures(
@@ -65,7 +63,4 @@ def figures(
     from kappaskin.studies import write_figures
 
     written = [str(path) for path in write_figures(out, only)]
-    if json:
-        print_json(written)
-        return
-    print(*written, sep="\n")
+    print_result(written, json, lambda: "\n".join(written))

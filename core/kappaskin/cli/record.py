@@ -13,11 +13,12 @@ from cyclopts import Parameter
 from kappaskin.cli.common import (
     FAILED,
     Pair,
+    ProgressLine,
     Switch,
     check_time,
     pair,
-    print_json,
-    progress,
+    print_result,
+    result_of,
     save_arrays,
     stops,
 )
@@ -28,17 +29,17 @@ if TYPE_CHECKING:
     from kappaskin.recording import Recording
     from kappaskin.sensing import Sensor
 
-_LOOK = 0.05  # s
-_TELL = 1.0  # s
+_POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
 
 
 def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     """Record a source to a file, until stopped (Ctrl+C).
 
-    Every byte that comes, and what is made of it: an MCAP file that Foxglove, PlotJuggler and the
-    tools of ROS 2 open. It is called OUT.part until it is ended; `kappaskin repair` makes it whole
-    if it never was. Exit code 1 if it ended by itself, as on a full disk, or nothing came.
+    Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
+    PlotJuggler and the tools of ROS 2 open. It is called OUT.part until it is complete;
+    `kappaskin repair` restores one that never was. Exit code 1 if recording ended by itself, as on
+    a full disk, or if no readings came.
 
     Example: `kappaskin record sim: press.mcap --seconds 10`
 
@@ -63,7 +64,8 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
         engine.record(out)
         engine.connect(source)
         try:
-            status = _recorded(engine, seconds, stopped)
+            with ProgressLine() as show_progress:
+                status = _recorded(engine, seconds, stopped, show_progress)
         except Refusal:
             if not _ended(engine).recording.trouble:
                 out.unlink(missing_ok=True)  # ours, with nothing in it
@@ -82,11 +84,13 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     return FAILED if written.trouble or written.lost or not status.accounting.accepted else 0
 
 
-def _recorded(engine: "Engine", seconds: float, stopped: list[int]) -> "Status":
-    """Record until it is over; how the engine was then."""
+def _recorded(
+    engine: "Engine", seconds: float, stopped: list[int], show_progress: ProgressLine
+) -> "Status":
+    """Record until it is over; the last status."""
     from kappaskin.live import LOST, STREAMING
 
-    began = told = time.monotonic()
+    began = time.monotonic()
     known: Sensor | None = None
     while True:
         status, now = engine.status(), time.monotonic()
@@ -102,10 +106,8 @@ def _recorded(engine: "Engine", seconds: float, stopped: list[int]) -> "Status":
             raise Refusal(status.message)
         if status.state != STREAMING and known is None and now - began > _BEGIN:
             raise Refusal(f"{status.source}: nothing came within {_BEGIN:g} s")
-        if now - told >= _TELL and sys.stderr.isatty():
-            told = now
-            print(_line(status), end="\r", file=sys.stderr, flush=True)
-        time.sleep(_LOOK)
+        show_progress(_line(status))
+        time.sleep(_POLL)
 
 
 def _use_tare(engine: "Engine", sensor: "Sensor") -> None:
@@ -126,21 +128,21 @@ def _line(status: "Status") -> str:
 
 
 def _ended(engine: "Engine") -> "Status":
-    """End the recording; how the engine is once the file is whole."""
+    """End the recording; the status once the file is complete."""
     engine.record(None)
     asked = time.monotonic()
-    for _ in range(round(_BEGIN / _LOOK)):
+    for _ in range(round(_BEGIN / _POLL)):
         status = engine.status()
         if not status.recording.active and status.reported > asked:
             break
-        time.sleep(_LOOK)
+        time.sleep(_POLL)
     return engine.status()
 
 
 def info(file: Path, *, json: Switch = False) -> None:
-    """Tell what is in a recording: when, how long, of which device, what happened.
+    """Show what a recording contains: time, duration, devices, settings, events.
 
-    One that was not ended is told of up to where it breaks off.
+    An unfinished recording is shown up to where it breaks off.
 
     Example: `kappaskin info press.mcap`
 
@@ -154,22 +156,24 @@ def info(file: Path, *, json: Switch = False) -> None:
     from kappaskin.recording import Recording
 
     with Recording(file) as recording:
-        said = _said(recording)
-    if json:
-        print_json(said)
-        return
-    whole = "" if said["whole"] else " (not ended: see `kappaskin repair`)"
-    print(f"{file}: {said['seconds']:.1f} s from {said['began']}, by {said['library']}{whole}")
+        contents = _contents(recording)
+    print_result(contents, json, lambda: _contents_text(file, contents))
+
+
+def _contents_text(file: Path, contents: dict[str, Any]) -> str:
+    whole = "" if contents["whole"] else " (not ended: see `kappaskin repair`)"
+    seconds, began, library = (contents[name] for name in ("seconds", "began", "library"))
+    lines = [f"{file}: {seconds:.1f} s from {began}, by {library}{whole}"]
     for name in ("devices", "setups", "attachments", "events"):
-        print(f"{name}:", *([""] if said[name] else ["none"]))
-        for line in said[name]:
-            print(f"  {line}")
-    print("messages:")
-    for topic, count in sorted(said["messages"].items()):
-        print(f"  {count:>10,}  {topic}")
+        lines.append(f"{name}:" if contents[name] else f"{name}: none")
+        lines += [f"  {line}" for line in contents[name]]
+    counts = sorted(contents["messages"].items())
+    return "\n".join(
+        [*lines, "messages:", *(f"  {count:>10,}  {topic}" for topic, count in counts)]
+    )
 
 
-def _said(recording: "Recording") -> dict[str, Any]:
+def _contents(recording: "Recording") -> dict[str, Any]:
     from kappaskin.recording import decode
     from kappaskin.recording import messages as m
 
@@ -188,7 +192,7 @@ def _said(recording: "Recording") -> dict[str, Any]:
         "devices": [_device(text) for text in dict.fromkeys(texts(m.DEVICE))],
         "setups": texts(m.SETUP),
         "attachments": list(recording.attachments),
-        "events": [f"{time:.3f} s {said['name']}: {said['msg']}" for time, said in events],
+        "events": [f"{time:.3f} s {event['name']}: {event['msg']}" for time, event in events],
         "messages": recording.counts,
     }
 
@@ -201,10 +205,10 @@ def _device(text: str) -> str:
 
 
 def verify(file: Path) -> int:
-    """Work out every recorded estimate once more from the recorded bytes, and compare bit for bit.
+    """Recompute every recorded estimate from the recorded bytes and compare bit for bit.
 
-    Exit code 0 if all are the same, 1 if one is not, and then the first is told. Another processor
-    may round differently in the last digits.
+    Exit code 0 if all are the same, 1 if one differs; the first that does is printed. Another
+    processor may round differently in the last digits.
 
     Example: `kappaskin verify press.mcap`
 
@@ -218,7 +222,7 @@ def verify(file: Path) -> int:
     from kappaskin.recording import Verdict, verifying
 
     with Beside[float | Verdict]("verify", verifying, file) as work:
-        verdict = progress(work.wait(), Verdict)
+        verdict = result_of(work.wait(), Verdict)
     print(f"{file}: {verdict.words}")
     return 0 if verdict.same else FAILED
 
@@ -243,7 +247,7 @@ def repair(file: Path, *, out: Path) -> int:
     """
     from kappaskin.recording import Repaired, repairing
 
-    done = progress(repairing(file, out), Repaired)
+    done = result_of(repairing(file, out), Repaired)
     if not (done.total or done.attachments):
         print(f"{file}: {done.words}")
         return _NOTHING
@@ -265,9 +269,9 @@ def export(
     """Export a recording: readings and estimates as a table, or the skin's surface as a mesh.
 
     The suffix says what is written. A .csv, .npz or .h5 has a row for each frame: counts, readings,
-    coefficients, contact and geometry with their error bars, worked out anew from the recorded
-    bytes with the recorded settings. A .vtp or .stl is the skin in space at one moment, a .pvd a
-    series of .vtp files. Every file tells units, settings, calibration, tare and device.
+    coefficients, contact and geometry with their error bars, recomputed from the recorded bytes
+    with the recorded settings. A .vtp or .stl is the skin in space at one moment, a .pvd a
+    series of .vtp files. Every file states units, settings, calibration, tare and device.
 
     Example: `kappaskin export press.mcap --to press.csv --from 2 --until 4`
 
@@ -278,19 +282,19 @@ def export(
     to
         The file to write; refused where it is there already.
     begin
-        Seconds since the recording began from which frames are taken.
+        Start, in seconds since the recording began.
     until
-        Seconds since the recording began until which they are.
+        End, in seconds since the recording began; that of the recording when left out.
     every
         Seconds between two rows or surfaces; every frame when left out.
     at
-        Seconds since the recording began, of the one surface that is wanted.
+        The time of a single surface, in seconds since the recording began.
     """
     from kappaskin.recording import Exported, Exporting, Wanted
 
     try:
         with Exporting(Wanted(recording, to, begin, until, every, at)) as exporting:
-            done = progress(exporting.wait(), Exported)
+            done = result_of(exporting.wait(), Exported)
     except KeyboardInterrupt:
         raise Refusal("stopped before the end; nothing was written") from None
     print(*exporting.files, sep="\n")
@@ -314,7 +318,7 @@ def reconstruct(
     1/m with NaN for a missing reading, and optionally `sigma` in 1/m and `radius` in m, the base
     radius along x (infinite when flat). A `size` (1,) with `positions` (P, 1) is a strip, of whose
     curvature only xx is read. An `outline` (V, 2) m is that of a polygon, one number the radius of
-    a disk; a `rigidity` in N m tells forces.
+    a disk; with a `rigidity` in N m, forces are computed too.
 
     Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`
 

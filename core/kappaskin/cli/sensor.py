@@ -26,7 +26,7 @@ def _millimetres(text: str) -> tuple[float, ...]:
         raise Refusal(f"expected radii in millimetres such as 100,50,25, got {text!r}") from None
 
 
-def _asked(question: str) -> str:
+def _answer_to(question: str) -> str:
     print(question, end="", file=sys.stderr, flush=True)
     if answer := sys.stdin.readline() if sys.stdin else "":
         return answer
@@ -49,8 +49,8 @@ def calibrate(
 ) -> int:
     """Calibrate a sensor against cylinders of known radius.
 
-    Names one cylinder after the other and waits for Enter; a simulated source is laid on them by
-    itself. The exit code is 1 when some channel failed: the file is written, without that channel.
+    Asks for one cylinder after the other and waits for Enter; a simulated source lays itself on
+    them. The exit code is 1 when some channel failed: the file is written without that channel.
 
     Example: `kappaskin calibrate /dev/ttyACM0 --out skin.toml --radii 100,50,33,25,20`
 
@@ -65,9 +65,10 @@ def calibrate(
     seconds
         How long the readings on each cylinder are averaged.
     hold
-        Seconds on the smallest cylinder from which creep is told; without it creep is not sought.
+        Seconds on the smallest cylinder to measure creep; without it creep is not measured.
     dwell
-        Ask nobody: the device is laid on the cylinders by itself, so many seconds each.
+        Do not wait for Enter: the device moves by itself and stays on each cylinder so many
+        seconds.
     json
         Print one JSON object with every channel instead of a summary.
     """
@@ -80,7 +81,7 @@ def calibrate(
         sensor, sweep = take_sweep(
             source,
             None if radii is None else _millimetres(radii),
-            _asked,
+            _answer_to,
             lambda line: print(line, file=sys.stderr),
             seconds=seconds,
             hold=hold,
@@ -102,10 +103,10 @@ _READ = 0.05  # s that one read may wait
 
 
 def tare(source: str, *, undo: Switch = False) -> None:
-    """Take what a sensor reads at rest as its zero.
+    """Tare a sensor: take its readings at rest as its zero.
 
-    Refused, with the reason, while the skin is loaded or moves. What is taken is kept for this
-    sensor's serial number, and used whenever it is connected; a simulated sensor's is only told.
+    Refused, with the reason, while the skin is loaded or moves. The tare is saved under the
+    sensor's serial number and used whenever it is connected; a simulated sensor's is only printed.
 
     Example: `kappaskin tare /dev/ttyACM0`
 
@@ -114,7 +115,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
     source
         `sim:`, `sim:SCENE`, or a port or URL for pyserial.
     undo
-        Use no tare of this sensor any more, instead of taking one.
+        Stop using this sensor's tare instead of taking one.
     """
     from kappaskin.calibration import Tares, data_folder
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
@@ -122,7 +123,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
 
     tares = Tares(data_folder())
     with closing(open_source(source)) as opened:
-        sensor = _met(opened)
+        sensor = _answering(opened)
         if undo:
             tares.use(sensor.serial_number, None)
             print(f"{sensor.name} {sensor.serial_number}: no tare is in use")
@@ -137,7 +138,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
         print(f"kept in {tares.path(sensor.serial_number)}")
 
 
-def _met(source: "Source") -> "Sensor":
+def _answering(source: "Source") -> "Sensor":
     while source.sensor is None:
         source.read(_READ)
         if source.trouble:
@@ -164,7 +165,7 @@ def _taken(source: "Source", sensor: "Sensor", used: "Tare | None") -> "Tare":
 
 
 def _tell(taken: "Tare", before: "Tare | None") -> None:
-    """Print what was taken, beside the one in use before."""
+    """Print the tare that was taken, and how far it is from the one in use before."""
     import numpy as np
 
     offset, error = (math.sqrt(float(np.nanmean(x**2))) for x in (taken.offset, taken.offset_sd))
@@ -181,9 +182,9 @@ def _tell(taken: "Tare", before: "Tare | None") -> None:
 def press(
     source: str, *, quick: Switch = False, patience: float = 20.0, json: Switch = False
 ) -> int:
-    """Press one element after the other, to see that each answers where the map says.
+    """Verify the channel map: press one element after the other and see which one answers.
 
-    Names one element after the other and notices by itself when it was pressed and let go; a
+    Asks for one element after the other and detects by itself when it is pressed and released; a
     simulated source presses by itself. The exit code is 1 when the map is not confirmed.
 
     Example: `kappaskin press /dev/ttyACM0 --quick`
@@ -193,10 +194,10 @@ def press(
     source
         `sim:`, `sim:SCENE`, or a port or URL for pyserial.
     quick
-        Of a grid, press two elements in each row and column: they tell whether rows, columns or
-        components are exchanged, but not every two elements.
+        On a grid, press two elements in each row and column only: enough to see whether rows,
+        columns or components are exchanged, but not every pair of elements.
     patience
-        Seconds without an answer after which the next element is asked for.
+        Seconds to wait for an answer before the next element is asked for.
     json
         Print one JSON object with every press and the map that was found.
     """
@@ -234,10 +235,10 @@ _WAIT = 0.1  # s
 
 
 def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> int:
-    """Print what comes over a port as readable lines, to bring up a device.
+    """Print what a device sends as readable lines, to bring it up.
 
     Every message with its sequence number, time and content (of scans, ten a second), every gap and
-    every byte that was thrown away, and a summary at the end (Ctrl+C). Exit code 1 if no message
+    every byte that was discarded, and a summary at the end (Ctrl+C). Exit code 1 if no message
     came, or the line broke.
 
     Example: `kappaskin monitor /dev/ttyACM0`
@@ -249,7 +250,7 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
     seconds
         How long to listen; until stopped when left out.
     reset
-        Pulse DTR and RTS first, at which many boards start anew.
+        Pulse DTR and RTS first, which resets many boards.
     """
     from kappaskin.sources import Monitor
 
@@ -269,10 +270,10 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
 
 
 def device(scene: str = "", *, rate: float | None = None, dwell: float | None = None) -> None:
-    """Play a simulated sensor on a pseudo-terminal, as a real one would on a serial port.
+    """Run a simulated sensor on a pseudo-terminal, like a real one on a serial port.
 
-    Prints one JSON line with the port, then serves until stopped (Ctrl+C); then tells on standard
-    error how many messages it spent a sequence number on and how many it could not send.
+    Prints one JSON line with the port, then serves until stopped (Ctrl+C); then prints on standard
+    error how many messages it numbered and how many of these it could not send.
 
     Example: `kappaskin device circle --rate 500`
 

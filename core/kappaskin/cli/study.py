@@ -1,23 +1,29 @@
 """Commands of studies: plan, simulate, cost, compare, stability, regions, study, report."""
 
-import os
 import sys
-import time
-from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin.cli.common import FAILED, Pair, Switch, Whole, print_json, save_arrays
+from kappaskin.cli.common import (
+    FAILED,
+    Pair,
+    ProgressLine,
+    Switch,
+    Whole,
+    print_json,
+    print_result,
+    save_arrays,
+)
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
     from kappaskin.scenes import Scene
-    from kappaskin.studies import Cost, Refused, Workers
+    from kappaskin.studies import Cost, Refused
 
 
 def plan(scene: str = "", *, json: Switch = False) -> None:
-    """Tell which effects a scene calls for at the accuracy that it asks for, and why.
+    """Show which effects a scene needs at the accuracy that it asks for, and why.
 
     Example: `kappaskin plan tapping`
 
@@ -32,11 +38,9 @@ def plan(scene: str = "", *, json: Switch = False) -> None:
     from kappaskin.studies import plan_rows, plan_text
 
     on = load_scene(scene)
-    cost_rows = plan_rows(on)
-    if json:
-        print_json({"scene": on.name, "accuracy": on.choice.accuracy, "effects": cost_rows})
-    else:
-        print(plan_text(on, cost_rows))
+    rows = plan_rows(on)
+    value = {"scene": on.name, "accuracy": on.choice.accuracy, "effects": rows}
+    print_result(value, json, lambda: plan_text(on, rows))
 
 
 def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None) -> None:
@@ -68,41 +72,33 @@ def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = 
 
 
 def _measured(scene: "Scene") -> "list[Cost | Refused]":
-    """What every setting costs; on a terminal, a line on standard error tells how far it is."""
+    """What every setting costs; on a terminal, a progress bar on standard error."""
     from kappaskin.studies import Cost, CostMeasurement, Refused, settings_to_try
 
     settings, found = settings_to_try(scene), list[Cost | Refused]()
-    told = sys.stderr.isatty()
     try:
-        with CostMeasurement(scene, settings) as measuring:
-            for cost in measuring.wait():
+        with CostMeasurement(scene, settings) as measurement, ProgressLine() as show_progress:
+            for cost in measurement.wait():
                 found.append(cost)
                 done = 40 * len(found) // len(settings)
-                if told:
-                    bar = f"\r[{'#' * done:<40}] {len(found)} of {len(settings)}"
-                    print(bar, end="", file=sys.stderr, flush=True)
+                show_progress(f"[{'#' * done:<40}] {len(found)} of {len(settings)}")
     except KeyboardInterrupt:
         raise Refusal("stopped before the last setting; nothing was written") from None
-    finally:
-        if told:
-            print(file=sys.stderr)
     return found
 
 
 def _effects(scene: "Scene", json: bool) -> None:
-    """Tell what the scene's effects cost."""
+    """Print what the scene's effects cost."""
     from kappaskin.studies import effect_costs, effect_rows, effects_text, usual_setting
 
     setting = usual_setting(scene)
     found = effect_costs(scene, setting)
-    if json:
-        print_json(effect_rows(scene, setting, found))
-    else:
-        print(effects_text(scene, setting, found))
+    rows = effect_rows(scene, setting, found)
+    print_result(rows, json, lambda: effects_text(scene, setting, found))
 
 
 def _settings(scene: "Scene", found: "list[Cost | Refused]", json: bool) -> None:
-    """Tell what was found of settings; people are told of the effects too."""
+    """Print what the settings cost; as text, what the effects cost too."""
     from kappaskin.studies import cost_rows, costs_text
 
     if json:
@@ -112,7 +108,7 @@ def _settings(scene: "Scene", found: "list[Cost | Refused]", json: bool) -> None
     try:
         _effects(scene, json)
     except Refusal as refusal:  # the settings' table is worth its minute all the same
-        print(f"What each effect costs cannot be told: {refusal}")
+        print(f"What each effect costs cannot be measured: {refusal}")
 
 
 def cost(
@@ -126,7 +122,7 @@ def cost(
     """Measure what accuracy costs: error, time and memory of every method and setting.
 
     Takes about a minute. Bases, elements, precisions and channels are combined with each method;
-    marked are the settings that no other one beats in both error and time. A second table tells
+    marked are the settings that no other one beats in both error and time. A second table shows
     what each effect of the scene costs, and what leaving it out does to the shape.
 
     Example: `kappaskin cost --within 0.02mm --plot cost.svg`
@@ -136,7 +132,7 @@ def cost(
     scene
         The scene to measure on; the default one when left out.
     effects
-        Tell of the effects alone, which takes seconds.
+        Measure the effects alone, which takes seconds.
     within
         Instead of a table, name the setting that reaches this RMS error in the least time,
         conversion included, such as 0.02mm or 20um; or say what is missing, with exit code 1.
@@ -149,8 +145,8 @@ def cost(
     from kappaskin.scenes import load_scene
     from kappaskin.studies import accuracy_verdict, check_plot, parse_length, write_plot
 
-    asked = None if within is None else parse_length(within)
-    if effects and (asked is not None or plot is not None):
+    accuracy = None if within is None else parse_length(within)
+    if effects and (accuracy is not None or plot is not None):
         raise Refusal(
             "expected --effects without --within and --plot, which are about settings; leave it or "
             "them out"
@@ -164,14 +160,11 @@ def cost(
     found = _measured(on)
     if plot is not None:
         write_plot(plot, on, found)
-    if asked is None:
+    if accuracy is None:
         _settings(on, found, json)
         return 0
-    answer = accuracy_verdict(on, found, asked)
-    if json:
-        print_json(answer.to_json())
-    else:
-        print(*answer.said, sep="\n")
+    answer = accuracy_verdict(on, found, accuracy)
+    print_result(answer.to_json(), json, lambda: "\n".join(answer.lines))
     return 0 if answer.reached else FAILED
 
 
@@ -190,11 +183,8 @@ def compare(*, json: Switch = False) -> None:
     """
     from kappaskin.studies import compared, compared_text
 
-    cost_rows = compared()
-    if json:
-        print_json([asdict(row) for row in cost_rows])
-    else:
-        print(compared_text(cost_rows))
+    rows = compared()
+    print_result([asdict(row) for row in rows], json, lambda: compared_text(rows))
 
 
 def stability(
@@ -215,12 +205,9 @@ def stability(
     """
     from kappaskin.studies import run_stability, stability_text
 
-    told = sys.stderr.isatty()
-    cost_rows = run_stability(long, lambda case: print(case, file=sys.stderr) if told else None)
-    if json:
-        print_json(cost_rows)
-    else:
-        print(stability_text(cost_rows))
+    with ProgressLine() as show_progress:
+        rows = run_stability(long, show_progress)
+    print_result(rows, json, lambda: stability_text(rows))
 
 
 def regions(*, json: Switch = False) -> None:
@@ -235,38 +222,11 @@ def regions(*, json: Switch = False) -> None:
     """
     from kappaskin.studies import regions_text, run_regions
 
-    cost_rows = run_regions()
-    if json:
-        print_json(cost_rows)
-    else:
-        print(regions_text(cost_rows))
+    rows = run_regions()
+    print_result(rows, json, lambda: regions_text(rows))
 
 
-_EVERY = 10.0  # s between two lines of progress in a log
-
-
-def _workers(count: int | None, scheduler: str) -> "AbstractContextManager[Workers]":
-    from kappaskin.studies import cluster, processes
-
-    if scheduler:
-        if count is not None:
-            raise Refusal("expected --workers or --scheduler, got both; a cluster has its own")
-        return cluster(scheduler)
-    return processes(count if count is not None else os.cpu_count() or 1)
-
-
-class _Teller:
-    """Shows how far it is on standard error: on one line where somebody looks, else at times."""
-
-    def __init__(self) -> None:
-        self._looked_at, self._last = sys.stderr.isatty(), time.monotonic()
-
-    def __call__(self, line: str) -> None:
-        if self._looked_at:
-            print(f"\r\x1b[K{line}", end="", file=sys.stderr, flush=True)
-        elif time.monotonic() - self._last > _EVERY:
-            self._last = time.monotonic()
-            print(line, file=sys.stderr, flush=True)
+_LOG_EVERY = 10.0  # s between two lines of progress in a log
 
 
 def study(
@@ -274,10 +234,10 @@ def study(
 ) -> int:
     """Compute a design study: how good a sensor would be, before it is built.
 
-    A study is a scene with tables [[vary]] of what it goes through, [[draw]] of what is random, and
-    [measure] and [stop]. Every result is a file of its own in the folder: a study that was stopped
-    goes on where it was, and a changed one computes only what changed. The exit code is 1 where
-    some of it failed.
+    A study is a scene with tables [[vary]] of values to sweep, [[draw]] of values to draw at
+    random, and [measure] and [stop]. Every result is a file of its own in the folder: a study that
+    was stopped goes on where it was, and a changed one computes only what changed. The exit code is
+    1 where some of it failed.
 
     Example: `kappaskin study paper-elements --workers 2 --out elements`
 
@@ -293,31 +253,31 @@ def study(
     out
         The folder of its results; named as the study when left out.
     """
-    from kappaskin.studies import StudyFolder, load_study, run_study, table_text
+    from kappaskin.studies import StudyFolder, load_study, run_study, study_workers, table_text
 
-    asked = load_study(file)
-    path = out if out is not None else Path(asked.name)
-    with _workers(workers, scheduler) as found:
-        folder = StudyFolder.opened(path, asked)
+    if scheduler and workers is not None:
+        raise Refusal("expected --workers or --scheduler, got both; a cluster has its own")
+    loaded = load_study(file)
+    path = out if out is not None else Path(loaded.name)
+    with study_workers(workers, scheduler) as pool:
+        folder = StudyFolder.opened(path, loaded)
         try:
-            known = run_study(asked, folder, found, _Teller())
+            with ProgressLine(_LOG_EVERY) as show_progress:
+                points = run_study(loaded, folder, pool, show_progress)
         except KeyboardInterrupt:
             raise Refusal(
                 f"stopped; what was computed is in {path}, and the same command goes on from there"
             ) from None
-        finally:
-            if sys.stderr.isatty():
-                print(file=sys.stderr)
-    print(table_text(asked, known))
+    print(table_text(loaded, points))
     print(f"kappaskin report {path} makes a page of it", file=sys.stderr)
-    return FAILED if any(one.failures for one in known) else 0
+    return FAILED if any(point.failures for point in points) else 0
 
 
 def report(folder: Path) -> None:
-    """Make a page of a study's results: report.html, with a CSV and an SVG of each figure beside.
+    """Make a page of a study's results: report.html, with a CSV and an SVG of each figure.
 
-    The page needs no network, and says all that it takes to repeat the study. What is not computed
-    yet is missing in it, and said to be.
+    The page needs no network and states all that it takes to repeat the study. Results that are
+    not computed yet are listed as missing.
 
     Example: `kappaskin report elements`
 
@@ -326,17 +286,6 @@ def report(folder: Path) -> None:
     folder
         The folder that `kappaskin study` made.
     """
-    from kappaskin.studies import StudyFolder, draw_study, page_of, stored_results, table_csv
+    from kappaskin.studies import write_report
 
-    results = StudyFolder(folder)
-    study = results.study()
-    known = stored_results(study, results)
-    figures = draw_study(study, known)
-    files = {f"{name}.svg": svg for name, svg in figures.items()}
-    files |= {"report.csv": table_csv(study, known), "report.html": page_of(study, known, figures)}
-    try:
-        for name, text in files.items():
-            (folder / name).write_text(text, "utf-8")
-    except OSError as error:
-        raise Refusal(f"{folder}: cannot be written to ({error}); copy it elsewhere") from error
-    print(*(folder / name for name in files), sep="\n")
+    print(*write_report(folder), sep="\n")

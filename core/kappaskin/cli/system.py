@@ -10,7 +10,7 @@ from dataclasses import asdict
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, Literal
 
-from kappaskin.cli.common import FAILED, Switch, print_json
+from kappaskin.cli.common import FAILED, ProgressLine, Switch, print_json, print_result
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def _display() -> str:
 
 
 def examine() -> dict[str, Any]:
-    """Everything `kappaskin doctor` tells, as JSON values."""
+    """Everything that `kappaskin doctor` shows, as JSON values."""
     from kappaskin.sources import serial_ports
 
     missing = _missing()
@@ -99,11 +99,11 @@ def examine() -> dict[str, Any]:
 
 
 def doctor(port: str = "", *, json: Switch = False) -> int:
-    """Tell what this machine has, what is missing, and the line that installs it.
+    """Show what this machine has, what is missing, and the command that installs it.
 
-    Or look at one port for a few seconds: whether it is absent, busy, not permitted, silent, at
-    another baud rate or no sensor's; else who is there, how fast its readings come and how many are
-    lost. The exit code is 1 where no readings come.
+    Or examine one port for a few seconds: whether it is absent, busy, not permitted, silent, at
+    another baud rate or not a sensor; else which device it is, its frame rate and its losses. The
+    exit code is 1 where no readings come.
 
     Example: `kappaskin doctor /dev/ttyACM0`
 
@@ -165,9 +165,9 @@ def _tell_machine(json: bool) -> None:
         _line(package, version or "not installed")
     _line("display", found["display"] or "none (`xvfb-run` gives a virtual one)")
     for port in found["serial_ports"]:
-        said = Port(**port)
-        may = "" if said.opened else f"  no permission. {permission_line(said.port)}"
-        _line("serial port", f"{said.words}{may}")
+        serial_port = Port(**port)
+        may = "" if serial_port.opened else f"  no permission. {permission_line(serial_port.port)}"
+        _line("serial port", f"{serial_port.words}{may}")
     if not found["serial_ports"]:
         _line("serial ports", "none found")
     _line("missing", " ".join(found["missing"]) or "nothing")
@@ -178,7 +178,7 @@ def _tell_machine(json: bool) -> None:
 
 
 def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> int:
-    """Inflict faults on the line to a device, and tell what became of each.
+    """Inflict faults on the line to a device, and report what became of each.
 
     A relay before the device spoils what passes: noise, cuts, floods, unplugged cables. Exit code 1
     if a drill fails. Close the app first: the port is used.
@@ -192,20 +192,15 @@ def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> in
     json
         Print one JSON list of rows instead of a table.
     long
-        Do each for longer: 100 times unplugged, ten seconds of noise.
+        Run each for longer: 100 times unplugged, ten seconds of noise.
     """
     try:
         from kappaskin.studies import drills_text, run_drills
     except ImportError as error:
         raise Refusal("expected a system with pseudo-terminals (Linux, macOS)") from error
-    told = sys.stderr.isatty()
-    rows = run_drills(
-        source or None, long, lambda name: print(name, file=sys.stderr) if told else None
-    )
-    if json:
-        print_json(rows)
-    else:
-        print(drills_text(rows))
+    with ProgressLine() as show_progress:
+        rows = run_drills(source or None, long, show_progress)
+    print_result(rows, json, lambda: drills_text(rows))
     return FAILED if any(row["verdict"] == "failed" for row in rows) else 0
 
 

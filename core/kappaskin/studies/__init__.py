@@ -32,16 +32,11 @@ if TYPE_CHECKING:
     from kappaskin.studies.design.prospect import Prospect as Prospect
     from kappaskin.studies.design.prospect import check as check
     from kappaskin.studies.design.prospect import prospect as prospect
-    from kappaskin.studies.design.report import draw_study as draw_study
-    from kappaskin.studies.design.report import page_of as page_of
-    from kappaskin.studies.design.report import table_csv as table_csv
     from kappaskin.studies.design.report import table_text as table_text
+    from kappaskin.studies.design.report import write_report as write_report
     from kappaskin.studies.design.results import StudyFolder as StudyFolder
-    from kappaskin.studies.design.run import Workers as Workers
-    from kappaskin.studies.design.run import cluster as cluster
-    from kappaskin.studies.design.run import processes as processes
     from kappaskin.studies.design.run import run_study as run_study
-    from kappaskin.studies.design.run import stored_results as stored_results
+    from kappaskin.studies.design.run import study_workers as study_workers
     from kappaskin.studies.design.study import load_study as load_study
     from kappaskin.studies.drills.run import drills_text as drills_text
     from kappaskin.studies.drills.run import run_drills as run_drills
@@ -73,9 +68,9 @@ else:
             ),
             "cost.settings": "Cost Refused Setting cheapest frontier settings_to_try",
             "design.prospect": "Check Design Prospect check prospect",
-            "design.report": "draw_study page_of table_csv table_text",
+            "design.report": "table_text write_report",
             "design.results": "StudyFolder",
-            "design.run": "Workers cluster processes run_study stored_results",
+            "design.run": "run_study study_workers",
             "design.study": "load_study",
             "drills.run": "drills_text run_drills",
             "figures": "FIGURES write_figures",

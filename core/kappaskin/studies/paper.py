@@ -137,7 +137,7 @@ def table_1(
     """Table 1's six rows: 10 x 10 elements, truth 15 x 15, fit 8 x 8, RMS over 101 x 101 points.
 
     Displacements in mm; `e_max_mm` is signed, at the load. Rows with noise are means over 200
-    seeded draws, and tell how much of the skin the 95 % bands cover; those without also tell the
+    seeded draws, with the share of the skin that the 95 % bands cover; those without also have the
     errors with gages that sense the curvature of the bent surface, as those of a real skin do.
     """
     names = ("centre", "off-centre", "line")
@@ -197,7 +197,7 @@ def table_2(
 def paper_tables(
     method: str = next(iter(METHODS)), functions: tuple[int, int] = (8, 8)
 ) -> list[dict[str, Any]]:
-    """The rows of both tables; one that tells why, of a table that the method refuses."""
+    """The rows of both tables; of a table that the method refuses one row with the reason."""
     rows: list[dict[str, Any]] = []
     for number, table in enumerate((table_1, table_2), 1):
         try:
@@ -398,8 +398,13 @@ def misprints_text(rows: list[dict[str, Any]]) -> str:
     lines: list[str] = []
     for row in rows:
         gives = [("gives", f"{value:.4g}  {what}") for what, value in row["gives"].items()]
-        said = [("printed", row["printed"]), ("meant", row["meant"]), *gives, ("but", row["why"])]
+        lines_of = [
+            ("printed", row["printed"]),
+            ("meant", row["meant"]),
+            *gives,
+            ("but", row["why"]),
+        ]
         lines += [row["where"]]
         lines += [textwrap.fill(text, 96, initial_indent=f"    {name:<9}",
-                                subsequent_indent=" " * 13) for name, text in said]  # fmt: skip
+                                subsequent_indent=" " * 13) for name, text in lines_of]  # fmt: skip
     return "\n".join(lines)

@@ -89,7 +89,7 @@ def _seconds(run: Callable[[float], object], moments: list[float]) -> float:
 
 
 def costs_of(scene: Scene, plan: Plan) -> dict[str, float]:
-    """Seconds per frame that each effect there is adds to the bare plate: medians, in turn.
+    """Seconds per frame that each effect of the plan adds to the bare plate: medians, in turn.
 
     Frames follow one another, or where so few can be afforded, lie evenly over the scene.
     """
@@ -118,8 +118,8 @@ def costs_of(scene: Scene, plan: Plan) -> dict[str, float]:
 def plan_updates(scene: Scene) -> Generator[list[dict[str, Any]]]:
     """One row for every known effect: its entry in the plan, and `microseconds` per frame.
 
-    That is None for an effect that there is nothing of in the scene. The rows come twice: at once,
-    with NaN for times that are not known yet, and then with all.
+    That is None for an effect that the scene has nothing of. The rows come twice: at once, with NaN
+    for times that are not measured yet, and then with all.
     """
     made = plan(scene)
     yield _rows(made, {entry.name: math.nan for entry in made if entry.effect is not None})
@@ -135,7 +135,7 @@ def _rows(plan: Plan, costs: dict[str, float]) -> list[dict[str, Any]]:
 
 
 def plan_rows(scene: Scene) -> list[dict[str, Any]]:
-    """The rows of `plan_told` with all times."""
+    """The rows of `plan_updates` with all times."""
     *_, rows = plan_updates(scene)
     return rows
 

@@ -55,7 +55,7 @@ def test_a_point_says_what_the_scene_says_but_for_what_varies(study_of):
     said = json.loads(list(study.points())[-1].document)
 
     assert said["elements"] == {"grid": [8, 8]}
-    assert said["touch"] == study.said["touch"]
+    assert said["touch"] == study.content["touch"]
     assert "vary" not in said
 
 

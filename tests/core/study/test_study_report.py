@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 import pytest
 
 from kappaskin.cli.common import FAILED
-from kappaskin.studies import StudyFolder, stored_results, table_text
+from kappaskin.studies import StudyFolder, table_text
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.report import mean_text, value_text
-from kappaskin.studies.design.results import Mean
+from kappaskin.studies.design.results import Mean, stored_results
 
 from .conftest import TEXT
 

@@ -12,8 +12,8 @@ import pytest
 import scipy
 
 from kappaskin import LeastSquares, Patch, Refusal, Simulator, SineBasis
-from kappaskin.studies import StudyFolder, run_study, stored_results
-from kappaskin.studies.design.results import BlockTask, Mean, run_task, version
+from kappaskin.studies import StudyFolder, run_study
+from kappaskin.studies.design.results import BlockTask, Mean, run_task, stored_results, version
 
 NOISES = '[[vary]]\n"effects.uniform-noise.rms" = [0.1, 0.4]\n'
 DRAWN = NOISES + '[[draw]]\nwhat = "touch[1].x"\nkind = "uniform"\nlow = 0.03\nhigh = 0.07\n'

@@ -13,9 +13,9 @@ import psutil
 import pytest
 
 from kappaskin import Refusal
-from kappaskin.studies import StudyFolder, cluster, processes, run_study
+from kappaskin.studies import StudyFolder, run_study
 from kappaskin.studies.design.results import BlockTask, run_task, version
-from kappaskin.studies.design.run import worker_kind
+from kappaskin.studies.design.run import cluster, processes, worker_kind
 
 pytestmark = pytest.mark.slow
 

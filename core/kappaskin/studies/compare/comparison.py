@@ -165,7 +165,7 @@ _TURNS, _BUDGET = (7, 201), 0.1  # least and most that are timed of a work, and 
 class ComparisonRow:
     """One way through one work; lengths in mm, times in s, memory in bytes.
 
-    `error_bars` tells whether the answers come with some, None where there is nothing to err about.
+    `error_bars` is whether the answers have some, None where there is no noise.
     `e_mm` and `rms_mm` are means over draws with noise of the signed error at the load and of the
     RMS error over the skin, `e_sd_mm` is that error's standard deviation; None where there is no
     noise. Those of exact readings are `exact`. `setup_s` goes to the first answer, `frame_s` is the

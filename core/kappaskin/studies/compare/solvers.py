@@ -1,4 +1,4 @@
-"""Ways from a question to a shape: our estimators, NumPy's and SciPy's solvers, finite elements."""
+"""Solvers to compare: our estimators, NumPy's and SciPy's least squares, finite elements."""
 
 import importlib
 from collections.abc import Callable
@@ -20,10 +20,10 @@ from kappaskin.studies.paper import LoadCase
 
 @dataclass(frozen=True, eq=False)
 class Solver:
-    """A way to a shape, made once for what does not change from one question to the next.
+    """A solver, made once for what does not change from one question to the next.
 
     `solve` takes a question, readings (..., 3, P) in 1/m or a load, to `count` unknowns (..., U);
-    `at` tells of points (G, 2) in m the matrix (G, U) that makes displacements of them. `kept` are
+    `at` makes of points (G, 2) in m the matrix (G, U) from unknowns to displacements. `kept` are
     bytes that it holds where Python does not count them.
     """
 

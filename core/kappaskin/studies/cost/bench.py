@@ -1,4 +1,4 @@
-"""A scene and settings to what each of them costs: error, time, memory."""
+"""The bench: error, time and memory of each setting on a scene."""
 
 import statistics
 import time
@@ -68,8 +68,8 @@ class _Judge:
     def __call__(self, coefficients: Array) -> tuple[Array, Array]:
         """Signed error at the load and RMS over the skin, (T,) each in m."""
         c = coefficients.reshape(len(coefficients), -1).astype(float)
-        off = np.hypot(np.linalg.norm(c @ self.R.T - self.reached, axis=1), self.left)
-        return np.vecdot(self.at_load, c) - self.true_at_load, off / np.sqrt(self.points)
+        rms = np.hypot(np.linalg.norm(c @ self.R.T - self.reached, axis=1), self.left)
+        return np.vecdot(self.at_load, c) - self.true_at_load, rms / np.sqrt(self.points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class Bench:
         if not np.isfinite([pressed.contact for pressed in self._pressed]).all():
             why = "lies on cylinders" if scene.laid else "is not pressed"
             raise Refusal(
-                f"expected a scene with a load to tell errors by, but the skin of {scene.name} "
+                f"expected a scene with a load to measure errors by, but the skin of {scene.name} "
                 f"{why}; choose one such as centre"
             )
         # Planned once: what stands still calls for no skew, but the whole scene is to be judged.
@@ -233,7 +233,7 @@ def _judged(judge: _Judge, fit: Estimator, curvature: Array) -> tuple[Array, Arr
 
 
 def traced(made: Callable[[], _Made]) -> tuple[_Made, int]:
-    """What is made, and the bytes that were held besides at the highest point of making it."""
+    """What is made, and the most bytes that were held while making it."""
     mine = not tracemalloc.is_tracing()
     if mine:
         tracemalloc.start()

@@ -42,7 +42,7 @@ def write_plot(path: Path, scene: Scene, costs: Sequence[Cost | Refused]) -> Non
 def draw(figure: style.Figure, scene: Scene, costs: Sequence[Cost | Refused]) -> None:
     """Arithmetic alone left, with the conversion right; `costs` as they were measured."""
     known = [cost for cost in costs if isinstance(cost, Cost)]
-    # Who says nothing is as far off as the shape is large.
+    # An answer of zero has an error as large as the shape.
     shown = [cost for cost in known if cost.rms < cost.shape_rms]
     if not shown:
         raise Refusal("expected a setting whose error is smaller than the shape, got none to draw")

@@ -11,7 +11,7 @@ from kappaskin.studies.cost.effects import EffectCost, effect_costs
 from kappaskin.studies.cost.settings import Cost, Refused, Setting
 
 EffectCosts = tuple[EffectCost, ...] | Refused
-"""What a scene's effects cost with a setting, or why that setting cannot tell."""
+"""What a scene's effects cost with a setting, or why that setting is refused."""
 
 _Item = Cost | Refused | tuple[Setting, EffectCosts]
 
@@ -46,26 +46,26 @@ class CostMeasurement:
     ) -> None:
         Bench(scene)  # or refused here
         self.effects: dict[Setting, EffectCosts] = {}
-        self._beside = Beside("kappaskin-cost", _measured, scene, settings, effects_with)
+        self._process = Beside("kappaskin-cost", _measured, scene, settings, effects_with)
 
     @property
     def done(self) -> bool:
-        return self._beside.done
+        return self._process.done
 
     def poll(self) -> list[Cost | Refused]:
         """What has been measured since the last call.
 
-        Raises a `Refusal` when the process has died, once all that it measured is told.
+        Raises a `Refusal` when the process has died, once all that it measured is returned.
         """
-        return list(self._costs(self._beside.poll()))
+        return list(self._costs(self._process.poll()))
 
     def wait(self) -> Generator[Cost | Refused]:
         """Each cost as soon as it is measured, to the end."""
-        yield from self._costs(self._beside.wait())
+        yield from self._costs(self._process.wait())
 
-    def _costs(self, told: Iterable[_Item]) -> Generator[Cost | Refused]:
-        """The costs among what was told; what it was told of effects is kept."""
-        for one in told:
+    def _costs(self, items: Iterable[_Item]) -> Generator[Cost | Refused]:
+        """The costs among `items`; those of effects go to `effects`."""
+        for one in items:
             if isinstance(one, tuple):
                 self.effects |= [one]
             else:
@@ -73,7 +73,7 @@ class CostMeasurement:
 
     def close(self) -> None:
         """Stop measuring and end the process."""
-        self._beside.close()
+        self._process.close()
 
     def __enter__(self) -> "CostMeasurement":
         return self

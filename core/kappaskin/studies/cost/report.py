@@ -43,10 +43,10 @@ def _setting(s: Setting) -> dict[str, Any]:
 
 def row(cost: Cost | Refused) -> dict[str, Any]:
     """One of `rows`, without its place among the others."""
-    told = _setting(cost.setting)
+    setting = _setting(cost.setting)
     if isinstance(cost, Refused):
-        return told | dict.fromkeys(_FIGURES) | {"refused": cost.reason}
-    return told | {name: figure(cost) for name, figure in _FIGURES.items()} | {"refused": None}
+        return setting | dict.fromkeys(_FIGURES) | {"refused": cost.reason}
+    return setting | {name: figure(cost) for name, figure in _FIGURES.items()} | {"refused": None}
 
 
 _FIGURES: dict[str, Callable[[Cost], float]] = {
@@ -71,7 +71,7 @@ _FIGURES: dict[str, Callable[[Cost], float]] = {
 def cost_rows(scene: Scene, costs: Sequence[Cost | Refused]) -> list[dict[str, Any]]:
     """`costs` as JSON values; the figures of a refused setting are None, `refused` says why.
 
-    `frontier` says whether no other row beats it in both `rms_mm` and `frame_s`, where errors that
+    `frontier` is whether no other row beats it in both `rms_mm` and `frame_s`, where errors that
     are `ALIKE` count as equal, `frontier_total` the same of `total_s`; `exact` stands for readings
     without noise.
     """
@@ -87,7 +87,7 @@ def cost_rows(scene: Scene, costs: Sequence[Cost | Refused]) -> list[dict[str, A
 def effect_rows(
     scene: Scene, setting: Setting, found: Sequence[EffectCost]
 ) -> list[dict[str, Any]]:
-    """What was `found` of effects, with `setting`, as JSON values; `error` is the bound."""
+    """The costs `found` of effects, with `setting`, as JSON values; `error` is the bound."""
     return [
         {"scene": scene.name, "effect": cost.name, "kept": cost.kept}
         | _setting(setting)
@@ -102,10 +102,10 @@ def effect_rows(
 
 
 def effects_text(scene: Scene, setting: Setting, found: Sequence[EffectCost]) -> str:
-    """What was `found` of effects, with `setting`, for people."""
-    said = setting.method, "{} x {} functions".format(*setting.functions)
+    """The costs `found` of effects, with `setting`, as a table."""
+    how = setting.method, "{} x {} functions".format(*setting.functions)
     lines = [
-        f"What each effect costs in the scene {scene.name}, with {', '.join(said)}",
+        f"What each effect costs in the scene {scene.name}, with {', '.join(how)}",
         "us      what it adds to simulating a frame",
         "bound   by how much leaving it out changes a reading at most, as a share of the peak",
         f"RMS     error over the skin, mean of {FRAMES} frames all over the scene",
@@ -157,11 +157,11 @@ E       signed error at the load, mean +- standard deviation of those frames
 
 def _outro(costs: Sequence[Cost | Refused]) -> str:
     refused = Counter(cost.setting.method for cost in costs if isinstance(cost, Refused))
-    said = f"{len(costs)} settings tried; --json prints them all."
+    text = f"{len(costs)} settings tried; --json prints them all."
     if refused:
         each = ", ".join(f"{method} {count}" for method, count in refused.items())
-        said += f" Refused: {each}."
-    return said
+        text += f" Refused: {each}."
+    return text
 
 
 def _named(cost: Cost | Refused) -> str:
@@ -233,7 +233,7 @@ def parse_length(text: str) -> float:
 
 @dataclass(frozen=True)
 class AccuracyVerdict:
-    """Whether an accuracy is `reached`, the setting's `cost` and what to say about it.
+    """Whether an accuracy is `reached`, the setting's `cost`, and the answer in `lines` of text.
 
     `cost` is that of the cheapest setting that reaches it; when none does, that of the most
     accurate one.
@@ -241,14 +241,14 @@ class AccuracyVerdict:
 
     reached: bool
     cost: Cost | None
-    said: tuple[str, ...]
+    lines: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
         """The verdict as JSON values."""
         return {
             "reached": self.reached,
             "setting": None if self.cost is None else row(self.cost),
-            "said": list(self.said),
+            "said": list(self.lines),
         }
 
 
@@ -261,14 +261,14 @@ def accuracy_verdict(
     """
     found = cheapest(costs, within)
     if found is not None:
-        said = (f"{_mm_text(within)} is reached; with the least time by", *described(found))
-        return AccuracyVerdict(True, found, (*said, *_remarks(scene, costs, within, found)))
+        lines = (f"{_mm_text(within)} is reached; with the least time by", *described(found))
+        return AccuracyVerdict(True, found, (*lines, *_remarks(scene, costs, within, found)))
     known = [cost for cost in costs if isinstance(cost, Cost)]
     if not known:
         return AccuracyVerdict(False, None, ("No setting that was tried gives a shape.",))
     best = min(known, key=lambda cost: cost.rms)
-    said = f"{_mm_text(within)} is reached by none of {len(known)} settings; nearest is"
-    return AccuracyVerdict(False, best, (said, *described(best), *_missing(scene, known, within)))
+    line = f"{_mm_text(within)} is reached by none of {len(known)} settings; nearest is"
+    return AccuracyVerdict(False, best, (line, *described(best), *_missing(scene, known, within)))
 
 
 def _mm_text(length: float) -> str:
@@ -301,28 +301,31 @@ def described(cost: Cost) -> tuple[str, ...]:
 def _remarks(
     scene: Scene, costs: Sequence[Cost | Refused], within: float, found: Cost
 ) -> list[str]:
-    """What else must be known of the setting `found`: other elements, a lower rate."""
-    said: list[str] = []
+    """Remarks on the setting `found`: other elements than the scene's, too high a rate."""
+    lines: list[str] = []
     own = own_elements(scene)
     if found.setting.elements != own:
         mine = [c for c in costs if isinstance(c, Cost) and c.setting.elements == own]
         with_mine = cheapest(mine, within)
         nearest = min(mine, key=lambda cost: cost.rms, default=None)
         if with_mine is not None:
-            said += ["That is another sensor; with the scene's own elements", *described(with_mine)]
+            lines += [
+                "That is another sensor; with the scene's own elements",
+                *described(with_mine),
+            ]
         elif nearest is not None:
-            said += ["The scene's own elements do not reach it; nearest is", *described(nearest)]
+            lines += ["The scene's own elements do not reach it; nearest is", *described(nearest)]
     slowest = max(found.conversion_time, found.time_per_frame)
     if slowest * scene.rate > 1 + 1e-9:
         what, remedy = "computing a frame", "a faster computer"
         if found.conversion_time > found.time_per_frame:
             each = 1e6 / scene.rate / found.channels
             what, remedy = "a scan", f"a converter that takes {each:.3g} us per channel"
-        said.append(
+        lines.append(
             f"At the scene's {scene.rate:g} frames/s {what} may take {_s(1 / scene.rate)}, not "
             f"{_s(slowest)}: it needs {remedy}, or at most {1 / slowest:.0f} frames/s."
         )
-    return said
+    return lines
 
 
 def _missing(scene: Scene, known: Sequence[Cost], within: float) -> list[str]:
@@ -333,8 +336,8 @@ def _missing(scene: Scene, known: Sequence[Cost], within: float) -> list[str]:
         least = min(whole, key=lambda cost: cost.rms_exact)
         Ni, Nj = least.setting.functions
         return [
-            f"Missing are functions, and elements that tell them apart: without noise the error is "
-            f"{_mm_text(least.rms_exact)}",
+            "Missing are functions, and elements that distinguish them: without noise the error "
+            f"is {_mm_text(least.rms_exact)}",
             f"at best, with {Ni} x {Nj} functions on {elements_text(least)} elements. Neither a "
             "faster conversion nor more time helps.",
         ]

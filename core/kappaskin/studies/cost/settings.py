@@ -87,8 +87,8 @@ class Cost:
 
     `e` is the mean of the signed error at the load over the frames and `e_sd` its standard
     deviation, `rms` the mean of the RMS error over the skin; `e_exact` and `rms_exact` are those
-    of readings that nothing spoils. `shape_rms` is the RMS of the true shape itself: who says
-    nothing is as far off.
+    of readings that nothing spoils. `shape_rms` is the RMS of the true shape itself, the error
+    of an answer that is always zero.
     """
 
     setting: Setting
@@ -140,7 +140,7 @@ def settings_to_try(
 ) -> tuple[Setting, ...]:
     """Every combination of these, square ones, on the scene's own `elements` and on others.
 
-    Those that tell most come first: the scene's own elements, all of them scanned, in float64.
+    The most informative come first: the scene's own elements, all of them scanned, in float64.
     On a strip `functions` and `elements` are those along it.
     """
     strip = scene.layout.patch.strip
@@ -168,8 +168,8 @@ def frontier(costs: Iterable[Cost | Refused], total: bool = False) -> tuple[Cost
     """The costs that no other beats in both RMS error, with noise, and time; fastest first.
 
     The time is that of the arithmetic in a frame; with `total`, conversion counts too. A slower one
-    must be better than the faster ones here by more than `ALIKE`. To say nothing beats what is
-    further off than the shape.
+    must be better than the faster ones here by more than `ALIKE`. An error larger
+    than the shape itself is beaten by an answer of zero.
     """
     known = [cost for cost in costs if isinstance(cost, Cost) and cost.rms < cost.shape_rms]
     kept: list[Cost] = []

@@ -92,25 +92,25 @@ class FrameBlock:
         times = _times(self.scene, len(self.truths)).tolist()
         return np.array([sum(load.force for load in self.simulator.loads(t)) for t in times])
 
-    def apart(self) -> Array:
+    def rms_error(self) -> Array:
         """RMS over the skin of what was fitted less what was true, (T,) in m."""
         A, B, C = _lengths(self.estimator.basis, self.scene.basis)
         inside, outside = self.coefficients @ A - self.true @ B, self.true @ C
         return np.sqrt(np.vecdot(inside, inside) + np.vecdot(outside, outside))
 
-    def off(self, points: Array) -> Array:
+    def errors_at(self, points: Array) -> Array:
         """What was fitted less what was true at `points` (G, 2), (T, G) in m."""
         fitted = self.coefficients @ self.estimator.basis.at(points).T
         return fitted - self.true @ self.scene.basis.at(points).T
 
     @cached_property
     def touches(self) -> list[Touch]:
-        """The contact that each frame tells."""
+        """The contact that is found in each frame."""
         find = _contact_finder(self.estimator, self.scene.plate, self.scene.edge)
         return [find(K, fit) for K, fit in zip(self.curvature, self.fits, strict=True)]
 
     def objects(self) -> Generator[ContactObject]:
-        """The object that each frame tells."""
+        """The object that is recognised in each frame."""
         find = _object_finder(self.estimator, self.scene.plate, self.scene.edge)
         for K, fit, touch in zip(self.curvature, self.fits, self.touches, strict=True):
             yield find(K, float(fit.noise), touch)
@@ -149,7 +149,7 @@ _SIDE = 21  # points along each side at which error bars are judged, less those 
 
 @dataclass(frozen=True)
 class StudyMeasure:
-    """Something to measure: values (T,) of a block's frames, NaN where a frame tells none.
+    """Something to measure: values (T,) of a block's frames, NaN where a frame has none.
 
     `title` is what it is called, `unit` what it is shown in, `scale` how many of those the value's
     own unit has. Where there are no frames to average over, it is one value. A `share` is one of
@@ -189,7 +189,7 @@ def _radius_of(block: FrameBlock) -> float:
     stimulus = block.scene.indenter
     rigid = stimulus.what.rigid if stimulus and isinstance(stimulus.what, Indenter) else None
     if (radius := getattr(rigid, "radius", None)) is None:
-        raise Refusal("expected a sphere or a cylinder that presses to tell errors of its radius")
+        raise Refusal("expected a sphere or a cylinder that presses, to measure errors of radius")
     return radius
 
 
@@ -207,7 +207,7 @@ def _covered(block: FrameBlock) -> Array:
     points = points[patch.contains(points)]
     reach = scipy.special.stdtrit(np.maximum(block.fit.spare, 1), 0.975)
     bands = np.reshape(reach, (-1, 1)) * block.fit.surface_sd(points)
-    held = np.mean(np.abs(block.off(points)) <= bands, axis=1)
+    held = np.mean(np.abs(block.errors_at(points)) <= bands, axis=1)
     return np.where(np.isnan(block.fit.noise), np.nan, held)  # which makes no bands
 
 
@@ -243,7 +243,7 @@ def _time(block: FrameBlock) -> Array:
 
 
 MEASURES = {
-    "rms": StudyMeasure("RMS error of the shape", "mm", 1e3, FrameBlock.apart),
+    "rms": StudyMeasure("RMS error of the shape", "mm", 1e3, FrameBlock.rms_error),
     "at-load": StudyMeasure("error at the load, signed", "mm", 1e3, _at_load),
     "contact": StudyMeasure("distance of the contact found", "mm", 1e3, _contact),
     "force": StudyMeasure("error of the force, of the largest", "%", 1e2, _force),

@@ -8,10 +8,18 @@ import platform
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import cycle
+from pathlib import Path
 from typing import Any, cast
 
+from kappaskin.errors import Refusal
 from kappaskin.studies.design.measures import MEASURES, StudyMeasure
-from kappaskin.studies.design.results import Mean, PointResults, version
+from kappaskin.studies.design.results import (
+    Mean,
+    PointResults,
+    StudyFolder,
+    stored_results,
+    version,
+)
 from kappaskin.studies.design.study import Axis, Study
 from kappaskin.studies.figures import style
 
@@ -64,13 +72,17 @@ def remarks_on(study: Study, known: Sequence[PointResults]) -> list[str]:
     remarks: list[str] = []
     for one in known:
         values = one.point.values.items()
-        told = ", ".join(f"{study.called(place)} {value_text(value)}" for place, value in values)
-        at = f"at {told}" if told else "everywhere"
+        values_text = ", ".join(
+            f"{study.called(place)} {value_text(value)}" for place, value in values
+        )
+        at = f"at {values_text}" if values_text else "everywhere"
         if failures := one.failures:
             failed = f"{len(failures)} of {one.done} blocks failed"
             remarks.append(f"{at}: {failed}: {failures[0]}")
         elif not one.complete:
-            remarks.append(f"{at}: {one.done} of {one.wanted} blocks are computed by this version")
+            remarks.append(
+                f"{at}: {one.done} of {one.required} blocks are computed by this version"
+            )
         elif not one.enough:
             what = ", ".join(study.stop.of)
             remarks.append(
@@ -105,11 +117,11 @@ def table_csv(study: Study, known: Sequence[PointResults]) -> str:
     for one in known:
         values = [value if isinstance(value, str | float | int) else value_text(value)
                   for value in one.point.values.values()]  # fmt: skip
-        told = list[Any]()
+        figures = list[Any]()
         for name in study.measures:
             mean, scale = one.mean(name), MEASURES[name].scale
-            told += [scale * mean.mean, scale * mean.half, scale * mean.sd, mean.count]
-        write([*values, *told, one.done, len(one.failures)])
+            figures += [scale * mean.mean, scale * mean.half, scale * mean.sd, mean.count]
+        write([*values, *figures, one.done, len(one.failures)])
     return text.getvalue()
 
 
@@ -150,7 +162,7 @@ def page_of(study: Study, known: Sequence[PointResults], figures: Mapping[str, s
         f"<p class='faint'>{len(known)} points, {computed} blocks of "
         f"{study.base.measure.frames} frames. Bars and ± are 95 % intervals of the mean. "
         "What varies is in the units of scene files: m, 1/m, N and s.</p>",
-        f"<h2>To be known with it</h2><ul>{remarks}</ul>" if remarks else "",
+        f"<h2>Remarks</h2><ul>{remarks}</ul>" if remarks else "",
         *drawn,
         "<h2>Table</h2>",
         f"<div class='wide'>{_table(study, known)}</div>",
@@ -269,3 +281,22 @@ def _curves(
         )
         curves.setdefault(label, []).append(one)
     return curves
+
+
+# All of it in the study's folder
+
+
+def write_report(folder: Path) -> list[Path]:
+    """Write report.html, report.csv and an SVG of each figure from the results in a `folder`."""
+    results = StudyFolder(folder)
+    study = results.study()
+    known = stored_results(study, results)
+    figures = draw_study(study, known)
+    files = {f"{name}.svg": svg for name, svg in figures.items()}
+    files |= {"report.csv": table_csv(study, known), "report.html": page_of(study, known, figures)}
+    try:
+        for name, text in files.items():
+            (folder / name).write_text(text, "utf-8")
+    except OSError as error:
+        raise Refusal(f"{folder}: cannot be written to ({error}); copy it elsewhere") from error
+    return [folder / name for name in files]

@@ -6,6 +6,7 @@ import math
 import os
 import sys
 import threading
+from collections import deque
 from dataclasses import asdict, dataclass, field
 from functools import cache, cached_property, lru_cache
 from importlib import metadata
@@ -65,7 +66,7 @@ BlockMoments = dict[str, Moments]
 
 @dataclass(frozen=True)
 class BlockTask:
-    """Block number `block` of the point that `document`, in JSON, says; `version` is who asks.
+    """Block number `block` of the point that `document` describes in JSON, for a `version`.
 
     Its numbers depend on nothing else, whoever computes it, and when.
     """
@@ -85,8 +86,8 @@ class BlockTask:
     @cached_property
     def seed(self) -> int:
         """The seed of what is random in it, whatever is measured of that."""
-        said = json.loads(self.document)
-        return int(self._digest(json.dumps(said | {"measure": None}, sort_keys=True))[:16], 16)
+        content = json.loads(self.document)
+        return int(self._digest(json.dumps(content | {"measure": None}, sort_keys=True))[:16], 16)
 
 
 @lru_cache(4)
@@ -95,13 +96,13 @@ def _setup(document: str) -> PointSetup:
 
 
 def _drawn(task: BlockTask) -> tuple[dict[str, Any], PointSetup]:
-    """What the task's point says, and its setup, with what is drawn of them."""
-    said, setup = json.loads(task.document), _setup(task.document)
+    """The content of the task's point, and its setup, with random values drawn."""
+    content, setup = json.loads(task.document), _setup(task.document)
     if not setup.draws:
-        return said, setup
+        return content, setup
     rng = np.random.default_rng(task.seed)
-    said = with_values(said, {place: draw(rng) for place, draw in setup.draws})
-    return said, setup_of(said, MEASURES)
+    content = with_values(content, {place: draw(rng) for place, draw in setup.draws})
+    return content, setup_of(content, MEASURES)
 
 
 def run_task(task: BlockTask) -> BlockMoments:
@@ -112,8 +113,8 @@ def run_task(task: BlockTask) -> BlockMoments:
             "on all"
         )
     with _ONE_BY_ONE:
-        said, setup = _drawn(task)
-        block = block_of(setup, estimator_of(said, setup), task.seed)
+        content, setup = _drawn(task)
+        block = block_of(setup, estimator_of(content, setup), task.seed)
         return {name: Moments.of(MEASURES[name].of(block)) for name in setup.measure.what}
 
 
@@ -170,7 +171,7 @@ def _half(means: Array, weights: Array, mean: float) -> float:
 class PointResults:
     """What is known of one `point`: how many blocks are `done`, and why some failed.
 
-    Results are held until no more are wanted, and then what they come to alone: a study of many
+    Results are held until no more are required, and then their means alone: a study of many
     points takes little more memory than one of few.
     """
 
@@ -180,13 +181,13 @@ class PointResults:
     _results: dict[int, BlockMoments | str] = field(default_factory=dict[int, "BlockMoments | str"])
     _means: dict[str, Mean] = field(default_factory=dict[str, Mean])
     _failures: list[str] = field(default_factory=list[str])
-    wanted: int = field(init=False)
+    required: int = field(init=False)
 
     def __post_init__(self) -> None:
-        self.wanted = self.study.stop.least
+        self.required = self.study.stop.least
 
     def take(self, block: int, result: BlockMoments | str) -> range:
-        """Numbers of the blocks to compute next, when `block` was the last of those wanted.
+        """Numbers of the blocks to compute next, when `block` was the last of those required.
 
         They follow from the results of all before alone, whoever computed them in whatever order.
         """
@@ -194,12 +195,12 @@ class PointResults:
         self.done += 1
         if not self.complete:
             return range(0)
-        before, most = self.wanted, self.study.stop.most
+        before, most = self.required, self.study.stop.most
         if before == most or self.failures or self.enough:
             self._close()
             return range(0)
-        self.wanted = min(math.ceil(_MORE * before), most)
-        return range(before, self.wanted)
+        self.required = min(math.ceil(_MORE * before), most)
+        return range(before, self.required)
 
     def _close(self) -> None:
         self._means = {name: self.mean(name) for name in self.study.measures}
@@ -218,16 +219,16 @@ class PointResults:
     @property
     def complete(self) -> bool:
         """Whether all blocks that it takes were computed."""
-        return self.done == self.wanted
+        return self.done == self.required
 
     @property
     def enough(self) -> bool:
-        """Whether all that is to be known well is."""
+        """Whether all means are known as well as the study asks."""
         stop = self.study.stop
         return all(self.mean(name).within(stop.within) for name in stop.of)
 
     def mean(self, measure: str) -> Mean:
-        """What is known of a measure, from its blocks in order."""
+        """The mean of a measure, from its blocks in order."""
         if self._means:
             return self._means[measure]
         blocks = [result[measure] for result in self._in_order() if not isinstance(result, str)]
@@ -294,14 +295,14 @@ class StudyFolder:
     def result(self, task: BlockTask) -> BlockMoments | str | None:
         """What the task measured, or why it failed; None where neither is known."""
         try:
-            said: dict[str, Any] = json.loads(self._file(task).read_text("utf-8"))
-            if "failed" in said:
-                return str(said["failed"])
-            return {name: Moments(**moments) for name, moments in said["measured"].items()}
+            content: dict[str, Any] = json.loads(self._file(task).read_text("utf-8"))
+            if "failed" in content:
+                return str(content["failed"])
+            return {name: Moments(**moments) for name, moments in content["measured"].items()}
         except (OSError, ValueError, KeyError, TypeError):
             return None  # to be computed anew
 
-    def keep(self, task: BlockTask, result: BlockMoments | str) -> None:
+    def save(self, task: BlockTask, result: BlockMoments | str) -> None:
         """Write what the task measured, or why it failed."""
         failed = isinstance(result, str)
         found = (
@@ -325,3 +326,16 @@ class StudyFolder:
         part = file.with_name(f".{file.name}.part")
         part.write_text(text, "utf-8")
         os.replace(part, file)
+
+
+def stored_results(study: Study, folder: StudyFolder) -> list[PointResults]:
+    """The results of every point of `study` that are in its `folder`."""
+    found = list[PointResults]()
+    for point in study.points():
+        known, blocks = PointResults(point, study), deque(range(study.stop.least))
+        while blocks:
+            block = blocks.popleft()
+            if (result := folder.result(BlockTask(point.document, block, version()))) is not None:
+                blocks.extend(known.take(block, result))
+        found.append(known)
+    return found

@@ -48,7 +48,7 @@ class Workers(Protocol):
 
 
 def scheduler_lost() -> Refusal:
-    """What to say once no scheduler answers any more."""
+    """The refusal once no scheduler answers any more."""
     return Refusal(
         "the scheduler is gone; what was computed is kept, and the same command goes on from there"
     )
@@ -111,6 +111,20 @@ class _Cluster:
 
 
 @contextmanager
+def study_workers(count: int | None = None, scheduler: str = "") -> Generator[Workers]:
+    """The workers of a Dask `scheduler`, or without one so many processes of this machine.
+
+    As many as there are cores when no `count` is given.
+    """
+    if scheduler:
+        found = cluster(scheduler)
+    else:
+        found = processes(count if count is not None else os.cpu_count() or 1)
+    with found as workers:
+        yield workers
+
+
+@contextmanager
 def cluster(address: str) -> Generator[Workers]:
     """The workers of the Dask scheduler at `address`, such as tcp://10.0.0.5:8786."""
     try:
@@ -118,7 +132,7 @@ def cluster(address: str) -> Generator[Workers]:
     except ImportError as error:
         raise lacking("dask", "a scheduler", error) from error
     try:
-        _knock(address)
+        _check_connection(address)
         client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise Refusal(
@@ -133,7 +147,7 @@ def cluster(address: str) -> Generator[Workers]:
             client.close(_PATIENCE)
 
 
-def _knock(address: str) -> None:
+def _check_connection(address: str) -> None:
     """Raise an error unless somebody is there: Dask itself would go on trying for 15 s."""
     place = urlsplit(address if "//" in address else f"tcp://{address}")
     if place.scheme not in ("tcp", "tls") or place.hostname is None or place.port is None:
@@ -142,7 +156,7 @@ def _knock(address: str) -> None:
 
 
 def worker_kind() -> str:
-    """What the last bits depend on of the worker that is asked: products add up by threads."""
+    """What the last bits of a worker's results depend on: products add up by threads."""
     threads = os.environ.get("OPENBLAS_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "many"))
     return f"{version()}, threads of BLAS {threads}"
 
@@ -157,17 +171,17 @@ def _check_workers(client: Any, address: str) -> None:
             f"{address} --nthreads 1"
         ) from None
     try:
-        told: dict[str, str] = client.run(worker_kind)
+        kinds: dict[str, str] = client.run(worker_kind)
     except Exception as error:  # whatever a worker without kappaskin, or with an old one, raises
         raise Refusal(
-            f"{address}: expected workers with {version()}, got some that cannot tell theirs "
+            f"{address}: expected workers with {version()}, got some that do not report theirs "
             f"({error}); install the same kappaskin[dask] there"
         ) from error
     alike = f"{version()}, threads of BLAS 1"
-    if others := {worker: other for worker, other in told.items() if other != alike}:
+    if others := {worker: other for worker, other in kinds.items() if other != alike}:
         worker, other = next(iter(others.items()))
         raise Refusal(
-            f"{address}: expected workers with {alike}, got {len(others)} of {len(told)} "
+            f"{address}: expected workers with {alike}, got {len(others)} of {len(kinds)} "
             f"with another, {worker} with {other}; install the same on all, and "
             "start them with OPENBLAS_NUM_THREADS=1"
         )
@@ -175,31 +189,31 @@ def _check_workers(client: Any, address: str) -> None:
 
 # The run
 
-_AHEAD = 3  # tasks in hand for each worker: one at work, the others on their way
-_PROGRESS_EVERY = 0.5  # s between two words about the progress, at least
+_QUEUED = 3  # tasks for each worker: one is computed, the others are on their way
+_PROGRESS_EVERY = 0.5  # s between two lines of progress, at least
 
 
 @dataclass
 class StudyProgress:
-    """How far a study is: blocks `done` of those `wanted` by now, some `found` in the folder."""
+    """Progress of a study: blocks `done` of those `required` by now, some `found` in the folder."""
 
-    wanted: int
+    required: int
     began: float
     done: int = 0
     found: int = 0
     failed: int = 0
 
     def line(self, now: float) -> str:
-        """What to tell at `now` in s: how far it is, the rate, the time left, failures."""
+        """A line of progress at `now` in s: blocks done, rate, time left, failures."""
         rate = (self.done - self.found) / max(now - self.began, 1e-9)
-        left = f", {(self.wanted - self.done) / rate:.0f} s left" if rate else ""
+        left = f", {(self.required - self.done) / rate:.0f} s left" if rate else ""
         found = f", {self.found} known before" if self.found else ""
         failed = f", {self.failed} failed" if self.failed else ""
-        return f"{self.done} of {self.wanted} blocks{found}, {rate:.3g}/s{left}{failed}"
+        return f"{self.done} of {self.required} blocks{found}, {rate:.3g}/s{left}{failed}"
 
 
 class _Run:
-    """A study at work: what is known of its points, what is left to do and who does it."""
+    """A running study: the results of its points, the tasks left and the workers."""
 
     def __init__(self, study: Study, folder: StudyFolder, workers: Workers) -> None:
         self._folder, self._workers = folder, workers
@@ -226,7 +240,7 @@ class _Run:
             self._submit(*self._alone.popleft())
         if self._alone or any(task.key in self._suspects for _, task in self._running.values()):
             return True
-        while len(self._running) < _AHEAD * self._workers.count:
+        while len(self._running) < _QUEUED * self._workers.count:
             known, block = self._next.popleft() if self._next else next(self._first, (None, 0))
             if known is None:
                 break
@@ -250,13 +264,13 @@ class _Run:
                 self._suspects.add(task.key)
                 self._alone.append((known, task))
             else:
-                self._folder.keep(task, result)
+                self._folder.save(task, result)
                 self._take(known, task.block, result)
 
     def _take(self, known: PointResults, block: int, result: BlockMoments | str) -> None:
         following = known.take(block, result)
         self._next.extend((known, number) for number in following)
-        self.progress.wanted += len(following)
+        self.progress.required += len(following)
         self.progress.done += 1
         self.progress.failed += isinstance(result, str)
 
@@ -280,31 +294,18 @@ class _Run:
 
 
 def run_study(
-    study: Study, folder: StudyFolder, workers: Workers, tell: Callable[[str], None]
+    study: Study, folder: StudyFolder, workers: Workers, show_progress: Callable[[str], None]
 ) -> list[PointResults]:
-    """What is known of every point of `study` in the end; `tell` is told how far it is.
+    """The results of every point of `study`; `show_progress` gets a line now and then.
 
     Results go to the `folder` one by one, and what is there already is not computed again.
     """
-    run_task = _Run(study, folder, workers)
+    run = _Run(study, folder, workers)
     try:
-        while run_task.fill():
-            run_task.collect()
-            tell(run_task.progress.line(time.monotonic()))
+        while run.fill():
+            run.collect()
+            show_progress(run.progress.line(time.monotonic()))
     finally:
-        run_task.cancel()
-    tell(run_task.progress.line(time.monotonic()))
-    return run_task.known
-
-
-def stored_results(study: Study, folder: StudyFolder) -> list[PointResults]:
-    """What is known of every point of `study` from the results in its `folder`."""
-    found = list[PointResults]()
-    for point in study.points():
-        known, blocks = PointResults(point, study), deque(range(study.stop.least))
-        while blocks:
-            block = blocks.popleft()
-            if (result := folder.result(BlockTask(point.document, block, version()))) is not None:
-                blocks.extend(known.take(block, result))
-        found.append(known)
-    return found
+        run.cancel()
+    show_progress(run.progress.line(time.monotonic()))
+    return run.known

@@ -139,16 +139,16 @@ def read_draw(table: Table) -> tuple[str, Distribution]:
     return place, made
 
 
-# What a point says
+# The setup
 
 _NAME = "the study"
 _MOST_READINGS = 2**23  # in a block: 64 MB for each array of them
-_ELSEWHERE = ("file", "recorded")  # keys of a touch that name files beside that of the scene
+_ELSEWHERE = ("file", "recorded")  # keys of a touch that name other files
 
 
 @dataclass(frozen=True)
 class FitSettings:
-    """How shapes are told: a `method` of `METHODS` for Ni x Nj `functions`.
+    """How shapes are reconstructed: by a `method` of `METHODS` with Ni x Nj `functions`.
 
     With `compensate`, the loops of the scene's hysteresis are undone first, as by a calibration
     that found them exactly.
@@ -197,7 +197,7 @@ class MeasureSettings:
 
 @dataclass(frozen=True)
 class PointSetup:
-    """One point: the scene, how its shapes are told, what is measured, what is drawn anew."""
+    """One point: the scene, fit, placement and measures, and what is drawn at random."""
 
     scene: Scene
     fit: FitSettings
@@ -207,7 +207,7 @@ class PointSetup:
 
 
 def read_setup(top: Table, file: Path, known: Iterable[str]) -> PointSetup:
-    """The setup that a file says at its `top`, which measures things that are `known`."""
+    """The setup in a file's `top` table; `known` are the names of measures."""
     tables = fit, place, measure = [top.table(name) for name in ("fit", "place", "measure")]
     drawing = top.tables("draw")
     scene = _scene(top, file)
@@ -229,7 +229,7 @@ def read_setup(top: Table, file: Path, known: Iterable[str]) -> PointSetup:
 
 
 def _scene(top: Table, file: Path) -> Scene:
-    """The scene, of which a worker that has no other files can make all."""
+    """The scene, which must be complete without other files: workers have none."""
     for touch in top.tables("touch"):
         for key in _ELSEWHERE:
             if key in touch:
@@ -240,31 +240,33 @@ def _scene(top: Table, file: Path) -> Scene:
                 )
     scene = scene_of(top, file)
     if not (scene.loads or scene.indenter):
-        raise top.refusal("expected a scene with a load or an object to tell errors by, got none")
+        raise top.refusal(
+            "expected a scene with a load or an object to measure errors by, got none"
+        )
     return scene
 
 
-def setup_of(said: dict[str, Any], known: Iterable[str]) -> PointSetup:
-    """The setup of what a point says; its refusals name no file."""
+def setup_of(content: dict[str, Any], known: Iterable[str]) -> PointSetup:
+    """The setup of a point's `content`; its refusals name no file."""
     try:
-        return read_setup(Table(said, Lines(""), _NAME), Path("study.toml"), known)
+        return read_setup(Table(content, Lines(""), _NAME), Path("study.toml"), known)
     except Refusal as refusal:
         raise Refusal(str(refusal).removeprefix(f"{_NAME}, line 1: ")) from refusal
 
 
-def estimator_of(said: dict[str, Any], setup: PointSetup) -> Estimator:
-    """What tells the shapes of a point, remembered for points with the same sensor and fit."""
+def estimator_of(content: dict[str, Any], setup: PointSetup) -> Estimator:
+    """The estimator of a point, cached for points with the same sensor and fit."""
     if METHODS[setup.fit.method].remembers:
         return _estimator(setup)
-    alike = {key: said.get(key) for key in ("skin", "elements", "fit", "place")}
+    alike = {key: content.get(key) for key in ("skin", "elements", "fit", "place")}
     return _cached_estimator(_SameSensor(json.dumps(alike, sort_keys=True), setup))
 
 
 @dataclass(frozen=True)
 class _SameSensor:
-    """A setup, equal to those of which the same is `told` of sensor and fit."""
+    """A setup, equal to others with the same `description` of sensor and fit."""
 
-    told: str
+    description: str
     setup: PointSetup = field(compare=False)
 
 

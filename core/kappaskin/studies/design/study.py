@@ -37,9 +37,9 @@ def parts_of(place: str) -> list[str | int]:
     return found
 
 
-def put_value(said: dict[str, Any], place: str, value: Any) -> None:
-    """Have `said` say `value` at `place`; tables on the way there are made."""
-    parts, at = parts_of(place), cast("Any", said)
+def put_value(content: dict[str, Any], place: str, value: Any) -> None:
+    """Set the `value` at `place` of `content`; tables on the way there are made."""
+    parts, at = parts_of(place), cast("Any", content)
     for part, following in pairwise(parts):
         at = _inside(at, part, place, isinstance(following, int))
     if isinstance(last := parts[-1], int):
@@ -68,9 +68,9 @@ def _inside(at: Any, part: str | int, place: str, array: bool) -> Any:
     return found
 
 
-def with_values(said: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
-    """A copy of `said` with these `values` at their places."""
-    changed = copy.deepcopy(said)
+def with_values(content: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """A copy of `content` with these `values` at their places."""
+    changed = copy.deepcopy(content)
     for place, value in values.items():
         put_value(changed, place, value)
     return changed
@@ -127,23 +127,23 @@ def read_axis(table: Table, most: int) -> Axis:
     if not places or not all(counts.values()):
         raise table.refusal("expected values to go through, got none")
     if len(set(counts.values())) > 1:
-        told = ", ".join(f"{count} of {place}" for place, count in counts.items())
-        raise table.refusal(f"expected as many values of each, since they go together, got {told}")
+        got = ", ".join(f"{count} of {place}" for place, count in counts.items())
+        raise table.refusal(f"expected as many values of each, since they go together, got {got}")
     return Axis(places)
 
 
 def _values(table: Table, place: str, most: int) -> list[Any]:
     if not table.is_table(place):
         return table.listed(place)
-    said = table.table(place)
-    if "first" not in said and "last" not in said:
-        raise said.refusal(
+    inner = table.table(place)
+    if "first" not in inner and "last" not in inner:
+        raise inner.refusal(
             "expected a list or a range such as { first = 1, last = 9, count = 5 }; write a place "
             'with dots in quotes, as "elements.grid"'
         )
-    made = said.make(_Range)
-    said.done()
-    with said.blamed():
+    made = inner.make(_Range)
+    inner.done()
+    with inner.blamed():
         return made.values(most)
 
 
@@ -203,7 +203,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Point:
-    """One combination of what is varied, by its place in the file; `document` says all in JSON."""
+    """One combination of values by their place in the file; `document` is the point in JSON."""
 
     values: dict[str, Any]
     document: str
@@ -211,7 +211,7 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What a study's file, of this `text`, says; `base` is its setup before anything is varied."""
+    """A study, as its file's `text` describes it; `base` is the setup before anything varies."""
 
     name: str
     title: str
@@ -220,7 +220,7 @@ class Study:
     base: PointSetup
     axes: tuple[Axis, ...]
     stop: Stop
-    said: dict[str, Any]
+    content: dict[str, Any]
 
     @property
     def measures(self) -> tuple[str, ...]:
@@ -246,7 +246,7 @@ class Study:
     def points(self) -> Iterator[Point]:
         """Every combination of what is varied."""
         for values in points_of(self.axes):
-            yield Point(values, json.dumps(with_values(self.said, values), sort_keys=True))
+            yield Point(values, json.dumps(with_values(self.content, values), sort_keys=True))
 
 
 def load_study(name: str) -> Study:
@@ -262,13 +262,13 @@ def load_study(name: str) -> Study:
 
 def read_study(text: str, file: Path) -> Study:
     """The study that `text`, of `file`, describes."""
-    said = parsed(text, file)
-    top = Table(said, Lines(text), str(file))
+    content = parsed(text, file)
+    top = Table(content, Lines(text), str(file))
     tables, stopping = top.tables("vary"), top.table("stop")
     base = read_setup(top, file, MEASURES)
     stop = _stop(stopping, base.measure.what)
     axes = tuple(read_axis(table, stop.points) for table in tables)
-    own = {key: value for key, value in said.items() if key not in (*_AROUND, *_TEXTS)}
+    own = {key: value for key, value in content.items() if key not in (*_AROUND, *_TEXTS)}
     with top.blamed("vary"):
         check_product(axes, stop.points)
     _check_places(top, axes, base.draws)
@@ -293,7 +293,7 @@ def _stop(table: Table, measured: tuple[str, ...]) -> Stop:
 def _check_places(
     top: Table, axes: tuple[Axis, ...], draws: tuple[tuple[str, Distribution], ...]
 ) -> None:
-    """Refuse what would be said twice, and what changes nothing that is simulated."""
+    """Refuse what would be set twice, and what changes nothing that is simulated."""
     seen = list[list[str | int]]()
     for table, axis in zip(top.tables("vary"), axes, strict=True):
         for place in axis.places:
@@ -318,10 +318,10 @@ def _check_place(
     seen.append(parts)
 
 
-def _check(table: Table, key: str, said: dict[str, Any], values: dict[str, Any]) -> None:
-    """Refuse `values` by place, which are said at a `key`, that the scene cannot have."""
+def _check(table: Table, key: str, content: dict[str, Any], values: dict[str, Any]) -> None:
+    """Refuse `values` by place, given at a `key`, that the scene cannot have."""
     try:
-        setup_of(with_values(said, values), MEASURES)
+        setup_of(with_values(content, values), MEASURES)
     except Refusal as refusal:
-        told = ", ".join(f"{place} = {value!r:.40}" for place, value in values.items())
-        raise table.refusal(f"with {told}: {refusal}", key) from refusal
+        given = ", ".join(f"{place} = {value!r:.40}" for place, value in values.items())
+        raise table.refusal(f"with {given}: {refusal}", key) from refusal

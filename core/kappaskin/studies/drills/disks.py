@@ -47,7 +47,7 @@ def _room(_: Path) -> Generator[None]:
 
 
 def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> DrillOutcome:
-    """Replace a file while there is no room: the old one stays whole, and it is said."""
+    """Replace a file on a full disk: the old one stays intact, and the error is reported."""
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
         path = Path(folder) / "skin.toml"
         save_calibration(_calibration("before"), path)
@@ -58,7 +58,7 @@ def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> 
             except Refusal as reason:
                 refusal = str(reason)
         claims = [
-            ("cannot be written" in refusal, "that there was no room is not told"),
+            ("cannot be written" in refusal, "that the disk was full is not reported"),
             (path.read_bytes() == before, "the file that was there is spoilt"),
             (list(Path(folder).iterdir()) == [path], "half a file is left behind"),
         ]
@@ -90,7 +90,7 @@ class _SlowDisk(Disk):
 
 
 class _FullDisk(Disk):
-    """One with little room beside what is kept in reserve."""
+    """A disk with little room apart from the reserve."""
 
     def put(self, data: bytes) -> None:
         room = _ROOM - self.tell()
@@ -101,17 +101,17 @@ class _FullDisk(Disk):
 
 
 class _Listener(Recorder):
-    """A recorder that counts the bytes it is told of."""
+    """A recorder that counts the bytes it receives."""
 
-    told = 0
+    received = 0
 
     def came(self, host_time: float, data: bytes) -> None:
-        self.told += len(data)
+        self.received += len(data)
         super().came(host_time, data)
 
 
 def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> DrillOutcome:
-    """Record for a while to a bad disk: reads go on, the file is whole, and it is told."""
+    """Record for a while to a bad disk: reads go on, the file is whole, and trouble is reported."""
     stand.settle()
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
         path = Path(folder) / "drill.mcap"
@@ -120,7 +120,7 @@ def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> DrillOu
             slowest = stand.longest_read(10.0 if stand.long else 2.0)
             stand.recover(_WITHIN)
             stand.source.record(None)
-        claims = _claims(path, recorder.written, recorder.told, full)
+        claims = _claims(path, recorder.written, recorder.received, full)
     stand.drain()
     lost = stand.source.accounting().lost
     return stand.outcome(
@@ -130,8 +130,8 @@ def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> DrillOu
     )
 
 
-def _claims(path: Path, written: Written, told: int, full: bool) -> list[tuple[bool, str]]:
-    """Whether the file is what it should be, of so many bytes that the recorder was told of."""
+def _claims(path: Path, written: Written, received: int, full: bool) -> list[tuple[bool, str]]:
+    """Whether the file is what it should be, of so many bytes that the recorder received."""
     try:
         with Recording(path) as recording:
             whole = recording.whole
@@ -140,12 +140,12 @@ def _claims(path: Path, written: Written, told: int, full: bool) -> list[tuple[b
         return [(False, str(refusal))]
     kept = sum(len(data) for _, sent, data in lines if not sent)
     if full:
-        room = "whole up to then" in written.trouble and 0 < kept < told
-        return [(whole, "the file is not whole"), (room, "that the disk was full is not told")]
-    said = not written.trouble and not written.lost
+        room = "whole up to then" in written.trouble and 0 < kept < received
+        return [(whole, "the file is not whole"), (room, "that the disk was full is not reported")]
+    untroubled = not written.trouble and not written.lost
     return [
-        (whole and said, f"the file is not whole: {written.trouble or written.lost}"),
-        (kept == told, f"of {told} bytes {kept} were recorded"),
+        (whole and untroubled, f"the file is not whole: {written.trouble or written.lost}"),
+        (kept == received, f"of {received} bytes {kept} were recorded"),
     ]
 
 

@@ -85,7 +85,7 @@ def _speed(baud_rate: int, stand: Stand) -> DrillOutcome:
     relay.spoil = clean
     lost = stand.source.accounting().lost
     return stand.outcome(
-        (stand.told("rate"), "the rate that was found is not told"),
+        (stand.reported("rate"), "the rate that was found is not reported"),
         (lost == 0, f"{lost} messages lost after the rate was found"),
         restarted=True,  # what was sent before is nowhere counted
     )
@@ -130,7 +130,7 @@ _FOLLOWED = 5.0  # s: two pings are answered, one is lost, and the next after it
 _BACK = 2.0  # s after a port's return
 _BLOCKED = 0.3  # s that a read may take on a busy machine
 _GROWTH = 10 * 2**20  # bytes
-_NUMBERED = 200  # messages after which a restart can be told from a late one
+_NUMBERED = 200  # messages after which a restart can be distinguished from a late one
 _NOBODY = bytes(65536)
 
 
@@ -203,11 +203,11 @@ def _twice(stand: Stand) -> DrillOutcome:
     stand.heal()
     stand.recover(_WITHIN)
     twice = stand.source.accounting().duplicate
-    return stand.outcome((twice > 0, "no message was told to have come twice"))
+    return stand.outcome((twice > 0, "no message was reported as a duplicate"))
 
 
-def _untold(stand: Stand) -> DrillOutcome:
-    """Keep from the program who is there, for a while after it has begun to listen."""
+def _without_information(stand: Stand) -> DrillOutcome:
+    """Hold back the device's description for a while after the program has begun to listen."""
     stand.relay.rewrite = without_information
     stand.run(1.0)
     stand.heal()
@@ -224,18 +224,18 @@ def _restart(stand: Stand) -> DrillOutcome:
     stand.recover(_WITHIN)
     stand.run(0.5)
     return stand.outcome(
-        (stand.told("restarted"), "that the device restarted is not told"), restarted=True
+        (stand.reported("restarted"), "the restart of the device is not reported"), restarted=True
     )
 
 
 def _other(key: str, event: str, stand: Stand) -> DrillOutcome:
-    """Let it say something else of itself while it is plugged in."""
+    """Change what it reports of itself while it is plugged in."""
     stand.settle()
     stand.relay.rewrite = InformationChange(key, "drill")
-    told = stand.until(lambda: stand.told(event), _BACK)
+    reported = stand.until(lambda: stand.reported(event), _BACK)
     stand.recover(_WITHIN)
     stand.heal()
-    return stand.outcome((told, f"another {key.replace('_', ' ')} is not told"))
+    return stand.outcome((reported, f"another {key.replace('_', ' ')} is not reported"))
 
 
 def _other_plugged_in(stand: Stand) -> DrillOutcome:
@@ -246,8 +246,8 @@ def _other_plugged_in(stand: Stand) -> DrillOutcome:
     stand.relay.rewrite, stand.relay.sequence = InformationChange("serial_number", "drill"), 0
     stand.relay.plug()
     stand.recover(_BACK)
-    said = (stand.told("other"), "that it is another device is not told")
-    return stand.outcome(said, cut_off=True, restarted=True)
+    other = (stand.reported("other"), "that it is another device is not reported")
+    return stand.outcome(other, cut_off=True, restarted=True)
 
 
 def _unplug(stand: Stand) -> DrillOutcome:
@@ -267,9 +267,12 @@ def _unplug(stand: Stand) -> DrillOutcome:
         worst = max(worst, stand.recovered)
     stand.recovered = worst
     stand.run(0.2)
-    told = [sum(event.kind == kind for event in stand.events) for kind in ("gone", "back")]
+    counts = [sum(event.kind == kind for event in stand.events) for kind in ("gone", "back")]
     return stand.outcome(
-        (told == [cycles, cycles], f"of {cycles} times, gone was told {told[0]}, back {told[1]}"),
+        (
+            counts == [cycles, cycles],
+            f"of {cycles} times, gone was reported {counts[0]}, back {counts[1]}",
+        ),
         *ProcessResources.now().leaked(before, _GROWTH),
         cut_off=True,
     )
@@ -288,7 +291,7 @@ def _suspend(stand: Stand) -> DrillOutcome:
 
 
 def _in_step(stand: Stand) -> bool:
-    """Whether the newest frame is said to have been taken just before it came."""
+    """Whether the newest frame's time of measurement is just before its arrival."""
     frame = stand.last
     return frame is not None and abs(frame.host_time - frame.taken) < 0.2
 
@@ -297,8 +300,8 @@ def _device_clock(stand: Stand) -> DrillOutcome:
     """Set the device's clock, forth and back."""
     stand.settle()
     followed: list[bool] = []
-    for ahead in (100.0, 50.0):
-        stand.relay.rewrite = ClockShift(ahead)
+    for shift in (100.0, 50.0):
+        stand.relay.rewrite = ClockShift(shift)
         stand.recover(_WITHIN)
         followed.append(stand.until(lambda: _in_step(stand), _BACK))
     return stand.outcome((all(followed), "times do not follow the device's clock"))
@@ -310,8 +313,8 @@ def _host_clock(stand: Stand) -> DrillOutcome:
     # A ping unanswered at first is sent again after seconds; before an answer no clock is known.
     stand.until(lambda: stand.last and stand.last.taken_sd < math.inf, _START)
     followed: list[bool] = []
-    for ahead in (30.0, 10.0):
-        stand.clock = lambda ahead=ahead: time.monotonic() + ahead
+    for shift in (30.0, 10.0):
+        stand.clock = lambda shift=shift: time.monotonic() + shift
         stand.recover(_WITHIN)
         followed.append(stand.until(lambda: _in_step(stand), _FOLLOWED))
     trouble = stand.source.trouble
@@ -327,7 +330,7 @@ DEVICE_DRILLS = [
     Drill("not read", "nobody asks for frames for a while", _not_read, _WITHIN),
     Drill("deaf", "a device that does not read what it is sent", _deaf, _WITHIN),
     Drill("twice", "every message comes twice", _twice, _WITHIN),
-    Drill("untold", "a device that says late what it is", _untold, _BACK),
+    Drill("untold", "a device that says late what it is", _without_information, _BACK),
     Drill("restart", "a device that begins anew while it is connected", _restart, _WITHIN),
     Drill(
         "other device",

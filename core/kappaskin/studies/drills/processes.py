@@ -47,7 +47,7 @@ def _recovery(stand: Stand, engine: Engine, within: float) -> float:
 
 
 def _drained(stand: Stand, engine: Engine) -> Accounting:
-    """What the engine says of everything that was sent, once it says so again and again."""
+    """The engine's accounting of everything that was sent, once it no longer changes."""
     seen, reported, same, end = Accounting(), 0.0, 0, time.monotonic() + _DRAINED
     while same < _SAME and time.monotonic() < end:
         stand.relay.forget()
@@ -98,14 +98,14 @@ def _suspend(stand: Stand) -> DrillOutcome:
 
 
 def _killed(stand: Stand) -> DrillOutcome:
-    """Kill the live process: another takes over, and it is said."""
+    """Kill the live process: another takes over, and an event reports it."""
     with Engine() as engine:
         streaming, was = _streaming(stand, engine), engine.pid
         _kill(was, signal.SIGKILL)
         noticed = _pumped(stand, lambda: engine.status().state == LOST, _NOTICED)
         _pumped(stand, lambda: engine.revive() or engine.pid != was, _START)
         recovered = _recovery(stand, engine, _RESTARTED)
-        told = any(event.kind == "engine" for event in engine.status().events)
+        reported = any(event.kind == "engine" for event in engine.status().events)
         return _outcome(
             stand,
             engine,
@@ -113,7 +113,7 @@ def _killed(stand: Stand) -> DrillOutcome:
             (streaming, "no frames came"),
             (noticed, "that it ended was not noticed within 1 s"),
             (engine.pid != was, "no other process was started"),
-            (told, "that it was started anew is not told"),
+            (reported, "that it was restarted is not reported"),
         )
 
 

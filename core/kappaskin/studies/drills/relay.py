@@ -172,7 +172,7 @@ _ANSWER = struct.Struct("<Qh")  # as to a ping: when it came in us, how warm it 
 
 @dataclass
 class ClockShift:
-    """As from a device whose clock shows `ahead` s more; nothing is before 0."""
+    """As from a device whose clock is `ahead` s fast; no time is before 0."""
 
     ahead: float
 
@@ -186,7 +186,7 @@ class ClockShift:
 
 @dataclass
 class InformationChange:
-    """As from a device that says `value` under `key` of what it is."""
+    """As from a device that reports `value` under `key` of its description."""
 
     key: str
     value: str
@@ -200,14 +200,14 @@ class InformationChange:
 
 
 def without_information(message: FromDevice) -> list[FromDevice]:
-    """As from a device that does not say what it is."""
+    """As from a device that does not describe itself."""
     return [] if isinstance(message, Information) else [message]
 
 
 # Faults of bytes under way
 
 _BURST = 64  # bytes, the mean of a burst of garbage
-_KIND = 3  # where a message says of which kind it is
+_KIND = 3  # the place of a message's kind
 
 
 @dataclass
@@ -287,7 +287,7 @@ def received_at(data: bytes, sent_at: float, read_at: float) -> bytes:
     """What a receiver at the baud rate `read_at` takes for bytes when `data` is sent at another.
 
     It waits for the line to fall, samples the middle of eight bits, lowest first, and of a stop
-    bit; whether that is one is not looked at, as systems do unless told to.
+    bit; whether that is one is not checked, as systems do by default.
     """
     line = np.append(_levels(data), np.ones(10, np.uint8))
     step = sent_at / read_at  # bits of the sender per bit of the receiver

@@ -35,11 +35,11 @@ def run_drills(
     progress: Callable[[str], object] = lambda _: None,
     chosen: Sequence[Drill] = DRILLS,
 ) -> list[dict[str, Any]]:
-    """One row for each drill, done on the device at `source`, or a simulated one.
+    """One row for each drill, run on the device at `source`, or a simulated one.
 
     `sent`, `accepted` and `lost` in messages, `discarded` in bytes, `recovered_s` None where
-    nothing had to recover; `verdict` is held, failed or skipped. `progress` is told each drill
-    before it is done.
+    nothing had to recover; `verdict` is held, failed or skipped. `progress` gets the name of
+    each drill before it is run.
     """
     rows: list[dict[str, Any]] = []
     with opened(source, _SEED) as device:

@@ -26,7 +26,7 @@ _PAGE = 4096
 
 @dataclass(frozen=True)
 class ProcessResources:
-    """Threads, open descriptors, child processes and resident bytes; 0 where it cannot be told."""
+    """Threads, open descriptors, child processes and resident bytes; 0 where unknown."""
 
     threads: int
     descriptors: int
@@ -144,10 +144,10 @@ def opened(source: str | None, seed: int) -> Generator[Device]:
 
 
 def _port_of(process: "subprocess.Popen[str]") -> str:
-    said = process.stdout.readline() if process.stdout else ""
-    if not said:
+    line = process.stdout.readline() if process.stdout else ""
+    if not line:
         raise SourceError("the simulated device did not start; try `kappaskin device`")
-    return str(json.loads(said)["port"])
+    return str(json.loads(line)["port"])
 
 
 class Stand:
@@ -251,8 +251,8 @@ class Stand:
             for frame in frames:
                 self._compare(frame)
 
-    def told(self, kind: str) -> bool:
-        """Whether the source told of such an event."""
+    def reported(self, kind: str) -> bool:
+        """Whether the source has reported an event of this kind."""
         return any(event.kind == kind for event in self.events)
 
     def outcome(
@@ -292,7 +292,7 @@ class Stand:
 
 @dataclass(frozen=True)
 class Drill:
-    """A fault: `does` says which, `run` inflicts it, and it must be over `within` so many s."""
+    """A fault: `does` describes it, `run` inflicts it, `within` is the longest recovery in s."""
 
     name: str
     does: str

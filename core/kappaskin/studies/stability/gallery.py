@@ -43,7 +43,7 @@ class HardCase:
     """`curvature` (T, 3, P) in 1/m, read of the shape with coefficients `truth` in m.
 
     `truth` is (Ri, Rj), or (T, Ri, Rj) of a shape that moves, of the functions of `true_basis`.
-    `hard` says in one sentence what is hard; `announced` why an answer may be less than exact, or
+    `hard` is one sentence on what is hard; `announced` why an answer may be less than exact, or
     none; empty where nothing excuses it.
     """
 
@@ -127,7 +127,7 @@ def _sizes() -> Iterator[HardCase]:
     )
     yield case_of(
         "Ni > m",
-        "functions 11 and 12 look like 9 and 8 in each channel; three channels tell them apart",
+        "functions 11 and 12 look like 9 and 8 in each channel; three channels distinguish them",
         _TENS,
         (12, 10),
     )
@@ -199,7 +199,7 @@ def _arcs() -> Iterator[HardCase]:
         layout,
         (8, 1),
         basis=SineBasis(patch, 8, 1, sliding=True),
-        announced="no reading tells where the skin as a whole is",
+        announced="no reading depends on where the skin as a whole is",
     )
 
 
@@ -274,7 +274,7 @@ def _scattered(points: Array) -> SensorLayout:
 
 
 def _pair(gap: float) -> HardCase:
-    """Two places, each with two elements, that tell two functions apart by the `gap` in m."""
+    """Two places, each with two elements, whose `gap` in m alone distinguishes two functions."""
     x = np.repeat([0.03 - gap / 2, 0.03 + gap / 2], 2)
     points = np.column_stack([x, np.full(4, 0.01)])
     return case_of(
@@ -282,7 +282,7 @@ def _pair(gap: float) -> HardCase:
         "two functions, seen from nearly the same place: all that is not noise is what they share",
         SensorLayout.scattered(Patch(0.1, 0.02, strip=True), points),
         (2, 1),
-        announced="what tells the functions apart is the distance of the elements",
+        announced="only the distance of the elements distinguishes the functions",
     )
 
 
@@ -321,12 +321,12 @@ def _readings() -> Iterator[HardCase]:
     dent = _dent(8)
     signal = _TENS.curvature_operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
     noise = 10 * float(np.sqrt(np.mean(signal**2)))
-    yield case_of("noise 10 times the signal", "readings tell more of the noise than of the shape",
+    yield case_of("noise 10 times the signal", "readings hold more noise than shape",
                   _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
 
 
 def _strong(chain: Transduction) -> Array:
-    """A dent whose peak curvature is half as much again as the electronics can tell."""
+    """A dent whose peak curvature is half as much again as the electronics can measure."""
     basis = SineBasis(_SQUARE, 8, 8)
     c = Plate(_SQUARE).deflection([PointLoad(0.045, 0.045)], basis)
     peak = np.abs(_TENS.curvature_operator(basis) @ c.ravel()).max()

@@ -1,4 +1,4 @@
-"""A case and a method to a row of numbers and a verdict.
+"""Verdicts: every hard case through every method that claims it, judged against the truth.
 
 The verdicts, in the order in which they are found:
 
@@ -61,7 +61,7 @@ class MethodAnswer:
 
     @classmethod
     def of(cls, case: HardCase, fit: Fit, frames: NDArray[np.intp]) -> "MethodAnswer":
-        """What `fit` says of these `frames` of a case at the middles of 9 x 9 cells."""
+        """The answer of a `fit` to these `frames` of a case, at the middles of 9 x 9 cells."""
         x, y = case.layout.patch.cell_centres(_PLACES, 1 if case.layout.patch.strip else _PLACES)
         places = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
         c = fit.coefficients.reshape(len(frames), -1).astype(float)
@@ -195,8 +195,8 @@ def run_stability(
     has it, None where a coefficient is not determined. `digits_lost` of the first frame, None where
     the least-squares answer is not sought or does not exist. `error_mm` and `bar_mm` (95 %) are
     root mean squares over the skin and all frames; `covered` is the share of the truth that lies
-    within the bar. `progress` is told each case when it is done. Cases are shared among processes
-    of one thread each: on matrices of this size more threads only wait for each other.
+    within the bar. `progress` gets the name of each case when it is done. Cases are shared among
+    processes of one thread each: on matrices of this size more threads only wait for each other.
     """
     names, rows = [case.name for case in gallery(long)], list[dict[str, Any]]()
     with (
