@@ -16,6 +16,7 @@ import pytest
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
 from kappaskin.cli import app
 from kappaskin.cli.common import REFUSED
+from kappaskin.estimation import METHODS
 
 pytestmark = pytest.mark.slow
 
@@ -267,6 +268,13 @@ def test_the_help_shows_the_commands_in_panels(run, panel, commands) -> None:
 
     lines = printed.partition(f"─ {panel} ─")[2].partition("╰")[0].splitlines()[1:]
     assert {line.split()[1] for line in lines if line[2:3] != " "} == commands
+
+
+@pytest.mark.parametrize("name", ["reconstruct", "tables"])
+def test_the_method_that_is_used_when_none_is_named_is_the_first(name) -> None:
+    arguments = {one.name: one for one in app[name].assemble_argument_collection()}
+
+    assert arguments["--method"].field_info.default == next(iter(METHODS))
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

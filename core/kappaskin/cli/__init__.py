@@ -18,7 +18,7 @@ app = App(
     name="kappaskin",
     help="Shape and contact from curvature-sensing tactile skins.",
     version=metadata.version("kappaskin"),
-    help_format="markdown",
+    help_format="plaintext",  # of the list; a parser of Markdown takes as long as all else
     group_commands=Group("Options", sort_key=9),
 )
 # A panel of the help for each group: its module, which holds its commands and loads no room before
@@ -34,8 +34,15 @@ _PANELS = {
 _GROUPS = {panel: Group(panel, sort_key=place) for place, panel in enumerate(_PANELS, 1)}
 for _panel, (_module, _names) in _PANELS.items():
     for _name in _names.split():
-        app.command(f"kappaskin.cli.{_module}:{_name}", name=_name, group=_GROUPS[_panel])
-app.command("kappaskin.cli.system:install_completion", name="--install-completion")
+        app.command(
+            f"kappaskin.cli.{_module}:{_name}",
+            name=_name,
+            group=_GROUPS[_panel],
+            help_format="markdown",
+        )
+app.command(
+    "kappaskin.cli.system:install_completion", name="--install-completion", help_format="markdown"
+)
 
 
 def _add_commands() -> None:
