@@ -1,8 +1,6 @@
-"""The comparison: works with known answers, each done every way, with errors, time and memory."""
+"""Questions with known answers, each answered by every solver: errors, time and memory."""
 
-import statistics
-import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle, groupby
@@ -26,33 +24,33 @@ from kappaskin.studies.compare.solvers import (
     scikit_fem,
     slopes_solver,
 )
-from kappaskin.studies.cost.bench import seconds, traced
+from kappaskin.studies.cost.bench import medians_in_turn, seconds, traced
 from kappaskin.studies.paper import LoadCase, fingertip_scene
 
 WITHIN = 1e-2
-"""RMS error of a plate's deflection that every way is to reach, as a share of the deflection's."""
+"""RMS error that every solver of a plate must reach, as a share of the RMS deflection."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A question whose answer is known, and the `ways` to answer it, ours first.
+    """A question whose answer is known, and the `solvers` of it, ours first.
 
     `points` (G, 2) in m are those of the surface and last the load's place, `truth` (G,) in m what
-    is there. `asked` is the question without noise, `draws` are those that are timed; `noisy` are
-    they when they are the same question with noise.
+    is there. `question` is without noise, `draws` are those that are timed; `noisy` is whether they
+    are the same question with noise.
     """
 
     name: str
-    ways: Mapping[str, Callable[[], Solver]]
-    asked: Any
+    solvers: Mapping[str, Callable[[], Solver]]
+    question: Any
     draws: Sequence[Any] | Array
     noisy: bool
     points: Array
     truth: Array
 
-    def errors(self, way: Solver, unknowns: Array) -> tuple[Array, Array]:
+    def errors(self, solver: Solver, unknowns: Array) -> tuple[Array, Array]:
         """Signed error at the load and RMS over the surface, (T,) each in mm, of (T, U)."""
-        off = 1e3 * ((way.at(self.points) @ unknowns.T).T - self.truth)
+        off = 1e3 * ((solver.at(self.points) @ unknowns.T).T - self.truth)
         return off[:, -1], np.sqrt(np.mean(off[:, :-1] ** 2, axis=1))
 
 
@@ -118,7 +116,7 @@ _PLATES: dict[str, tuple[Callable[[Plate, int], Solver], range]] = {
 
 
 def _pressed() -> Comparison:
-    """A plate that a fingertip presses in by 1 mm, by the coarsest of each way that is enough."""
+    """A plate pressed in by 1 mm, with the coarsest of each solver that is accurate enough."""
     patch = Patch(0.1, 0.1)
     plate, load = Plate(patch), GaussianLoad(0.04, 0.055, 5e-3)
     exact = _series(plate, _EXACT)
@@ -128,16 +126,16 @@ def _pressed() -> Comparison:
     truth = exact.at(points) @ exact.solve(load)
     draws = [load.shifted(dx, 0.0) for dx in np.linspace(-0.01, 0.01, 8).tolist()]
     name = f"A plate under a fingertip, within {WITHIN:.0%}"
-    work = Comparison(name, {}, load, draws, False, points, truth)
-    return replace(work, ways=dict(_coarsest(work, plate)))
+    comparison = Comparison(name, {}, load, draws, False, points, truth)
+    return replace(comparison, solvers=dict(_coarsest(comparison, plate)))
 
 
-def _coarsest(work: Comparison, plate: Plate) -> Generator[tuple[str, Callable[[], Solver]]]:
-    enough = WITHIN * 1e3 * float(np.sqrt(np.mean(work.truth[:-1] ** 2)))
+def _coarsest(comparison: Comparison, plate: Plate) -> Generator[tuple[str, Callable[[], Solver]]]:
+    enough = WITHIN * 1e3 * float(np.sqrt(np.mean(comparison.truth[:-1] ** 2)))
     for name, (make, sizes) in _PLATES.items():
         for size in sizes:
-            way = make(plate, size)
-            if work.errors(way, way.solve(work.asked)[None])[1] <= enough:
+            solver = make(plate, size)
+            if comparison.errors(solver, solver.solve(comparison.question)[None])[1] <= enough:
                 yield name.format(size), partial(make, plate, size)
                 break
 
@@ -155,22 +153,25 @@ def comparisons() -> Generator[Comparison]:
     yield _pressed()
 
 
-_TURNS, _BUDGET = (7, 201), 0.1  # least and most that are timed of a work, and about how long in s
+_TURNS, _BUDGET = (
+    (7, 201),
+    0.1,
+)  # least and most answers timed, and about how long in s
 
 
-# Every way through a work: how far off it comes out, how long it takes, what it holds
+# Every solver in a comparison: its errors, its time, its memory
 
 
 @dataclass(frozen=True)
 class ComparisonRow:
-    """One way through one work; lengths in mm, times in s, memory in bytes.
+    """One solver in one comparison; lengths in mm, times in s, memory in bytes.
 
     `error_bars` is whether the answers have some, None where there is no noise.
     `e_mm` and `rms_mm` are means over draws with noise of the signed error at the load and of the
     RMS error over the skin, `e_sd_mm` is that error's standard deviation; None where there is no
     noise. Those of exact readings are `exact`. `setup_s` goes to the first answer, `frame_s` is the
-    median of the next ones, and `ratio` is that over the median of our first way. `memory_bytes` is
-    the most that the set-up and an answer held at once.
+    median of the next ones, and `ratio` is that over the median of our first solver.
+    `memory_bytes` is the most that the set-up and an answer held at once.
     """
 
     work: str
@@ -189,63 +190,60 @@ class ComparisonRow:
 
 
 def compared() -> list[ComparisonRow]:
-    """All works by all ways; raises a `Refusal` when what they need is not installed."""
+    """All comparisons with all solvers; raises a `Refusal` when what they need is not installed."""
     scikit_fem()  # at once, not after half of the work
-    return [row for work in comparisons() for row in _through(work)]
+    return [row for comparison in comparisons() for row in _through(comparison)]
 
 
-def _through(work: Comparison) -> list[ComparisonRow]:
-    made = [_first_answer(make, work.asked) for make in work.ways.values()]
-    medians = _medians([way for way, _, _ in made], work.draws)
+def _through(comparison: Comparison) -> list[ComparisonRow]:
+    made = [_first_answer(make, comparison.question) for make in comparison.solvers.values()]
+    answering = [partial(_answer_next, solver, cycle(comparison.draws)) for solver, _, _ in made]
+    medians = medians_in_turn(answering, _TURNS, _BUDGET)
     return [
         ComparisonRow(
-            work.name,
+            comparison.name,
             by,
-            way.count,
-            way.error_bars if work.noisy else None,
-            *_errors(work, way),
+            solver.count,
+            solver.error_bars if comparison.noisy else None,
+            *_errors(comparison, solver),
             setup,
             median,
             median / medians[0],
             memory,
         )
-        for by, (way, setup, memory), median in zip(work.ways, made, medians, strict=True)
+        for by, (solver, setup, memory), median in zip(
+            comparison.solvers, made, medians, strict=True
+        )
     ]
 
 
 def _errors(
-    work: Comparison, way: Solver
+    comparison: Comparison, solver: Solver
 ) -> tuple[float, float, float | None, float | None, float | None]:
-    found = way.solve(work.asked)[None]
-    if not work.noisy:
-        (e,), (rms,) = work.errors(way, found)
+    found = solver.solve(comparison.question)[None]
+    if not comparison.noisy:
+        (e,), (rms,) = comparison.errors(solver, found)
         return float(e), float(rms), None, None, None
-    e, rms = work.errors(way, np.vstack([found, way.solve(work.draws)]))
+    e, rms = comparison.errors(solver, np.vstack([found, solver.solve(comparison.draws)]))
     noisy = float(e[1:].mean()), float(e[1:].std(ddof=1)), float(rms[1:].mean())
     return float(e[0]), float(rms[0]), *noisy
 
 
-def _first_answer(make: Callable[[], Solver], asked: Any) -> tuple[Solver, float, int]:
-    """A way that has answered once, the seconds until then and the bytes."""
+def _answer_next(solver: Solver, draws: Iterator[Any]) -> list[float]:
+    """Seconds of the answer to the next of the `draws`."""
+    return [seconds(solver.solve, next(draws))]
+
+
+def _first_answer(make: Callable[[], Solver], question: Any) -> tuple[Solver, float, int]:
+    """A solver that has answered once, the seconds until then and the bytes."""
 
     def answered() -> Solver:
-        way = make()
-        way.solve(asked)
-        return way
+        solver = make()
+        solver.solve(question)
+        return solver
 
-    way, memory = traced(answered)
-    return way, seconds(answered), memory + way.kept
-
-
-def _medians(ways: Sequence[Solver], draws: Iterable[Any]) -> list[float]:
-    """Median seconds of each way's answers to the `draws`, in turn with the others."""
-    each, (least, most) = cycle(draws), _TURNS
-    taken: list[list[float]] = []
-    end = time.perf_counter() + _BUDGET
-    while len(taken) < least or (len(taken) < most and time.perf_counter() < end):
-        one = next(each)
-        taken.append([seconds(way.solve, one) for way in ways])
-    return [statistics.median(times) for times in zip(*taken, strict=True)]
+    solver, memory = traced(answered)
+    return solver, seconds(answered), memory + solver.kept
 
 
 # The comparison as text for people

@@ -3,7 +3,7 @@
 import statistics
 import time
 import tracemalloc
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import cycle
@@ -255,15 +255,34 @@ def _medians(
     M = fit.M[used].astype(fit.dtype)
     K = exact[0].ravel()[used].astype(fit.dtype)
     frames = cycle(read)
-    ours: list[float] = []
-    theirs: list[float] = []
-    calls, least, most = 1, *_TURNS
-    end = time.perf_counter() + _BUDGET
-    while len(theirs) < least or (len(theirs) < most and time.perf_counter() < end):
-        ours += [seconds(fit, next(frames)) for _ in range(calls)]
-        theirs.append(seconds(np.linalg.lstsq, M, K))
-        calls = _CALLS if ours[0] < _SLOW else 1
-    return statistics.median(ours), statistics.median(theirs)
+    calls = _CALLS if seconds(fit, next(frames)) < _SLOW else 1
+    ours, theirs = medians_in_turn(
+        [
+            lambda: [seconds(fit, next(frames)) for _ in range(calls)],
+            lambda: [seconds(np.linalg.lstsq, M, K)],
+        ],
+        _TURNS,
+        _BUDGET,
+    )
+    return ours, theirs
+
+
+def medians_in_turn(
+    timed: Sequence[Callable[[], Iterable[float]]], turns: tuple[int, int], budget: float
+) -> list[float]:
+    """Median seconds of each of the things that are `timed` turn by turn, all in every turn.
+
+    So what else the machine does slows all of them alike. `turns` are the least and the most; after
+    about `budget` seconds no more than the least are begun.
+    """
+    taken = [list[float]() for _ in timed]
+    (least, most), end = turns, time.perf_counter() + budget
+    for turn in range(most):
+        if turn >= least and time.perf_counter() >= end:
+            break
+        for times, run in zip(taken, timed, strict=True):
+            times += run()
+    return [statistics.median(times) for times in taken]
 
 
 def seconds(call: Callable[..., object], *arguments: object) -> float:
