@@ -338,7 +338,7 @@ def test_effects_that_cannot_be_told_take_nothing_from_the_settings(run, monkeyp
     monkeypatch.setattr(kappaskin.studies, "usual_setting", refuse)
     code, printed, _ = run("cost")
     assert code == 0
-    assert printed.endswith("What each effect costs cannot be told: expected more\n")
+    assert printed.endswith("What each effect costs cannot be measured: expected more\n")
 
 
 @pytest.mark.parametrize(
