@@ -366,7 +366,7 @@ def _table_line(row: dict[str, Any]) -> str:
     return (
         f"{row['case']:<12}{'yes' if row['noise'] else 'no':<7}{row['w_applied_mm']:>8.2f}"
         f"{row['w_max_mm']:>8.3f} {bracketed('w_max_mm', '.2f'):<7}"
-        f"{row['e_max_mm']:>+10.3f}{spread:<8} {bracketed('e_max_mm', '+.2f'):<8}"
+        f"{row['e_max_mm']:>+z10.3f}{spread:<8} {bracketed('e_max_mm', '+.2f'):<8}"
         f"{row['rms_mm']:>8.4f} {bracketed('rms_mm', '.3f'):<8}"
         + (f"{paper('experiment_w_max_mm', '.2f'):>8}" if row["table"] == 2 else on_slopes)
     ).rstrip()
