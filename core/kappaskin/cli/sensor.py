@@ -132,10 +132,10 @@ def tare(source: str, *, undo: Switch = False) -> None:
         taken = _taken(opened, sensor, used)
     _tell(taken, used)
     if sensor.simulated:
-        print("not kept: the sensor is simulated")
+        print("not saved: the sensor is simulated")
     else:
         tares.add(taken)
-        print(f"kept in {tares.path(sensor.serial_number)}")
+        print(f"saved in {tares.path(sensor.serial_number)}")
 
 
 def _answering(source: "Source") -> "Sensor":
