@@ -94,12 +94,13 @@ def test_every_exported_name_is_what_type_checkers_see(face):
     assert set(face.__all__) <= set(dir(face))
 
 
-def test_every_exported_name_is_there_and_is_no_room():
-    rooms = {module.name for module in pkgutil.iter_modules(kappaskin.__path__)}
+@pytest.mark.parametrize("face", [kappaskin, kappaskin.studies])
+def test_every_exported_name_is_there_and_is_no_module(face):
+    modules = {module.name for module in pkgutil.iter_modules(face.__path__)}
 
-    for name in kappaskin.__all__:
-        assert hasattr(kappaskin, name)  # or raises what its room does
-    assert not rooms & set(kappaskin.__all__)
+    for name in face.__all__:
+        assert hasattr(face, name)  # or raises what its module does
+    assert not modules & set(face.__all__)
 
 
 def test_a_misspelt_name_is_refused_as_of_any_module():
