@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
@@ -15,7 +16,7 @@ import pytest
 
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
 from kappaskin.cli import app
-from kappaskin.cli.common import REFUSED
+from kappaskin.cli.common import REFUSED, ProgressLine
 from kappaskin.estimation import METHODS
 
 pytestmark = pytest.mark.slow
@@ -268,6 +269,26 @@ def test_the_help_shows_the_commands_in_panels(run, panel, commands) -> None:
 
     lines = printed.partition(f"─ {panel} ─")[2].partition("╰")[0].splitlines()[1:]
     assert {line.split()[1] for line in lines if line[2:3] != " "} == commands
+
+
+def test_progress_is_one_line_that_changes_on_a_terminal(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+
+    with ProgressLine() as show_progress:
+        show_progress("half")
+        show_progress("done")
+
+    assert capsys.readouterr().err == "\r\x1b[Khalf\r\x1b[Kdone\n"
+
+
+@pytest.mark.parametrize(("log_every", "printed"), [(0.0, "half\ndone\n"), (60.0, "")])
+def test_progress_in_a_log_is_a_line_now_and_then(capsys, log_every, printed) -> None:
+    with ProgressLine(log_every) as show_progress:
+        for line in ("half", "done"):
+            time.sleep(1e-3)
+            show_progress(line)
+
+    assert capsys.readouterr().err == printed
 
 
 @pytest.mark.parametrize("name", ["reconstruct", "tables"])

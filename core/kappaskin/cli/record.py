@@ -48,7 +48,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     source
         `sim:`, `sim:SCENE`, or a port or URL for pyserial.
     out
-        The file, which must not be there yet.
+        The file; it must not exist yet.
     seconds
         How long to record.
     """
@@ -241,9 +241,9 @@ def repair(file: Path, *, out: Path) -> int:
     Parameters
     ----------
     file
-        The recording; it stays as it is.
+        The recording; it is not changed.
     out
-        The new one, which must not be there yet.
+        The new recording; it must not exist yet.
     """
     from kappaskin.recording import Repaired, repairing
 
@@ -268,7 +268,7 @@ def export(
 ) -> None:
     """Export a recording: readings and estimates as a table, or the skin's surface as a mesh.
 
-    The suffix says what is written. A .csv, .npz or .h5 has a row for each frame: counts, readings,
+    The suffix selects the format. A .csv, .npz or .h5 has a row for each frame: counts, readings,
     coefficients, contact and geometry with their error bars, recomputed from the recorded bytes
     with the recorded settings. A .vtp or .stl is the skin in space at one moment, a .pvd a
     series of .vtp files. Every file states units, settings, calibration, tare and device.
@@ -280,7 +280,7 @@ def export(
     recording
         The recording to read.
     to
-        The file to write; refused where it is there already.
+        The file to write; refused where it exists already.
     begin
         Start, in seconds since the recording began.
     until
