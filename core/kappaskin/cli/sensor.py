@@ -14,7 +14,7 @@ from kappaskin.cli.common import FAILED, Switch, check_time, print_json, stops
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
-    from kappaskin.calibration import Tare
+    from kappaskin.calibration import Rest, Tare, Taring
     from kappaskin.sensing import Sensor
     from kappaskin.sources import Source
 
@@ -117,7 +117,9 @@ def tare(source: str, *, undo: Switch = False) -> None:
     undo
         Stop using this sensor's tare instead of taking one.
     """
-    from kappaskin.calibration import Tares, data_folder
+    # All of it before the source is opened: while modules load, readings wait.
+    from kappaskin.calibration import Tares, Taring, data_folder
+    from kappaskin.contact import LoadSeeker
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
     from kappaskin.sources import open_source
 
@@ -129,8 +131,11 @@ def tare(source: str, *, undo: Switch = False) -> None:
             print(f"{sensor.name} {sensor.serial_number}: no tare is in use")
             return
         used = None if sensor.simulated else tares.load(sensor.serial_number).fit_for(sensor)
-        taken = _taken(opened, sensor, used)
-    _tell(taken, used)
+        taring = Taring(sensor, time.monotonic())
+        _take_readings(opened, sensor, taring)
+        now = datetime.now().astimezone()
+        taken = taring.tare(LoadSeeker(sensor), _rest(sensor, used), now, opened.temperature)
+    _print_tare(taken, used)
     if sensor.simulated:
         print("not saved: the sensor is simulated")
     else:
@@ -146,25 +151,25 @@ def _answering(source: "Source") -> "Sensor":
     return source.sensor
 
 
-def _taken(source: "Source", sensor: "Sensor", used: "Tare | None") -> "Tare":
-    import numpy as np
-
-    from kappaskin.calibration import Rest, Taring
-    from kappaskin.contact import LoadSeeker
-
-    taring = Taring(sensor, time.monotonic())
+def _take_readings(source: "Source", sensor: "Sensor", taring: "Taring") -> None:
     while not taring.done(time.monotonic()):
         for frame in source.read(_READ):
             taring.take(frame.device_time, frame.host_time, sensor.nominal(frame))
         if source.sensor is not sensor:
             raise Refusal("another device answered, or the same one anew; tare again")
+
+
+def _rest(sensor: "Sensor", used: "Tare | None") -> "Rest":
+    """What the sensor reads at rest as far as is known: the tare that is in use."""
+    import numpy as np
+
+    from kappaskin.calibration import Rest
+
     zero = np.zeros(sensor.channels) if used is None else used.offset
-    rest = Rest(zero, np.zeros(sensor.channels), used)
-    now = datetime.now().astimezone()
-    return taring.tare(LoadSeeker(sensor), rest, now, source.temperature)
+    return Rest(zero, np.zeros(sensor.channels), used)
 
 
-def _tell(taken: "Tare", before: "Tare | None") -> None:
+def _print_tare(taken: "Tare", before: "Tare | None") -> None:
     """Print the tare that was taken, and how far it is from the one in use before."""
     import numpy as np
 
