@@ -56,9 +56,22 @@ def test_a_command_that_is_typed_loads_what_it_needs_alone():
     loaded = loaded_by("from kappaskin.cli import main\nmain(['device', '--help'])")
 
     commands = {name.split(".")[2] for name in loaded if name.startswith("kappaskin.cli.")}
-    assert commands == {"common", "device"}
+    assert commands == {"common", "sensor"}
     assert "kappaskin_app" not in loaded
     assert "kappaskin.studies" not in loaded
+
+
+@pytest.mark.parametrize("arguments", [["--help"], [], ["study", "--help"], ["app", "--help"]])
+def test_the_help_loads_no_room(arguments):
+    loaded = loaded_by(f"from kappaskin.cli import main\nmain({arguments!r})")
+
+    ours = {name for name in loaded if name.startswith("kappaskin.")}
+    rooms = {name.split(".")[1] for name in ours} - {"cli", "errors", "_lazy"}
+    assert rooms <= {"studies"}  # for the names of the figures alone
+    assert {name for name in ours if name.startswith("kappaskin.studies.")} <= {
+        "kappaskin.studies.figures"
+    }
+    assert not {"numpy", "scipy", "matplotlib", "PySide6", "vtkmodules"} & loaded
 
 
 @pytest.mark.parametrize("face", [kappaskin, kappaskin.studies])
@@ -81,12 +94,13 @@ def test_every_exported_name_is_what_type_checkers_see(face):
     assert set(face.__all__) <= set(dir(face))
 
 
-def test_every_exported_name_is_there_and_is_no_room():
-    rooms = {module.name for module in pkgutil.iter_modules(kappaskin.__path__)}
+@pytest.mark.parametrize("face", [kappaskin, kappaskin.studies])
+def test_every_exported_name_is_there_and_is_no_module(face):
+    modules = {module.name for module in pkgutil.iter_modules(face.__path__)}
 
-    for name in kappaskin.__all__:
-        assert hasattr(kappaskin, name)  # or raises what its room does
-    assert not rooms & set(kappaskin.__all__)
+    for name in face.__all__:
+        assert hasattr(face, name)  # or raises what its module does
+    assert not modules & set(face.__all__)
 
 
 def test_a_misspelt_name_is_refused_as_of_any_module():

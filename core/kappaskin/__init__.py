@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from kappaskin.calibration import elements_to_press as elements_to_press
     from kappaskin.calibration import load_calibration as load_calibration
     from kappaskin.calibration import save_calibration as save_calibration
-    from kappaskin.cli.machine import examine as examine
+    from kappaskin.cli.system import examine as examine
     from kappaskin.contact import NO_OBJECT as NO_OBJECT
     from kappaskin.contact import ContactObject as ContactObject
     from kappaskin.contact import ForceTorqueSensor as ForceTorqueSensor
@@ -176,10 +176,10 @@ if TYPE_CHECKING:
     from kappaskin.studies import FIGURES as FIGURES
     from kappaskin.studies import Check as Check
     from kappaskin.studies import Cost as Cost
+    from kappaskin.studies import CostMeasurement as CostMeasurement
     from kappaskin.studies import Design as Design
     from kappaskin.studies import EffectCost as EffectCost
-    from kappaskin.studies import Effects as Effects
-    from kappaskin.studies import Measuring as Measuring
+    from kappaskin.studies import EffectCosts as EffectCosts
     from kappaskin.studies import Prospect as Prospect
     from kappaskin.studies import Refused as Refused
     from kappaskin.studies import Setting as Setting
@@ -188,7 +188,7 @@ if TYPE_CHECKING:
     from kappaskin.studies import costs as costs
     from kappaskin.studies import effect_costs as effect_costs
     from kappaskin.studies import frontier as frontier
-    from kappaskin.studies import plan_told as plan_told
+    from kappaskin.studies import plan_updates as plan_updates
     from kappaskin.studies import prospect as prospect
     from kappaskin.studies import settings_to_try as settings_to_try
     from kappaskin.studies import write_figures as write_figures
@@ -204,7 +204,7 @@ else:
                 "Tare Tares Verdict calibrate data_folder elements_to_press load_calibration "
                 "save_calibration"
             ),
-            "cli.machine": "examine",
+            "cli.system": "examine",
             "contact": (
                 "ContactObject ForceTorqueSensor IntrinsicContact IntrinsicTouch NO_OBJECT "
                 "ObjectFinder PointContact Wrench local_geometry placed"
@@ -242,8 +242,8 @@ else:
             "skin": "Disk Distances Patch Polygon between distances onto_rim",
             "sources": "LISTS Port serial_ports",
             "studies": (
-                "Check Cost Design EffectCost Effects FIGURES Measuring Prospect Refused "
-                "Setting cheapest check costs effect_costs frontier plan_told prospect "
+                "Check Cost CostMeasurement Design EffectCost EffectCosts FIGURES Prospect Refused "
+                "Setting cheapest check costs effect_costs frontier plan_updates prospect "
                 "settings_to_try write_figures"
             ),
         },

@@ -14,7 +14,7 @@ _BARE = Path(__file__).with_name("bare_window.py")
 
 def _import(statement: str) -> float:
     start = time.perf_counter()
-    subprocess.run([sys.executable, "-c", statement], check=True)
+    subprocess.run([sys.executable, "-c", statement], check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - start
 
 
@@ -34,6 +34,16 @@ def test_importing_the_library_costs_little_more_than_numpy_and_scipy(figure, ra
     figure(f"{ours}: {times:.2f} times {theirs}")
     asked = 2.0 if "Engine" in ours else 1.5
     ratio(f"{ours}, against NumPy and SciPy", times, at_most=asked)
+
+
+def test_the_help_of_the_command_costs_little_more_than_numpy(figure, ratio) -> None:
+    helped = "from kappaskin.cli import main; main(['--help'])"
+    taken = [(_import(helped), _import("import numpy")) for _ in range(9)]
+    own, numpy = (statistics.median(times) for times in zip(*taken, strict=True))
+    figure(f"kappaskin --help: {own:.2f} s, {own / numpy:.2f} times import numpy")
+    # What a person does not notice is allowed on a machine where NumPy is there at once.
+    ratio("kappaskin --help, of 2.5 times import numpy or 0.35 s", own / max(2.5 * numpy, 0.35),
+          at_most=1)  # fmt: skip
 
 
 def _drawn(script: Path) -> tuple[float, float]:

@@ -8,9 +8,10 @@ import psutil
 
 from kappaskin import LeastSquares, Simulator, SineBasis, load_scene
 from kappaskin.pipeline import reconstruct
-from kappaskin.studies import Folder, processes, run_study
+from kappaskin.studies import StudyFolder, run_study
+from kappaskin.studies.design.results import BlockTask, run_task, version
+from kappaskin.studies.design.run import processes
 from kappaskin.studies.design.study import read_study
-from kappaskin.studies.design.task import Task, run, version
 
 TEXT = """
 format = 1
@@ -40,7 +41,7 @@ def study_of(frames, blocks):
 
 
 def task_of(study, block):
-    return Task(next(study.points()).document, block, version())
+    return BlockTask(next(study.points()).document, block, version())
 
 
 def test_draws_against_a_loop_over_reconstruct(figure, ratio, medians, tmp_path):
@@ -51,7 +52,7 @@ def test_draws_against_a_loop_over_reconstruct(figure, ratio, medians, tmp_path)
     grid, fit = patch.grid(101, 101), LeastSquares(SineBasis(patch, 8, 8), scene.layout)
     fitted, true = fit.basis.on_grid(*grid), scene.basis.on_grid(*grid)(truth.coefficients)
     blocks = iter(range(10_000))
-    run(task_of(study, next(blocks)))
+    run_task(task_of(study, next(blocks)))
 
     def by_reconstruct():
         curvature = simulator.reading(scan, 0.0)[1].reshape(3, -1)
@@ -63,7 +64,7 @@ def test_draws_against_a_loop_over_reconstruct(figure, ratio, medians, tmp_path)
         return np.sqrt(np.mean((fitted(fit(curvature).coefficients) - true) ** 2))
 
     def by_study():
-        return run(task_of(study, next(blocks)))
+        return run_task(task_of(study, next(blocks)))
 
     whole, bare, block = medians(by_reconstruct, by_estimator, by_study, turns=15, calls=2)
     figure(
@@ -85,7 +86,7 @@ def computed(study, folder, workers):
             most = max(p.memory_info().rss for p in (own, *own.children(recursive=True)))
 
     began = time.perf_counter()
-    run_study(study, Folder.opened(folder, study), workers, tell)
+    run_study(study, StudyFolder.opened(folder, study), workers, tell)
     return time.perf_counter() - began, most
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
-from kappaskin.studies.drills.held import Held
+from kappaskin.studies.drills.stand import ProcessResources
 from kappaskin_app.features import FEATURES
 from kappaskin_app.shell.window import MainWindow
 
@@ -56,7 +56,7 @@ def main(times: int) -> None:
     for _ in range(times):
         _cycle(application)
         blocks = sum(Path("/dev/shm", name).exists() for name in names)
-        held.append({**asdict(Held.now()), "blocks": blocks})
+        held.append({**asdict(ProcessResources.now()), "blocks": blocks})
     print(json.dumps(held))
 
 

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
@@ -15,7 +16,8 @@ import pytest
 
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
 from kappaskin.cli import app
-from kappaskin.cli.common import REFUSED
+from kappaskin.cli.common import REFUSED, ProgressLine
+from kappaskin.estimation import METHODS
 
 pytestmark = pytest.mark.slow
 
@@ -248,6 +250,81 @@ def test_every_subcommand_shows_an_example_in_its_help(run) -> None:
         code, text, told = run(name, "--help")
         assert (code, told) == (0, "")
         assert "Example" in text, name
+
+
+@pytest.mark.parametrize(
+    ("panel", "commands"),
+    [
+        ("Live", {"app", "demo", "replay", "publish", "listen"}),
+        ("Recordings", {"record", "info", "verify", "repair", "export", "reconstruct"}),
+        ("Sensor", {"calibrate", "tare", "press", "monitor", "device"}),
+        ("Studies", {"plan", "simulate", "cost", "compare", "stability", "regions", "study",
+                     "report"}),
+        ("Paper", {"tables", "figures"}),
+        ("System", {"doctor", "drill"}),
+    ],
+)  # fmt: skip
+def test_the_help_shows_the_commands_in_panels(run, panel, commands) -> None:
+    _, printed, _ = run("--help")
+
+    lines = printed.partition(f"─ {panel} ─")[2].partition("╰")[0].splitlines()[1:]
+    assert {line.split()[1] for line in lines if line[2:3] != " "} == commands
+
+
+def test_progress_is_one_line_that_changes_on_a_terminal(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+
+    with ProgressLine() as show_progress:
+        show_progress("half")
+        show_progress("done")
+
+    assert capsys.readouterr().err == "\r\x1b[Khalf\r\x1b[Kdone\n"
+
+
+@pytest.mark.parametrize(("log_every", "printed"), [(0.0, "half\ndone\n"), (60.0, "")])
+def test_progress_in_a_log_is_a_line_now_and_then(capsys, log_every, printed) -> None:
+    with ProgressLine(log_every) as show_progress:
+        for line in ("half", "done"):
+            time.sleep(1e-3)
+            show_progress(line)
+
+    assert capsys.readouterr().err == printed
+
+
+@pytest.mark.parametrize("name", ["reconstruct", "tables"])
+def test_the_method_that_is_used_when_none_is_named_is_the_first(name) -> None:
+    arguments = {one.name: one for one in app[name].assemble_argument_collection()}
+
+    assert arguments["--method"].field_info.default == next(iter(METHODS))
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_can_be_installed(tmp_path, shell) -> None:
+    home = {**os.environ, "HOME": str(tmp_path)}
+    for name in ("ZSH_CUSTOM", "XDG_DATA_HOME", "XDG_CONFIG_HOME", "ZDOTDIR"):
+        home.pop(name, None)
+
+    found = outside("--install-completion", "--shell", shell, env=home)
+
+    assert (found.returncode, found.stderr) == (0, "")
+    file, _, message = found.stdout.partition(": ")
+    assert message == "installed; open a new shell to use it\n"
+    assert Path(file).is_relative_to(tmp_path)
+    script = Path(file).read_text()
+    assert "stability" in script
+    assert "replay" in script
+    assert "--as-printed" in script or "as-printed" in script
+
+
+def test_a_home_that_cannot_be_written_gets_no_completion(tmp_path) -> None:
+    (tmp_path / ".local").write_text("in the way")
+
+    found = outside(
+        "--install-completion", "--shell", "bash", env={**os.environ, "HOME": str(tmp_path)}
+    )
+
+    assert found.returncode == REFUSED
+    assert found.stderr.startswith("kappaskin: completion cannot be written")
 
 
 def test_the_version_is_that_of_the_distribution(run) -> None:

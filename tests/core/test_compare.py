@@ -7,18 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import kappaskin.cli.compare
+import kappaskin.studies
 import kappaskin_resources
 from kappaskin import GaussianLoad, Patch, Plate, SineBasis, load_scene
 from kappaskin.cli import main
 from kappaskin.cli.common import REFUSED
 from kappaskin.studies import compared, compared_text
-from kappaskin.studies.compare.elements import bent
-from kappaskin.studies.compare.slopes import integrated
-from kappaskin.studies.compare.solvers import iterated, lstsq, pinv
-from kappaskin.studies.compare.table import errors_text
-from kappaskin.studies.compare.works import WITHIN
-from kappaskin.studies.tables import Case, table_1
+from kappaskin.studies.compare.comparison import WITHIN, errors_text
+from kappaskin.studies.compare.solvers import (
+    lsqr_solver,
+    lstsq_solver,
+    pinv_solver,
+    plate_solver,
+    slopes_solver,
+)
+from kappaskin.studies.paper import LoadCase, table_1
 
 pytestmark = pytest.mark.slow
 
@@ -60,9 +63,9 @@ def test_our_rows_are_table_1s(rows, name):
     assert ours.rms_mm == pytest.approx(noisy["rms_mm"], rel=1e-9)
 
 
-@pytest.mark.parametrize("make", [lstsq, pinv, iterated])
+@pytest.mark.parametrize("make", [lstsq_solver, pinv_solver, lsqr_solver])
 def test_others_have_our_coefficients_where_readings_decide_them(make):
-    case = Case.of(load_scene("centre"), "least-squares", (8, 8))
+    case = LoadCase.of(load_scene("centre"), "least-squares", (8, 8))
     noisy = case.noisy()[:3]
 
     one, many = (make(case).solve(readings) for readings in (noisy[0], noisy))
@@ -84,13 +87,13 @@ def test_others_leave_out_of_a_bent_skin_what_bends_nothing(rows):
 
 def test_slopes_are_integrated_to_the_surface_they_belong_to():
     scene = load_scene("centre")
-    case = Case.of(scene, "least-squares", (8, 8))
+    case = LoadCase.of(scene, "least-squares", (8, 8))
     basis = SineBasis(scene.plate.patch, 3, 2)
     c = np.array([[1.0, -0.4], [0.3, 0.2], [-0.1, 0.15]])
     readings = (scene.layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
     points = np.random.default_rng(0).uniform(0, 0.1, (50, 2))
 
-    way = integrated(case)
+    way = slopes_solver(case)
 
     np.testing.assert_allclose(
         way.at(points) @ way.solve(readings), basis.at(points) @ c.ravel(), atol=2e-3
@@ -104,7 +107,7 @@ def test_finite_elements_bend_a_plate_as_the_series_does():
     mine = basis.at(points) @ plate.deflection([load], basis).ravel()
 
     for element, cells, off in (("Argyris", 6, 2e-4), ("Morley", 24, 2e-2)):
-        way = bent(plate, element, cells)
+        way = plate_solver(plate, element, cells)
         np.testing.assert_allclose(way.at(points) @ way.solve(load), mine, rtol=off)
 
 
@@ -133,7 +136,7 @@ def test_without_scikit_fem_it_says_what_to_install(monkeypatch, capsys):
 
 
 def test_the_command_prints_the_table_or_its_rows(rows, monkeypatch, capsys):
-    monkeypatch.setattr(kappaskin.cli.compare, "compared", lambda: rows)
+    monkeypatch.setattr(kappaskin.studies, "compared", lambda: rows)
 
     assert main(["compare"]) == 0
     assert capsys.readouterr().out == compared_text(rows) + "\n"

@@ -3,6 +3,7 @@
 import json
 import math
 import multiprocessing
+import sys
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
@@ -10,12 +11,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-import kappaskin.cli.cost
+import kappaskin.studies
 from kappaskin import (
     Amplifier,
     Cost,
     GaussianNoise,
-    Measuring,
     Orbit,
     Patch,
     Plate,
@@ -34,10 +34,17 @@ from kappaskin import (
 )
 from kappaskin.cli.common import FAILED, REFUSED
 from kappaskin.scenes import SCENES
-from kappaskin.studies import costs_text, length_of, rows, verdict, write_plot
+from kappaskin.studies import (
+    CostMeasurement,
+    accuracy_verdict,
+    cost_rows,
+    costs_text,
+    parse_length,
+    write_plot,
+)
 from kappaskin.studies.cost.bench import Bench
-from kappaskin.studies.cost.choice import ALIKE
-from kappaskin.studies.tables import fingertip_scene, table_1
+from kappaskin.studies.cost.settings import ALIKE
+from kappaskin.studies.paper import fingertip_scene, table_1
 
 pytestmark = pytest.mark.slow
 
@@ -348,7 +355,7 @@ def test_an_accuracy_that_cannot_be_is_refused(within) -> None:
     [("0.02mm", 2e-5), ("20um", 2e-5), ("20 µm", 2e-5), ("2e-5m", 2e-5), (" .02 MM ", 2e-5)],
 )
 def test_an_accuracy_is_a_number_with_its_unit(text, metres) -> None:
-    assert length_of(text) == pytest.approx(metres, rel=1e-12)
+    assert parse_length(text) == pytest.approx(metres, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -357,15 +364,15 @@ def test_an_accuracy_is_a_number_with_its_unit(text, metres) -> None:
 )  # fmt: skip
 def test_other_texts_are_no_accuracy(text) -> None:
     with pytest.raises(Refusal, match=r"with its unit, mm, um or m, such as 0\.02mm; got"):
-        length_of(text)
+        parse_length(text)
 
 
 def test_what_reaches_an_accuracy_is_named_with_its_figures(small) -> None:
-    found = verdict(CENTRE, small, 0.02e-3)
+    found = accuracy_verdict(CENTRE, small, 0.02e-3)
     assert found.reached
     assert found.cost == cheapest(small, 0.02e-3)
     assert found.cost.setting.elements == (10, 10)
-    said = "\n".join(found.said)
+    said = "\n".join(found.lines)
     assert said.startswith("0.02 mm is reached; with the least time by")
     assert "8 x 8 functions, float64, 10 x 10 elements, all 300 channels scanned" in said
     assert "1.5 ms of conversion" in said
@@ -374,18 +381,18 @@ def test_what_reaches_an_accuracy_is_named_with_its_figures(small) -> None:
 def test_of_another_sensor_it_is_said_that_it_is_one() -> None:
     own, other = cost_of(3e-5), cost_of(1e-5, setting=replace(EIGHT, elements=(16, 16)))
     slow = replace(other, conversion_time=3.84e-3, channels=768)
-    said = "\n".join(verdict(CENTRE, [own, slow], 2e-5).said)
+    said = "\n".join(accuracy_verdict(CENTRE, [own, slow], 2e-5).lines)
     assert "The scene's own elements do not reach it; nearest is" in said
     assert "may take 2 ms, not 3.84 ms: it needs a converter that takes 2.6 us" in said
     assert "at most 260 frames/s" in said
     few = replace(EIGHT, elements=(6, 6))
     cheap = cost_of(1.9e-5, conversion=1e-4, setting=few)
-    said = "\n".join(verdict(CENTRE, [replace(own, rms=1e-5), cheap], 2e-5).said)
+    said = "\n".join(accuracy_verdict(CENTRE, [replace(own, rms=1e-5), cheap], 2e-5).lines)
     assert "That is another sensor; with the scene's own elements" in said
 
 
 def test_arithmetic_that_is_too_slow_needs_a_faster_computer() -> None:
-    said = "\n".join(verdict(CENTRE, [cost_of(1e-5, time=4e-3)], 2e-5).said)
+    said = "\n".join(accuracy_verdict(CENTRE, [cost_of(1e-5, time=4e-3)], 2e-5).lines)
     assert "computing a frame may take 2 ms, not 4 ms: it needs a faster computer" in said
     assert "at most 250 frames/s" in said
 
@@ -393,8 +400,8 @@ def test_arithmetic_that_is_too_slow_needs_a_faster_computer() -> None:
 def test_where_noise_is_the_limit_readings_are_missing() -> None:
     # (5^2 - 0) / (1^2 - 0) = 25 times the readings: 5 times as many along each side.
     cost = cost_of(5e-5, rms_exact=0.0)
-    found = verdict(CENTRE, [cost], 1e-5)
-    said = "\n".join(found.said)
+    found = accuracy_verdict(CENTRE, [cost], 1e-5)
+    said = "\n".join(found.lines)
     assert (found.reached, found.cost) == (False, cost)
     assert "Missing are readings" in said
     assert "25 times as many" in said
@@ -405,32 +412,32 @@ def test_where_noise_is_the_limit_readings_are_missing() -> None:
 def test_more_readings_do_bring_the_accuracy_that_was_told() -> None:
     (cost,) = measured(CENTRE, EIGHT)
     within = 0.6 * cost.rms
-    said = "\n".join(verdict(CENTRE, [cost], within).said)
+    said = "\n".join(accuracy_verdict(CENTRE, [cost], within).lines)
     m = int(said.split("more elements: about ")[1].split(" x ")[0])
     (more,) = measured(CENTRE, replace(EIGHT, elements=(m, m)))
     assert more.rms == pytest.approx(within, rel=0.15)
 
 
 def test_where_functions_are_the_limit_they_are_missing() -> None:
-    found = verdict(CENTRE, [cost_of(5e-5, rms_exact=4e-5)], 1e-5)
-    said = "\n".join(found.said)
+    found = accuracy_verdict(CENTRE, [cost_of(5e-5, rms_exact=4e-5)], 1e-5)
+    said = "\n".join(found.lines)
     assert not found.reached
-    assert "Missing are functions, and elements that tell them apart" in said
+    assert "Missing are functions, and elements that distinguish them" in said
     assert "0.04 mm" in said
     assert "Neither a faster conversion nor more time helps" in said.replace("\n", " ")
 
 
 def test_where_nothing_gives_a_shape_that_is_said() -> None:
-    found = verdict(CENTRE, [Refused(EIGHT, "no")], 1e-5)
+    found = accuracy_verdict(CENTRE, [Refused(EIGHT, "no")], 1e-5)
     assert (found.reached, found.cost) == (False, None)
-    assert "No setting" in found.said[0]
+    assert "No setting" in found.lines[0]
 
 
 # Rows, text, picture
 
 
 def test_rows_are_json_with_the_frontier_marked(small) -> None:
-    told = rows(CENTRE, small)
+    told = cost_rows(CENTRE, small)
     assert json.loads(json.dumps(told, allow_nan=False)) == told
     assert len(told) == len(small) == len(SMALL)
     assert len({tuple(row) for row in told}) == 1
@@ -488,7 +495,7 @@ def test_a_plot_of_nothing_is_refused(tmp_path) -> None:
 
 def test_a_process_of_its_own_tells_the_same_errors_one_by_one() -> None:
     settings = EIGHT, replace(EIGHT, elements=(6, 6)), replace(EIGHT, functions=(4, 4))
-    with Measuring(CENTRE, settings) as measuring:
+    with CostMeasurement(CENTRE, settings) as measuring:
         found = [*measuring.poll(), *measuring.wait()]
         assert measuring.done
         assert measuring.poll() == []
@@ -498,7 +505,7 @@ def test_a_process_of_its_own_tells_the_same_errors_one_by_one() -> None:
 
 
 def test_measuring_ends_when_it_is_told_to() -> None:
-    with Measuring(CENTRE, settings_to_try(CENTRE)) as measuring:
+    with CostMeasurement(CENTRE, settings_to_try(CENTRE)) as measuring:
         assert isinstance(next(measuring.wait()), Cost)
     assert measuring.done
     assert measuring.poll() == []
@@ -506,11 +513,11 @@ def test_measuring_ends_when_it_is_told_to() -> None:
 
 def test_what_cannot_be_measured_is_refused_before_a_process_is_started() -> None:
     with pytest.raises(Refusal, match="is not pressed"):
-        Measuring(CENTRE.touched_by(), [EIGHT])
+        CostMeasurement(CENTRE.touched_by(), [EIGHT])
 
 
 def test_a_process_that_dies_is_told_of() -> None:
-    with Measuring(CENTRE, settings_to_try(CENTRE)) as measuring:
+    with CostMeasurement(CENTRE, settings_to_try(CENTRE)) as measuring:
         (child,) = [p for p in multiprocessing.active_children() if p.name == "kappaskin-cost"]
         child.kill()
         with pytest.raises(Refusal, match="ended unexpectedly; ask again"):
@@ -520,7 +527,7 @@ def test_a_process_that_dies_is_told_of() -> None:
 
 def test_what_was_measured_before_a_process_died_is_told_first() -> None:
     deadly = replace(EIGHT, functions=("eight", "eight"))
-    with Measuring(CENTRE, [EIGHT, deadly]) as measuring:
+    with CostMeasurement(CENTRE, [EIGHT, deadly]) as measuring:
         (child,) = [p for p in multiprocessing.active_children() if p.name == "kappaskin-cost"]
         child.join()
         (told,) = measuring.poll()
@@ -532,14 +539,14 @@ def test_what_was_measured_before_a_process_died_is_told_first() -> None:
 @pytest.fixture
 def few(monkeypatch) -> None:
     """The command tries little."""
-    monkeypatch.setattr(kappaskin.cli.cost, "settings_to_try", lambda scene: [EIGHT, *SMALL[:2]])
+    monkeypatch.setattr(kappaskin.studies, "settings_to_try", lambda scene: [EIGHT, *SMALL[:2]])
 
 
 @pytest.mark.usefixtures("few")
 def test_the_command_prints_rows_and_draws_and_tells_how_far_it_is(
     run, tmp_path, monkeypatch
 ) -> None:
-    monkeypatch.setattr(kappaskin.cli.cost.sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     plot = tmp_path / "cost.svg"
     code, printed, told = run("cost", "--scene", "centre", "--json", "--plot", plot)
     assert (code, told.count("\n")) == (0, 1)

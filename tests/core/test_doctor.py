@@ -8,8 +8,8 @@ import pytest
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
-from kappaskin.cli import machine as doctor
 from kappaskin.cli import main
+from kappaskin.cli import system as doctor
 
 pytestmark = pytest.mark.slow  # the first that asks for the system's name runs uname
 

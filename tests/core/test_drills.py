@@ -17,15 +17,26 @@ from kappaskin.cli import main
 from kappaskin.sources import BAUD_RATES, Information, Operation, Reply, Samples, information
 from kappaskin.sources.wire import Fault
 from kappaskin.studies import drills_text, run_drills
-from kappaskin.studies.drills.devices import DRILLS as OF_DEVICES
-from kappaskin.studies.drills.drill import Drill
-from kappaskin.studies.drills.held import Held
-from kappaskin.studies.drills.outcome import Outcome, judged
-from kappaskin.studies.drills.rewrite import Says, Times, untold
+from kappaskin.studies.drills.line import DEVICE_DRILLS as OF_DEVICES
+from kappaskin.studies.drills.relay import (
+    ClockShift,
+    CutScans,
+    FlippedBits,
+    Garbage,
+    InformationChange,
+    received_at,
+    without_information,
+)
 from kappaskin.studies.drills.run import DRILLS, row_of
-from kappaskin.studies.drills.spoil import Cut, Flips, Garbage
-from kappaskin.studies.drills.stand import Device, Stand, opened
-from kappaskin.studies.drills.uart import heard
+from kappaskin.studies.drills.stand import (
+    Device,
+    Drill,
+    DrillOutcome,
+    ProcessResources,
+    Stand,
+    judged,
+    opened,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -97,10 +108,12 @@ def test_a_line_that_does_not_recover_is_found(stand) -> None:
     stand.settle()
     stand.relay.spoil = lambda data: b""
     stand.recover(0.1)
-    assert judged(Outcome(recovered=stand.recovered), 0.1) == [
+    assert judged(DrillOutcome(recovered=stand.recovered), 0.1) == [
         "did not recover within 0.1 s; not at all"
     ]
-    assert judged(Outcome(recovered=2.0), 1.0) == ["did not recover within 1 s; not for 2.00 s"]
+    assert judged(DrillOutcome(recovered=2.0), 1.0) == [
+        "did not recover within 1 s; not for 2.00 s"
+    ]
 
 
 def test_reads_that_take_long_again_and_again_are_found_and_one_is_not(stand, monkeypatch) -> None:
@@ -119,9 +132,9 @@ def test_reads_that_take_long_again_and_again_are_found_and_one_is_not(stand, mo
 
 
 def test_what_leaks_is_found() -> None:
-    before = Held.now()
+    before = ProcessResources.now()
     ends = os.pipe()
-    grown = replace(Held.now(), memory=before.memory + 2**21)
+    grown = replace(ProcessResources.now(), memory=before.memory + 2**21)
     failures = [text for holds, text in grown.leaked(before, 2**20) if not holds]
     for end in ends:
         os.close(end)
@@ -136,7 +149,7 @@ def test_a_users_own_device_is_drilled_but_not_stopped(device) -> None:
 
 
 def test_a_drill_that_cannot_be_done_fails_with_the_reason(device) -> None:
-    def refused(stand: Stand) -> Outcome:
+    def refused(stand: Stand) -> DrillOutcome:
         raise SourceError("no frames come")
 
     row = row_of(Drill("none", "nothing", refused), device)
@@ -174,22 +187,22 @@ MESSAGE = bytes(range(256)) * 4
 
 @pytest.mark.parametrize("rate", BAUD_RATES)
 def test_a_uart_at_the_senders_rate_hears_what_was_sent(rate) -> None:
-    assert heard(MESSAGE, rate, rate) == MESSAGE
+    assert received_at(MESSAGE, rate, rate) == MESSAGE
 
 
 def test_a_uart_bears_a_rate_that_is_three_percent_off_and_no_more() -> None:
     # Nine and a half bits drift by half of one: at 5.3 %.
-    assert heard(MESSAGE, 1e6, 1.03e6) == heard(MESSAGE, 1e6, 0.97e6) == MESSAGE
-    assert heard(MESSAGE, 1e6, 1.08e6) != MESSAGE
-    assert heard(MESSAGE, 1e6, 0.92e6) != MESSAGE
+    assert received_at(MESSAGE, 1e6, 1.03e6) == received_at(MESSAGE, 1e6, 0.97e6) == MESSAGE
+    assert received_at(MESSAGE, 1e6, 1.08e6) != MESSAGE
+    assert received_at(MESSAGE, 1e6, 0.92e6) != MESSAGE
 
 
 def test_half_the_rate_hears_every_other_bit() -> None:
     # On the line 0xAA is 0 0101 0101 1, the start bit first. A receiver of half the rate samples
     # levels 3, 5, 7 and 9 of these, counted from 0, and then the silence.
-    assert heard(b"\xaa", 2.0, 1.0) == bytes([0b11111000])
+    assert received_at(b"\xaa", 2.0, 1.0) == bytes([0b11111000])
     # Read twice as fast, it is heard as 0 0 1 1 0 0 1 1 0 0 and so on, the first 0 as a start bit.
-    assert heard(b"\x55", 1.0, 2.0)[0] == 0b01100110
+    assert received_at(b"\x55", 1.0, 2.0)[0] == 0b01100110
 
 
 def test_garbage_takes_about_its_share() -> None:
@@ -199,29 +212,29 @@ def test_garbage_takes_about_its_share() -> None:
 
 
 def test_as_many_bits_turn_over_as_are_said_to() -> None:
-    spoil = Flips(1000, np.random.default_rng(0))
+    spoil = FlippedBits(1000, np.random.default_rng(0))
     flips = sum(int.from_bytes(spoil(bytes(500))).bit_count() for _ in range(500))
     assert flips == pytest.approx(500 * 500 * 8 / 1000, rel=0.1)
 
 
 def test_scans_are_cut_at_every_byte() -> None:
-    cut, scan = Cut(), b"\x4b\xa7\x01\x02" + bytes(20)
+    cut, scan = CutScans(), b"\x4b\xa7\x01\x02" + bytes(20)
     assert [len(cut(scan)) for _ in range(2 * 24)] == [n for k in range(24) for n in (k, 24)]
     assert cut(b"\x4b\xa7\x01\x01") == b"\x4b\xa7\x01\x01"
 
 
 def test_a_clock_that_is_ahead_is_so_in_pings_too() -> None:
     pong = Reply(1, 2.0, 7, Operation.PING, Fault.NONE, (2_000_000).to_bytes(8, "little") + b"\0\0")
-    [later] = Times(3.0)(pong)
+    [later] = ClockShift(3.0)(pong)
     assert later.time == 5.0
     assert int.from_bytes(later.data[:8], "little") == 5_000_000
-    assert Times(-3.0)(pong)[0].time == 0.0
+    assert ClockShift(-3.0)(pong)[0].time == 0.0
 
 
 def test_another_number_is_said_in_information_only() -> None:
     text = information.to_json(load_scene("centre").sensor())
-    [said] = Says("serial_number", "other")(Information(0, 0.0, text))
+    [said] = InformationChange("serial_number", "other")(Information(0, 0.0, text))
     assert information.from_json(said.text).serial_number == "other"
     scan = Samples(1, 0.0, np.arange(3), np.zeros(3, np.int32))
-    assert Says("serial_number", "other")(scan) == untold(scan) == [scan]
-    assert untold(said) == []
+    assert InformationChange("serial_number", "other")(scan) == without_information(scan) == [scan]
+    assert without_information(said) == []

@@ -8,12 +8,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-import kappaskin.cli.cost
-import kappaskin.studies.plan
+import kappaskin.studies
+import kappaskin.studies.simulation
 from kappaskin import (
     Cost,
     EffectCost,
-    Measuring,
     Refusal,
     Refused,
     Scene,
@@ -26,7 +25,7 @@ from kappaskin import (
 from kappaskin.cli.common import REFUSED
 from kappaskin.scenes import Choice, CorruptedFrames, Creep, DroppedFrames, GaussianNoise, plan
 from kappaskin.scenes.effects.temperature import Temperature
-from kappaskin.studies import effect_rows, effects_text, usual_setting
+from kappaskin.studies import CostMeasurement, effect_rows, effects_text, usual_setting
 
 pytestmark = pytest.mark.slow
 
@@ -39,7 +38,7 @@ FIGURES = ("rms_with", "rms_without")
 @pytest.fixture(autouse=True)
 def quick(monkeypatch) -> None:
     """Times are not what is tested here."""
-    monkeypatch.setattr(kappaskin.studies.plan, "_FRAMES", 1)
+    monkeypatch.setattr(kappaskin.studies.simulation, "_FRAMES", 1)
 
 
 def told(scene: Scene, setting: Setting | None = None) -> dict[str, EffectCost]:
@@ -289,7 +288,7 @@ def test_the_table_says_each_effect_in_a_line() -> None:
 
 def test_a_process_of_its_own_tells_of_effects_after_the_first_cost() -> None:
     settings = EIGHT, replace(EIGHT, functions=(4, 4))
-    with Measuring(CENTRE, settings, EIGHT) as measuring:
+    with CostMeasurement(CENTRE, settings, EIGHT) as measuring:
         costs_there = measuring.wait()
         assert next(costs_there).setting == EIGHT
         assert not measuring.effects
@@ -303,7 +302,7 @@ def test_a_process_of_its_own_tells_of_effects_after_the_first_cost() -> None:
 
 def test_a_setting_that_cannot_judge_effects_leaves_the_others_alone() -> None:
     many = replace(EIGHT, functions=(12, 12))
-    with Measuring(CENTRE, [], many) as measuring:
+    with CostMeasurement(CENTRE, [], many) as measuring:
         assert list(measuring.wait()) == []
     assert isinstance(measuring.effects[many], Refused)
     assert "140 of the 144" in measuring.effects[many].reason
@@ -323,7 +322,7 @@ def test_the_command_tells_of_effects_alone(run) -> None:
 
 
 def test_the_command_tells_people_of_effects_below_the_settings(run, monkeypatch) -> None:
-    monkeypatch.setattr(kappaskin.cli.cost, "settings_to_try", lambda scene: [EIGHT])
+    monkeypatch.setattr(kappaskin.studies, "settings_to_try", lambda scene: [EIGHT])
     code, printed, _ = run("cost")
     assert code == 0
     assert printed.index("1 settings tried") < printed.index("What each effect costs in the scene")
@@ -335,11 +334,11 @@ def test_effects_that_cannot_be_told_take_nothing_from_the_settings(run, monkeyp
     def refuse(scene: Scene) -> Setting:
         raise Refusal("expected more")
 
-    monkeypatch.setattr(kappaskin.cli.cost, "settings_to_try", lambda scene: [EIGHT])
-    monkeypatch.setattr(kappaskin.cli.cost, "usual_setting", refuse)
+    monkeypatch.setattr(kappaskin.studies, "settings_to_try", lambda scene: [EIGHT])
+    monkeypatch.setattr(kappaskin.studies, "usual_setting", refuse)
     code, printed, _ = run("cost")
     assert code == 0
-    assert printed.endswith("What each effect costs cannot be told: expected more\n")
+    assert printed.endswith("What each effect costs cannot be measured: expected more\n")
 
 
 @pytest.mark.parametrize(

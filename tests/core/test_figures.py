@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import RendererAgg
 from kappaskin import FIGURES, SECOND_GENERATION, Refusal, load_scene, write_figures
 from kappaskin.cli import main
 from kappaskin.studies.figures import fig2, fig9, style
-from kappaskin.studies.initial_curvature import initial_curvature
+from kappaskin.studies.figures.initial_curvature import initial_curvature
 
 pytestmark = pytest.mark.slow
 

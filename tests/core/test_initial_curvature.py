@@ -8,7 +8,7 @@ import pytest
 
 from kappaskin import FIRST_GENERATION_LOOPS, Hysteresis
 from kappaskin.scenes import Creep
-from kappaskin.studies.initial_curvature import SHARES, initial_curvature
+from kappaskin.studies.figures.initial_curvature import SHARES, initial_curvature
 
 R0 = 12.9e-3
 THETA = math.pi * (np.arange(10) + 0.5) / 10

@@ -25,12 +25,10 @@ from kappaskin import (
 )
 from kappaskin.estimation import METHODS
 from kappaskin.estimation.fit import DenseSpread
-from kappaskin.studies import stability as study
-from kappaskin.studies.stability.case import Kind
-from kappaskin.studies.stability.gallery import gallery
-from kappaskin.studies.stability.precise import least_squares
-from kappaskin.studies.stability.reference import reference_of
-from kappaskin.studies.stability.run import rows_of
+from kappaskin.studies import run_stability
+from kappaskin.studies.stability.gallery import CaseKind, gallery
+from kappaskin.studies.stability.reference import least_squares, reference_of
+from kappaskin.studies.stability.verdicts import rows_of
 
 pytestmark = pytest.mark.slow
 
@@ -41,7 +39,7 @@ SEEK_LEAST_SQUARES = ("least-squares", "direct")
 
 @pytest.fixture(scope="module")
 def rows():
-    return study.run_stability()
+    return run_stability()
 
 
 def verdicts(rows, **wanted):
@@ -57,7 +55,9 @@ def test_there_is_a_row_for_every_case_method_and_precision(rows):
     assert max(Counter((r["case"], r["method"], r["precision"]) for r in rows).values()) == 1
     assert {r["method"] for r in rows} == set(METHODS)
     assert {r["precision"] for r in rows} == {"float64", "float32"}
-    assert {r["case"] for r in rows} >= {n for n, c in CASES.items() if c.kind is not Kind.LARGE}
+    assert {r["case"] for r in rows} >= {
+        n for n, c in CASES.items() if c.kind is not CaseKind.LARGE
+    }
 
 
 def test_no_method_of_ours_is_wrong(rows):
@@ -169,7 +169,7 @@ def test_the_hardest_cases_raise_no_warnings(rows, case):
 
 
 def test_the_command_prints_one_list_without_nan(rows, run, monkeypatch):
-    monkeypatch.setattr("kappaskin.cli.stability.run_stability", lambda long, told: rows)
+    monkeypatch.setattr("kappaskin.studies.run_stability", lambda long, told: rows)
 
     code, out, err = run("stability", "--json")
 
@@ -178,7 +178,7 @@ def test_the_command_prints_one_list_without_nan(rows, run, monkeypatch):
 
 
 def test_the_table_has_every_case_with_what_is_hard_about_it(rows, run, monkeypatch):
-    monkeypatch.setattr("kappaskin.cli.stability.run_stability", lambda long, told: rows)
+    monkeypatch.setattr("kappaskin.studies.run_stability", lambda long, told: rows)
 
     code, out, _ = run("stability")
 
@@ -364,7 +364,7 @@ def test_there_is_no_reference_where_the_readings_decide_nothing():
 
 
 def test_the_reference_by_transforms_is_that_by_double_double():
-    case = replace(CASES["paper"], kind=Kind.LARGE)
+    case = replace(CASES["paper"], kind=CaseKind.LARGE)
     dense, fast = reference_of(CASES["paper"]), reference_of(case)
 
     g, h = dense.scaled(fast.answer), dense.scaled(dense.answer)

@@ -8,7 +8,7 @@ import pytest
 
 from kappaskin.errors import Refusal
 from kappaskin.studies import misprints, misprints_text, paper_tables, tables_text
-from kappaskin.studies.tables import DRAWS, fingertip_scene, table_1, table_2
+from kappaskin.studies.paper import DRAWS, fingertip_scene, table_1, table_2
 
 CASES = ("centre", "off-centre", "line")
 CHECKED = {

@@ -39,7 +39,7 @@ def device_of(scene) -> Iterator[str]:
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr("kappaskin.cli.tare.data_folder", lambda: tmp_path / "tares")
+    monkeypatch.setattr("kappaskin.calibration.data_folder", lambda: tmp_path / "tares")
     return tmp_path / "tares"
 
 
@@ -53,7 +53,7 @@ def test_a_tare_is_told_and_kept_and_undone(folder, capsys):
         assert main(["tare", port, "--undo"]) == 0
 
     assert "Simulated skin KS/../7: 300 of 300 channels tared, offsets of" in first
-    assert f"kept in {Tares(folder).path('KS/../7')}" in first
+    assert f"saved in {Tares(folder).path('KS/../7')}" in first
     assert "1/m (RMS) from the tare of" in second
     assert len(kept.tares) == 2
     assert kept.used == kept.tares[-1]
@@ -79,7 +79,7 @@ def test_a_simulated_sensor_s_is_only_told(folder, capsys):
     with device_of(replace(load_scene("centre"), stimuli=(), rate=100.0)) as port:
         assert main(["tare", port]) == 0
 
-    assert "not kept: the sensor is simulated" in capsys.readouterr().out
+    assert "not saved: the sensor is simulated" in capsys.readouterr().out
     assert not folder.exists()
 
 

@@ -1,4 +1,4 @@
-"""The command `kappaskin`: a file for each subcommand, in a few lines."""
+"""The command `kappaskin`: its subcommands in groups, a module for each group."""
 
 import os
 import sys
@@ -8,7 +8,7 @@ from importlib import metadata
 # for each other on busy cores took twenty times as long.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Group
 
 from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
@@ -18,43 +18,38 @@ app = App(
     name="kappaskin",
     help="Shape and contact from curvature-sensing tactile skins.",
     version=metadata.version("kappaskin"),
-    help_format="markdown",
+    help_format="plaintext",  # of the list; a parser of Markdown takes as long as all else
+    group_commands=Group("Options", sort_key=9),
 )
-# Only names, until one is typed or all are listed: no command waits for what others need.
-for _command in (
-    "tables",
-    "reconstruct",
-    "calibrate",
-    "tare",
-    "press",
-    "regions",
-    "cost",
-    "compare",
-    "stability",
-    "study",
-    "report",
-    "plan",
-    "simulate",
-    "device",
-    "drill",
-    "export",
-    "monitor",
-    "record",
-    "info",
-    "verify",
-    "repair",
-    "publish",
-    "listen",
-    "figures",
-    "doctor",
-):
-    app.command(f"kappaskin.cli.{_command}:{_command}")
+# A panel of the help for each group: its module, which holds its commands and loads no room before
+# one of them runs, and their names.
+_PANELS = {
+    "Live": ("live", "publish listen"),
+    "Recordings": ("record", "record info verify repair export reconstruct"),
+    "Sensor": ("sensor", "calibrate tare press monitor device"),
+    "Studies": ("study", "plan simulate cost compare stability regions study report"),
+    "Paper": ("paper", "tables figures"),
+    "System": ("system", "doctor drill"),
+}
+_GROUPS = {panel: Group(panel, sort_key=place) for place, panel in enumerate(_PANELS, 1)}
+for _panel, (_module, _names) in _PANELS.items():
+    for _name in _names.split():
+        app.command(
+            f"kappaskin.cli.{_module}:{_name}",
+            name=_name,
+            group=_GROUPS[_panel],
+            help_format="markdown",
+        )
+app.command(
+    "kappaskin.cli.system:install_completion", name="--install-completion", help_format="markdown"
+)
 
 
 def _add_commands() -> None:
+    """Add the commands of other packages, such as those that open the app."""
     for entry in metadata.entry_points(group="kappaskin.commands"):
         if entry.name not in app:
-            app.command(entry.value, name=entry.name)
+            app.command(entry.value, name=entry.name, group=_GROUPS["Live"])
 
 
 def _load_all() -> None:

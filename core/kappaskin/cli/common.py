@@ -1,17 +1,20 @@
-"""What commands share: exit codes, and how they stop, read pairs, print JSON and write files."""
+"""What commands share: exit codes, stop signals, pairs of numbers, progress, JSON and files."""
 
 import json
+import math
 import signal
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-import numpy as np
 from cyclopts import Parameter, Token
-from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _Kind = TypeVar("_Kind")
 
@@ -50,7 +53,7 @@ def pair(text: str, what: str) -> tuple[int, int]:
 
 
 def stops() -> list[int]:
-    """The signals to stop (Ctrl+C, and what ends a service) that come from now on."""
+    """The signals to stop (Ctrl+C, and the end of a service) that are received from now on."""
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: stopped.append(got))
@@ -63,17 +66,38 @@ def check_time(seconds: float, what: str) -> None:
         raise Refusal(f"expected a time above 0 s to {what}, got {seconds:g}")
 
 
-def progress(told: Iterable[object], kind: type[_Kind]) -> _Kind:
-    """What comes of work that tells shares of itself, and at its end something of a `kind`.
+class ProgressLine:
+    """Progress on standard error: a line that changes on a terminal, elsewhere one now and then.
 
-    The shares are shown where somebody looks.
+    A context manager; `log_every` are the seconds between two lines where there is no terminal.
     """
-    shown = sys.stderr.isatty()
-    for item in told:
-        if isinstance(item, kind):
-            return item
-        if shown:
-            print(f"{item:4.0%}", end="\r", file=sys.stderr, flush=True)
+
+    def __init__(self, log_every: float = math.inf) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._log_every, self._logged = log_every, time.monotonic()
+
+    def __call__(self, line: str) -> None:
+        if self._terminal:
+            print(f"\r\x1b[K{line}", end="", file=sys.stderr, flush=True)
+        elif time.monotonic() - self._logged > self._log_every:
+            self._logged = time.monotonic()
+            print(line, file=sys.stderr, flush=True)
+
+    def __enter__(self) -> "ProgressLine":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._terminal:
+            print(file=sys.stderr)
+
+
+def result_of(items: Iterable[object], kind: type[_Kind]) -> _Kind:
+    """The result, of a `kind`, at the end of work that reports the share done until then."""
+    with ProgressLine() as show_progress:
+        for item in items:
+            if isinstance(item, kind):
+                return item
+            show_progress(f"{item:4.0%}")
     raise Refusal("the work ended without a result; try again")
 
 
@@ -82,8 +106,18 @@ def print_json(value: Any) -> None:
     print(json.dumps(value, allow_nan=False))
 
 
-def save_arrays(out: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+def print_result(value: Any, as_json: bool, text: Callable[[], str]) -> None:
+    """Print a value as JSON, or as the `text` that people read."""
+    if as_json:
+        print_json(value)
+    else:
+        print(text())
+
+
+def save_arrays(out: Path, arrays: "Mapping[str, NDArray[Any]]") -> None:
     """Write an NPZ; raises a `Refusal` where that cannot be."""
+    import numpy as np
+
     try:
         with out.open("wb") as file:
             np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]

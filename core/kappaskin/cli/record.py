@@ -1,30 +1,45 @@
-"""A source to a recording, without a window."""
+"""Commands on recordings: record, info, verify, repair, export, reconstruct."""
 
 import math
 import sys
 import time
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-from kappaskin.calibration import Tares, data_folder
-from kappaskin.cli.common import FAILED, check_time, stops
+from cyclopts import Parameter
+
+from kappaskin.cli.common import (
+    FAILED,
+    Pair,
+    ProgressLine,
+    Switch,
+    check_time,
+    pair,
+    print_result,
+    result_of,
+    save_arrays,
+    stops,
+)
 from kappaskin.errors import Refusal
-from kappaskin.live import LOST, STREAMING, Engine, Status
-from kappaskin.pipeline import Setup
-from kappaskin.recording import REPLAY
-from kappaskin.sensing import Sensor
 
-_LOOK = 0.05  # s
-_TELL = 1.0  # s
+if TYPE_CHECKING:
+    from kappaskin.live import Engine, Status
+    from kappaskin.recording import Recording
+    from kappaskin.sensing import Sensor
+
+_POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
 
 
 def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     """Record a source to a file, until stopped (Ctrl+C).
 
-    Every byte that comes, and what is made of it: an MCAP file that Foxglove, PlotJuggler and the
-    tools of ROS 2 open. It is called OUT.part until it is ended; `kappaskin repair` makes it whole
-    if it never was. Exit code 1 if it ended by itself, as on a full disk, or nothing came.
+    Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
+    PlotJuggler and the tools of ROS 2 open. It is called OUT.part until it is complete;
+    `kappaskin repair` restores one that never was. Exit code 1 if recording ended by itself, as on
+    a full disk, or if no readings came.
 
     Example: `kappaskin record sim: press.mcap --seconds 10`
 
@@ -33,10 +48,13 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     source
         `sim:`, `sim:SCENE`, or a port or URL for pyserial.
     out
-        The file, which must not be there yet.
+        The file; it must not exist yet.
     seconds
         How long to record.
     """
+    from kappaskin.live import Engine
+    from kappaskin.recording import REPLAY
+
     check_time(seconds, "record")
     if source.startswith(REPLAY):
         raise Refusal(f"expected a live source to record, got {source}; copy its file")
@@ -46,7 +64,8 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
         engine.record(out)
         engine.connect(source)
         try:
-            status = _recorded(engine, seconds, stopped)
+            with ProgressLine() as show_progress:
+                status = _recorded(engine, seconds, stopped, show_progress)
         except Refusal:
             if not _ended(engine).recording.trouble:
                 out.unlink(missing_ok=True)  # ours, with nothing in it
@@ -65,9 +84,13 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     return FAILED if written.trouble or written.lost or not status.accounting.accepted else 0
 
 
-def _recorded(engine: Engine, seconds: float, stopped: list[int]) -> Status:
-    """Record until it is over; how the engine was then."""
-    began = told = time.monotonic()
+def _recorded(
+    engine: "Engine", seconds: float, stopped: list[int], show_progress: ProgressLine
+) -> "Status":
+    """Record until it is over; the last status."""
+    from kappaskin.live import LOST, STREAMING
+
+    began = time.monotonic()
     known: Sensor | None = None
     while True:
         status, now = engine.status(), time.monotonic()
@@ -83,19 +106,20 @@ def _recorded(engine: Engine, seconds: float, stopped: list[int]) -> Status:
             raise Refusal(status.message)
         if status.state != STREAMING and known is None and now - began > _BEGIN:
             raise Refusal(f"{status.source}: nothing came within {_BEGIN:g} s")
-        if now - told >= _TELL and sys.stderr.isatty():
-            told = now
-            print(_line(status), end="\r", file=sys.stderr, flush=True)
-        time.sleep(_LOOK)
+        show_progress(_line(status))
+        time.sleep(_POLL)
 
 
-def _use_tare(engine: Engine, sensor: Sensor) -> None:
+def _use_tare(engine: "Engine", sensor: "Sensor") -> None:
+    from kappaskin.calibration import Tares, data_folder
+    from kappaskin.pipeline import Setup
+
     if not sensor.simulated:
         tare = Tares(data_folder()).load(sensor.serial_number).fit_for(sensor)
         engine.set_up(replace(Setup(), tare=tare))
 
 
-def _line(status: Status) -> str:
+def _line(status: "Status") -> str:
     written = status.recording
     return (
         f"{written.seconds:7.1f} s  {written.size / 1e6:8.1f} MB  {status.rate:6.0f} frames/s  "
@@ -103,13 +127,225 @@ def _line(status: Status) -> str:
     )
 
 
-def _ended(engine: Engine) -> Status:
-    """End the recording; how the engine is once the file is whole."""
+def _ended(engine: "Engine") -> "Status":
+    """End the recording; the status once the file is complete."""
     engine.record(None)
     asked = time.monotonic()
-    for _ in range(round(_BEGIN / _LOOK)):
+    for _ in range(round(_BEGIN / _POLL)):
         status = engine.status()
         if not status.recording.active and status.reported > asked:
             break
-        time.sleep(_LOOK)
+        time.sleep(_POLL)
     return engine.status()
+
+
+def info(file: Path, *, json: Switch = False) -> None:
+    """Show what a recording contains: time, duration, devices, settings, events.
+
+    An unfinished recording is shown up to where it breaks off.
+
+    Example: `kappaskin info press.mcap`
+
+    Parameters
+    ----------
+    file
+        The recording.
+    json
+        Print one JSON object instead.
+    """
+    from kappaskin.recording import Recording
+
+    with Recording(file) as recording:
+        contents = _contents(recording)
+    print_result(contents, json, lambda: _contents_text(file, contents))
+
+
+def _contents_text(file: Path, contents: dict[str, Any]) -> str:
+    whole = "" if contents["whole"] else " (not ended: see `kappaskin repair`)"
+    seconds, began, library = (contents[name] for name in ("seconds", "began", "library"))
+    lines = [f"{file}: {seconds:.1f} s from {began}, by {library}{whole}"]
+    for name in ("devices", "setups", "attachments", "events"):
+        lines.append(f"{name}:" if contents[name] else f"{name}: none")
+        lines += [f"  {line}" for line in contents[name]]
+    counts = sorted(contents["messages"].items())
+    return "\n".join(
+        [*lines, "messages:", *(f"  {count:>10,}  {topic}" for topic, count in counts)]
+    )
+
+
+def _contents(recording: "Recording") -> dict[str, Any]:
+    from kappaskin.recording import decode
+    from kappaskin.recording import messages as m
+
+    def texts(topic: m.Topic) -> list[str]:
+        return [decode(m.STRING, got.data)["data"] for got in recording.messages_on(topic)]
+
+    def when(stamp: int) -> float:
+        return (stamp - recording.first) * 1e-9
+
+    events = [(when(got.stamp), decode(m.LOG, got.data)) for got in recording.messages_on(m.EVENTS)]
+    return {
+        "began": datetime.fromtimestamp(recording.first * 1e-9, UTC).isoformat(),
+        "seconds": when(recording.last),
+        "library": recording.library,
+        "whole": recording.whole,
+        "devices": [_device(text) for text in dict.fromkeys(texts(m.DEVICE))],
+        "setups": texts(m.SETUP),
+        "attachments": list(recording.attachments),
+        "events": [f"{time:.3f} s {event['name']}: {event['msg']}" for time, event in events],
+        "messages": recording.counts,
+    }
+
+
+def _device(text: str) -> str:
+    from kappaskin.sources import from_json
+
+    sensor = from_json(text)
+    return f"{sensor.name} {sensor.serial_number}, {sensor.layout}, firmware {sensor.firmware}"
+
+
+def verify(file: Path) -> int:
+    """Recompute every recorded estimate from the recorded bytes and compare bit for bit.
+
+    Exit code 0 if all are the same, 1 if one differs; the first that does is printed. Another
+    processor may round differently in the last digits.
+
+    Example: `kappaskin verify press.mcap`
+
+    Parameters
+    ----------
+    file
+        The recording.
+    """
+    # As the engine does: products are summed in another order by more than one thread.
+    from kappaskin._background import Beside
+    from kappaskin.recording import Verdict, verifying
+
+    with Beside[float | Verdict]("verify", verifying, file) as work:
+        verdict = result_of(work.wait(), Verdict)
+    print(f"{file}: {verdict.words}")
+    return 0 if verdict.same else FAILED
+
+
+_NOTHING = 3
+
+
+def repair(file: Path, *, out: Path) -> int:
+    """Save every whole message of a damaged or unfinished recording to a new file.
+
+    Any MCAP file will do. Exit code 0 if nothing was lost, 1 if some of the file could not be read,
+    3 if nothing of it could.
+
+    Example: `kappaskin repair press.mcap.part --out press.mcap`
+
+    Parameters
+    ----------
+    file
+        The recording; it is not changed.
+    out
+        The new recording; it must not exist yet.
+    """
+    from kappaskin.recording import Repaired, repairing
+
+    done = result_of(repairing(file, out), Repaired)
+    if not (done.total or done.attachments):
+        print(f"{file}: {done.words}")
+        return _NOTHING
+    print(f"{out}: {done.words}")
+    for topic, count in sorted(done.messages.items()):
+        print(f"  {count:>10,}  {topic}")
+    return FAILED if done.lost else 0
+
+
+def export(
+    recording: Path,
+    *,
+    to: Path,
+    begin: Annotated[float, Parameter("--from")] = 0.0,
+    until: float = math.inf,
+    every: float = 0.0,
+    at: float | None = None,
+) -> None:
+    """Export a recording: readings and estimates as a table, or the skin's surface as a mesh.
+
+    The suffix selects the format. A .csv, .npz or .h5 has a row for each frame: counts, readings,
+    coefficients, contact and geometry with their error bars, recomputed from the recorded bytes
+    with the recorded settings. A .vtp or .stl is the skin in space at one moment, a .pvd a
+    series of .vtp files. Every file states units, settings, calibration, tare and device.
+
+    Example: `kappaskin export press.mcap --to press.csv --from 2 --until 4`
+
+    Parameters
+    ----------
+    recording
+        The recording to read.
+    to
+        The file to write; refused where it exists already.
+    begin
+        Start, in seconds since the recording began.
+    until
+        End, in seconds since the recording began; that of the recording when left out.
+    every
+        Seconds between two rows or surfaces; every frame when left out.
+    at
+        The time of a single surface, in seconds since the recording began.
+    """
+    from kappaskin.recording import Exported, Exporting, Wanted
+
+    try:
+        with Exporting(Wanted(recording, to, begin, until, every, at)) as exporting:
+            done = result_of(exporting.wait(), Exported)
+    except KeyboardInterrupt:
+        raise Refusal("stopped before the end; nothing was written") from None
+    print(*exporting.files, sep="\n")
+    print(done.words, file=sys.stderr)
+
+
+def reconstruct(
+    readings: Path,
+    *,
+    out: Path,
+    basis: Pair = "8x8",
+    grid: Pair | None = None,
+    edge: str = "hinged",
+    method: str = "least-squares",
+    contact: Switch = False,
+    objects: Switch = False,
+) -> None:
+    """Turn a file of curvature readings into a file of shapes.
+
+    READINGS is an NPZ with `size` (2,) m, `positions` (P, 2) m, `curvature` (T, 3, P) or (3, P) in
+    1/m with NaN for a missing reading, and optionally `sigma` in 1/m and `radius` in m, the base
+    radius along x (infinite when flat). A `size` (1,) with `positions` (P, 1) is a strip, of whose
+    curvature only xx is read. An `outline` (V, 2) m is that of a polygon, one number the radius of
+    a disk; with a `rigidity` in N m, forces are computed too.
+
+    Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`
+
+    Parameters
+    ----------
+    readings
+        The NPZ to read.
+    out
+        The NPZ to write: coefficients, sd, residual and, with a grid, the surface w.
+    basis
+        Number of functions along x and y.
+    grid
+        Number of points of the surface along x and y; none when left out.
+    edge
+        How the skin is held: hinged, sliding, clamped or elastic.
+    method
+        How the coefficients are found: least-squares, as-printed, direct, fast, bayes,
+        finite-slope, tracking or robust.
+    contact
+        Write the contact of each frame too, and the skin's geometry there.
+    objects
+        Write the contact and what it is: plane, cylinder, sphere or edge; some 50 ms a frame.
+    """
+    from kappaskin.pipeline import reconstruct as reconstructed
+
+    points = pair(grid, "a grid") if grid else None
+    functions = pair(basis, "a basis")
+    found = reconstructed(readings, functions, points, edge, method, contact, objects)
+    save_arrays(out, found)
+    print(f"{out}: {len(found['coefficients'])} shapes", file=sys.stderr)

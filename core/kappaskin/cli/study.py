@@ -1,38 +1,232 @@
-"""A design study, on this machine or a cluster."""
+"""Commands of studies: plan, simulate, cost, compare, stability, regions, study, report."""
 
-import os
 import sys
-import time
-from contextlib import AbstractContextManager
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from kappaskin.cli.common import FAILED, Whole
+from kappaskin.cli.common import (
+    FAILED,
+    Pair,
+    ProgressLine,
+    Switch,
+    Whole,
+    print_json,
+    print_result,
+    save_arrays,
+)
 from kappaskin.errors import Refusal
-from kappaskin.studies import Folder, Workers, cluster, load_study, processes, run_study, table_text
 
-_EVERY = 10.0  # s between two lines of progress in a log
-
-
-def _workers(count: int | None, scheduler: str) -> AbstractContextManager[Workers]:
-    if scheduler:
-        if count is not None:
-            raise Refusal("expected --workers or --scheduler, got both; a cluster has its own")
-        return cluster(scheduler)
-    return processes(count if count is not None else os.cpu_count() or 1)
+if TYPE_CHECKING:
+    from kappaskin.scenes import Scene
+    from kappaskin.studies import Cost, Refused
 
 
-class _Teller:
-    """Shows how far it is on standard error: on one line where somebody looks, else at times."""
+def plan(scene: str = "", *, json: Switch = False) -> None:
+    """Show which effects a scene needs at the accuracy that it asks for, and why.
 
-    def __init__(self) -> None:
-        self._looked_at, self._last = sys.stderr.isatty(), time.monotonic()
+    Example: `kappaskin plan tapping`
 
-    def __call__(self, line: str) -> None:
-        if self._looked_at:
-            print(f"\r\x1b[K{line}", end="", file=sys.stderr, flush=True)
-        elif time.monotonic() - self._last > _EVERY:
-            self._last = time.monotonic()
-            print(line, file=sys.stderr, flush=True)
+    Parameters
+    ----------
+    scene
+        The name of a ready scene, or a file that ends in .toml; the default one when left out.
+    json
+        Print one JSON object, with an entry for every known effect, instead of a table.
+    """
+    from kappaskin.scenes import load_scene
+    from kappaskin.studies import plan_rows, plan_text
+
+    on = load_scene(scene)
+    rows = plan_rows(on)
+    value = {"scene": on.name, "accuracy": on.choice.accuracy, "effects": rows}
+    print_result(value, json, lambda: plan_text(on, rows))
+
+
+def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None) -> None:
+    """Simulate a scene into an NPZ file.
+
+    It has `counts` and `curvature` (T, 3, P), the `truth` (T, Ni, Nj) in m, `time` (T,) in s, the
+    `contact` (T, 2) in m, NaN where nothing touches or a frame was lost, and the `plan` as JSON.
+    The same seed gives the same bytes.
+
+    Example: `kappaskin simulate tapping --frames 1000 --out taps.npz`
+
+    Parameters
+    ----------
+    scene
+        The name of a ready scene, or a file that ends in .toml; the default one when left out.
+    frames
+        How many frames.
+    seed
+        The seed of all that is random; the scene's own when left out.
+    out
+        The file to write.
+    """
+    from kappaskin.scenes import load_scene
+    from kappaskin.studies import simulated_readings
+
+    found = simulated_readings(load_scene(scene), frames, seed)
+    save_arrays(out, found)
+    print(f"{out}: {frames} frames", file=sys.stderr)
+
+
+def _measured(scene: "Scene") -> "list[Cost | Refused]":
+    """What every setting costs; on a terminal, a progress bar on standard error."""
+    from kappaskin.studies import Cost, CostMeasurement, Refused, settings_to_try
+
+    settings, found = settings_to_try(scene), list[Cost | Refused]()
+    try:
+        with CostMeasurement(scene, settings) as measurement, ProgressLine() as show_progress:
+            for cost in measurement.wait():
+                found.append(cost)
+                done = 40 * len(found) // len(settings)
+                show_progress(f"[{'#' * done:<40}] {len(found)} of {len(settings)}")
+    except KeyboardInterrupt:
+        raise Refusal("stopped before the last setting; nothing was written") from None
+    return found
+
+
+def _effects(scene: "Scene", json: bool) -> None:
+    """Print what the scene's effects cost."""
+    from kappaskin.studies import effect_costs, effect_rows, effects_text, usual_setting
+
+    setting = usual_setting(scene)
+    found = effect_costs(scene, setting)
+    rows = effect_rows(scene, setting, found)
+    print_result(rows, json, lambda: effects_text(scene, setting, found))
+
+
+def _settings(scene: "Scene", found: "list[Cost | Refused]", json: bool) -> None:
+    """Print what the settings cost; as text, what the effects cost too."""
+    from kappaskin.studies import cost_rows, costs_text
+
+    if json:
+        print_json(cost_rows(scene, found))
+        return
+    print(costs_text(scene, found), end="\n\n", flush=True)
+    try:
+        _effects(scene, json)
+    except Refusal as refusal:  # the settings' table is worth its minute all the same
+        print(f"What each effect costs cannot be measured: {refusal}")
+
+
+def cost(
+    *,
+    scene: str = "",
+    effects: Switch = False,
+    within: Pair | None = None,
+    plot: Path | None = None,
+    json: Switch = False,
+) -> int:
+    """Measure what accuracy costs: error, time and memory of every method and setting.
+
+    Takes about a minute. Bases, elements, precisions and channels are combined with each method;
+    marked are the settings that no other one beats in both error and time. A second table shows
+    what each effect of the scene costs, and what leaving it out does to the shape.
+
+    Example: `kappaskin cost --within 0.02mm --plot cost.svg`
+
+    Parameters
+    ----------
+    scene
+        The scene to measure on; the default one when left out.
+    effects
+        Measure the effects alone, which takes seconds.
+    within
+        Instead of a table, name the setting that reaches this RMS error in the least time,
+        conversion included, such as 0.02mm or 20um; or say what is missing, with exit code 1.
+    plot
+        The file, SVG or PNG, to draw error against time into.
+    json
+        Print one JSON list of rows instead of a table, of the settings, or with --effects of the
+        effects; with --within one object.
+    """
+    from kappaskin.scenes import load_scene
+    from kappaskin.studies import accuracy_verdict, check_plot, parse_length, write_plot
+
+    accuracy = None if within is None else parse_length(within)
+    if effects and (accuracy is not None or plot is not None):
+        raise Refusal(
+            "expected --effects without --within and --plot, which are about settings; leave it or "
+            "them out"
+        )
+    on = load_scene(scene)
+    if effects:
+        _effects(on, json)
+        return 0
+    if plot is not None:
+        check_plot(plot)
+    found = _measured(on)
+    if plot is not None:
+        write_plot(plot, on, found)
+    if accuracy is None:
+        _settings(on, found, json)
+        return 0
+    answer = accuracy_verdict(on, found, accuracy)
+    print_result(answer.to_json(), json, lambda: "\n".join(answer.lines))
+    return 0 if answer.reached else FAILED
+
+
+def compare(*, json: Switch = False) -> None:
+    """Run the same work through what one would use instead: error, time and memory side by side.
+
+    NumPy's and SciPy's least squares and scikit-fem's finite elements, each set as well as it can
+    be. Needs `kappaskin[compare]`; takes some seconds.
+
+    Example: `kappaskin compare --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    """
+    from kappaskin.studies import compared, compared_text
+
+    rows = compared()
+    print_result([asdict(row) for row in rows], json, lambda: compared_text(rows))
+
+
+def stability(
+    *,
+    json: Switch = False,
+    long: Switch = False,
+) -> None:
+    """Run hard cases through every method that claims them, and judge each answer.
+
+    Example: `kappaskin stability --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    long
+        Run the longest cases too: a million frames, up to 512 functions a side.
+    """
+    from kappaskin.studies import run_stability, stability_text
+
+    with ProgressLine() as show_progress:
+        rows = run_stability(long, show_progress)
+    print_result(rows, json, lambda: stability_text(rows))
+
+
+def regions(*, json: Switch = False) -> None:
+    """Measure what scanning a region of interest buys and costs, on a contact that moves.
+
+    Example: `kappaskin regions --json`
+
+    Parameters
+    ----------
+    json
+        Print one JSON list of rows instead of a table.
+    """
+    from kappaskin.studies import regions_text, run_regions
+
+    rows = run_regions()
+    print_result(rows, json, lambda: regions_text(rows))
+
+
+_LOG_EVERY = 10.0  # s between two lines of progress in a log
 
 
 def study(
@@ -40,10 +234,10 @@ def study(
 ) -> int:
     """Compute a design study: how good a sensor would be, before it is built.
 
-    A study is a scene with tables [[vary]] of what it goes through, [[draw]] of what is random, and
-    [measure] and [stop]. Every result is a file of its own in the folder: a study that was stopped
-    goes on where it was, and a changed one computes only what changed. The exit code is 1 where
-    some of it failed.
+    A study is a scene with tables [[vary]] of values to sweep, [[draw]] of values to draw at
+    random, and [measure] and [stop]. Every result is a file of its own in the folder: a study that
+    was stopped goes on where it was, and a changed one computes only what changed. The exit code is
+    1 where some of it failed.
 
     Example: `kappaskin study paper-elements --workers 2 --out elements`
 
@@ -59,19 +253,39 @@ def study(
     out
         The folder of its results; named as the study when left out.
     """
-    asked = load_study(file)
-    path = out if out is not None else Path(asked.name)
-    with _workers(workers, scheduler) as found:
-        folder = Folder.opened(path, asked)
+    from kappaskin.studies import StudyFolder, load_study, run_study, study_workers, table_text
+
+    if scheduler and workers is not None:
+        raise Refusal("expected --workers or --scheduler, got both; a cluster has its own")
+    loaded = load_study(file)
+    path = out if out is not None else Path(loaded.name)
+    with study_workers(workers, scheduler) as pool:
+        folder = StudyFolder.opened(path, loaded)
         try:
-            known = run_study(asked, folder, found, _Teller())
+            with ProgressLine(_LOG_EVERY) as show_progress:
+                points = run_study(loaded, folder, pool, show_progress)
         except KeyboardInterrupt:
             raise Refusal(
                 f"stopped; what was computed is in {path}, and the same command goes on from there"
             ) from None
-        finally:
-            if sys.stderr.isatty():
-                print(file=sys.stderr)
-    print(table_text(asked, known))
+    print(table_text(loaded, points))
     print(f"kappaskin report {path} makes a page of it", file=sys.stderr)
-    return FAILED if any(one.failures for one in known) else 0
+    return FAILED if any(point.failures for point in points) else 0
+
+
+def report(folder: Path) -> None:
+    """Make a page of a study's results: report.html, with a CSV and an SVG of each figure.
+
+    The page needs no network and states all that it takes to repeat the study. Results that are
+    not computed yet are listed as missing.
+
+    Example: `kappaskin report elements`
+
+    Parameters
+    ----------
+    folder
+        The folder that `kappaskin study` made.
+    """
+    from kappaskin.studies import write_report
+
+    print(*write_report(folder), sep="\n")

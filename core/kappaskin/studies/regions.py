@@ -1,4 +1,4 @@
-"""What scanning a region buys and costs while the contact moves: full scans against regions."""
+"""Scanning a region of interest while the contact moves, compared with full scans."""
 
 import math
 from dataclasses import dataclass, replace
@@ -51,7 +51,7 @@ def scene_of(period: float) -> Scene:
 
 
 class _Clock:
-    """A clock that only those who sleep by it move: arithmetic takes no time here."""
+    """A clock that only sleeping moves: arithmetic takes no time here."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -74,7 +74,7 @@ class _Answer:
 
 
 def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[_Answer]:
-    """What the closed loop answers: each contact moves what the next frame scans."""
+    """The estimates of the closed loop: each contact moves the region that the next frame scans."""
     clock = _Clock()
     source = SimulatedSource(scene, clock, clock.sleep)
     pipeline = Pipeline(source.sensor, Setup(nx=_POINTS, ny=_POINTS, method=method), clock=clock)
@@ -92,7 +92,7 @@ def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[
 
 
 class _Errors:
-    """How far answers are from the truth at any time, in mm."""
+    """Errors of estimates against the truth at any time, in mm."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._basis = scene, scene.basis
@@ -128,7 +128,7 @@ def measured(
     newest = _rms([error(a.estimate, (a.ended + b.ended) / 2) for a, b in pairwise(answers)])
     (load,) = scene.loads_at(0.0)
     x, y = (float(along) for along in load.centre())
-    told = bargain(scene.sensor(), region, PointLoad(x, y, load.force), TABLE_1_NOISE)
+    bounds = bargain(scene.sensor(), region, PointLoad(x, y, load.force), TABLE_1_NOISE)
     return {
         "speed_mm_s": 1e3 * 2 * math.pi * 0.022 / period,
         "method": method,
@@ -138,7 +138,7 @@ def measured(
         "channels": float(np.mean([a.channels for a in answers])),
         "rate": (len(answers) - 1) / (answers[-1].began - answers[0].began),
         "found": float(np.mean([a.estimate.touch.present for a in answers])),
-        "bound_mm": 1e3 * math.hypot(*told.bound[:2]),
+        "bound_mm": 1e3 * math.hypot(*bounds.bound[:2]),
         "contact_mm": float(own[0]),
         "shape_mm": float(own[1]),
         "newest_contact_mm": float(newest[0]),
@@ -151,10 +151,30 @@ def run_regions(seconds: float = 1.0) -> list[dict[str, Any]]:
 
     Each row is a closed loop of `seconds`, on a skin that moves while a frame is read: `contact_mm`
     and `shape_mm` against the truth in the middle of the frame's own scan, `newest_...` against the
-    truth while the answer is the newest there is, as a controller meets it. `bound_mm` is what one
-    frame tells of the contact's position at best where the circle begins (see `contact_bound`);
-    readings held from earlier frames tell more. `found` is the share of frames with a contact.
+    truth while the estimate is the newest there is, as a controller sees it. `bound_mm` is how
+    well one frame can locate the contact where the circle begins (see `contact_bound`); readings
+    held from earlier frames add to that. `found` is the share of frames with a contact.
     """
     return [
         measured(period, region, seconds, method) for period in PERIODS for region, method in ROWS
     ]
+
+
+def regions_text(rows: list[dict[str, Any]]) -> str:
+    """The rows of `regions` under a heading."""
+    lines = [
+        "A contact on a circle, 20 us per channel; RMS errors of contact and shape in mm,",
+        "of each frame in the middle of its scan, and while its answer is the newest there is",
+        f"{'mm/s':>6}  {'method':<14}{'around':<10}{'radius':>6}{'share':>7}{'channels':>10}"
+        f"{'frames/s':>10}{'contact':>9}{'newest':>8}{'shape':>8}{'newest':>8}",
+    ]
+    for row in rows:
+        radius = "" if row["radius_mm"] is None else format(row["radius_mm"], ".1f")
+        share = "" if row["share"] is None else format(row["share"], ".0%")
+        lines.append(
+            f"{row['speed_mm_s']:>6.0f}  {row['method']:<14}{row['around']:<10}{radius:>6}"
+            f"{share:>7}{row['channels']:>10.0f}{row['rate']:>10.0f}{row['contact_mm']:>9.3f}"
+            f"{row['newest_contact_mm']:>8.3f}{row['shape_mm']:>8.3f}"
+            f"{row['newest_shape_mm']:>8.3f}"
+        )
+    return "\n".join(lines)

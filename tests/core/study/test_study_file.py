@@ -11,9 +11,18 @@ import pytest
 
 from kappaskin import PLACEMENTS, Refusal
 from kappaskin.studies import load_study
-from kappaskin.studies.design.draws import KINDS, LogUniform, Normal, Some, Uniform, Whole
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.setup import Measuring, Placing, Reconstruction
+from kappaskin.studies.design.setup import (
+    KINDS,
+    FitSettings,
+    LogUniform,
+    MeasureSettings,
+    Normal,
+    PlacementSettings,
+    Some,
+    Uniform,
+    Whole,
+)
 from kappaskin.studies.design.study import STUDIES, Stop
 
 TWO = """
@@ -46,7 +55,7 @@ def test_a_point_says_what_the_scene_says_but_for_what_varies(study_of):
     said = json.loads(list(study.points())[-1].document)
 
     assert said["elements"] == {"grid": [8, 8]}
-    assert said["touch"] == study.said["touch"]
+    assert said["touch"] == study.content["touch"]
     assert "vary" not in said
 
 
@@ -232,6 +241,6 @@ def test_the_guide_names_all_that_a_study_may_say():
 
     for name in (*MEASURES, *KINDS, *PLACEMENTS):
         assert f"`{name}`" in guide or name == "scene"
-    for kind in (Reconstruction, Placing, Measuring, Stop):
+    for kind in (FitSettings, PlacementSettings, MeasureSettings, Stop):
         for field in fields(kind):
             assert re.search(rf"\n    {field.name} = ", guide)

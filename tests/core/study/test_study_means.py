@@ -8,8 +8,7 @@ import pytest
 from scipy import stats
 
 from kappaskin import Refusal
-from kappaskin.studies.design.known import Known, Mean
-from kappaskin.studies.design.task import Moments
+from kappaskin.studies.design.results import Mean, Moments, PointResults
 
 
 @pytest.mark.parametrize("large", [np.inf, 1e200])
@@ -41,7 +40,7 @@ def test_the_interval_of_equal_blocks_is_students_of_their_means():
 def test_the_order_in_which_blocks_come_changes_no_bit(study_of):
     study = study_of("", ("least = 2\nmost = 4", "least = 50\nmost = 50"))
     means = np.random.default_rng(0).normal(3.0, 1.0, 50).tolist()
-    upward, downward = (Known(next(study.points()), study) for _ in range(2))
+    upward, downward = (PointResults(next(study.points()), study) for _ in range(2))
 
     for block, mean in enumerate(means):
         upward.take(block, {"rms": Moments(1, mean, 0.0)})
@@ -54,7 +53,7 @@ def test_the_order_in_which_blocks_come_changes_no_bit(study_of):
 def test_what_is_held_of_a_point_does_not_grow_with_its_blocks(study_of):
     def held(blocks):
         study = study_of("", ("least = 2\nmost = 4", f"least = {blocks}\nmost = {blocks}"))
-        known = Known(next(study.points()), study)
+        known = PointResults(next(study.points()), study)
         for block in range(blocks):
             known.take(block, {"rms": Moments(1, float(block), 0.0)})
         known.study = None  # the same for all points

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kappaskin import METHODS, Refusal
-from kappaskin.studies.design.task import Task, run, version
+from kappaskin.studies.design.results import BlockTask, run_task, version
 
 POINT = 'what = "point"\nx = 0.05\ny = 0.03\nforce = 0.1'
 SPHERE = 'what = "sphere"\nradius = 0.02\nx = 0.05\ny = 0.05\nforce = 0.6'
@@ -13,7 +13,7 @@ QUIET = "rms = 0.2", "rms = 0.0"
 
 
 def measured(study, block=0):
-    return run(Task(next(study.points()).document, block, version()))
+    return run_task(BlockTask(next(study.points()).document, block, version()))
 
 
 def measuring(*names, frames=5):

@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 import pytest
 
 from kappaskin.cli.common import FAILED
-from kappaskin.studies import Folder, known_of, table_text
-from kappaskin.studies.design.known import Mean
+from kappaskin.studies import StudyFolder, table_text
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.table import mean_text, value_text
+from kappaskin.studies.design.report import mean_text, value_text
+from kappaskin.studies.design.results import Mean, stored_results
 
 from .conftest import TEXT
 
@@ -113,7 +113,7 @@ def test_figures_stand_beside_the_page(folder):
 def test_what_is_not_computed_yet_is_said_to_be_missing(study_of, tmp_path):
     study = study_of(VARIED)
 
-    told = table_text(study, known_of(study, Folder.opened(tmp_path, study)))
+    told = table_text(study, stored_results(study, StudyFolder.opened(tmp_path, study)))
 
     assert told.count("0 of 2 blocks are computed by this version") == 4
     assert "6 x 6  0.1         -       0" in told

@@ -12,9 +12,8 @@ import pytest
 import scipy
 
 from kappaskin import LeastSquares, Patch, Refusal, Simulator, SineBasis
-from kappaskin.studies import Folder, known_of, run_study
-from kappaskin.studies.design.known import Mean
-from kappaskin.studies.design.task import Task, run, version
+from kappaskin.studies import StudyFolder, run_study
+from kappaskin.studies.design.results import BlockTask, Mean, run_task, stored_results, version
 
 NOISES = '[[vary]]\n"effects.uniform-noise.rms" = [0.1, 0.4]\n'
 DRAWN = NOISES + '[[draw]]\nwhat = "touch[1].x"\nkind = "uniform"\nlow = 0.03\nhigh = 0.07\n'
@@ -26,8 +25,8 @@ class Here:
 
     count = 2
 
-    def __init__(self, done=run):
-        self.done, self.tasks = done, list[Task]()
+    def __init__(self, done=run_task):
+        self.done, self.tasks = done, list[BlockTask]()
 
     def submit(self, task):
         self.tasks.append(task)
@@ -44,7 +43,7 @@ def quiet(line):
 
 
 def computed(study, path, workers=None):
-    return run_study(study, Folder.opened(path, study), workers or Here(), quiet)
+    return run_study(study, StudyFolder.opened(path, study), workers or Here(), quiet)
 
 
 def results(known):
@@ -55,7 +54,7 @@ def results(known):
 
 
 def task_of(study, block=0):
-    return Task(next(study.points()).document, block, version())
+    return BlockTask(next(study.points()).document, block, version())
 
 
 def test_a_block_is_what_a_loop_over_its_frames_gives(study_of):
@@ -71,7 +70,7 @@ def test_a_block_is_what_a_loop_over_its_frames_gives(study_of):
         off = fitted(fit(read.reshape(3, -1)).coefficients) - true(truth.coefficients)
         errors.append(np.sqrt(np.mean(off**2)))
 
-    found = run(task)["rms"]
+    found = run_task(task)["rms"]
 
     assert found.count == 40
     np.testing.assert_allclose(found.mean, np.mean(errors), rtol=1e-12)
@@ -81,8 +80,8 @@ def test_a_block_is_what_a_loop_over_its_frames_gives(study_of):
 def test_a_task_gives_the_same_numbers_whatever_else_is_measured(study_of):
     few, many = study_of(DRAWN), study_of(DRAWN, ('["rms"]', '["covered", "rms"]'))
 
-    assert run(task_of(few))["rms"] == run(task_of(many))["rms"]
-    assert run(task_of(few)) == run(task_of(few))
+    assert run_task(task_of(few))["rms"] == run_task(task_of(many))["rms"]
+    assert run_task(task_of(few)) == run_task(task_of(few))
 
 
 def test_blocks_points_and_seeds_differ(study_of):
@@ -90,10 +89,10 @@ def test_blocks_points_and_seeds_differ(study_of):
     other = study_of(DRAWN, ("rate", "seed = 7\nrate"))
     documents = [one.document, two.document, next(other.points()).document]
 
-    tasks = [Task(document, block, version()) for document in documents for block in (0, 1)]
+    tasks = [BlockTask(document, block, version()) for document in documents for block in (0, 1)]
 
     assert len({task.seed for task in tasks}) == len({task.key for task in tasks}) == 6
-    assert len({run(task)["rms"].mean for task in tasks}) == 6
+    assert len({run_task(task)["rms"].mean for task in tasks}) == 6
 
 
 def test_title_and_text_change_no_result(study_of):
@@ -106,7 +105,7 @@ def test_another_version_is_refused(study_of):
     task = replace(task_of(study_of()), version="kappaskin 9, meaning 9")
 
     with pytest.raises(Refusal, match="expected a worker with kappaskin 9"):
-        run(task)
+        run_task(task)
 
 
 def test_a_version_says_all_that_the_last_bits_depend_on():
@@ -132,7 +131,11 @@ def test_what_is_computed_is_not_computed_again(study_of, tmp_path):
     second = computed(study, tmp_path / "out", again)
 
     assert not again.tasks
-    assert results(second) == results(first) == results(known_of(study, Folder(tmp_path / "out")))
+    assert (
+        results(second)
+        == results(first)
+        == results(stored_results(study, StudyFolder(tmp_path / "out")))
+    )
 
 
 def test_a_stopped_study_goes_on_where_it_was(study_of, tmp_path):
@@ -141,12 +144,12 @@ def test_a_stopped_study_goes_on_where_it_was(study_of, tmp_path):
     def stopped(task):
         if len(stopping.tasks) > 3:
             raise KeyboardInterrupt
-        return run(task)
+        return run_task(task)
 
     stopping = Here(stopped)
     with pytest.raises(KeyboardInterrupt):
         computed(study, tmp_path / "out", stopping)
-    known = sum(one.done for one in known_of(study, Folder(tmp_path / "out")))
+    known = sum(one.done for one in stored_results(study, StudyFolder(tmp_path / "out")))
     second = computed(study, tmp_path / "out", rest)
 
     assert results(second) == results(computed(study, tmp_path / "whole"))
@@ -202,7 +205,7 @@ def test_tasks_of_a_worker_that_died_are_given_to_another(study_of, tmp_path):
         if len(deaths) < 2:
             deaths.append(task.key)
             raise BrokenProcessPool("a process died")
-        return run(task)
+        return run_task(task)
 
     study = study_of(NOISES)
 
@@ -223,7 +226,7 @@ class Fragile:
     def _finish(self, future, task):
         with self._lock:
             if not future.done():
-                future.set_result(run(task))
+                future.set_result(run_task(task))
 
     def submit(self, task):
         future = Future()
@@ -244,8 +247,8 @@ def test_a_task_that_kills_workers_fails_alone(study_of, tmp_path):
 
     for known in found:
         assert known.failures == ["the process that computed it died, and so did a second one"]
-        folder, point = Folder(tmp_path / "out"), known.point.document
-        kept = [folder.result(Task(point, block, version())) for block in range(known.done)]
+        folder, point = StudyFolder(tmp_path / "out"), known.point.document
+        kept = [folder.result(BlockTask(point, block, version())) for block in range(known.done)]
         assert [isinstance(result, str) for result in kept] == [False, True, False, False]
 
 
@@ -262,12 +265,12 @@ class Watched:
         self.beside += [task.block for other in self._again if not other.done()]
         if task.key in self._first:
             self._again.append(future)
-            Timer(0.05, lambda: future.set_result(run(task))).start()
+            Timer(0.05, lambda: future.set_result(run_task(task))).start()
         elif task.block == 1:
             for pending in (*self._first.values(), future):
                 pending.set_exception(BrokenProcessPool("a process died"))
         elif task.block > 1:
-            future.set_result(run(task))
+            future.set_result(run_task(task))
         self._first[task.key] = future
         return future
 
@@ -284,17 +287,17 @@ def test_what_may_kill_workers_is_alone_for_as_long_as_it_takes(study_of, tmp_pa
 
 def test_a_folder_of_another_study_or_of_none_is_refused(study_of, tmp_path):
     study = study_of()
-    Folder.opened(tmp_path / "out", study)
+    StudyFolder.opened(tmp_path / "out", study)
 
     with pytest.raises(Refusal, match="got that of small; choose another"):
-        Folder.opened(tmp_path / "out", replace(study, name="large"))
+        StudyFolder.opened(tmp_path / "out", replace(study, name="large"))
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "cat.png").touch()
     with pytest.raises(Refusal, match="expected the folder of a study"):
-        Folder.opened(tmp_path / "photos", study)
+        StudyFolder.opened(tmp_path / "photos", study)
     (tmp_path / "file").touch()
     with pytest.raises(Refusal, match="expected a folder that can be written to"):
-        Folder.opened(tmp_path / "file", study)
+        StudyFolder.opened(tmp_path / "file", study)
 
 
 def test_the_rule_stops_where_the_interval_is_narrow_enough(study_of, tmp_path):
@@ -308,6 +311,6 @@ def test_the_rule_stops_where_the_interval_is_narrow_enough(study_of, tmp_path):
     assert mean.half <= 0.06 * mean.mean
     assert 3 < known.done < 99
     # One round before, it was not.
-    folder, rounds = Folder(tmp_path / "out"), range(math.ceil(known.done / 1.6))
+    folder, rounds = StudyFolder(tmp_path / "out"), range(math.ceil(known.done / 1.6))
     before = Mean.of([folder.result(task_of(study, block))["rms"] for block in rounds])
     assert before.half > 0.06 * before.mean

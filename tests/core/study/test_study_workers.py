@@ -13,9 +13,9 @@ import psutil
 import pytest
 
 from kappaskin import Refusal
-from kappaskin.studies import Folder, cluster, processes, run_study
-from kappaskin.studies.design.task import Task, run, version
-from kappaskin.studies.design.workers import kind
+from kappaskin.studies import StudyFolder, run_study
+from kappaskin.studies.design.results import BlockTask, run_task, version
+from kappaskin.studies.design.run import cluster, processes, worker_kind
 
 pytestmark = pytest.mark.slow
 
@@ -26,9 +26,9 @@ LONGER = "least = 2\nmost = 4", "least = 30\nmost = 30"
 
 def results(study, path):
     """What the folder at `path` holds of each block."""
-    folder = Folder(path)
+    folder = StudyFolder(path)
     return [
-        {block: folder.result(Task(point.document, block, version())) for block in range(30)}
+        {block: folder.result(BlockTask(point.document, block, version())) for block in range(30)}
         for point in study.points()
     ]
 
@@ -36,7 +36,10 @@ def results(study, path):
 def here(study):
     """The same without any workers."""
     return [
-        {block: run(Task(point.document, block, version())) for block in range(study.stop.least)}
+        {
+            block: run_task(BlockTask(point.document, block, version()))
+            for block in range(study.stop.least)
+        }
         for point in study.points()
     ]
 
@@ -62,7 +65,7 @@ def test_processes_give_the_numbers_of_this_one_though_one_is_killed(study_of, t
     study, kill = study_of("", LONGER), Killer(newest_child)
 
     with processes(2) as workers:
-        run_study(study, Folder.opened(tmp_path, study), workers, kill)
+        run_study(study, StudyFolder.opened(tmp_path, study), workers, kill)
 
     assert kill.killed
     assert results(study, tmp_path) == here(study)
@@ -111,7 +114,7 @@ def test_a_cluster_gives_the_numbers_of_this_process_though_a_worker_is_killed(
     while True:
         try:
             with cluster(address) as workers:
-                run_study(study, Folder.opened(tmp_path / "out", study), workers, kill)
+                run_study(study, StudyFolder.opened(tmp_path / "out", study), workers, kill)
             break
         except Refusal:  # not all are up yet
             if time.monotonic() > deadline:
@@ -148,7 +151,7 @@ def test_a_worker_tells_the_threads_that_its_bits_depend_on(monkeypatch):
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     monkeypatch.setenv("OMP_NUM_THREADS", "4")
 
-    assert kind() == ALIKE.replace("BLAS 1", "BLAS 4")
+    assert worker_kind() == ALIKE.replace("BLAS 1", "BLAS 4")
 
 
 class Told:

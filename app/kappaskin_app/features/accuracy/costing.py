@@ -12,7 +12,15 @@ from kappaskin.estimation import METHODS
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin.scenes import GaussianNoise, Scene, UniformNoise
-from kappaskin.studies import Cost, Effects, Measuring, Refused, Setting, frontier, settings_to_try
+from kappaskin.studies import (
+    Cost,
+    CostMeasurement,
+    EffectCosts,
+    Refused,
+    Setting,
+    frontier,
+    settings_to_try,
+)
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
@@ -71,11 +79,11 @@ class Costing(QObject):
         self._history, self._session = history, session
         self.scene: Scene | None = None
         self.costs: dict[Setting, Cost | Refused] = {}
-        self.effects: dict[Setting, Effects] = {}
+        self.effects: dict[Setting, EffectCosts] = {}
         self.refusal = self.about = ""
         self._of: tuple[bool, int, float] = (False, 0, 0.0)
         self._tried: tuple[Setting, ...] = ()
-        self._measuring: Measuring | None = None
+        self._measuring: CostMeasurement | None = None
         self._watched = False
         self._next = 0.0
         self._recent: deque[tuple[float, float, float]] = deque()
@@ -176,7 +184,7 @@ class Costing(QObject):
         present = self.present
         return None if present is None else self.costs.get(present)
 
-    def spoiling(self) -> Effects | None:
+    def spoiling(self) -> EffectCosts | None:
         """What the effects of the scene cost with the setting in use, None while not known."""
         setting = self._with()
         return None if setting is None else self.effects.get(setting)
@@ -243,7 +251,7 @@ class Costing(QObject):
             if effects_with in self.effects or self.unlike():
                 effects_with = None
             if self.scene is not None and (missing or effects_with):
-                self._measuring = Measuring(self.scene, missing, effects_with)
+                self._measuring = CostMeasurement(self.scene, missing, effects_with)
         except Refusal as refusal:
             self.refusal = str(refusal)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QLineEdit, QWidget
 
-from kappaskin.cli.machine import examine
+from kappaskin.cli.system import examine
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin_app.guard import guarded

@@ -8,14 +8,14 @@ from kappaskin._background import Beside
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin.scenes import Scene
-from kappaskin.studies import plan_told
+from kappaskin.studies import plan_updates
 from kappaskin_app.shell.session import Session
 
 
 class Planning(QObject):
     """Has every effect of the scene sized and timed; `changed` tells when there is news.
 
-    `rows` are what `plan_told` told last, of `scene` or, while `waiting`, of the one before it;
+    `rows` are what `plan_updates` told last, of `scene` or, while `waiting`, of the one before it;
     `refusal` says why there are none.
     """
 
@@ -54,7 +54,7 @@ class Planning(QObject):
             self._take_up(self._measuring)
         elif self._session.inside and self._session.scene is not self.scene:
             self.scene, self.refusal = self._session.scene, ""
-            self._measuring = Beside("kappaskin-plan", plan_told, self.scene)
+            self._measuring = Beside("kappaskin-plan", plan_updates, self.scene)
             self.changed.emit()
 
     def cancel(self) -> None:

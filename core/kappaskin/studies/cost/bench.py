@@ -1,9 +1,9 @@
-"""A scene and settings to what each of them costs: error, time, memory."""
+"""The bench: error, time and memory of each setting on a scene."""
 
 import statistics
 import time
 import tracemalloc
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import cycle
@@ -18,7 +18,7 @@ from kappaskin.frames import Array
 from kappaskin.scenes import Pressed, Pressing, Scene, Simulator, moments_of, planned
 from kappaskin.sensing import Scan, Sensor, SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.setting import SCANS, Cost, Refused, Setting
+from kappaskin.studies.cost.settings import SCANS, Cost, Refused, Setting
 
 SETTLING, DRAWS = 8, 40
 """Frames that methods with a memory are given to settle, and those that are judged after them."""
@@ -68,8 +68,8 @@ class _Judge:
     def __call__(self, coefficients: Array) -> tuple[Array, Array]:
         """Signed error at the load and RMS over the skin, (T,) each in m."""
         c = coefficients.reshape(len(coefficients), -1).astype(float)
-        off = np.hypot(np.linalg.norm(c @ self.R.T - self.reached, axis=1), self.left)
-        return np.vecdot(self.at_load, c) - self.true_at_load, off / np.sqrt(self.points)
+        rms = np.hypot(np.linalg.norm(c @ self.R.T - self.reached, axis=1), self.left)
+        return np.vecdot(self.at_load, c) - self.true_at_load, rms / np.sqrt(self.points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class Bench:
         if not np.isfinite([pressed.contact for pressed in self._pressed]).all():
             why = "lies on cylinders" if scene.laid else "is not pressed"
             raise Refusal(
-                f"expected a scene with a load to tell errors by, but the skin of {scene.name} "
+                f"expected a scene with a load to measure errors by, but the skin of {scene.name} "
                 f"{why}; choose one such as centre"
             )
         # Planned once: what stands still calls for no skew, but the whole scene is to be judged.
@@ -233,7 +233,7 @@ def _judged(judge: _Judge, fit: Estimator, curvature: Array) -> tuple[Array, Arr
 
 
 def traced(made: Callable[[], _Made]) -> tuple[_Made, int]:
-    """What is made, and the bytes that were held besides at the highest point of making it."""
+    """What is made, and the most bytes that were held while making it."""
     mine = not tracemalloc.is_tracing()
     if mine:
         tracemalloc.start()
@@ -255,15 +255,34 @@ def _medians(
     M = fit.M[used].astype(fit.dtype)
     K = exact[0].ravel()[used].astype(fit.dtype)
     frames = cycle(read)
-    ours: list[float] = []
-    theirs: list[float] = []
-    calls, least, most = 1, *_TURNS
-    end = time.perf_counter() + _BUDGET
-    while len(theirs) < least or (len(theirs) < most and time.perf_counter() < end):
-        ours += [seconds(fit, next(frames)) for _ in range(calls)]
-        theirs.append(seconds(np.linalg.lstsq, M, K))
-        calls = _CALLS if ours[0] < _SLOW else 1
-    return statistics.median(ours), statistics.median(theirs)
+    calls = _CALLS if seconds(fit, next(frames)) < _SLOW else 1
+    ours, theirs = medians_in_turn(
+        [
+            lambda: [seconds(fit, next(frames)) for _ in range(calls)],
+            lambda: [seconds(np.linalg.lstsq, M, K)],
+        ],
+        _TURNS,
+        _BUDGET,
+    )
+    return ours, theirs
+
+
+def medians_in_turn(
+    timed: Sequence[Callable[[], Iterable[float]]], turns: tuple[int, int], budget: float
+) -> list[float]:
+    """Median seconds of each of the things that are `timed` turn by turn, all in every turn.
+
+    So what else the machine does slows all of them alike. `turns` are the least and the most; after
+    about `budget` seconds no more than the least are begun.
+    """
+    taken = [list[float]() for _ in timed]
+    (least, most), end = turns, time.perf_counter() + budget
+    for turn in range(most):
+        if turn >= least and time.perf_counter() >= end:
+            break
+        for times, run in zip(taken, timed, strict=True):
+            times += run()
+    return [statistics.median(times) for times in taken]
 
 
 def seconds(call: Callable[..., object], *arguments: object) -> float:

@@ -1,4 +1,4 @@
-"""A scene to what each effect in it costs, and what leaving it out does to the shape."""
+"""What each effect of a scene costs, and what leaving it out does to the shape."""
 
 from dataclasses import dataclass, replace
 
@@ -24,12 +24,12 @@ from kappaskin.scenes import (
 )
 from kappaskin.sensing import SensorLayout
 from kappaskin.studies.cost.bench import SETTLING, Bench, points_on, with_elements
-from kappaskin.studies.cost.setting import SCANS, Setting, own_elements
-from kappaskin.studies.plan import costs_of
+from kappaskin.studies.cost.settings import SCANS, Setting, own_elements
+from kappaskin.studies.simulation import costs_of
 
 _PLACES, _EACH = 20, 2  # moments of the scene, and frames that are judged at each of them
 FRAMES = _PLACES * _EACH
-"""Frames that an effect is judged by."""
+"""Frames that the errors of an effect are averaged over."""
 _MOST = 8  # functions along a side, as the app begins with
 
 
@@ -67,14 +67,14 @@ def usual_setting(scene: Scene) -> Setting:
 
 
 def effect_costs(scene: Scene, setting: Setting) -> tuple[EffectCost, ...]:
-    """What every effect that there is of `scene` costs one who answers with `setting`.
+    """What every effect of `scene` costs, with `setting` as the estimator.
 
     Errors are means over twenty moments all over the scene, on a skin that moves: `Bench` looks
     where it is pressed hardest and stands still, when nothing drifts and no scan is skewed. All
     that is random is drawn alike with an effect and without it. An effect that makes another skin,
     tension, foam or fluid, changes the shape itself: the error is always from the shape of the skin
     that has it. The setting knows dead elements, and how long gages are. Steps and rails count
-    where they are simulated, though a frame has both whatever the plan says.
+    where they are simulated, though a frame has both whatever is planned.
 
     Refuses what `Bench` refuses, and a setting that gives no answer.
     """
@@ -113,14 +113,14 @@ def _without(scene: Scene, effect: Effect) -> Scene:
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """Coefficients of the true shapes (T, Ri, Rj) and of those that are told (T, Ni, Nj), in m."""
+    """Coefficients of the true shapes (T, Ri, Rj) and of those fitted (T, Ni, Nj), in m."""
 
     true: Array
-    told: Array
+    fitted: Array
 
 
 class _Judge:
-    """What a setting makes of a scene all over it, and how far off that is."""
+    """What a setting makes of a whole scene, and its errors."""
 
     def __init__(self, scene: Scene, setting: Setting, contact: Array) -> None:
         self._setting = setting
@@ -147,25 +147,25 @@ class _Judge:
         if Saturation.name in names:
             electronics = scene.transduction
             curvature[electronics.saturated(electronics.counts(curvature))] = np.nan
-        told = self._told(scene.layout, curvature)
-        return _Answer(self._judged(np.array(shapes)), self._judged(told))
+        fitted = self._fitted(scene.layout, curvature)
+        return _Answer(self._judged(np.array(shapes)), self._judged(fitted))
 
-    def _told(self, layout: SensorLayout, curvature: Array) -> Array:
+    def _fitted(self, layout: SensorLayout, curvature: Array) -> Array:
         """The coefficients (T, Ni, Nj) of `curvature` (T, 3 P), of which some is not scanned."""
         live, s = layout.live & self._scanned, self._setting
         fit = estimator_for(s.method, self._basis, replace(layout, live=live), dtype=s.precision)
         K = np.where(live, curvature.reshape(-1, *live.shape), np.nan)
         with np.errstate(all="ignore"):  # what is not finite is refused
-            told = fit(K).coefficients.astype(float)
-        if not np.isfinite(told).all():
+            fitted = fit(K).coefficients.astype(float)
+        if not np.isfinite(fitted).all():
             raise Refusal("the coefficients are not finite: the arithmetic overflowed")
-        return told
+        return fitted
 
     def _judged(self, each: Array) -> Array:
         """Of something for every frame, that of those after the settling, flat."""
         return each.reshape(*self._times.shape, -1)[:, SETTLING:].reshape(FRAMES, -1)
 
     def rms(self, answer: _Answer, truth: _Answer) -> float:
-        """How far the shapes that `answer` tells are from the true ones of `truth`, in m."""
-        off = answer.told @ self._at.T - truth.true @ self._true_at.T
-        return float(np.sqrt(np.mean(off**2, axis=1)).mean())
+        """RMS error of the shapes fitted in `answer` from the true ones of `truth`, in m."""
+        error = answer.fitted @ self._at.T - truth.true @ self._true_at.T
+        return float(np.sqrt(np.mean(error**2, axis=1)).mean())

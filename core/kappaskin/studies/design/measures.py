@@ -1,29 +1,155 @@
-"""A block of frames to what a study measures of it."""
+"""Measures of a study: a block of simulated frames and what is measured of it."""
 
 import math
 import statistics
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import cast
 
 import numpy as np
 import scipy
 
+from kappaskin.bases import Basis
+from kappaskin.contact import ContactObject, ObjectFinder, PointContact
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Estimator, predicted_sd
-from kappaskin.frames import Array
-from kappaskin.scenes import Indenter, Scene, kept_of
+from kappaskin.estimation import Estimator, Fit, in_time, predicted_sd
+from kappaskin.frames import Array, Touch, Truth
+from kappaskin.mechanics import Plate
+from kappaskin.scenes import Hysteresis, Indenter, Scene, Simulator, kept_of
 from kappaskin.studies.cost.bench import points_on
-from kappaskin.studies.design.block import Block
+from kappaskin.studies.design.setup import PointSetup
+
+# Blocks of frames: what was true, what was read, what was fitted
+
+
+@lru_cache(8)
+def _lengths(basis: Basis, reference: Basis) -> tuple[Array, Array, Array]:
+    """A (N, N), B (Nr, N) and C (Nr, Nr) with |c A - w B|^2 + |w C|^2 the surfaces' distance^2.
+
+    By RMS over the skin. The functions of both on G points are Q R, and Q changes no lengths.
+    """
+    points, N = points_on(basis.patch), basis.size
+    functions = np.hstack([basis.at(points), reference.at(points)]) / np.sqrt(len(points))
+    R = cast("Array", np.linalg.qr(functions, mode="r")).T
+    return R[:N, :N].copy(), R[N:, :N].copy(), R[N:, N:].copy()
+
+
+@lru_cache(2)
+def _contact_finder(estimator: Estimator, plate: Plate, edge: str) -> PointContact:
+    return PointContact(plate, estimator.layout, edge)
+
+
+@lru_cache(2)
+def _object_finder(estimator: Estimator, plate: Plate, edge: str) -> ObjectFinder:
+    return ObjectFinder(plate, estimator.layout, edge)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameBlock:
+    """T frames that a `simulator` made, and what `estimator` makes of them.
+
+    `truths` are T, or one of a skin that nothing moves on; `curvature` (T, 3, P) in 1/m.
+    """
+
+    simulator: Simulator
+    estimator: Estimator
+    truths: list[Truth]
+    curvature: Array
+
+    @property
+    def scene(self) -> Scene:
+        return self.simulator.scene
+
+    @cached_property
+    def fits(self) -> list[Fit]:
+        """The fit of each frame, by an estimator that may remember those before."""
+        return [self.estimator(K) for K in self.curvature]
+
+    @cached_property
+    def fit(self) -> Fit:
+        """The fit of all frames, each of which is taken in once by what remembers."""
+        return in_time(self.fits) if self.estimator.remembers else self.estimator(self.curvature)
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """What was fitted, (T, N) in m."""
+        return self.fit.coefficients.reshape(len(self.curvature), -1)
+
+    @cached_property
+    def true(self) -> Array:
+        """The true coefficients, (T, Nr) in m or (1, Nr)."""
+        return np.array([truth.coefficients.ravel() for truth in self.truths])
+
+    @cached_property
+    def contact(self) -> Array:
+        """Where the skin was pressed, (T, 2) in m or (1, 2)."""
+        return np.array([truth.contact for truth in self.truths])
+
+    def forces(self) -> Array:
+        """What pressed in all, (T,) in N or (1,)."""
+        times = _times(self.scene, len(self.truths)).tolist()
+        return np.array([sum(load.force for load in self.simulator.loads(t)) for t in times])
+
+    def rms_error(self) -> Array:
+        """RMS over the skin of what was fitted less what was true, (T,) in m."""
+        A, B, C = _lengths(self.estimator.basis, self.scene.basis)
+        inside, outside = self.coefficients @ A - self.true @ B, self.true @ C
+        return np.sqrt(np.vecdot(inside, inside) + np.vecdot(outside, outside))
+
+    def errors_at(self, points: Array) -> Array:
+        """What was fitted less what was true at `points` (G, 2), (T, G) in m."""
+        fitted = self.coefficients @ self.estimator.basis.at(points).T
+        return fitted - self.true @ self.scene.basis.at(points).T
+
+    @cached_property
+    def touches(self) -> list[Touch]:
+        """The contact that is found in each frame."""
+        find = _contact_finder(self.estimator, self.scene.plate, self.scene.edge)
+        return [find(K, fit) for K, fit in zip(self.curvature, self.fits, strict=True)]
+
+    def objects(self) -> Generator[ContactObject]:
+        """The object that is recognised in each frame."""
+        find = _object_finder(self.estimator, self.scene.plate, self.scene.edge)
+        for K, fit, touch in zip(self.curvature, self.fits, self.touches, strict=True):
+            yield find(K, float(fit.noise), touch)
+
+
+def _times(scene: Scene, frames: int) -> Array:
+    return np.arange(frames) / scene.rate
+
+
+def block_of(setup: PointSetup, estimator: Estimator, seed: int) -> FrameBlock:
+    """`setup.measure.frames` frames, spoilt as `seed` decides."""
+    scene = replace(setup.scene, layout=estimator.layout, seed=seed)
+    simulator, times = Simulator(scene), _times(scene, setup.measure.frames)
+    truths, read = simulator.readings(scene.sensor().scan(), times)
+    if setup.fit.compensate:
+        read = _compensated(scene, read)
+    read[:, ~scene.layout.live.ravel()] = np.nan
+    known = [truth for truth in truths if truth is not None]
+    return FrameBlock(simulator, estimator, known, read.reshape(len(times), 3, -1))
+
+
+def _compensated(scene: Scene, read: Array) -> Array:
+    """Readings (T, 3 P) in 1/m, one after the other, with the scene's loops undone."""
+    loops = [effect for effect in kept_of(scene) if isinstance(effect, Hysteresis)]
+    if not loops:
+        raise Refusal("expected a scene with hysteresis to compensate, got none of it")
+    undo = loops[0].operator(read.shape[1]).inverse.start()
+    return np.array([undo(frame) for frame in read])
+
+
+# The measures
 
 _CALLS = 21  # of a fit that is timed
 _SIDE = 21  # points along each side at which error bars are judged, less those on the edges
 
 
 @dataclass(frozen=True)
-class Measure:
-    """Something to measure: values (T,) of a block's frames, NaN where a frame tells none.
+class StudyMeasure:
+    """Something to measure: values (T,) of a block's frames, NaN where a frame has none.
 
     `title` is what it is called, `unit` what it is shown in, `scale` how many of those the value's
     own unit has. Where there are no frames to average over, it is one value. A `share` is one of
@@ -33,47 +159,47 @@ class Measure:
     title: str
     unit: str
     scale: float
-    of: Callable[[Block], Array]
+    of: Callable[[FrameBlock], Array]
     share: bool = False
 
 
-def _at_load(block: Block) -> Array:
+def _at_load(block: FrameBlock) -> Array:
     at = block.estimator.basis.at(block.contact)
     true = np.vecdot(block.scene.basis.at(block.contact), block.true)
     return np.vecdot(at, block.coefficients) - true
 
 
-def _contact(block: Block) -> Array:
+def _contact(block: FrameBlock) -> Array:
     found = np.array([touch.position for touch in block.touches])
     return np.hypot(*(found - block.contact).T)
 
 
-def _force(block: Block) -> Array:
+def _force(block: FrameBlock) -> Array:
     """As a share of the largest force in the block."""
     found, true = np.array([touch.force for touch in block.touches]), block.forces()
     largest = np.abs(true).max()
     return np.abs(found - true) / (largest if largest else np.nan)
 
 
-def _found(block: Block) -> Array:
+def _found(block: FrameBlock) -> Array:
     return np.array([float(touch.present) for touch in block.touches])
 
 
-def _radius_of(block: Block) -> float:
+def _radius_of(block: FrameBlock) -> float:
     stimulus = block.scene.indenter
     rigid = stimulus.what.rigid if stimulus and isinstance(stimulus.what, Indenter) else None
     if (radius := getattr(rigid, "radius", None)) is None:
-        raise Refusal("expected a sphere or a cylinder that presses to tell errors of its radius")
+        raise Refusal("expected a sphere or a cylinder that presses, to measure errors of radius")
     return radius
 
 
-def _radius(block: Block) -> Array:
+def _radius(block: FrameBlock) -> Array:
     true = _radius_of(block)
     off = np.array([abs(found.radius / true - 1) for found in block.objects()])
     return np.where(np.isfinite(off), off, np.nan)
 
 
-def _covered(block: Block) -> Array:
+def _covered(block: FrameBlock) -> Array:
     """The share of the skin that lies within the 95 % bands, (T,)."""
     patch = block.scene.plate.patch
     x, y = (along[1:-1] for along in patch.grid(_SIDE, 3 if patch.strip else _SIDE))
@@ -81,7 +207,7 @@ def _covered(block: Block) -> Array:
     points = points[patch.contains(points)]
     reach = scipy.special.stdtrit(np.maximum(block.fit.spare, 1), 0.975)
     bands = np.reshape(reach, (-1, 1)) * block.fit.surface_sd(points)
-    held = np.mean(np.abs(block.off(points)) <= bands, axis=1)
+    held = np.mean(np.abs(block.errors_at(points)) <= bands, axis=1)
     return np.where(np.isnan(block.fit.noise), np.nan, held)  # which makes no bands
 
 
@@ -97,17 +223,17 @@ def _predicted_rms(estimator: Estimator, noise: float) -> float:
     return float(np.sqrt(np.mean(sd**2)))
 
 
-def _predicted(block: Block) -> Array:
+def _predicted(block: FrameBlock) -> Array:
     if block.estimator.has_prior:  # which counts on other skins than one at rest
         return np.array([np.nan])
     return np.array([_predicted_rms(block.estimator, noise_of(block.scene))])
 
 
-def _rate(block: Block) -> Array:
+def _rate(block: FrameBlock) -> Array:
     return np.array([block.scene.sensor().scan().rate])
 
 
-def _time(block: Block) -> Array:
+def _time(block: FrameBlock) -> Array:
     taken, _ = list[float](), block.fit  # what remembers takes the frames in before
     for K in block.curvature[np.arange(_CALLS) % len(block.curvature)]:
         begun = time.perf_counter()
@@ -117,16 +243,16 @@ def _time(block: Block) -> Array:
 
 
 MEASURES = {
-    "rms": Measure("RMS error of the shape", "mm", 1e3, Block.apart),
-    "at-load": Measure("error at the load, signed", "mm", 1e3, _at_load),
-    "contact": Measure("distance of the contact found", "mm", 1e3, _contact),
-    "force": Measure("error of the force, of the largest", "%", 1e2, _force),
-    "found": Measure("frames with a contact found", "%", 1e2, _found, share=True),
-    "radius": Measure("error of the object's radius", "%", 1e2, _radius),
-    "covered": Measure("skin within the 95 % bands", "%", 1e2, _covered, share=True),
-    "predicted": Measure("RMS error by noise alone, predicted", "mm", 1e3, _predicted),
-    "rate": Measure("frame rate that the conversions allow", "frames/s", 1.0, _rate),
-    "time": Measure("time to fit a frame", "us", 1e6, _time),
+    "rms": StudyMeasure("RMS error of the shape", "mm", 1e3, FrameBlock.rms_error),
+    "at-load": StudyMeasure("error at the load, signed", "mm", 1e3, _at_load),
+    "contact": StudyMeasure("distance of the contact found", "mm", 1e3, _contact),
+    "force": StudyMeasure("error of the force, of the largest", "%", 1e2, _force),
+    "found": StudyMeasure("frames with a contact found", "%", 1e2, _found, share=True),
+    "radius": StudyMeasure("error of the object's radius", "%", 1e2, _radius),
+    "covered": StudyMeasure("skin within the 95 % bands", "%", 1e2, _covered, share=True),
+    "predicted": StudyMeasure("RMS error by noise alone, predicted", "mm", 1e3, _predicted),
+    "rate": StudyMeasure("frame rate that the conversions allow", "frames/s", 1.0, _rate),
+    "time": StudyMeasure("time to fit a frame", "us", 1e6, _time),
 }
 """What can be measured, by name; lengths in m, rates in 1/s, times in s, the others shares of 1.
 

@@ -1,4 +1,4 @@
-"""A design, not built yet, to how well it will tell the skin's shape, and to a check of that."""
+"""The accuracy that a design will have before it is built, predicted and checked by simulation."""
 
 import math
 from collections.abc import Generator
@@ -18,9 +18,9 @@ from kappaskin.frames import Array, Mask
 from kappaskin.scenes import Scene, Simulator
 from kappaskin.skin import Patch
 from kappaskin.studies.design.measures import noise_of
-from kappaskin.studies.design.setup import Placing
+from kappaskin.studies.design.setup import PlacementSettings
 
-_APART = 0.4  # of the mean distance between elements: places that are tried
+_SPACING = 0.4  # of the mean distance between elements: places that are tried
 _SIDE = 41  # points along each side of the maps
 _BLOCK, _MOST = 250, 5_000  # frames at a time, and in all
 
@@ -29,7 +29,7 @@ _BLOCK, _MOST = 250, 5_000  # frames at a time, and in all
 class Design:
     """A `scene` with its elements placed `by` one of `PLACEMENTS`.
 
-    Shapes are told of Ni x Nj `functions` by least squares.
+    Shapes are reconstructed by least squares with Ni x Nj `functions`.
     """
 
     scene: Scene
@@ -37,17 +37,17 @@ class Design:
     by: str = "scene"
 
     def __post_init__(self) -> None:
-        Placing(self.by)  # for its refusal
+        PlacementSettings(self.by)  # for its refusal
 
     def estimator(self) -> Estimator:
-        """Tells shapes from the elements where they are placed; `Refusal` where they cannot be."""
+        """The estimator with the elements placed; raises a `Refusal` where they cannot be."""
         scene, patch = self.scene, self.scene.plate.patch
         check_placement(scene.layout, self.by)
         Ni, Nj = self.functions
         basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
-        apart = _APART * math.sqrt(patch.a * patch.b / len(scene.layout))
+        spacing = _SPACING * math.sqrt(patch.a * patch.b / len(scene.layout))
         return estimator_for(
-            "least-squares", basis, elements_placed(scene.layout, basis, self.by, apart)
+            "least-squares", basis, elements_placed(scene.layout, basis, self.by, spacing)
         )
 
 
@@ -95,7 +95,7 @@ class Check:
     """What came of simulating a design for so many `frames`.
 
     `sd` (ny, nx) in m is what the displacement varied by at the points of its prospect; `rms` in m
-    over the skin is what was told less what was true, what the functions cannot make included.
+    over the skin is the error of the reconstruction, what the functions cannot represent included.
     """
 
     frames: int
@@ -123,7 +123,7 @@ def _on_map(on: Mask, values: Array) -> Array:
 
 
 def prospect(design: Design) -> Prospect:
-    """What the covariance says of a design, without a simulation."""
+    """The standard deviations that the covariance predicts of a design, without a simulation."""
     estimator = design.estimator()
     x, y, on, points = _points(design.scene.plate.patch)
     sd = predicted_sd(estimator, noise_of(design.scene), points)
@@ -148,13 +148,13 @@ def check(design: Design, frames: int = _MOST, seed: int = 0) -> Generator[Check
         T = min(_BLOCK, frames - count)
         truths, read = simulator.readings(scan, (count + np.arange(T)) / scene.rate)
         known = np.array([truth.coefficients.ravel() for truth in truths if truth is not None])
-        told = estimator(read.reshape(T, 3, -1)).coefficients.reshape(T, -1) @ rows.T
-        apart = told - known @ true_rows.T
-        off += float(np.sum(apart**2 @ shares))
+        fitted = estimator(read.reshape(T, 3, -1)).coefficients.reshape(T, -1) @ rows.T
+        error = fitted - known @ true_rows.T
+        off += float(np.sum(error**2 @ shares))
         # Chan's way to add what differs from one mean to what does from another.
-        here = apart.mean(axis=0)
+        here = error.mean(axis=0)
         share = T / (count + T)
-        squares += np.sum((apart - here) ** 2, axis=0) + count * share * (here - mean) ** 2
+        squares += np.sum((error - here) ** 2, axis=0) + count * share * (here - mean) ** 2
         mean += share * (here - mean)
         count += T
         sd = np.sqrt(squares / max(count - 1, 1))

@@ -1,11 +1,15 @@
-"""What one point of a study says to all that is simulated, fitted and measured there."""
+"""One point of a study: its scene, placement, fit and measures, and what is drawn at random."""
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
+import scipy
 
 from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
@@ -18,16 +22,133 @@ from kappaskin.estimation import (
     estimator_for,
 )
 from kappaskin.scenes import Lines, Scene, Table, scene_of
-from kappaskin.studies.design.draws import Distribution, read_draw
 
-_NAME = "the study"
-_MOST_READINGS = 2**23  # in a block: 64 MB for each array of them
-_ELSEWHERE = ("file", "recorded")  # keys of a touch that name files beside that of the scene
+# Tables [[draw]]: values that are drawn anew for every block of frames
+
+
+class Distribution(Protocol):
+    """Something that values are drawn from; all of its values lie within bounds."""
+
+    def __call__(self, rng: np.random.Generator) -> Any: ...
+
+
+def _check_bounds(low: float, high: float) -> None:
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise Refusal(f"expected finite bounds with low below high, got {low:g} and {high:g}")
 
 
 @dataclass(frozen=True)
-class Reconstruction:
-    """How shapes are told: a `method` of `METHODS` for Ni x Nj `functions`.
+class Uniform:
+    """Even from `low` to `high`."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        _check_bounds(self.low, self.high)
+
+    def __call__(self, rng: np.random.Generator) -> float:
+        return float(rng.uniform(self.low, self.high))
+
+
+@dataclass(frozen=True)
+class LogUniform:
+    """Every factor alike from `low` to `high`, both above zero."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        _check_bounds(self.low, self.high)
+        if not self.low > 0:
+            raise Refusal(f"expected low above zero where factors are alike, got {self.low:g}")
+
+    def __call__(self, rng: np.random.Generator) -> float:
+        return float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normal about `mean` with standard deviation `sd`, cut off below `low` and above `high`."""
+
+    mean: float
+    sd: float
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        _check_bounds(self.low, self.high)
+        if not (math.isfinite(self.mean) and 0 < self.sd < math.inf):
+            raise Refusal(f"expected a finite mean and an sd above zero, got {self}")
+        if not self.low <= self.mean <= self.high:
+            raise Refusal(f"expected the mean inside the bounds, got {self}")
+
+    def __call__(self, rng: np.random.Generator) -> float:
+        low, high = (
+            float(scipy.special.ndtr((end - self.mean) / self.sd)) for end in (self.low, self.high)
+        )
+        drawn = self.mean + self.sd * float(scipy.special.ndtri(rng.uniform(low, high)))
+        return min(max(drawn, self.low), self.high)
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number from `low` to `high`, both among them."""
+
+    low: int
+    high: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.low < self.high < 2**63:
+            raise Refusal(f"expected 0 <= low < high < 2^63, got {self.low} and {self.high}")
+
+    def __call__(self, rng: np.random.Generator) -> int:
+        return int(rng.integers(self.low, self.high, endpoint=True))
+
+
+@dataclass(frozen=True)
+class Some:
+    """`count` different whole numbers from 0 to `of` - 1, such as elements that are dead."""
+
+    of: int
+    count: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.count <= self.of < 2**31:
+            raise Refusal(f"expected a count from 0 to {self.of}, got {self.count}")
+
+    def __call__(self, rng: np.random.Generator) -> list[int]:
+        return sorted(rng.permutation(self.of)[: self.count].tolist())
+
+
+KINDS = {
+    "uniform": Uniform,
+    "log-uniform": LogUniform,
+    "normal": Normal,
+    "whole": Whole,
+    "some": Some,
+}
+"""What values can be drawn from, by name."""
+
+
+def read_draw(table: Table) -> tuple[str, Distribution]:
+    """The place in the file `what`, and what its values are drawn from."""
+    place = table.get("what", str)
+    made = table.make(table.choose("kind", KINDS))
+    table.done()
+    return place, made
+
+
+# The setup
+
+_NAME = "the study"
+_MOST_READINGS = 2**23  # in a block: 64 MB for each array of them
+_ELSEWHERE = ("file", "recorded")  # keys of a touch that name other files
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """How shapes are reconstructed: by a `method` of `METHODS` with Ni x Nj `functions`.
 
     With `compensate`, the loops of the scene's hysteresis are undone first, as by a calibration
     that found them exactly.
@@ -45,7 +166,7 @@ class Reconstruction:
 
 
 @dataclass(frozen=True)
-class Placing:
+class PlacementSettings:
     """Where the elements are: `by` one of `PLACEMENTS`, at least `apart` in m from each other."""
 
     by: str = "scene"
@@ -59,7 +180,7 @@ class Placing:
 
 
 @dataclass(frozen=True)
-class Measuring:
+class MeasureSettings:
     """`what` to measure, in `frames` of each block."""
 
     what: tuple[str, ...]
@@ -75,22 +196,22 @@ class Measuring:
 
 
 @dataclass(frozen=True)
-class Setup:
-    """One point: the scene, how its shapes are told, what is measured, what is drawn anew."""
+class PointSetup:
+    """One point: the scene, fit, placement and measures, and what is drawn at random."""
 
     scene: Scene
-    fit: Reconstruction
-    place: Placing
-    measure: Measuring
+    fit: FitSettings
+    place: PlacementSettings
+    measure: MeasureSettings
     draws: tuple[tuple[str, Distribution], ...]
 
 
-def read_setup(top: Table, file: Path, known: Iterable[str]) -> Setup:
-    """The setup that a file says at its `top`, which measures things that are `known`."""
+def read_setup(top: Table, file: Path, known: Iterable[str]) -> PointSetup:
+    """The setup in a file's `top` table; `known` are the names of measures."""
     tables = fit, place, measure = [top.table(name) for name in ("fit", "place", "measure")]
     drawing = top.tables("draw")
     scene = _scene(top, file)
-    made = fit.make(Reconstruction), place.make(Placing), measure.make(Measuring)
+    made = fit.make(FitSettings), place.make(PlacementSettings), measure.make(MeasureSettings)
     for table in tables:
         table.done()
     among = {name: name for name in known}
@@ -104,11 +225,11 @@ def read_setup(top: Table, file: Path, known: Iterable[str]) -> Setup:
             f"of {3 * len(scene.layout)} = {readings}; take fewer frames and more blocks",
             "frames",
         )
-    return Setup(scene, *made, tuple(read_draw(table) for table in drawing))
+    return PointSetup(scene, *made, tuple(read_draw(table) for table in drawing))
 
 
 def _scene(top: Table, file: Path) -> Scene:
-    """The scene, of which a worker that has no other files can make all."""
+    """The scene, which must be complete without other files: workers have none."""
     for touch in top.tables("touch"):
         for key in _ELSEWHERE:
             if key in touch:
@@ -119,40 +240,42 @@ def _scene(top: Table, file: Path) -> Scene:
                 )
     scene = scene_of(top, file)
     if not (scene.loads or scene.indenter):
-        raise top.refusal("expected a scene with a load or an object to tell errors by, got none")
+        raise top.refusal(
+            "expected a scene with a load or an object to measure errors by, got none"
+        )
     return scene
 
 
-def setup_of(said: dict[str, Any], known: Iterable[str]) -> Setup:
-    """The setup of what a point says; its refusals name no file."""
+def setup_of(content: dict[str, Any], known: Iterable[str]) -> PointSetup:
+    """The setup of a point's `content`; its refusals name no file."""
     try:
-        return read_setup(Table(said, Lines(""), _NAME), Path("study.toml"), known)
+        return read_setup(Table(content, Lines(""), _NAME), Path("study.toml"), known)
     except Refusal as refusal:
         raise Refusal(str(refusal).removeprefix(f"{_NAME}, line 1: ")) from refusal
 
 
-def estimator_of(said: dict[str, Any], setup: Setup) -> Estimator:
-    """What tells the shapes of a point, remembered for points with the same sensor and fit."""
+def estimator_of(content: dict[str, Any], setup: PointSetup) -> Estimator:
+    """The estimator of a point, cached for points with the same sensor and fit."""
     if METHODS[setup.fit.method].remembers:
         return _estimator(setup)
-    alike = {key: said.get(key) for key in ("skin", "elements", "fit", "place")}
-    return _remembered(_Alike(json.dumps(alike, sort_keys=True), setup))
+    alike = {key: content.get(key) for key in ("skin", "elements", "fit", "place")}
+    return _cached_estimator(_SameSensor(json.dumps(alike, sort_keys=True), setup))
 
 
 @dataclass(frozen=True)
-class _Alike:
-    """A setup, equal to those of which the same is `told` of sensor and fit."""
+class _SameSensor:
+    """A setup, equal to others with the same `description` of sensor and fit."""
 
-    told: str
-    setup: Setup = field(compare=False)
+    description: str
+    setup: PointSetup = field(compare=False)
 
 
 @lru_cache(8)
-def _remembered(alike: _Alike) -> Estimator:
+def _cached_estimator(alike: _SameSensor) -> Estimator:
     return _estimator(alike.setup)
 
 
-def _estimator(setup: Setup) -> Estimator:
+def _estimator(setup: PointSetup) -> Estimator:
     scene, fit = setup.scene, setup.fit
     patch = scene.plate.patch
     Ni, Nj = fit.functions

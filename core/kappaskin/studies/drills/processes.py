@@ -1,4 +1,4 @@
-"""Drills on the live process and the one that shows: they are killed, or stand still."""
+"""Drills on the live process and on the one that shows: killed, or suspended."""
 
 import os
 import signal
@@ -11,9 +11,7 @@ from pathlib import Path
 
 from kappaskin.live import LOST, STREAMING, Engine
 from kappaskin.sources import Accounting
-from kappaskin.studies.drills.drill import Drill
-from kappaskin.studies.drills.outcome import Outcome
-from kappaskin.studies.drills.stand import Stand
+from kappaskin.studies.drills.stand import Drill, DrillOutcome, Stand
 
 _START = 20.0  # s that a process may take until it computes
 _NOTICED = 1.0  # s
@@ -22,7 +20,7 @@ _WITHIN = 1.0  # s
 _DRAINED = 20.0  # s
 _SAME = 5  # reports in a row
 _MEMORY = "/dev/shm"
-_PARENT = "kappaskin.studies.drills.parent"
+_PARENT = "kappaskin.studies.drills.processes"
 
 
 def _pumped(stand: Stand, done: Callable[[], object], within: float) -> bool:
@@ -49,7 +47,7 @@ def _recovery(stand: Stand, engine: Engine, within: float) -> float:
 
 
 def _drained(stand: Stand, engine: Engine) -> Accounting:
-    """What the engine says of everything that was sent, once it says so again and again."""
+    """The engine's accounting of everything that was sent, once it no longer changes."""
     seen, reported, same, end = Accounting(), 0.0, 0, time.monotonic() + _DRAINED
     while same < _SAME and time.monotonic() < end:
         stand.relay.forget()
@@ -62,11 +60,13 @@ def _drained(stand: Stand, engine: Engine) -> Accounting:
     return seen
 
 
-def _outcome(stand: Stand, engine: Engine, recovered: float, *claims: tuple[bool, str]) -> Outcome:
+def _outcome(
+    stand: Stand, engine: Engine, recovered: float, *claims: tuple[bool, str]
+) -> DrillOutcome:
     seen = _drained(stand, engine)
     laws = ((seen.balanced, "the accounting does not balance"), *claims)
     failures = tuple(text for holds, text in laws if not holds)
-    return Outcome(
+    return DrillOutcome(
         stand.relay.spent, seen.accepted, seen.lost, seen.bytes_discarded, 0, recovered, failures
     )
 
@@ -76,7 +76,7 @@ def _streaming(stand: Stand, engine: Engine) -> bool:
     return _pumped(stand, lambda: _shows(engine, 0), _START)
 
 
-def _suspend(stand: Stand) -> Outcome:
+def _suspend(stand: Stand) -> DrillOutcome:
     """Stop the live process for a while, and let it go on."""
     with Engine() as engine:
         streaming = _streaming(stand, engine)
@@ -97,15 +97,15 @@ def _suspend(stand: Stand) -> Outcome:
         )
 
 
-def _killed(stand: Stand) -> Outcome:
-    """Kill the live process: another takes over, and it is said."""
+def _killed(stand: Stand) -> DrillOutcome:
+    """Kill the live process: another takes over, and an event reports it."""
     with Engine() as engine:
         streaming, was = _streaming(stand, engine), engine.pid
         _kill(was, signal.SIGKILL)
         noticed = _pumped(stand, lambda: engine.status().state == LOST, _NOTICED)
         _pumped(stand, lambda: engine.revive() or engine.pid != was, _START)
         recovered = _recovery(stand, engine, _RESTARTED)
-        told = any(event.kind == "engine" for event in engine.status().events)
+        reported = any(event.kind == "engine" for event in engine.status().events)
         return _outcome(
             stand,
             engine,
@@ -113,11 +113,11 @@ def _killed(stand: Stand) -> Outcome:
             (streaming, "no frames came"),
             (noticed, "that it ended was not noticed within 1 s"),
             (engine.pid != was, "no other process was started"),
-            (told, "that it was started anew is not told"),
+            (reported, "that it was restarted is not reported"),
         )
 
 
-def _orphaned(stand: Stand) -> Outcome:
+def _orphaned(stand: Stand) -> DrillOutcome:
     """Kill the process that shows: the live one ends, and leaves no memory."""
     command = [sys.executable, "-m", _PARENT, stand.relay.port]
     with subprocess.Popen(
@@ -136,7 +136,7 @@ def _orphaned(stand: Stand) -> Outcome:
         (ended, f"the live process is still there after {took:.1f} s"),
         (clean, f"left in {_MEMORY}: {', '.join(block.name for block in blocks)}"),
     ]
-    return Outcome(
+    return DrillOutcome(
         sent=stand.relay.spent,
         recovered=took,
         failures=tuple(text for holds, text in failures if not holds),
@@ -167,8 +167,16 @@ def _blocks_of(pid: int) -> list[Path]:
     return []
 
 
-DRILLS = [
+PROCESS_DRILLS = [
     Drill("engine suspended", "the live process stands still and goes on", _suspend, _WITHIN),
     Drill("engine killed", "kill -9 of the live process: another takes over", _killed, _RESTARTED),
     Drill("app killed", "kill -9 of what shows: the live process ends too", _orphaned, _WITHIN),
 ]
+
+
+if __name__ == "__main__":
+    with Engine() as engine:
+        engine.connect(sys.argv[1])
+        print(engine.pid, flush=True)
+        while engine.alive:
+            time.sleep(0.1)

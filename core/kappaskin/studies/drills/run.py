@@ -1,21 +1,29 @@
-"""Drills to rows: each done on the device, and judged."""
+"""Running the drills, and their table."""
 
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from kappaskin.errors import SourceError
-from kappaskin.studies.drills import bytes_spoilt, devices, disks, processes, recordings
-from kappaskin.studies.drills.drill import Drill
-from kappaskin.studies.drills.outcome import NeedsSimulated, Outcome, judged
-from kappaskin.studies.drills.stand import Device, Stand, opened
+from kappaskin.studies.drills.disks import CALIBRATION_DRILLS, RECORDING_DRILLS
+from kappaskin.studies.drills.line import BYTE_DRILLS, DEVICE_DRILLS
+from kappaskin.studies.drills.processes import PROCESS_DRILLS
+from kappaskin.studies.drills.stand import (
+    Device,
+    Drill,
+    DrillOutcome,
+    NeedsSimulatedDevice,
+    Stand,
+    judged,
+    opened,
+)
 
 DRILLS: tuple[Drill, ...] = (
-    *bytes_spoilt.DRILLS,
-    *devices.DRILLS,
-    *processes.DRILLS,
-    *disks.DRILLS,
-    *recordings.DRILLS,
+    *BYTE_DRILLS,
+    *DEVICE_DRILLS,
+    *PROCESS_DRILLS,
+    *CALIBRATION_DRILLS,
+    *RECORDING_DRILLS,
 )
 
 _SEED = 6
@@ -27,11 +35,11 @@ def run_drills(
     progress: Callable[[str], object] = lambda _: None,
     chosen: Sequence[Drill] = DRILLS,
 ) -> list[dict[str, Any]]:
-    """One row for each drill, done on the device at `source`, or a simulated one.
+    """One row for each drill, run on the device at `source`, or a simulated one.
 
     `sent`, `accepted` and `lost` in messages, `discarded` in bytes, `recovered_s` None where
-    nothing had to recover; `verdict` is held, failed or skipped. `progress` is told each drill
-    before it is done.
+    nothing had to recover; `verdict` is held, failed or skipped. `progress` gets the name of
+    each drill before it is run.
     """
     rows: list[dict[str, Any]] = []
     with opened(source, _SEED) as device:
@@ -59,15 +67,32 @@ def row_of(drill: Drill, device: Device, long: bool = False) -> dict[str, Any]:
     }
 
 
-def _done(drill: Drill, device: Device, long: bool) -> tuple[Outcome, list[str], str]:
+def _done(drill: Drill, device: Device, long: bool) -> tuple[DrillOutcome, list[str], str]:
     stand = Stand(device, long)
     try:
         outcome = drill.run(stand)
-    except NeedsSimulated:
-        return Outcome(), ["needs the simulated device"], "skipped"
+    except NeedsSimulatedDevice:
+        return DrillOutcome(), ["needs the simulated device"], "skipped"
     except SourceError as error:
-        return Outcome(), [str(error)], "failed"
+        return DrillOutcome(), [str(error)], "failed"
     finally:
         stand.close()
     reasons = judged(outcome, drill.within)
     return outcome, reasons, "failed" if reasons else "held"
+
+
+def drills_text(rows: list[dict[str, Any]]) -> str:
+    """A table with a line for each drill, and the reasons of those that failed."""
+    lines = [
+        f"{'drill':<20}{'sent':>8}{'accepted':>10}{'lost':>8}{'discarded':>11}{'wrong':>7}"
+        f"{'recovered after':>17}  verdict"
+    ]
+    for row in rows:
+        after = "-" if row["recovered_s"] is None else f"{row['recovered_s']:.3f} s"
+        lines.append(
+            f"{row['drill']:<20}{row['sent']:>8}{row['accepted']:>10}{row['lost']:>8}"
+            f"{row['discarded']:>11}{row['wrong']:>7}{after:>17}  {row['verdict']}"
+        )
+        lines += [f"    {reason}" for reason in row["reasons"]]
+    failed = sum(row["verdict"] == "failed" for row in rows)
+    return "\n".join([*lines, f"{len(rows)} drills, {failed or 'none'} failed"])

@@ -1,11 +1,13 @@
-"""A device, the relay before it and what reads through that: what a drill is done on."""
+"""The test stand of a drill: a device, the relay before it and the source that reads through it."""
 
 import json
 import math
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -17,8 +19,78 @@ import numpy as np
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.sources import Line, SerialSource
-from kappaskin.studies.drills.outcome import NeedsSimulated, Outcome
 from kappaskin.studies.drills.relay import Relay, clean, unchanged
+
+_PAGE = 4096
+
+
+@dataclass(frozen=True)
+class ProcessResources:
+    """Threads, open descriptors, child processes and resident bytes; 0 where unknown."""
+
+    threads: int
+    descriptors: int
+    processes: int
+    memory: int
+
+    @classmethod
+    def now(cls) -> "ProcessResources":
+        """Of this process."""
+        own = Path("/proc/self")
+        if not (own / "fd").exists():
+            return cls(threading.active_count(), 0, 0, 0)
+        children = (own / "task" / str(os.getpid()) / "children").read_text().split()
+        resident = int((own / "statm").read_text().split()[1])
+        return cls(
+            threading.active_count(), len(os.listdir(own / "fd")), len(children), resident * _PAGE
+        )
+
+    def leaked(self, since: "ProcessResources", memory: int) -> list[tuple[bool, str]]:
+        """Claims that nothing was added, but for so many bytes of `memory`."""
+        grown = self.memory - since.memory
+        return [
+            (self.threads <= since.threads, f"{self.threads - since.threads} threads leaked"),
+            (
+                self.descriptors <= since.descriptors,
+                f"{self.descriptors - since.descriptors} descriptors leaked",
+            ),
+            (self.processes <= since.processes, "a process leaked"),
+            (grown <= memory, f"memory grew by {grown / 2**20:.1f} MiB"),
+        ]
+
+
+class NeedsSimulatedDevice(Exception):
+    """The fault needs the process that plays a device."""
+
+
+@dataclass(frozen=True)
+class DrillOutcome:
+    """Figures of a drill: messages `sent`, `accepted` and `lost`, and bytes `discarded`.
+
+    `wrong` counts frames that were accepted but never sent so. `recovered` is the time from the end
+    of the fault to the first good frame sent after it in s, NaN where nothing had to recover.
+    `failures` are the claims that did not hold.
+    """
+
+    sent: int = 0
+    accepted: int = 0
+    lost: int = 0
+    discarded: int = 0
+    wrong: int = 0
+    recovered: float = math.nan
+    failures: tuple[str, ...] = ()
+
+
+def judged(outcome: DrillOutcome, within: float) -> list[str]:
+    """Why a drill failed: its own claims, a wrong frame, or no recovery `within` so many s."""
+    reasons = list(outcome.failures)
+    if outcome.wrong:
+        reasons.append(f"{outcome.wrong} wrong frames were accepted")
+    if within < math.inf and not outcome.recovered <= within:
+        after = "at all" if math.isnan(outcome.recovered) else f"for {outcome.recovered:.2f} s"
+        reasons.append(f"did not recover within {within:g} s; not {after}")
+    return reasons
+
 
 RATE = 200  # frames/s of the simulated device
 _TICK = 0.002  # s that a read waits
@@ -39,7 +111,7 @@ class Device:
     def signal(self, number: int) -> None:
         """Send a signal to the process that plays the device."""
         if self.process is None:
-            raise NeedsSimulated
+            raise NeedsSimulatedDevice
         self.process.send_signal(number)
 
 
@@ -72,10 +144,10 @@ def opened(source: str | None, seed: int) -> Generator[Device]:
 
 
 def _port_of(process: "subprocess.Popen[str]") -> str:
-    said = process.stdout.readline() if process.stdout else ""
-    if not said:
+    line = process.stdout.readline() if process.stdout else ""
+    if not line:
         raise SourceError("the simulated device did not start; try `kappaskin device`")
-    return str(json.loads(said)["port"])
+    return str(json.loads(line)["port"])
 
 
 class Stand:
@@ -179,13 +251,13 @@ class Stand:
             for frame in frames:
                 self._compare(frame)
 
-    def told(self, kind: str) -> bool:
-        """Whether the source told of such an event."""
+    def reported(self, kind: str) -> bool:
+        """Whether the source has reported an event of this kind."""
         return any(event.kind == kind for event in self.events)
 
     def outcome(
         self, *claims: tuple[bool, str], cut_off: bool = False, restarted: bool = False
-    ) -> Outcome:
+    ) -> DrillOutcome:
         """What became of it all, once the line is drained; `claims` that are false are failures.
 
         Every byte and every number sent must be accounted for, but for bytes on a line that was
@@ -201,7 +273,7 @@ class Stand:
         if not restarted:
             text = f"{self.relay.sequence} messages were sent, {seen.span} accounted for"
             laws.append((seen.span == self.relay.sequence, text))
-        return Outcome(
+        return DrillOutcome(
             self.relay.spent,
             seen.accepted,
             seen.lost,
@@ -216,3 +288,13 @@ class Stand:
             self._source.close()
         self.relay.unplug()
         shutil.rmtree(self._folder)
+
+
+@dataclass(frozen=True)
+class Drill:
+    """A fault: `does` describes it, `run` inflicts it, `within` is the longest recovery in s."""
+
+    name: str
+    does: str
+    run: Callable[[Stand], DrillOutcome]
+    within: float = math.inf

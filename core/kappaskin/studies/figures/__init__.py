@@ -1,4 +1,58 @@
-"""Figures for print: names to files, each drawn from a run of its own."""
+"""The paper's figures: their names, what draws each, and files of them."""
 
-from kappaskin.studies.figures.registry import FIGURES as FIGURES
-from kappaskin.studies.figures.registry import write_figures as write_figures
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from kappaskin.errors import Refusal
+
+
+def _draw(module: str) -> Callable[[Any], None]:
+    """What draws the figure of that module, which is imported when it is first drawn."""
+    return lambda figure: import_module(f"{__name__}.{module}").draw(figure)
+
+
+FIGURES = {
+    "fig1": _draw("fig1"),
+    "fig2": _draw("fig2"),
+    "fig6": _draw("fig6"),
+    "fig8": _draw("fig8"),
+    "fig9": _draw("fig9"),
+    "initial-curvature": _draw("initial_curvature"),
+}
+"""What draws each figure on an empty matplotlib.figure.Figure; fig1 to fig9 are the paper's."""
+
+
+def _known(names: Iterable[str]) -> list[str]:
+    asked = list(dict.fromkeys(names))
+    unknown = [name for name in asked if name not in FIGURES]
+    if unknown or not asked:
+        got = ", ".join(map(repr, unknown)) or "none"
+        raise Refusal(f"expected figures among {', '.join(FIGURES)}; got {got}")
+    return asked
+
+
+def write_figures(out: Path, names: Iterable[str]) -> list[Path]:
+    """Draw the figures `names` into the folder `out`, each as SVG and as PNG: the files written.
+
+    The folder is made when there is none. Nothing in it is replaced before all are drawn.
+    """
+    from kappaskin.studies.figures import style
+
+    asked = _known(names)
+    style.loaded()  # or refused before a folder is made
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=".figures-", dir=out) as room:
+            made = list[Path]()
+            for name in asked:
+                for kind, drawn in style.drawn(FIGURES[name], *style.KINDS).items():
+                    made.append(Path(room) / f"{name}.{kind}")
+                    made[-1].write_bytes(drawn)
+            return [path.replace(out / path.name) for path in made]
+    except OSError as error:
+        raise Refusal(
+            f"{out}: expected a folder that can be written to ({error}); choose another"
+        ) from error

@@ -1,4 +1,4 @@
-"""The paper's Fig. 1: how a skin is built, and what a linear sensor of ten elements tells."""
+"""The paper's Fig. 1: how a skin is built, and what a linear sensor of ten elements measures."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ class _Run:
 
 
 def run() -> _Run:
-    """A strip pressed off its middle, read with Table 1's noise, told by 8 functions of x."""
+    """A strip pressed off its middle, read with Table 1's noise, fitted by 8 functions of x."""
     plate, reference = Plate(SKIN), SineBasis(SKIN, 15, 1)
     load = scaled_to(plate, PointLoad(_LOAD, SKIN.b / 2), _PRESSED, reference)
     truth = plate.deflection([load], reference).ravel()

@@ -1,4 +1,4 @@
-"""The paper's Fig. 2: a curved n x m patch, and the curvature that one element tells."""
+"""The paper's Fig. 2: a curved n x m patch, and the curvature that one element measures."""
 
 import math
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ _NUMBER = ELEMENT[0] + COLUMNS * ELEMENT[1]
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """What the readings tell of a skin whose every cell is drawn as one tile.
+    """The shape fitted to the readings, every cell of the skin drawn as one tile.
 
     `tiles` (P, T, 3) in mm are their outlines and `tensor` (P, 2, 2) in 1/m the curvature at their
     centres; `covariance` (3, 3) that of xx, yy, xy of the element that is enlarged.
@@ -58,7 +58,7 @@ def run(noise: float = _NOISE) -> _Run:
     """A fingertip's skin pressed off its middle, read with noise.
 
     The truth has the 8 x 6 functions that are fitted: with more, the error of leaving them out
-    would be ten times the noise's at an element, and no error bar would tell.
+    would be ten times the noise's at an element, and no error bar would show it.
     """
     plate, basis = Plate(SKIN), SineBasis(SKIN, 8, 6)
     load = scaled_to(plate, PointLoad(*_LOAD), _PRESSED, basis)
@@ -95,7 +95,7 @@ def draw(figure: style.Figure) -> None:
     style.letter(figure, 101, 79, "b", f"the element framed in a (heights × {_RAISED})")
     _draw_skin(figure, style.place(figure, (2, 3, 92, 80), projection="3d"), found)
     _draw_element(style.place(figure, (98, 20, 76, 58), projection="3d"), found)
-    _tell(figure, found)
+    _write_values(figure, found)
 
 
 def _draw_skin(figure: style.Figure, axes: style.Axes, found: _Run) -> None:
@@ -144,7 +144,7 @@ def _draw_element(axes: style.Axes, found: _Run) -> None:
     axes.axis("off")
 
 
-def _tell(figure: style.Figure, found: _Run) -> None:
+def _write_values(figure: style.Figure, found: _Run) -> None:
     (xx, xy), (_, yy) = found.tensor[_NUMBER]
     values, vectors = found.principal
     tensor = f"curvature xx {xx:.1f}, yy {yy:.1f}, xy {xy:.1f} 1/m"

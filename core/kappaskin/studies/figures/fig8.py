@@ -109,11 +109,11 @@ def _draw_loop(axes: style.Axes, first: _Run, second: _Run) -> None:
     axes.set(xlim=ends, ylim=(-100, 100), xticks=range(-80, 81, 40), yticks=range(-80, 81, 40))
     axes.set(xlabel="applied curvature [1/m]", ylabel="curvature read [1/m]")
     axes.legend(loc="upper left")
-    told = ["widest gap, κ > 0 / κ < 0:"]
+    lines = ["widest gap, κ > 0 / κ < 0:"]
     for name, found in (("first", first), ("second", second)):
         inner, outer = found.report.gaps[:, PAIR]
-        told.append(f"{name} {inner:.1f} / {outer:.1f} 1/m")
-    axes.text(83, -97, "\n".join(told), ha="right", va="bottom", linespacing=1.4)
+        lines.append(f"{name} {inner:.1f} / {outer:.1f} 1/m")
+    axes.text(83, -97, "\n".join(lines), ha="right", va="bottom", linespacing=1.4)
 
 
 def _draw_errors(axes: style.Axes, found: _Run) -> None:

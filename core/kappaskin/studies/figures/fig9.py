@@ -1,4 +1,4 @@
-"""The paper's Fig. 9: a fingertip's arc at rest, pressed, and as ten noisy readings tell it."""
+"""The paper's Fig. 9: a fingertip's arc at rest, pressed, and as ten noisy readings give it."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from kappaskin.bases import basis_for
 from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
 from kappaskin.studies.figures import style
-from kappaskin.studies.tables import APPLIED, RADIUS, fingertip_scene
+from kappaskin.studies.paper import APPLIED, RADIUS, fingertip_scene
 
 NOISE = 4.5
 """RMS of a reading's noise in 1/m (Table 2)."""
@@ -102,8 +102,8 @@ def _draw_shape(axes: style.Axes, load: _Load) -> None:
     top = 1e3 * (RADIUS - load.true[90]) + 0.35
     style.arrow(axes, (0, top + 4.5), (0, top))
     axes.text(0.8, top + 4.5, "Q", va="top", style="italic")
-    told = f"found {load.found}\nRMS error {1e3 * load.rms:.2f} mm"
-    axes.text(0, 5, told, ha="center", va="center", linespacing=1.5)
+    text = f"found {load.found}\nRMS error {1e3 * load.rms:.2f} mm"
+    axes.text(0, 5, text, ha="center", va="center", linespacing=1.5)
 
 
 def _draw_deflection(axes: style.Axes, load: _Load) -> None:

@@ -1,10 +1,108 @@
-"""What base curvature costs through hysteresis, as the study's rows drawn against it."""
+"""How far a skin's base curvature costs accuracy through hysteresis (the paper's section 6.2).
 
+The same strip of ten elements is bent to base radii from the fingertip's to flat, and the same
+dent, Eq. 10 as it must read, is pressed into it and let go, slowly, some times over. What is
+assumed:
+
+- The gages are bonded while flat and have no past; then the skin is bent to its base radius once.
+  So a gage on a fingertip begins each press at the far end of a loop, a gage on a flat skin at the
+  origin.
+- The skin at rest is then taken as zero (tare), and readings count with the slope of a long way.
+  Nothing undoes the loops.
+- All gages have the same loops, which depend on the way of the curvature alone, not on its rate.
+- The skin moves alike whatever its radius; the loads that make it do so differ.
+- The ends of a bent skin are pinned, those of the flat one hinged. That matters: pinned ends decide
+  the function k = 1, which on a flat strip must be read from small changes of curvature.
+"""
+
+import math
 from typing import Any
 
+import numpy as np
+
+from kappaskin.bases import Basis, SineBasis
+from kappaskin.estimation import LeastSquares
+from kappaskin.frames import Array
+from kappaskin.scenes import SECOND_GENERATION_LOOPS, ReadingEffect, Running
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
 from kappaskin.studies.figures import style
-from kappaskin.studies.initial_curvature import initial_curvature
-from kappaskin.studies.tables import RADIUS
+from kappaskin.studies.paper import RADIUS
+
+SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.0)
+"""Base curvatures, as shares of the paper's fingertip's."""
+
+_ELEMENTS, _CYCLES = 10, 3
+_STEPS, _BENDING = 50, 101
+_PRESS: Array = np.concatenate([np.linspace(0, 1, _STEPS + 1), np.linspace(1, 0, _STEPS + 1)[1:]])
+_PACE = 0.02  # s a step, for effects that know time: a press takes a second
+
+
+def _pressed(running: Running, base: float, change: Array) -> Array:
+    """Readings (cycles, steps, P) of presses by up to `change` (P,) of a tared skin."""
+    bending = np.multiply.outer(base * np.linspace(0, 1, _BENDING), np.ones_like(change))
+    pressing = base + np.multiply.outer(np.tile(_PRESS, _CYCLES), change)
+    way: Array = np.concatenate([bending, pressing])
+    readings = np.array([running(way[n], n * _PACE) for n in range(len(way))])
+    tared = readings[_BENDING:] - readings[_BENDING - 1]
+    return tared.reshape(_CYCLES, len(_PRESS), len(change))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _errors(basis: Basis, fit: LeastSquares, truth: Array, readings: Array) -> dict[str, float]:
+    """What one cycle of `readings` (steps, P) makes of the dent `truth` (8, 1)."""
+    change = fit.M[:_ELEMENTS] @ truth.ravel()
+    true_readings: Array = np.multiply.outer(_PRESS, change)
+    true_shapes: Array = np.multiply.outer(_PRESS, truth)
+    K = np.zeros((len(_PRESS), 3, _ELEMENTS))
+    K[:, 0] = readings
+    shape = basis.on_grid(*basis.patch.grid(101, 2))
+    off: Array = 1e3 * shape(fit(K).coefficients - true_shapes)[:, 0]
+    going, coming = readings[: _STEPS + 1], readings[_STEPS:][::-1]
+    return {
+        "swing": float(np.abs(change).max()),
+        "reading_rms": _rms(readings - true_readings),
+        "loop_width": float(np.abs(going - coming).max()),
+        "e_max_mm": float(off[_STEPS, 50]),
+        "rms_mm": _rms(off),
+        "rest_rms_mm": _rms(off[-1:]),
+    }
+
+
+def initial_curvature(
+    effect: ReadingEffect = SECOND_GENERATION_LOOPS, applied: float = 1.27
+) -> list[dict[str, Any]]:
+    """Errors by base curvature for readings that `effect` spoils, as rows ready for a figure.
+
+    `applied` is the displacement under the load in mm. For each of `SHARES` a row of the first
+    cycle and one of the last, settled one: `swing` (the largest change of curvature), `reading_rms`
+    and `loop_width` (the widest) in 1/m;
+    `e_max_mm` at the load when fully pressed, `rms_mm` over the skin and the cycle, `rest_rms_mm`
+    over the skin after release, when there is no dent. `base_radius_mm` is None when flat.
+    """
+    truth = np.zeros((8, 1))
+    truth[0], truth[2] = applied / 4e3, -3 * applied / 4e3
+    rows: list[dict[str, Any]] = []
+    for share in SHARES:
+        base = share / RADIUS
+        patch = Patch(math.pi * RADIUS, 0.02, 1 / base if base else math.inf, strip=True)
+        basis = SineBasis(patch, 8, 1)
+        fit = LeastSquares(basis, SensorLayout.regular(patch, _ELEMENTS, 1))
+        running = effect.start((_ELEMENTS,), np.random.default_rng(0))
+        cycles = _pressed(running, base, fit.M[:_ELEMENTS] @ truth.ravel())
+        for name, readings in (("first", cycles[0]), ("settled", cycles[-1])):
+            row = {
+                "base_curvature": base,
+                "base_radius_mm": 1e3 / base if base else None,
+                "ends": "pinned" if base else "hinged",
+                "applied_mm": applied,
+                "cycle": name,
+            }
+            rows.append(row | _errors(basis, fit, truth, readings))
+    return rows
 
 
 def draw(figure: style.Figure) -> None:

@@ -1,7 +1,8 @@
 """How every figure looks: sizes for print, the app's colours, and the same bytes every time."""
 
+import io
 import re
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 
@@ -64,6 +65,11 @@ _RULES = {
 }
 
 
+# Neither a date nor a version: the same run gives the same bytes.
+KINDS = {"svg": {"Date": None, "Creator": "kappaskin"}, "png": {"Software": "kappaskin"}}
+"""What a figure can be written as, with the metadata of the file."""
+
+
 def loaded() -> Any:
     """Matplotlib, or a refusal where it is missing."""
     try:
@@ -81,6 +87,16 @@ def sheet() -> Generator[Figure]:
         mpl.rcdefaults()
         mpl.rcParams.update(_RULES)
         yield mpl.figure.Figure()
+
+
+def drawn(draw: Callable[[Figure], None], *kinds: str) -> dict[str, bytes]:
+    """What `draw` draws on an empty figure, as a file of each of some `KINDS`."""
+    files = {kind: io.BytesIO() for kind in kinds}
+    with sheet() as figure:
+        draw(figure)
+        for kind, file in files.items():
+            figure.savefig(file, format=kind, metadata=KINDS[kind])
+    return {kind: file.getvalue() for kind, file in files.items()}
 
 
 def resize(figure: Figure, width: float, height: float) -> None:

@@ -1,20 +1,102 @@
-"""The hard cases themselves, made one by one when they are asked for."""
+"""Hard cases: what a case is, and the gallery of them.
+
+Where a case does not say otherwise, 40 frames are read of a shape whose every function bends the
+skin alike, by about 0.3 1/m, with Gaussian noise of the paper's 0.231 1/m; all seeded.
+"""
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 
-from kappaskin.bases import CurvatureMap, SineBasis
+from kappaskin.bases import Basis, CurvatureMap, SineBasis
 from kappaskin.estimation import FiniteSlope
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.scenes import TABLE_1_NOISE, scaled_to
 from kappaskin.sensing import SensorLayout, Transduction
 from kappaskin.skin import Patch
-from kappaskin.studies.stability.case import FRAMES, SEED, Case, Kind, case_of
-from kappaskin.studies.tables import RADIUS
+from kappaskin.studies.paper import RADIUS
+
+FRAMES = 40
+"""Frames of a case, each with its own noise: an error bar is judged by all of them."""
+
+SEED = 8
+_BENDS = 0.3  # 1/m by each function: slopes are then too slight to matter
+
+
+class CaseKind(Enum):
+    """What a case asks of a method; which methods claim it follows."""
+
+    ANY = "any method that takes the skin"
+    LINEAR = "readings as a skin of slight slope gives them, to more digits than slopes allow"
+    SLOPES = "readings of a skin with slopes near one"
+    SEQUENCE = "more frames than a method that solves each anew is asked for"
+    DENSE = "as many functions as dense algebra does quickly, but nothing slower"
+    LARGE = "more functions than a dense matrix is made for"
+
+
+@dataclass(frozen=True, eq=False)
+class HardCase:
+    """`curvature` (T, 3, P) in 1/m, read of the shape with coefficients `truth` in m.
+
+    `truth` is (Ri, Rj), or (T, Ri, Rj) of a shape that moves, of the functions of `true_basis`.
+    `hard` is one sentence on what is hard; `announced` why an answer may be less than exact, or
+    none; empty where nothing excuses it.
+    """
+
+    name: str
+    hard: str
+    basis: Basis
+    layout: SensorLayout
+    true_basis: Basis
+    truth: Array
+    curvature: Array
+    announced: str = ""
+    kind: CaseKind = CaseKind.ANY
+
+    @property
+    def in_reach(self) -> bool:
+        """Whether the functions that are fitted can be the truth."""
+        return self.true_basis == self.basis
+
+
+def case_of(
+    name: str,
+    hard: str,
+    layout: SensorLayout,
+    functions: tuple[int, int],
+    *,
+    announced: str = "",
+    noise: float = TABLE_1_NOISE,
+    kind: CaseKind = CaseKind.ANY,
+    basis: Basis | None = None,
+    true_basis: Basis | None = None,
+    truth: Array | None = None,
+    spoilt: Callable[[Array], Array] = lambda K: K,
+) -> HardCase:
+    """A case of `functions` on a `layout`; `spoilt` makes of clean, noisy readings what comes."""
+    rng = np.random.default_rng(SEED)
+    basis = SineBasis(layout.patch, *functions) if basis is None else basis
+    true_basis = basis if true_basis is None else true_basis
+    M = layout.curvature_operator(true_basis)
+    c = _even(true_basis, M, rng) if truth is None else truth
+    clean = np.dot(c.reshape(-1, true_basis.size), M.T).reshape(-1, 3, len(layout))
+    frames = (FRAMES if len(clean) == 1 else len(clean)) if noise else 1
+    K = clean + rng.normal(0.0, noise, (frames, 3, len(layout)))
+    return HardCase(name, hard, basis, layout, true_basis, c, spoilt(K), announced, kind)
+
+
+def _even(basis: Basis, M: Array, rng: np.random.Generator) -> Array:
+    """Coefficients (Ni, Nj) of which each function that is free bends the skin alike."""
+    W = np.eye(basis.size) if basis.free is None else basis.free
+    A = M @ W
+    length = np.linalg.norm(A, axis=0) / math.sqrt(len(A))
+    length[length <= 1e-9 * length.max(initial=1.0)] = np.inf  # it would move without bending
+    return (W @ (_BENDS * rng.normal(size=len(length)) / length)).reshape(basis.shape)
+
 
 _PATTERNS = 4  # of missing readings
 _SQUARE = Patch(0.1, 0.1)
@@ -27,7 +109,7 @@ def _dent(functions: int) -> Array:
     return Plate(_SQUARE).deflection([scaled_to(Plate(_SQUARE), load, 1e-3, basis)], basis)
 
 
-def _sizes() -> Iterator[Case]:
+def _sizes() -> Iterator[HardCase]:
     yield case_of("paper", "nothing: the paper's grid and basis, to compare with", _TENS, (8, 8))
     yield case_of(
         "paper, exact",
@@ -35,7 +117,7 @@ def _sizes() -> Iterator[Case]:
         _TENS,
         (8, 8),
         noise=0,
-        kind=Kind.LINEAR,
+        kind=CaseKind.LINEAR,
     )
     yield case_of(
         "Ni = m",
@@ -45,7 +127,7 @@ def _sizes() -> Iterator[Case]:
     )
     yield case_of(
         "Ni > m",
-        "functions 11 and 12 look like 9 and 8 in each channel; three channels tell them apart",
+        "functions 11 and 12 look like 9 and 8 in each channel; three channels distinguish them",
         _TENS,
         (12, 10),
     )
@@ -64,7 +146,7 @@ def _sizes() -> Iterator[Case]:
         (12, 12),
         truth=_dent(12),
         noise=0,
-        kind=Kind.LINEAR,
+        kind=CaseKind.LINEAR,
         announced="140 of 144 coefficients are determined",
     )
     yield case_of(
@@ -72,7 +154,7 @@ def _sizes() -> Iterator[Case]:
         "a function that is zero at every element is seen by its twist alone",
         _TENS,
         (20, 8),
-        kind=Kind.DENSE,
+        kind=CaseKind.DENSE,
     )
     yield case_of(
         "Ni = 2m, Nj = 2n",
@@ -81,25 +163,25 @@ def _sizes() -> Iterator[Case]:
         (20, 20),
         truth=_dent(20),
         announced="there are fewer readings than coefficients",
-        kind=Kind.DENSE,
+        kind=CaseKind.DENSE,
     )
     yield case_of(
         "Ni = 64",
         "unscaled, the lengths of the columns differ by a factor of thousands",
         SensorLayout.regular(Patch(0.5, 0.5), 65, 3),
         (64, 2),
-        kind=Kind.DENSE,
+        kind=CaseKind.DENSE,
     )
     yield case_of(
         "16 x 16",
         "256 unknowns of 867 readings, by dense algebra",
         SensorLayout.regular(_SQUARE, 17, 17),
         (16, 16),
-        kind=Kind.DENSE,
+        kind=CaseKind.DENSE,
     )
 
 
-def _arcs() -> Iterator[Case]:
+def _arcs() -> Iterator[HardCase]:
     patch = Patch(math.pi * RADIUS, 0.02, RADIUS, strip=True)
     layout = SensorLayout.regular(patch, 10, 1)
     hard = "sin(theta) moves half a circle as a whole and bends nothing: its column is zero"
@@ -108,7 +190,7 @@ def _arcs() -> Iterator[Case]:
     dent = np.zeros((8, 1))
     dent[0], dent[2] = a0, -3 * a0
     yield case_of("fingertip, exact", f"{hard}; pinned ends decide it", layout, (8, 1), truth=dent,
-                  noise=0, kind=Kind.LINEAR)  # fmt: skip
+                  noise=0, kind=CaseKind.LINEAR)  # fmt: skip
     yield case_of("fingertip", f"{hard}; pinned ends decide it, noise of 4.5 1/m", layout, (8, 1),
                   truth=dent, noise=4.5, basis=pinned)  # fmt: skip
     yield case_of(
@@ -117,11 +199,11 @@ def _arcs() -> Iterator[Case]:
         layout,
         (8, 1),
         basis=SineBasis(patch, 8, 1, sliding=True),
-        announced="no reading tells where the skin as a whole is",
+        announced="no reading depends on where the skin as a whole is",
     )
 
 
-def _loads() -> Iterator[Case]:
+def _loads() -> Iterator[HardCase]:
     places = {
         "load near an edge": (5e-4, 0.04, "0.5 mm from an edge, between it and the first element"),
         "load near a corner": (2e-3, 2e-3, "2 mm from both edges of a corner"),
@@ -139,7 +221,7 @@ def _loads() -> Iterator[Case]:
             (8, 8),
             true_basis=fine,
             truth=1e-3 * w / peak,
-            kind=Kind.LINEAR,
+            kind=CaseKind.LINEAR,
         )
     yield case_of(
         "load on the edge",
@@ -159,7 +241,7 @@ def _only(channel: int) -> SensorLayout:
     return replace(_TENS, live=live)
 
 
-def _elements() -> Iterator[Case]:
+def _elements() -> Iterator[HardCase]:
     for channel, name in enumerate(COMPONENTS):
         yield case_of(f"only {name}", "one channel kind of three", _only(channel), (8, 8))
     yield case_of("dead elements", "five elements of a hundred read nothing",
@@ -191,8 +273,8 @@ def _scattered(points: Array) -> SensorLayout:
     return SensorLayout.scattered(_SQUARE, points)
 
 
-def _pair(gap: float) -> Case:
-    """Two places, each with two elements, that tell two functions apart by the `gap` in m."""
+def _pair(gap: float) -> HardCase:
+    """Two places, each with two elements, whose `gap` in m alone distinguishes two functions."""
     x = np.repeat([0.03 - gap / 2, 0.03 + gap / 2], 2)
     points = np.column_stack([x, np.full(4, 0.01)])
     return case_of(
@@ -200,20 +282,20 @@ def _pair(gap: float) -> Case:
         "two functions, seen from nearly the same place: all that is not noise is what they share",
         SensorLayout.scattered(Patch(0.1, 0.02, strip=True), points),
         (2, 1),
-        announced="what tells the functions apart is the distance of the elements",
+        announced="only the distance of the elements distinguishes the functions",
     )
 
 
-def _scales() -> Iterator[Case]:
+def _scales() -> Iterator[HardCase]:
     for name, side in (("1 mm", 1e-3), ("1 m", 1.0)):
         yield case_of(f"{name} patch", f"the lengths of M's columns go with 1/{name}^2",
                     SensorLayout.regular(Patch(side, side), 10, 10), (8, 8),
-                    kind=Kind.LINEAR)  # fmt: skip
+                    kind=CaseKind.LINEAR)  # fmt: skip
     yield case_of("1:100", "functions across bend ten thousand times as much as those along",
                   SensorLayout.regular(Patch(0.01, 1.0), 4, 20), (3, 15))  # fmt: skip
 
 
-def _readings() -> Iterator[Case]:
+def _readings() -> Iterator[HardCase]:
     holes = np.random.default_rng(SEED).random((_PATTERNS, 3, 100))
     holes = np.tile(holes, (FRAMES // _PATTERNS, 1, 1))
 
@@ -232,19 +314,19 @@ def _readings() -> Iterator[Case]:
                   announced="there is nothing to go by")  # fmt: skip
     chain = Transduction()
     yield case_of("rails", "bent so far that the electronics stand on a rail where it matters most",
-                  _TENS, (8, 8), truth=_strong(chain), noise=0.1, kind=Kind.LINEAR,
+                  _TENS, (8, 8), truth=_strong(chain), noise=0.1, kind=CaseKind.LINEAR,
                   spoilt=lambda K: chain.curvature(chain.counts(K)))  # fmt: skip
     yield case_of("spikes", "one reading of each frame is off by 1e6 1/m", _TENS, (8, 8),
                   spoilt=spiked, announced="a spike is no noise: bars widen with it")  # fmt: skip
     dent = _dent(8)
     signal = _TENS.curvature_operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
     noise = 10 * float(np.sqrt(np.mean(signal**2)))
-    yield case_of("noise 10 times the signal", "readings tell more of the noise than of the shape",
+    yield case_of("noise 10 times the signal", "readings hold more noise than shape",
                   _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
 
 
 def _strong(chain: Transduction) -> Array:
-    """A dent whose peak curvature is half as much again as the electronics can tell."""
+    """A dent whose peak curvature is half as much again as the electronics can measure."""
     basis = SineBasis(_SQUARE, 8, 8)
     c = Plate(_SQUARE).deflection([PointLoad(0.045, 0.045)], basis)
     peak = np.abs(_TENS.curvature_operator(basis) @ c.ravel()).max()
@@ -252,7 +334,7 @@ def _strong(chain: Transduction) -> Array:
     return c * 1.5 * 0.5 * (high - low) * chain.resolution / peak
 
 
-def _slopes() -> Iterator[Case]:
+def _slopes() -> Iterator[HardCase]:
     basis = SineBasis(_SQUARE, 8, 8)
     c = Plate(_SQUARE).deflection([PointLoad(0.04, 0.06)], basis)
     slope = np.abs(basis.on_grid(*_SQUARE.grid(101, 101), dx=1)(c)).max()
@@ -261,12 +343,12 @@ def _slopes() -> Iterator[Case]:
         skin = FiniteSlope(basis, _TENS)
         rng = np.random.default_rng(SEED)
         K = skin.predicted(truth) + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, 3, 100))
-        yield Case(f"slopes of {steepest}", "gages sense the curvature of the bent surface, which "
-                   "is not that of Eqs. 3-5", basis, _TENS, basis, truth, K,
-                   "linear methods do not know slopes", Kind.SLOPES)  # fmt: skip
+        hard = "gages sense the curvature of the bent surface, which is not that of Eqs. 3-5"
+        yield HardCase(f"slopes of {steepest}", hard, basis, _TENS, basis, truth, K,
+                       "linear methods do not know slopes", CaseKind.SLOPES)  # fmt: skip
 
 
-def _sequence(frames: int, elements: int, functions: int) -> Case:
+def _sequence(frames: int, elements: int, functions: int) -> HardCase:
     """A dent that goes round a hundred times."""
     layout = SensorLayout.regular(_SQUARE, elements, elements)
     basis = SineBasis(_SQUARE, functions, functions)
@@ -277,10 +359,10 @@ def _sequence(frames: int, elements: int, functions: int) -> Case:
     truth = way[np.arange(frames) % len(way)].reshape(frames, *basis.shape)
     return case_of(f"{frames} frames", "errors of many steps could add up, and a covariance lose "
                    "its definiteness", layout, basis.shape, truth=truth,
-                   kind=Kind.SEQUENCE)  # fmt: skip
+                   kind=CaseKind.SEQUENCE)  # fmt: skip
 
 
-def _large(count: int) -> Case:
+def _large(count: int) -> HardCase:
     """`count` functions a side on one more element a side."""
     patch = Patch(0.1, 0.1)
     basis, layout = (
@@ -292,11 +374,11 @@ def _large(count: int) -> Case:
     x, y = patch.cell_centres(count + 1, count + 1)
     clean = np.stack([CurvatureMap(basis, name, x, y)(c).ravel() for name in COMPONENTS])
     K = clean + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, *clean.shape))
-    return Case(f"{count} x {count}", f"{count**2} unknowns of {clean.size} readings", basis,
-                layout, basis, c, K, kind=Kind.LARGE)  # fmt: skip
+    return HardCase(f"{count} x {count}", f"{count**2} unknowns of {clean.size} readings", basis,
+                layout, basis, c, K, kind=CaseKind.LARGE)  # fmt: skip
 
 
-def gallery(long: bool = False) -> Iterator[Case]:
+def gallery(long: bool = False) -> Iterator[HardCase]:
     """Every case, made when it is asked for; the largest only when `long`."""
     for room in (_sizes, _arcs, _loads, _elements, _scales, _readings, _slopes):
         yield from room()

@@ -1,4 +1,4 @@
-"""A case to what rounding may cost in it: conditions, and the answer to more digits than asked for.
+"""The reference of a hard case: its condition, and its answer in extended precision.
 
 Coefficients are compared in the scaled unknowns, each times the length of its column of M, in which
 every function bends the skin alike.
@@ -11,12 +11,133 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
+from scipy import fft, linalg
 
 from kappaskin.estimation import column_lengths, singular_values
 from kappaskin.frames import Array
-from kappaskin.studies.stability.case import Case, Kind
-from kappaskin.studies.stability.precise import least_squares
+from kappaskin.studies.stability.gallery import CaseKind, HardCase
+
+# Least squares in extended precision.
+#
+# Numbers are pairs whose sum counts: the nearest float64 and what is missing from it, 106 bits in
+# all (Dekker, doi:10.1007/BF01397083). The residuals of the augmented system r + A g = b, A^T r = 0
+# are taken in them and corrected with one factorisation in float64 (Bjorck,
+# doi:10.1007/BF01939321), until nothing changes any more.
+
+_SPLITTER = 2.0**27 + 1
+_STEPS = 60
+_DONE = 1e-18  # of the solution: so small must the last correction be
+_CONTRACTS = 0.5  # a correction longer than this share of the one before: no more to gain
+
+
+def _two_sum(a: Array, b: Array) -> tuple[Array, Array]:
+    """a + b as a pair, without error."""
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+def _halves(a: Array) -> tuple[Array, Array]:
+    t = _SPLITTER * a
+    high = t - (t - a)
+    return high, a - high
+
+
+def _two_product(a: Array, b: Array) -> tuple[Array, Array]:
+    """a b as a pair, without error."""
+    p = a * b
+    (a1, a2), (b1, b2) = _halves(a), _halves(b)
+    return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DoubleDouble:
+    """Numbers to 106 bits: `high`, the nearest float64, and `low`, what is missing from it."""
+
+    high: Array
+    low: Array
+
+    @classmethod
+    def of(cls, values: Array) -> "DoubleDouble":
+        return cls(values, np.zeros_like(values))
+
+    @classmethod
+    def _carried(cls, high: Array, low: Array) -> "DoubleDouble":
+        s = high + low
+        return cls(s, low - (s - high))
+
+    def __add__(self, other: "DoubleDouble") -> "DoubleDouble":
+        s, e = _two_sum(self.high, other.high)
+        return DoubleDouble._carried(s, e + (self.low + other.low))
+
+    def __neg__(self) -> "DoubleDouble":
+        return DoubleDouble(-self.high, -self.low)
+
+    def __sub__(self, other: "DoubleDouble") -> "DoubleDouble":
+        return self + -other
+
+    def before(self, A: Array) -> "DoubleDouble":
+        """A (R, N) times these numbers (N,)."""
+        p, e = _two_product(A, self.high)
+        terms = DoubleDouble._carried(p, e + A * self.low)
+        while (count := terms.high.shape[1]) > 1:  # halved by adding, so that errors stay few
+            half = count // 2
+            left = DoubleDouble(terms.high[:, :half], terms.low[:, :half])
+            added = left + DoubleDouble(
+                terms.high[:, half : 2 * half], terms.low[:, half : 2 * half]
+            )
+            odd = terms.high[:, 2 * half :], terms.low[:, 2 * half :]
+            terms = DoubleDouble(np.hstack([added.high, odd[0]]), np.hstack([added.low, odd[1]]))
+        return DoubleDouble(terms.high[:, 0], terms.low[:, 0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """The unknowns g (F,) and what they leave of the readings, r = b - A g (R,)."""
+
+    unknowns: DoubleDouble
+    residual: DoubleDouble
+
+
+def least_squares(A: Array, free: Array | None, b: Array) -> Solution | None:
+    """The g (F,) that make |b - A W g| smallest, for A (R, N) and `free` W (N, F), b (R,).
+
+    W is the identity when None. None where A W has not full rank to float64, so that no correction
+    gets any nearer; its columns should be of about equal length.
+    """
+    factors = [A] if free is None else [A, free]
+    product: Array = A if free is None else A @ free
+    if product.shape[0] < product.shape[1]:
+        return None
+    Q, R = cast("tuple[Array, Array]", linalg.qr(product, mode="economic"))
+    if not np.abs(np.diag(R)).min() > 0:
+        return None
+    g = DoubleDouble.of(np.zeros_like(product[0]))
+    r, K = DoubleDouble.of(b), DoubleDouble.of(b)
+    last = np.inf
+    for _ in range(_STEPS):
+        f = K - r - _applied(factors, g)
+        h = -_applied([X.T for X in reversed(factors)], r)
+        u = linalg.solve_triangular(R, h.high, trans="T")
+        seen = Q.T @ f.high
+        step = linalg.solve_triangular(R, seen - u)
+        g, r = g + DoubleDouble.of(step), r + DoubleDouble.of(f.high + Q @ (u - seen))
+        change, size = float(np.linalg.norm(step)), float(np.linalg.norm(g.high))
+        if not change > _DONE * size:
+            return Solution(g, r)
+        if not change <= _CONTRACTS * last:
+            break
+        last = change
+    return None
+
+
+def _applied(factors: list[Array], x: DoubleDouble) -> DoubleDouble:
+    for A in reversed(factors):
+        x = x.before(A)
+    return x
+
+
+# The reference
 
 _Precise = NDArray[np.longdouble]
 _EPS = float(np.finfo(float).eps)
@@ -83,9 +204,9 @@ class Reference:
         return min(math.log10(off / (eps * size)), -math.log10(eps)) if size else -math.log10(eps)
 
 
-def reference_of(case: Case) -> Reference:
+def reference_of(case: HardCase) -> Reference:
     """The reference of the readings that the first frame has."""
-    if case.kind is Kind.LARGE:
+    if case.kind is CaseKind.LARGE:
         return _by_transforms(case)
     used = case.layout.live & np.isfinite(case.curvature[0])
     M = case.layout.curvature_operator(case.basis)[used.ravel()]
@@ -116,7 +237,7 @@ def _condition(values: Array, shape: tuple[int, int]) -> float:
     return float(values[0] / values[-1])
 
 
-def _by_transforms(case: Case) -> Reference:
+def _by_transforms(case: HardCase) -> Reference:
     """Of sines on a regular grid of more elements: M^T M is diagonal, M^T K three transforms.
 
     They are computed in extended precision, 64 bits where the machine has them.

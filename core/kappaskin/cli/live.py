@@ -1,0 +1,144 @@
+"""Commands on live estimates: publish, listen."""
+
+import math
+import time
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
+from kappaskin.errors import Refusal
+
+if TYPE_CHECKING:
+    from kappaskin.live import Engine, Status
+    from kappaskin.publish import Latency, Published
+
+_EVERY = 1.0  # s between two lines
+_POLL = 0.05  # s
+
+Many = Annotated[list[str] | None, Parameter(negative="")]
+Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=True)]
+
+
+def publish(
+    source: str, *, udp: Many = None, foxglove: Perhaps = None, seconds: float = math.inf
+) -> int:
+    """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
+
+    Prints a line a second: frames/s, messages sent and dropped, and the 99th percentile of the
+    time from the arrival of a frame until it was sent. The messages are explained in
+    `publishing/messages.md` among the resources. Exit code 1 if there was nothing
+    to send.
+
+    Example: `kappaskin publish /dev/ttyACM0 --udp 192.168.1.20:9870 --foxglove`
+
+    Parameters
+    ----------
+    source
+        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+    udp
+        HOST:PORT to send JSON datagrams to; may be given several times.
+    foxglove
+        Serve Foxglove at HOST:PORT, or without one at 127.0.0.1:8765; give it after the source.
+    seconds
+        How long to publish; until stopped when left out.
+    """
+    from kappaskin.live import Engine
+    from kappaskin.publish import targets_of
+    from kappaskin.scenes import load_scene
+    from kappaskin.sources import SIMULATION
+
+    check_time(seconds, "publish")
+    places = foxglove if foxglove != [] else [""]
+    targets = [f"udp://{place}" for place in udp or ()]
+    targets += [f"foxglove://{place}" for place in places or ()]
+    if not targets:
+        raise Refusal("expected somebody to send to: give --udp HOST:PORT, or --foxglove")
+    targets_of(targets)  # or refused here
+    if source.startswith(SIMULATION):
+        load_scene(source.removeprefix(SIMULATION))  # or refused here
+    stopped = stops()
+    with Engine() as engine:
+        engine.publish(targets)
+        engine.connect(source)
+        status = _watched(engine, time.monotonic() + seconds, stopped)
+    return FAILED if math.isnan(status.publishing.latency.whole) else 0
+
+
+def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
+    """Print a line a second until the `end`; the last status."""
+    printed, line = time.monotonic(), ""
+    status = engine.status()
+    while not stopped and time.monotonic() < end:
+        time.sleep(_POLL)
+        engine.revive()
+        status = engine.status()
+        for target in status.publishing.targets:
+            if target.refusal:
+                raise Refusal(target.refusal)
+        if time.monotonic() - printed >= _EVERY:
+            printed, line = time.monotonic(), _line(status)
+            print(line, flush=True)
+    if (last := _line(status)) != line:
+        print(last)
+    return status
+
+
+def _line(status: "Status") -> str:
+    publishing = status.publishing
+    parts = [f"{status.state:9}", f"{status.rate:6.0f} frames/s", *map(_words, publishing.targets)]
+    if math.isfinite(publishing.latency.whole):
+        parts.append(_late(publishing.latency))
+    return "  ".join([*parts, status.message])
+
+
+def _words(target: "Published") -> str:
+    text = f"{target.target}: {target.sent} sent, {target.dropped} dropped"
+    if target.target.startswith("foxglove"):
+        return f"{text}, {len(target.receivers)} connected"
+    trouble = target.receivers[0].trouble if target.receivers else "opening"
+    return f"{text} ({trouble})" if trouble else text
+
+
+def _late(latency: "Latency") -> str:
+    return f"99 % within {1e3 * latency.whole:.1f} ms"
+
+
+_READ = 0.1  # s
+
+
+def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False) -> int:
+    """Print what is published to a UDP port of this machine, until stopped (Ctrl+C).
+
+    Contacts (ten a second) with their error bars and their age when sent, every loss on the
+    network, the state of the source, and a summary. Exit code 1 if no contact came.
+
+    Example: `kappaskin listen --udp 9870`
+
+    Parameters
+    ----------
+    udp
+        The port.
+    seconds
+        How long to listen; until stopped when left out.
+    json
+        Print every message as it came, one a line.
+    """
+    from kappaskin.publish import Listener
+
+    check_time(seconds, "listen")
+    stopped = stops()
+    listener, end = Listener(udp), time.monotonic() + seconds
+    try:
+        while not stopped and time.monotonic() < end:
+            for message in listener.read(_READ):
+                lines = listener.lines(message)
+                if json:
+                    print_json(message)
+                else:
+                    print(*lines, sep="\n", end="\n" if lines else "", flush=bool(lines))
+    finally:
+        listener.close()
+    if not json:
+        print(listener.summary)
+    return 0 if listener.contacts else FAILED

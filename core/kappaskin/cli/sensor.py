@@ -1,0 +1,309 @@
+"""Commands on a sensor: calibrate, tare, press, monitor, device."""
+
+import json
+import math
+import sys
+import time
+from contextlib import closing
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kappaskin.cli.common import FAILED, Switch, check_time, print_json, stops
+from kappaskin.errors import Refusal
+
+if TYPE_CHECKING:
+    from kappaskin.calibration import Rest, Tare, Taring
+    from kappaskin.sensing import Sensor
+    from kappaskin.sources import Source
+
+
+def _millimetres(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) / 1e3 for part in text.split(","))
+    except ValueError:
+        raise Refusal(f"expected radii in millimetres such as 100,50,25, got {text!r}") from None
+
+
+def _answer_to(question: str) -> str:
+    print(question, end="", file=sys.stderr, flush=True)
+    if answer := sys.stdin.readline() if sys.stdin else "":
+        return answer
+    print(file=sys.stderr)
+    raise Refusal(
+        "standard input ended before the last step, nothing was written; run this in a terminal, "
+        "or give --dwell if the device is laid on the cylinders by itself"
+    )
+
+
+def calibrate(
+    source: str,
+    *,
+    out: Path,
+    radii: str | None = None,
+    seconds: float = 1.0,
+    hold: float = 0.0,
+    dwell: float | None = None,
+    json: Switch = False,
+) -> int:
+    """Calibrate a sensor against cylinders of known radius.
+
+    Asks for one cylinder after the other and waits for Enter; a simulated source lays itself on
+    them. The exit code is 1 when some channel failed: the file is written without that channel.
+
+    Example: `kappaskin calibrate /dev/ttyACM0 --out skin.toml --radii 100,50,33,25,20`
+
+    Parameters
+    ----------
+    source
+        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+    out
+        The file to write.
+    radii
+        Radii of the cylinders in millimetres; those that the sensor can read when left out.
+    seconds
+        How long the readings on each cylinder are averaged.
+    hold
+        Seconds on the smallest cylinder to measure creep; without it creep is not measured.
+    dwell
+        Do not wait for Enter: the device moves by itself and stays on each cylinder so many
+        seconds.
+    json
+        Print one JSON object with every channel instead of a summary.
+    """
+    from kappaskin.calibration import calibrate as calibrated
+    from kappaskin.calibration import check_place, save_calibration, summary, take_sweep
+    from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
+
+    check_place(out)
+    try:
+        sensor, sweep = take_sweep(
+            source,
+            None if radii is None else _millimetres(radii),
+            _answer_to,
+            lambda line: print(line, file=sys.stderr),
+            seconds=seconds,
+            hold=hold,
+            dwell=dwell,
+        )
+        report = calibrated(sweep, sensor, datetime.now(UTC))
+        save_calibration(report.calibration, out)
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+        raise Refusal("stopped before the last step; nothing was written") from None
+    if json:
+        print_json(report.to_json())
+    else:
+        print(*summary(report), sep="\n")
+    return FAILED if report.failed else 0
+
+
+_READ = 0.05  # s that one read may wait
+
+
+def tare(source: str, *, undo: Switch = False) -> None:
+    """Tare a sensor: take its readings at rest as its zero.
+
+    Refused, with the reason, while the skin is loaded or moves. The tare is saved under the
+    sensor's serial number and used whenever it is connected; a simulated sensor's is only printed.
+
+    Example: `kappaskin tare /dev/ttyACM0`
+
+    Parameters
+    ----------
+    source
+        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+    undo
+        Stop using this sensor's tare instead of taking one.
+    """
+    # All of it before the source is opened: while modules load, readings wait.
+    from kappaskin.calibration import Tares, Taring, data_folder
+    from kappaskin.contact import LoadSeeker
+    from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
+    from kappaskin.sources import open_source
+
+    tares = Tares(data_folder())
+    with closing(open_source(source)) as opened:
+        sensor = _answering(opened)
+        if undo:
+            tares.use(sensor.serial_number, None)
+            print(f"{sensor.name} {sensor.serial_number}: no tare is in use")
+            return
+        used = None if sensor.simulated else tares.load(sensor.serial_number).fit_for(sensor)
+        taring = Taring(sensor, time.monotonic())
+        _take_readings(opened, sensor, taring)
+        now = datetime.now().astimezone()
+        taken = taring.tare(LoadSeeker(sensor), _rest(sensor, used), now, opened.temperature)
+    _print_tare(taken, used)
+    if sensor.simulated:
+        print("not saved: the sensor is simulated")
+    else:
+        tares.add(taken)
+        print(f"saved in {tares.path(sensor.serial_number)}")
+
+
+def _answering(source: "Source") -> "Sensor":
+    while source.sensor is None:
+        source.read(_READ)
+        if source.trouble:
+            raise Refusal(source.trouble)
+    return source.sensor
+
+
+def _take_readings(source: "Source", sensor: "Sensor", taring: "Taring") -> None:
+    while not taring.done(time.monotonic()):
+        for frame in source.read(_READ):
+            taring.take(frame.device_time, frame.host_time, sensor.nominal(frame))
+        if source.sensor is not sensor:
+            raise Refusal("another device answered, or the same one anew; tare again")
+
+
+def _rest(sensor: "Sensor", used: "Tare | None") -> "Rest":
+    """What the sensor reads at rest as far as is known: the tare that is in use."""
+    import numpy as np
+
+    from kappaskin.calibration import Rest
+
+    zero = np.zeros(sensor.channels) if used is None else used.offset
+    return Rest(zero, np.zeros(sensor.channels), used)
+
+
+def _print_tare(taken: "Tare", before: "Tare | None") -> None:
+    """Print the tare that was taken, and how far it is from the one in use before."""
+    import numpy as np
+
+    offset, error = (math.sqrt(float(np.nanmean(x**2))) for x in (taken.offset, taken.offset_sd))
+    warm = "" if taken.temperature is None else f" at {taken.temperature:.1f} degrees Celsius"
+    print(
+        f"{taken.name} {taken.serial_number}: {np.isfinite(taken.offset).sum()} of {len(taken)} "
+        f"channels tared{warm}, offsets of {offset:.3g} +- {error:.2g} 1/m (RMS)"
+    )
+    if before is not None:
+        moved = math.sqrt(float(np.nanmean((taken.offset - before.offset) ** 2)))
+        print(f"{moved:.3g} 1/m (RMS) from the tare of {before.date:%Y-%m-%d %H:%M}")
+
+
+def press(
+    source: str, *, quick: Switch = False, patience: float = 20.0, json: Switch = False
+) -> int:
+    """Verify the channel map: press one element after the other and see which one answers.
+
+    Asks for one element after the other and detects by itself when it is pressed and released; a
+    simulated source presses by itself. The exit code is 1 when the map is not confirmed.
+
+    Example: `kappaskin press /dev/ttyACM0 --quick`
+
+    Parameters
+    ----------
+    source
+        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+    quick
+        On a grid, press two elements in each row and column only: enough to see whether rows,
+        columns or components are exchanged, but not every pair of elements.
+    patience
+        Seconds to wait for an answer before the next element is asked for.
+    json
+        Print one JSON object with every press and the map that was found.
+    """
+    from kappaskin.calibration import press_elements
+    from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
+
+    try:
+        test, verdict = press_elements(
+            source,
+            lambda line: print(line, file=sys.stderr, flush=True),
+            quick=quick,
+            patience=patience,
+        )
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+        raise Refusal("stopped before the last element; the map was not verified") from None
+    if json:
+        print_json(
+            {
+                "confirmed": verdict.confirmed,
+                "words": list(verdict.words),
+                "order": None if verdict.order is None else verdict.order.tolist(),
+                "pressed": [
+                    {"asked": p.asked, "verdict": p.verdict, "answered": p.element}
+                    for p in test.done
+                ],
+            }
+        )
+    else:
+        print(*verdict.words, sep="\n")
+    return 0 if verdict.confirmed else FAILED
+
+
+_WAIT = 0.1  # s
+
+
+def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> int:
+    """Print what a device sends as readable lines, to bring it up.
+
+    Every message with its sequence number, time and content (of scans, ten a second), every gap and
+    every byte that was discarded, and a summary at the end (Ctrl+C). Exit code 1 if no message
+    came, or the line broke.
+
+    Example: `kappaskin monitor /dev/ttyACM0`
+
+    Parameters
+    ----------
+    port
+        A port, or a URL that pyserial opens.
+    seconds
+        How long to listen; until stopped when left out.
+    reset
+        Pulse DTR and RTS first, which resets many boards.
+    """
+    from kappaskin.sources import Monitor
+
+    check_time(seconds, "listen")
+    stopped = stops()
+    listening, end = Monitor(port), time.monotonic() + seconds
+    try:
+        if reset:
+            listening.reset()
+        while not (stopped or listening.gone) and time.monotonic() < end:
+            for line in listening.read(_WAIT):
+                print(line, flush=True)
+    finally:
+        listening.close()
+    print(listening.summary())
+    return FAILED if listening.gone or not listening.accounting().accepted else 0
+
+
+def device(scene: str = "", *, rate: float | None = None, dwell: float | None = None) -> None:
+    """Run a simulated sensor on a pseudo-terminal, like a real one on a serial port.
+
+    Prints one JSON line with the port, then serves until stopped (Ctrl+C); then prints on standard
+    error how many messages it numbered and how many of these it could not send.
+
+    Example: `kappaskin device circle --rate 500`
+
+    Parameters
+    ----------
+    scene
+        What to simulate; the default scene when left out.
+    rate
+        Frames per second; the scene's when left out.
+    dwell
+        Seconds on each cylinder, in the scene `calibration`; one when left out.
+    """
+    from kappaskin.scenes import load_scene
+    from kappaskin.sources import PseudoDevice
+
+    played = load_scene(scene)
+    if dwell is not None:
+        if played.laid is None:
+            raise Refusal(
+                f"the scene {played.name} has no cylinders to dwell on; leave --dwell out"
+            )
+        played = replace(played, laid=replace(played.laid, dwell=dwell))
+    server = PseudoDevice(played if rate is None else replace(played, rate=rate))
+    stopped = stops()
+    print(json.dumps({"port": server.port, "rate": server.rate}), flush=True)
+    server.serve(lambda: bool(stopped))
+    server.close()
+    print(json.dumps({"spent": server.spent, "unsent": server.unsent}), file=sys.stderr)

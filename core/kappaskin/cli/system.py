@@ -1,0 +1,231 @@
+"""Commands on this machine and its ports: doctor, drill, and completion in a shell."""
+
+import ctypes
+import math
+import os
+import platform
+import shutil
+import sys
+from dataclasses import asdict
+from importlib import metadata
+from typing import TYPE_CHECKING, Any, Literal
+
+from kappaskin.cli.common import FAILED, ProgressLine, Switch, print_json, print_result
+from kappaskin.errors import Refusal
+
+if TYPE_CHECKING:
+    from kappaskin.sources import Diagnosis
+
+PACKAGES = (
+    "numpy",
+    "scipy",
+    "pyserial",
+    "cyclopts",
+    "pillow",
+    "platformdirs",
+    "trimesh",
+    "mcap",
+    "lz4",
+    "zstandard",
+    "PySide6-Essentials",
+    "pyvista",
+    "pyvistaqt",
+    "vtk",
+    "tomlkit",
+)
+
+# What Qt and VTK load at run time that no wheel carries: library, and Debian's package of it.
+LIBRARIES = {
+    "libEGL.so.1": "libegl1",
+    "libGL.so.1": "libgl1",
+    "libglib-2.0.so.0": "libglib2.0-0",
+    "libfontconfig.so.1": "libfontconfig1",
+    "libdbus-1.so.3": "libdbus-1-3",
+    "libxkbcommon-x11.so.0": "libxkbcommon-x11-0",
+    "libxcb-cursor.so.0": "libxcb-cursor0",
+    "libxcb-icccm.so.4": "libxcb-icccm4",
+    "libxcb-keysyms.so.1": "libxcb-keysyms1",
+    "libxcb-shape.so.0": "libxcb-shape0",
+}
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def _missing() -> list[str]:
+    """Debian's packages that are missing; other systems' wheels bring all they need."""
+    if not sys.platform.startswith("linux"):
+        return []
+    missing = [package for library, package in LIBRARIES.items() if not _loads(library)]
+    if not _display() and not shutil.which("Xvfb"):
+        missing.append("xvfb")
+    return missing
+
+
+def _display() -> str:
+    if not sys.platform.startswith("linux"):
+        return "native"
+    return os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or ""
+
+
+def examine() -> dict[str, Any]:
+    """Everything that `kappaskin doctor` shows, as JSON values."""
+    from kappaskin.sources import serial_ports
+
+    missing = _missing()
+    line = f"apt-get install -y --no-install-recommends {' '.join(missing)}" if missing else ""
+    return {
+        "kappaskin": _version("kappaskin"),
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "packages": {package: _version(package) for package in PACKAGES},
+        "display": _display(),
+        "serial_ports": [asdict(port) for port in serial_ports()],
+        "missing": missing,
+        "install": line,
+    }
+
+
+def doctor(port: str = "", *, json: Switch = False) -> int:
+    """Show what this machine has, what is missing, and the command that installs it.
+
+    Or examine one port for a few seconds: whether it is absent, busy, not permitted, silent, at
+    another baud rate or not a sensor; else which device it is, its frame rate and its losses. The
+    exit code is 1 where no readings come.
+
+    Example: `kappaskin doctor /dev/ttyACM0`
+
+    Parameters
+    ----------
+    port
+        The port or URL to look at; this machine when left out.
+    json
+        Print one JSON object instead of text.
+    """
+    from kappaskin.sources import diagnose
+
+    if not port:
+        _tell_machine(json)
+        return 0
+    found = diagnose(port)
+    if json:
+        print_json(found.to_json())
+    else:
+        _tell_port(found)
+    return FAILED if found.why else 0
+
+
+def _tell_port(found: "Diagnosis") -> None:
+    _line("port", found.plug)
+    if found.device:
+        _line("device", found.device)
+    if math.isfinite(found.rate):
+        _line("rate", f"{found.rate:.1f} frames/s of the {found.said_rate:g} it says")
+        known = f"known to {1e3 * found.clock_sd:.2g} ms" if found.clock_sd < math.inf else _DEAF
+        _line("clock", known)
+    if math.isfinite(found.temperature):
+        _line("temperature", f"{found.temperature:.1f} degrees Celsius")
+    if found.accounting.bytes_in:
+        _line("losses", f"{found.accounting.words}, in {found.accounting.bytes_in:,} bytes")
+    for event in found.events:
+        if event.kind != "met":
+            _line(event.kind, event.text)
+    _line("verdict", found.why or "well")
+
+
+_DEAF = "not known: the device does not answer pings"
+
+
+def _line(name: str, text: str) -> None:
+    print(f"{name:<20}{text}")
+
+
+def _tell_machine(json: bool) -> None:
+    from kappaskin.sources import Port, permission_line
+
+    found = examine()
+    if json:
+        print_json(found)
+        return
+    for name in ("kappaskin", "python", "system"):
+        _line(name, found[name])
+    for package, version in found["packages"].items():
+        _line(package, version or "not installed")
+    _line("display", found["display"] or "none (`xvfb-run` gives a virtual one)")
+    for port in found["serial_ports"]:
+        serial_port = Port(**port)
+        may = "" if serial_port.opened else f"  no permission. {permission_line(serial_port.port)}"
+        _line("serial port", f"{serial_port.words}{may}")
+    if not found["serial_ports"]:
+        _line("serial ports", "none found")
+    _line("missing", " ".join(found["missing"]) or "nothing")
+    if None in found["packages"].values():
+        print("Install the desktop app's packages with: pip install 'kappaskin[app]'")
+    if found["install"]:
+        print(f"Install what is missing with: sudo {found['install']}")
+
+
+def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> int:
+    """Inflict faults on the line to a device, and report what became of each.
+
+    A relay before the device spoils what passes: noise, cuts, floods, unplugged cables. Exit code 1
+    if a drill fails. Close the app first: the port is used.
+
+    Example: `kappaskin drill /dev/ttyACM0`
+
+    Parameters
+    ----------
+    source
+        The device's port, or a URL that pyserial opens; a simulated device when left out.
+    json
+        Print one JSON list of rows instead of a table.
+    long
+        Run each for longer: 100 times unplugged, ten seconds of noise.
+    """
+    try:
+        from kappaskin.studies import drills_text, run_drills
+    except ImportError as error:
+        raise Refusal("expected a system with pseudo-terminals (Linux, macOS)") from error
+    with ProgressLine() as show_progress:
+        rows = run_drills(source or None, long, show_progress)
+    print_result(rows, json, lambda: drills_text(rows))
+    return FAILED if any(row["verdict"] == "failed" for row in rows) else 0
+
+
+def install_completion(
+    *, shell: Literal["bash", "zsh", "fish", "powershell"] | None = None
+) -> None:
+    """Install completion of commands and options for your shell.
+
+    Writes a file of the shell's own, and a line that loads it into the shell's start-up file.
+
+    Example: `kappaskin --install-completion --shell zsh`
+
+    Parameters
+    ----------
+    shell
+        The shell; the one that this is run from when left out.
+    """
+    from cyclopts.completion import ShellDetectionError
+
+    from kappaskin.cli import app
+
+    try:
+        file = app.install_completion(shell=shell)
+    except ShellDetectionError as error:
+        raise Refusal(f"expected to be run from a shell ({error}); name it by --shell") from error
+    except OSError as error:
+        raise Refusal(f"completion cannot be written ({error}); make the place writable") from error
+    print(f"{file}: installed; open a new shell to use it")

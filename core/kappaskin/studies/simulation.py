@@ -1,0 +1,159 @@
+"""Simulated scenes: their readings with the truth, and what each effect costs."""
+
+import json
+import math
+import statistics
+import textwrap
+import time
+from collections.abc import Callable, Generator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.scenes import EFFECTS, Choice, Plan, ReadingEffect, Scene, Simulator, plan
+
+_MOST = 10_000_000  # readings: 80 MB for each array of them
+
+
+def simulated_readings(
+    scene: Scene, frames: int, seed: int | None = None
+) -> dict[str, NDArray[Any]]:
+    """Frames of `scene`: what `kappaskin simulate` writes, each array (T, ...).
+
+    A frame that the link loses is NaN in `curvature` and -1 in `counts`, on all its channels.
+    """
+    P, skin = len(scene.layout), scene.plate.patch
+    if not 1 <= frames <= _MOST // (3 * P):
+        raise Refusal(f"expected 1 to {_MOST // (3 * P)} frames of {3 * P} channels, got {frames}")
+    scene = scene if seed is None else replace(scene, seed=seed)
+    simulator, scan = Simulator(scene), scene.sensor().scan()
+    time = np.arange(frames) / scene.rate
+    curvature = np.full((frames, 3 * P), np.nan)
+    counts = np.full((frames, 3 * P), -1, np.int32)
+    truth = np.full((frames, *scene.basis.shape), np.nan)
+    contact = np.full((frames, 2), np.nan)
+    for n, moment in enumerate(time.tolist()):
+        true, reading = simulator.reading(scan, moment)
+        if true is not None:
+            truth[n], contact[n] = true.coefficients, true.contact
+        if not simulator.failure(n):
+            curvature[n] = reading
+            counts[n] = scene.transduction.counts(reading)
+    size = (skin.a,) if skin.strip else (skin.a, skin.b)
+    places = scene.layout.positions
+    return {
+        "counts": counts.reshape(frames, 3, P),
+        "curvature": curvature.reshape(frames, 3, P),
+        "truth": truth,
+        "time": time,
+        "contact": contact,
+        "plan": np.array(json.dumps([entry.to_json() for entry in plan(scene)])),
+        "size": np.array(size),
+        "positions": places[:, :1] if skin.strip else places,
+        "radius": np.array(skin.radius),
+    }
+
+
+# What each effect costs per frame, measured here, beside its place in the plan
+
+_TURNS, _FRAMES, _LEAST = 7, 40, 4  # turns, and frames of each: usually, and at least
+_TURN = 0.02  # s that the frames of one turn may take
+
+
+def _only(scene: Scene, *names: str) -> Scene:
+    """The scene with these effects alone."""
+    return replace(scene, choice=Choice(off=frozenset(EFFECTS) - set(names)))
+
+
+def _frame(scene: Scene, *names: str) -> Callable[[float], object]:
+    simulator, scan = Simulator(_only(scene, *names)), scene.sensor().scan()
+    return lambda moment: simulator.reading(scan, moment)
+
+
+def _running(curvature: Array, effect: ReadingEffect) -> Callable[[float], object]:
+    """The effect at work on readings `curvature` (3 P,) in 1/m."""
+    running = effect.start(curvature.shape, np.random.default_rng(0))
+    return lambda moment: running(curvature, moment)
+
+
+def _seconds(run: Callable[[float], object], moments: list[float]) -> float:
+    """Seconds that a call took, on average over `moments`."""
+    start = time.perf_counter()
+    for moment in moments:
+        run(moment)
+    return (time.perf_counter() - start) / len(moments)
+
+
+def costs_of(scene: Scene, plan: Plan) -> dict[str, float]:
+    """Seconds per frame that each effect of the plan adds to the bare plate: medians, in turn.
+
+    Frames follow one another, or where so few can be afforded, lie evenly over the scene.
+    """
+    bare = Simulator(_only(scene))
+    _, curvature = bare.reading(scene.sensor().scan(), 0.0)
+    runs = {"": _frame(scene)}
+    for entry in plan:
+        if isinstance(entry.effect, ReadingEffect):
+            runs[entry.name] = _running(curvature, entry.effect)
+        elif entry.effect is not None:
+            runs[entry.name] = _frame(scene, entry.name)
+    once = _seconds(runs[""], [scene.duration * n / _LEAST for n in range(_LEAST)])
+    frames = min(max(int(_TURN / once), _LEAST), _FRAMES)
+    step = max(1 / scene.rate, scene.duration / (_TURNS * frames) if frames < _FRAMES else 0.0)
+    taken = {name: list[float]() for name in runs}
+    for turn in range(_TURNS):
+        moments = [(turn * frames + n) * step for n in range(frames)]
+        for name, run in runs.items():
+            taken[name].append(_seconds(run, moments))
+    median = {name: statistics.median(times) for name, times in taken.items()}
+    alone = {e.name for e in plan if isinstance(e.effect, ReadingEffect)}
+    whole = median.pop("")
+    return {name: own if name in alone else max(own - whole, 0.0) for name, own in median.items()}
+
+
+def plan_updates(scene: Scene) -> Generator[list[dict[str, Any]]]:
+    """One row for every known effect: its entry in the plan, and `microseconds` per frame.
+
+    That is None for an effect that the scene has nothing of. The rows come twice: at once, with NaN
+    for times that are not measured yet, and then with all.
+    """
+    made = plan(scene)
+    yield _rows(made, {entry.name: math.nan for entry in made if entry.effect is not None})
+    yield _rows(made, costs_of(scene, made))
+
+
+def _rows(plan: Plan, costs: dict[str, float]) -> list[dict[str, Any]]:
+    """The entries of a plan with what their effects cost, in s per frame, where they are there."""
+    return [
+        entry.to_json() | {"microseconds": 1e6 * costs[entry.name] if entry.name in costs else None}
+        for entry in plan
+    ]
+
+
+def plan_rows(scene: Scene) -> list[dict[str, Any]]:
+    """The rows of `plan_updates` with all times."""
+    *_, rows = plan_updates(scene)
+    return rows
+
+
+def plan_text(scene: Scene, rows: list[dict[str, Any]]) -> str:
+    """The rows of `plan_rows` for people, those of the scene first."""
+    there = [row for row in rows if row["microseconds"] is not None]
+    lines = [
+        f"{scene.title}: errors as shares of the peak curvature, of which "
+        f"{scene.choice.accuracy:.2g} may be left out",
+        "",
+        f"{'effect':<18}{'size':>9}{'error':>9}{'us':>7}  kept  why",
+    ]
+    for row in there:
+        lines += [
+            f"{row['effect']:<18}{row['size']:>9.2g}{row['error']:>9.2g}"
+            f"{row['microseconds']:>7.1f}  {'yes' if row['kept'] else 'no':<5} {row['why']}",
+            f"{'':<18}size: {row['formula']}",
+        ]
+    absent = ", ".join(row["effect"] for row in rows if row["microseconds"] is None)
+    return "\n".join([*lines, "", *textwrap.wrap(f"Not in this scene: {absent}.", 100)])
