@@ -17,7 +17,7 @@ from kappaskin import (
     SineBasis,
 )
 from kappaskin.contact import contact_geometry
-from kappaskin.contact.products import _Dense
+from kappaskin.contact.point import _Dense
 
 PATCH = Patch(0.1, 0.1)
 PLATE, LAYOUT = Plate(PATCH), SensorLayout.regular(PATCH, 10, 10)

@@ -20,9 +20,8 @@ from kappaskin import (
     edges_of,
 )
 from kappaskin.bases import ORDERS, ElasticBasis, curvature_at, overlaps
-from kappaskin.bases.beam import ClampedBasis
-from kappaskin.bases.disk import DiskBasis
-from kappaskin.bases.polygon import PolygonBasis
+from kappaskin.bases.modes import DiskBasis, PolygonBasis
+from kappaskin.bases.product import ClampedBasis
 
 MIXED = [(2, 1), (1, 2), (2, 2)]
 

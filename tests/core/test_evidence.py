@@ -7,12 +7,9 @@ import pytest
 from scipy import stats
 
 from kappaskin import Patch, Plate, SensorLayout
-from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.evidence import of_length, of_plane, of_radius, peak
-from kappaskin.contact.hypotheses import SHARE, Hypotheses
+from kappaskin.contact.elastic_skin import ElasticSkin, Optimum, ends
+from kappaskin.contact.hypotheses import SHARE, Hypotheses, of_length, of_plane, of_radius, peak
 from kappaskin.contact.interior import Hypothesis, Width
-from kappaskin.contact.optimise import Optimum
-from kappaskin.contact.rigid_contacts import ends
 
 SIDE = 0.1
 BENT, FLAT = (

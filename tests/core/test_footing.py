@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, Plate, PointContact, PointLoad, SensorLayout, basis_for
-from kappaskin.contact.elastic_skin import ElasticSkin
+from kappaskin.contact.elastic_skin import EVEN, ROUND, ElasticSkin, Optimum, arcs, ends, ring
 from kappaskin.contact.hypotheses import hypotheses
 from kappaskin.contact.interior import narrow
-from kappaskin.contact.optimise import Optimum
-from kappaskin.contact.rigid_contacts import EVEN, ROUND, arcs, ends, ring
 
 SQUARE = Patch(0.1, 0.1)
 LAYOUT = SensorLayout.regular(SQUARE, 6, 6)

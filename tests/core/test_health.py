@@ -25,7 +25,7 @@ from kappaskin import (
     Stimulus,
     load_scene,
 )
-from kappaskin.health.window import Window
+from kappaskin.health.inconsistency import Window
 
 pytestmark = pytest.mark.slow
 

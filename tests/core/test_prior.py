@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Plate, SineBasis
-from kappaskin.estimation.prior import prior_root
+from kappaskin.estimation.bayes import prior_root
 
 
 def test_the_displacement_is_1_m_rms_over_the_skin(held_skin):

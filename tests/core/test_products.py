@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Patch, Plate, SensorLayout, SineBasis
-from kappaskin.contact.modal import modal
-from kappaskin.contact.products import loads_on
+from kappaskin.contact.point import loads_on, modal
 
 OBLONG = Patch(0.1, 0.07)
 BASIS = SineBasis(OBLONG, 7, 5)

@@ -22,9 +22,9 @@ from kappaskin import (
     Tracking,
     load_scene,
 )
-from kappaskin.estimation.choosing import telling_most
+from kappaskin.estimation.bayes import prior_root
 from kappaskin.estimation.kalman import MovingModes
-from kappaskin.estimation.prior import prior_root
+from kappaskin.estimation.tracking import telling_most
 
 pytestmark = pytest.mark.slow
 

@@ -13,6 +13,6 @@ from kappaskin.contact.objects import KINDS as KINDS
 from kappaskin.contact.objects import NO_OBJECT as NO_OBJECT
 from kappaskin.contact.objects import ContactObject as ContactObject
 from kappaskin.contact.objects import ObjectFinder as ObjectFinder
-from kappaskin.contact.placement import placed as placed
+from kappaskin.contact.objects import placed as placed
 from kappaskin.contact.point import NO_TOUCH as NO_TOUCH
 from kappaskin.contact.point import PointContact as PointContact

@@ -1,17 +1,108 @@
-"""From point forces to what the elements read and how far the skin gives, finely resolved."""
+"""Point forces on an elastic skin: where rigid objects press, what elements read, the best fit."""
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
 from kappaskin.bases import basis_for
-from kappaskin.contact.rigid_contacts import PointForces
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
+
+# A thin skin touches a rigid object only where it can press without being bent further than the
+# object is: a sphere on a ring, inside which the skin takes the sphere's curvature; a straight edge
+# at its two ends, between which the skin arches away from it; a cylinder at its two ends along an
+# arc across its axis, where one curvature asks for the pressure 1 / sqrt(1 - (t / a)^2), even in
+# the angle. A foam below presses the skin back on to the object in between as well. The last
+# parameter of ring and arcs is q, the square of the ring's radius or of the arc's half width: the
+# readings are nearly linear in it, so that noise may take it below zero.
+
+ARC = 4
+"""Points on an arc."""
+_ARC = np.cos((np.arange(ARC) + 0.5) * np.pi / ARC)
+_AROUND = 2 * np.pi * np.arange(12) / 12
+
+ROUND = np.stack([np.cos(_AROUND), np.sin(_AROUND), np.full(12, 1 / 12)], axis=-1)
+"""The `pattern` (12, 3) of an even circle: x, y and share of the force."""
+EVEN = (1.0, 1.0)
+"""The `narrow` of two arcs of the same width."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointForces:
+    """Forces `weights` (k,) in N at `points` (k, 2) in m, with derivatives for n parameters.
+
+    `moves` (n, k, 2) are those of the points, `growth` (n, k) those of the weights.
+    """
+
+    points: Array
+    weights: Array
+    moves: Array
+    growth: Array
+
+
+Contact = Callable[[Array], PointForces]
+"""Parameters to forces: x, y of the centre of force in m and the force in N come first."""
+
+
+def ring(pattern: Array) -> Contact:
+    """x, y, F, q: the force in a `pattern` (k, 3) of x, y and share, sqrt(q) times as large."""
+    share = pattern[:, 2]
+    unit = pattern[:, :2] - share @ pattern[:, :2]  # x, y is the centre of force
+
+    def forces(parameters: Array) -> PointForces:
+        force, c = parameters[2], math.sqrt(parameters[3])
+        moves, growth = np.zeros((4, *unit.shape)), np.zeros((4, len(unit)))
+        moves[0, :, 0] = moves[1, :, 1] = 1
+        moves[3] = unit / (2 * c)
+        growth[2] = share
+        return PointForces(parameters[:2] + c * unit, force * share, moves, growth)
+
+    return forces
+
+
+def ends(middle: float) -> Contact:
+    """x, y, F, angle, length squared, share: forces at two ends, and the share `middle` between.
+
+    The ends have (1/2 + share) and (1/2 - share) of the rest.
+    """
+    return lambda parameters: _at_ends(parameters, np.zeros((2, 1)), middle)
+
+
+def arcs(narrow: tuple[float, float], middle: float) -> Contact:
+    """The same and q: each end's force on an arc across, of half width sqrt(q) times `narrow`."""
+    return lambda parameters: _at_ends(parameters, np.multiply.outer(narrow, _ARC), middle)
+
+
+def _at_ends(parameters: Array, across: Array, middle: float) -> PointForces:
+    """Forces off the axis by `across` (2, k) times the root of the last parameter."""
+    force, angle, length, share = *parameters[2:4], math.sqrt(parameters[4]), parameters[5]
+    axis = np.array([math.cos(angle), math.sin(angle)])
+    beside = np.array([-axis[1], axis[0]])
+    k, n, rest, sign = across.shape[1], len(parameters), 1 - middle, np.array([1.0, -1.0])
+    of_end = rest * (0.5 + sign * share)
+    if middle:
+        across = np.vstack([across, across.mean(axis=0)])
+        sign, of_end = np.append(sign, 0.0), np.append(of_end, middle)
+    sign, growth, off = np.repeat(sign, k), np.zeros((n, across.size)), across.ravel()
+    place, a = sign / 2 - rest * share, math.sqrt(parameters[6]) if n > 6 else 0.0
+    u, v = place * length, off * a
+    moves = np.zeros((n, across.size, 2))
+    moves[0, :, 0] = moves[1, :, 1] = 1
+    moves[3] = np.multiply.outer(u, beside) - np.multiply.outer(v, axis)
+    moves[4] = np.multiply.outer(place / (2 * length), axis)
+    moves[5] = -rest * length * axis
+    if n > 6:
+        moves[6] = np.multiply.outer(off / (2 * a), beside)
+    growth[2], growth[5] = np.repeat(of_end, k) / k, rest * sign * force / k
+    points = parameters[:2] + np.multiply.outer(u, axis) + np.multiply.outer(v, beside)
+    return PointForces(points, force * growth[2], moves, growth)
+
 
 _MOST = 2000  # elements: 100 MB
 _SEARCHED = np.array([0.025, 0.045, 0.07, 0.1, 0.14, 0.19, 0.26, 0.35])  # of the shorter side
@@ -114,3 +205,96 @@ class ElasticSkin:
         explained = np.where(one * two > 0, one * h[:, None] + two * h, -np.inf)
         i, j = np.unravel_index(int(np.argmax(explained)), explained.shape)
         return points[[i, j]], np.array([one[i, j], two[i, j]])
+
+
+_GAIN = 0.05  # of chi-squared: less is not worth a step
+_DAMPING = 1e-3  # of the diagonal, at first
+_RIDGE = 1e-12  # of the diagonal, always
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """What is known of n parameters beforehand: normal around `mean`, within `low` and `high`."""
+
+    mean: Array
+    sd: Array
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Optimum:
+    """The best parameters (n,), their covariance (n, n) and cost, with the readings' part of it.
+
+    `ahead` (n,) is the step that a bound forbade.
+    """
+
+    contact: Contact
+    parameters: Array
+    covariance: Array
+    cost: float
+    squares: float
+    ahead: Array
+
+
+def climb(
+    skin: ElasticSkin,
+    contact: Contact,
+    start: Array,
+    prior: Prior,
+    readings: Array,
+    weight: Array,
+    steps: int,
+) -> Optimum:
+    """The optimum near `start` for `readings` (R,) with weights (R,), 1 / sd or 0 where missing."""
+    p, damping = start, _DAMPING
+    here = _answer(skin, contact, p, prior, readings, weight)
+    for _ in range(steps):
+        q = np.clip(p + here.step(damping), prior.low, prior.high)
+        there = _answer(skin, contact, q, prior, readings, weight)
+        if not there.cost < here.cost:
+            damping = max(10 * damping, 0.01)
+            continue
+        gain, p, here, damping = here.cost - there.cost, q, there, damping / 10
+        if gain < _GAIN:
+            break
+    return Optimum(contact, p, here.covariance, here.cost, here.squares, here.step(0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Here:
+    """The cost at some parameters, and its normal equations scaled to a diagonal of ones."""
+
+    cost: float
+    squares: float
+    normal: Array
+    gradient: Array
+    scale: Array
+
+    def step(self, damping: float) -> Array:
+        held = self.normal + (damping + _RIDGE) * np.eye(len(self.scale))
+        return np.linalg.solve(held, self.gradient) / self.scale
+
+    @property
+    def covariance(self) -> Array:
+        inverse = np.linalg.inv(self.normal + _RIDGE * np.eye(len(self.scale)))
+        return inverse / np.multiply.outer(self.scale, self.scale)
+
+
+def _answer(
+    skin: ElasticSkin, contact: Contact, p: Array, prior: Prior, readings: Array, weight: Array
+) -> _Here:
+    K, slopes = skin.readings(contact(p))
+    left, J, off = weight * (readings - K), weight[:, None] * slopes, (p - prior.mean) / prior.sd
+    squares = float(left @ left)
+    normal = J.T @ J + np.diag(prior.sd**-2)
+    scale = np.sqrt(np.diag(normal))
+    scale[scale == 0] = 1.0  # a parameter that nothing feels, as on the rim
+    gradient = (J.T @ left - off / prior.sd) / scale
+    return _Here(
+        squares + float(off @ off),
+        squares,
+        normal / np.multiply.outer(scale, scale),
+        gradient,
+        scale,
+    )

@@ -6,9 +6,16 @@ from typing import cast
 
 import numpy as np
 
-from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.optimise import Optimum
-from kappaskin.contact.rigid_contacts import ARC, EVEN, ROUND, PointForces, arcs, ends
+from kappaskin.contact.elastic_skin import (
+    ARC,
+    EVEN,
+    ROUND,
+    ElasticSkin,
+    Optimum,
+    PointForces,
+    arcs,
+    ends,
+)
 from kappaskin.frames import Array
 
 _LEAST = 3e-3  # of a side: as narrow as a ring or an arc is made

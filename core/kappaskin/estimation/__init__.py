@@ -1,18 +1,19 @@
 """Estimators: from readings to coefficients with error bars; placement of elements; regions."""
 
-from kappaskin.estimation.baselines import AsPrinted as AsPrinted
-from kappaskin.estimation.baselines import Direct as Direct
 from kappaskin.estimation.bayes import Bayes as Bayes
 from kappaskin.estimation.estimator import RIM_SD as RIM_SD
 from kappaskin.estimation.estimator import Estimator as Estimator
+from kappaskin.estimation.estimator import Remembered as Remembered
 from kappaskin.estimation.estimator import column_lengths as column_lengths
 from kappaskin.estimation.fast import Fast as Fast
-from kappaskin.estimation.finite_slope import FiniteSlope as FiniteSlope
 from kappaskin.estimation.fit import Fit as Fit
 from kappaskin.estimation.fit import Spread as Spread
 from kappaskin.estimation.fit import gathered as gathered
 from kappaskin.estimation.fit import in_time as in_time
 from kappaskin.estimation.fit import seen_through as seen_through
+from kappaskin.estimation.least_squares import AsPrinted as AsPrinted
+from kappaskin.estimation.least_squares import Direct as Direct
+from kappaskin.estimation.least_squares import FiniteSlope as FiniteSlope
 from kappaskin.estimation.least_squares import LeastSquares as LeastSquares
 from kappaskin.estimation.methods import METHODS as METHODS
 from kappaskin.estimation.methods import check_method as check_method
@@ -21,6 +22,7 @@ from kappaskin.estimation.placement import PLACEMENTS as PLACEMENTS
 from kappaskin.estimation.placement import check_placement as check_placement
 from kappaskin.estimation.placement import elements_placed as elements_placed
 from kappaskin.estimation.placement import predicted_sd as predicted_sd
+from kappaskin.estimation.placement import singular_values as singular_values
 from kappaskin.estimation.region import ADAPTIVE as ADAPTIVE
 from kappaskin.estimation.region import INTRINSIC as INTRINSIC
 from kappaskin.estimation.region import OFF as OFF
@@ -31,9 +33,7 @@ from kappaskin.estimation.region import Region as Region
 from kappaskin.estimation.region import Scanner as Scanner
 from kappaskin.estimation.region import bargain as bargain
 from kappaskin.estimation.region import contact_bound as contact_bound
-from kappaskin.estimation.remembered import Remembered as Remembered
 from kappaskin.estimation.robust import WHY as WHY
 from kappaskin.estimation.robust import Robust as Robust
 from kappaskin.estimation.spectrum import amplitudes as amplitudes
 from kappaskin.estimation.tracking import Tracking as Tracking
-from kappaskin.estimation.unseen import singular_values as singular_values

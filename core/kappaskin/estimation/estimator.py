@@ -1,8 +1,10 @@
-"""What every estimator takes and how it is asked: curvature to coefficients with error bars."""
+"""The estimator interface: curvature to coefficients with error bars."""
 
 from abc import ABC, abstractmethod
+from collections import OrderedDict
+from collections.abc import Callable
 from functools import cached_property
-from typing import ClassVar, cast
+from typing import ClassVar, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -12,6 +14,28 @@ from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.fit import Fit, Spread, gathered
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
+
+_SETS = 8  # that are kept: those used last
+_Made = TypeVar("_Made")
+
+
+class Remembered(Generic[_Made]):
+    """What was made of the sets of readings that were used last."""
+
+    def __init__(self) -> None:
+        self._made: OrderedDict[bytes, _Made] = OrderedDict()
+
+    def __call__(self, used: Mask, make: Callable[[Mask], _Made]) -> _Made:
+        """What `make` makes of the readings `used`; it is asked when it was not lately."""
+        key = used.tobytes()
+        if key in self._made:
+            self._made.move_to_end(key)
+            return self._made[key]
+        made = self._made[key] = make(used)
+        if len(self._made) > _SETS:
+            self._made.popitem(last=False)
+        return made
+
 
 RIM_SD = 0.2e-3
 """How far in m a rim that gives is expected to move, unless said otherwise."""

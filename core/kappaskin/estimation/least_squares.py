@@ -1,4 +1,4 @@
-"""Least squares, factored once: curvature to the coefficients of the shape, with error bars."""
+"""Least-squares estimators: factored once, per frame, and for finite slopes."""
 
 from dataclasses import dataclass
 from typing import cast
@@ -6,10 +6,11 @@ from typing import cast
 import numpy as np
 from scipy import linalg
 
-from kappaskin.estimation.estimator import Estimator, column_lengths
+from kappaskin.errors import RankDeficient
+from kappaskin.estimation.estimator import Estimator, Remembered, column_lengths
 from kappaskin.estimation.fit import DenseSpread, Fit
-from kappaskin.estimation.remembered import Remembered
 from kappaskin.frames import Array, Mask
+from kappaskin.sensing import NormalCurvature
 
 _MILD = 100.0  # a condition up to which a product of factors rounds no worse than they do
 _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits: factor anew
@@ -99,3 +100,136 @@ class LeastSquares(Estimator):
         for factor in solver.factors:
             c = np.dot(c, factor)
         return self._answer(flat, c, solver.spread, solver.count - self.unknowns)
+
+
+class _PerFrame(Estimator):
+    """An estimator that factors nothing: A = M with its weights is solved anew in each call."""
+
+    def _set_up(self) -> None:
+        self._A = (self.weight[:, None] * self._columns()).astype(self.dtype)
+
+    def _columns(self) -> Array:
+        return self.M
+
+    def _rows(self, flat: Array, used: Mask) -> tuple[Array, Array]:
+        """Of the readings used: A (R, F) and K (R, T), weighted."""
+        weight = self.weight[used].astype(self.dtype)
+        return self._A[used], (flat[..., used] * weight).T
+
+
+class AsPrinted(_PerFrame):
+    """c = (M^T M)^-1 M^T K, the normal equations of Eq. 6 as the paper prints them.
+
+    They square the condition number, and nothing tells when that has eaten every digit: kept to
+    show what it costs. Refuses only where the elimination itself divides by zero.
+    """
+
+    def _fit(self, flat: Array, used: Mask) -> Fit:
+        A, K = self._rows(flat, used)
+        if not len(A):
+            raise self.refusal(0, 0)
+        try:
+            c: Array = np.linalg.solve(A.T @ A, A.T @ K).astype(self.dtype)
+        except np.linalg.LinAlgError as error:
+            raise RankDeficient(
+                "Eq. 6 as printed divides by zero: M^T M has no inverse; use least-squares, which "
+                "says what is not determined"
+            ) from error
+
+        def covariance() -> Array:
+            N: Array = A.astype(np.float64)
+            return np.linalg.pinv(N.T @ N).astype(np.float64)
+
+        return self._answer(flat, c.T, DenseSpread(covariance), len(A) - self.unknowns)
+
+
+class Direct(_PerFrame):
+    """The least-squares shape by a general solver (LAPACK's gelsd) in every frame.
+
+    The columns of M are scaled to unit length first. Raises `RankDeficient` when the readings do
+    not decide the coefficients.
+    """
+
+    def _columns(self) -> Array:
+        W = self.basis.free
+        A = self.M if W is None else self.M @ W
+        length = column_lengths((self.weight[:, None] * A)[self.readable])
+        self._back = (np.eye(self.unknowns) if W is None else W) / length
+        return A / length
+
+    def _fit(self, flat: Array, used: Mask) -> Fit:
+        A, K = self._rows(flat, used)
+        if len(A) < self.unknowns:
+            raise self.refusal(len(A), len(A))
+        g, _, rank, _ = np.linalg.lstsq(A, K, rcond=max(A.shape) * np.finfo(self.dtype).eps)
+        if rank < self.unknowns:
+            raise self.refusal(len(A), int(rank))
+        back = self._back
+
+        def covariance() -> Array:
+            root = back @ np.linalg.pinv(A.astype(float))
+            return root @ root.T
+
+        c = (back @ g).T.astype(self.dtype)
+        return self._answer(flat, c, DenseSpread(covariance), len(A) - self.unknowns)
+
+
+_STEPS = 4  # at most; 2 or 3 do
+_EXACT = 1e-6  # of the readings' RMS: a step that changes them by less is the last one
+_ROUNDINGS = 100  # relative errors that a step may amount to by rounding alone, as in float32
+_CLOSE = 1e-2  # of the readings' RMS: so small must the fourth step be
+_CONTRACTS = 0.7  # a step longer than this share of the one before: it will not get there
+
+
+class FiniteSlope(Estimator):
+    """c <- c + M^+ (K - h(c)), from the least-squares shape on, at most four times.
+
+    h(c) is `NormalCurvature`; M^+ is that of `LeastSquares`, factored once. Where the steps do not
+    shrink, as when slopes are near one and noise is large, the answer is that of least squares and
+    `Fit.converged` says no.
+    """
+
+    def _set_up(self) -> None:
+        basis, layout = self.basis, self.layout
+        self._sensed = NormalCurvature(basis, layout, self.dtype)
+        self._linear = LeastSquares(basis, layout, self.sigma, self.rim_sd, self.dtype)
+
+    # Steps that run away may overflow: what is infinitely steep reads nothing, and what is no
+    # number does not converge.
+    @np.errstate(over="ignore", invalid="ignore")
+    def predicted(self, coefficients: Array) -> Array:
+        """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
+        return self._sensed(coefficients)
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def _fit(self, flat: Array, used: Mask) -> Fit:
+        K = flat.reshape(*flat.shape[:-1], 3, len(self.layout))
+        first = self._linear(K)
+        c, size = first.coefficients, _rms(np.where(used.reshape(3, -1), K, 0.0))
+        exact = max(_EXACT, _ROUNDINGS * float(np.finfo(self.dtype).eps))
+        last, steps = size, np.zeros(size.shape, int)
+        going, diverged = size > 0, np.zeros(size.shape, bool)
+        while going.any() and steps.max() < _STEPS:
+            step = self._linear(K - self.predicted(c)).coefficients
+            change = _rms(self._linear.predicted(step))
+            diverged |= going & ~(change < _CONTRACTS * last)
+            going &= ~diverged
+            c = np.where(going[..., None, None], c + step, c)
+            steps, last = steps + going, change
+            going &= change > exact * size
+        diverged |= going & (last > _CLOSE * size)
+        return Fit(
+            self,
+            first.curvature,
+            np.where(diverged[..., None, None], first.coefficients, c),
+            first.spreads,
+            first.spare,
+            first.told_noise,
+            steps,
+            ~diverged,
+        )
+
+
+def _rms(K: Array) -> Array:
+    """Root mean square (...) of readings (..., 3, P)."""
+    return np.sqrt(np.mean(K**2, axis=(-2, -1)))

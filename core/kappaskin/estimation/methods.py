@@ -5,19 +5,12 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
-from kappaskin.estimation.baselines import AsPrinted as AsPrinted
-from kappaskin.estimation.baselines import Direct as Direct
-from kappaskin.estimation.bayes import Bayes as Bayes
-from kappaskin.estimation.estimator import RIM_SD as RIM_SD
-from kappaskin.estimation.estimator import Estimator as Estimator
-from kappaskin.estimation.fast import Fast as Fast
-from kappaskin.estimation.finite_slope import FiniteSlope as FiniteSlope
-from kappaskin.estimation.fit import Fit as Fit
-from kappaskin.estimation.least_squares import LeastSquares as LeastSquares
-from kappaskin.estimation.robust import WHY as WHY
-from kappaskin.estimation.robust import Robust as Robust
-from kappaskin.estimation.tracking import Tracking as Tracking
-from kappaskin.estimation.unseen import singular_values as singular_values
+from kappaskin.estimation.bayes import Bayes
+from kappaskin.estimation.estimator import RIM_SD, Estimator
+from kappaskin.estimation.fast import Fast
+from kappaskin.estimation.least_squares import AsPrinted, Direct, FiniteSlope, LeastSquares
+from kappaskin.estimation.robust import Robust
+from kappaskin.estimation.tracking import Tracking
 from kappaskin.sensing import SensorLayout
 
 METHODS: dict[str, type[Estimator]] = {

@@ -1,4 +1,4 @@
-"""How many elements, and functions to tell, to where the elements are told most with.
+"""Element placement: observability of modes, predicted accuracy, D- and A-optimal placement.
 
 Readings with noise of variance s^2 leave the coefficients the covariance s^2 (M'M)^-1. A D-optimal
 placement makes the volume of that as small as can be, det M'M as large; an A-optimal one the mean
@@ -12,13 +12,39 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
-from kappaskin.estimation.estimator import Estimator
+from kappaskin.estimation.estimator import Estimator, column_lengths
 from kappaskin.estimation.fit import Spread
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
+
+
+def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
+    """How much is read of each of F shapes, (F,), the best seen first; the shapes (F, Ni, Nj) in m.
+
+    The singular values are those of M W of the live readings, its columns scaled to unit length:
+    the first over the last is `LeastSquares.condition`. Where the readings do not decide all
+    coefficients the last values are zero, or rounding, and any mixture of the last shapes leaves
+    the readings as they are; the rigid motions of a rim that gives are among them. Each shape is
+    scaled so that the squares of its coefficients add up to 1 m^2.
+    """
+    W = np.eye(basis.size) if basis.free is None else basis.free
+    M_W = layout.curvature_operator(basis)[layout.live.ravel()] @ W
+    length = column_lengths(M_W)
+    A, back = M_W / length, W / np.where(np.isfinite(length), length, 1.0)
+    R = cast("tuple[Array]", linalg.qr(A, mode="r"))[0][: A.shape[1]] if len(A) else A
+    _, s, Vt = linalg.svd(R) if len(A) else (None, np.empty(0), np.eye(A.shape[1]))
+    values = np.concatenate([s, np.zeros(A.shape[1] - len(s))])
+    shapes = (back @ Vt.T).T
+    if basis.unseen is not None:
+        values = np.concatenate([values, np.zeros(basis.unseen.shape[1])])
+        shapes = np.vstack([shapes, basis.unseen.T])
+    shapes /= np.linalg.norm(shapes, axis=1, keepdims=True)
+    return values, shapes.reshape(len(shapes), *basis.shape)
+
 
 _SWEEPS = 20  # over all elements at most; most placements are done after three to eight
 _GAIN = 1e-6  # of a criterion: a smaller one is not worth an exchange

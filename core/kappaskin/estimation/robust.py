@@ -13,12 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from kappaskin._state import Memory, Remembering
 from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation.bayes import Evidence
-from kappaskin.estimation.estimator import Estimator, numbers
+from kappaskin.estimation.bayes import Evidence, prior_root
+from kappaskin.estimation.estimator import Estimator, Remembered, numbers
 from kappaskin.estimation.fit import Fit, in_time
 from kappaskin.estimation.least_squares import LeastSquares
-from kappaskin.estimation.prior import prior_root
-from kappaskin.estimation.remembered import Remembered
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.frames import OVERTAKEN, Array, Frame, Mask
-from kappaskin.health.contradiction import Contradiction
-from kappaskin.health.explain import (
+from kappaskin.health.findings import (
     DEAD,
     DRIFTING,
     NOISY,
@@ -16,10 +15,11 @@ from kappaskin.health.explain import (
     SATURATED,
     STUCK,
     SWAPPED,
+    Finding,
     explain,
+    findings,
 )
-from kappaskin.health.findings import Finding, findings
-from kappaskin.health.window import Look, Window
+from kappaskin.health.inconsistency import Contradiction, Look, Window
 from kappaskin.sensing import Sensor
 
 _FAR = 4.0  # standard deviations: a channel that is further off is accused

@@ -1,10 +1,12 @@
-"""Loads on a patch, as what each basis function feels of them: a point, a line."""
+"""Loads: forces at a point, along a line, or distributed over an area."""
 
 import math
-from dataclasses import dataclass, fields, replace
-from typing import Protocol
+from abc import ABC, abstractmethod
+from dataclasses import Field, dataclass, fields, replace
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from kappaskin.bases import Basis, SineBasis
@@ -129,3 +131,166 @@ def is_point(load: Load) -> bool:
     if isinstance(load, LineLoad):
         return (load.x0, load.y0) == (load.x1, load.y1)
     return isinstance(load, PointLoad)
+
+
+_INSIDE = 1 - 1e-9  # of a load's size: one that touches an edge is on the patch, as computed
+
+
+class SpreadLoad(ABC):
+    """A force in N spread about (x, y) in m, alike on all sides of the two axes through it.
+
+    So the mean of sin(k x) sin(l y) under it is the product at its centre times the mean of the
+    wave cos(k x) cos(l y) about it: a multiplier per function (Eq. 9, extended).
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every kind is a dataclass
+    x: float
+    y: float
+    force: float
+
+    @abstractmethod
+    def _wave(self, k: Array, l: Array) -> Array:
+        """The mean of cos(k x) cos(l y) under the load when it is centred on x = y = 0."""
+
+    @abstractmethod
+    def _rim(self) -> Array:
+        """Points (P, 2) in m all round it, counted from its centre."""
+
+    @abstractmethod
+    def _quadrature(self, count: int) -> tuple[Array, Array]:
+        """Points (Q, 2) in m, counted from its centre, and weights (Q,) whose sum is one.
+
+        They take the mean of functions with up to `count` half waves across the load to rounding.
+        """
+
+    def centre(self) -> Array:
+        return np.array([self.x, self.y])
+
+    def check(self, patch: Patch) -> None:
+        check_on(self, patch, self.centre() + _INSIDE * self._rim())
+
+    def shifted(self, dx: float, dy: float) -> Self:
+        return replace(self, x=self.x + dx, y=self.y + dy)
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, force=self.force * factor)
+
+    def modal(self, basis: Basis) -> Array:
+        if isinstance(basis, SineBasis):
+            k, l = np.meshgrid(*basis.wavenumbers, indexing="ij")
+            return PointLoad(self.x, self.y, self.force).modal(basis) * self._wave(k, l)
+        points, weights = self._quadrature(max(basis.shape))
+        felt = weights @ basis.at(self.centre() + points)
+        if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
+            raise Refusal(
+                f"expected a load that lies wholly on the skin, got {self}; make it smaller"
+            )
+        return self.force * felt.reshape(basis.shape)
+
+
+def _check_size(load: SpreadLoad, *sizes: float) -> None:
+    if not all(0 < size < math.inf for size in sizes):
+        raise Refusal(
+            f"expected a load of a size above zero in metres, got {load}; for one of no size take "
+            "a point or a line"
+        )
+
+
+def _gauss(count: int) -> tuple[Array, Array]:
+    """Points on [-1, 1] and weights whose sum is one."""
+    t, w = np.polynomial.legendre.leggauss(16 + count)
+    return t, w / 2
+
+
+def _circle(count: int) -> Array:
+    angle = 2 * np.pi * np.arange(count) / count
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _rings(radius: Array, share: Array) -> tuple[Array, Array]:
+    """Points on circles of `radius` (C,) that carry `share` (C,), four times as many on each."""
+    round_it = _circle(4 * len(radius))
+    points = np.multiply.outer(radius, round_it).reshape(-1, 2)
+    return points, np.repeat(share, len(round_it)) / len(round_it)
+
+
+@dataclass(frozen=True)
+class DiscLoad(SpreadLoad):
+    """A force in N spread evenly over the disc of `radius` about (x, y), all in m."""
+
+    x: float
+    y: float
+    radius: float
+    force: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_size(self, self.radius)
+
+    def _wave(self, k: Array, l: Array) -> Array:
+        turn = np.hypot(k, l) * self.radius
+        return 2 * scipy.special.j1(turn) / turn
+
+    def _rim(self) -> Array:
+        return self.radius * _circle(64)
+
+    def _quadrature(self, count: int) -> tuple[Array, Array]:
+        t, w = _gauss(count)
+        radius = (1 + t) / 2
+        return _rings(self.radius * radius, 2 * radius * w)
+
+
+@dataclass(frozen=True)
+class GaussianLoad(SpreadLoad):
+    """A force in N spread like a normal distribution of standard deviation `sd` about (x, y) in m.
+
+    It must lie on the patch as far as four standard deviations from its centre: beyond them lies
+    exp(-8), less than 0.04 %, of its force, and what of that lies off the patch is not told apart.
+    """
+
+    x: float
+    y: float
+    sd: float
+    force: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_size(self, self.sd)
+
+    def _wave(self, k: Array, l: Array) -> Array:
+        return np.exp(-(k**2 + l**2) * self.sd**2 / 2)
+
+    def _rim(self) -> Array:
+        return 4 * self.sd * _circle(64)
+
+    def _quadrature(self, count: int) -> tuple[Array, Array]:
+        t, w = _gauss(count)
+        radius = 2 * (1 + t)  # in standard deviations
+        share = w * radius * np.exp(-(radius**2) / 2)
+        return _rings(self.sd * radius, share / share.sum())
+
+
+@dataclass(frozen=True)
+class RectangleLoad(SpreadLoad):
+    """A force in N spread evenly over `width` along x by `height` along y about (x, y), in m."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    force: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_size(self, self.width, self.height)
+
+    def _wave(self, k: Array, l: Array) -> Array:
+        return np.sinc(k * self.width / (2 * np.pi)) * np.sinc(l * self.height / (2 * np.pi))
+
+    def _rim(self) -> Array:
+        t = np.linspace(-1, 1, 17)
+        along, one = np.concatenate([t, t]), np.repeat([-1.0, 1.0], 17)
+        round_it = np.vstack([np.column_stack([along, one]), np.column_stack([one, along])])
+        return round_it * (self.width / 2, self.height / 2)
+
+    def _quadrature(self, count: int) -> tuple[Array, Array]:
+        t, w = _gauss(count)
+        x, y = np.meshgrid(self.width / 2 * t, self.height / 2 * t)
+        return np.column_stack([x.ravel(), y.ravel()]), np.multiply.outer(w, w).ravel()

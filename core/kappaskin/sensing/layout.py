@@ -1,16 +1,79 @@
-"""Where the elements are and what they sense."""
+"""Sensor layout: where the elements are, and the curvature that their gages read."""
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
-from kappaskin.bases import Basis, mean_curvature_at
+from kappaskin.bases import Basis, SineBasis, curvature_at, gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.skin import Patch
+
+_POINTS = 12  # exact to rounding for waves as short as the gage
+
+# A gage along the unit vector e reads the mean of the normal curvature e'Ke over its length L. One
+# lies along x and one along y. The twist is half of what two along the diagonals differ by, which
+# in the limit of short ones is f_xy. Each alone mixes the modes: it sees sin(k x) sin(l y) as
+# waves of k + l and of k - l. What they differ by does not: with h = L / sqrt(8) it is the twist
+#     k l cos(k x) cos(l y)   times   (cos(k h) sinc(l h) + sinc(k h) cos(l h)) / 2.
+_DIAGONAL = 1 / math.sqrt(2)
+
+
+def multipliers(sines: SineBasis, gage_length: float) -> Array:
+    """By what gages of `gage_length` in m read sines on a flat skin, (3, Ni, Nj).
+
+    xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above.
+    """
+    ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
+    L, h = gage_length, gage_length * _DIAGONAL / 2
+    twist = np.cos(ki * h) * _sinc(kj * h) + _sinc(ki * h) * np.cos(kj * h)
+    return np.stack([_sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2])
+
+
+def _sinc(t: Array) -> Array:
+    return np.sinc(t / np.pi)
+
+
+def mean_curvature_at(basis: Basis, positions: Array, gage_length: float) -> Array:
+    """What gages of `gage_length` in m, their middles at `positions`, read of each function.
+
+    xx, yy, xy (3, P, N) in 1/m per m, as `curvature_at` has it of gages without a length.
+    """
+    if not gage_length:
+        return curvature_at(basis, positions)
+    mean = _over_points if basis.patch.base_curvature else _between_ends
+
+    def along(x: float, y: float) -> Array:
+        return mean(basis, positions, gage_length, x, y)
+
+    rising, falling = along(_DIAGONAL, _DIAGONAL), along(_DIAGONAL, -_DIAGONAL)
+    return np.stack([along(1.0, 0.0), along(0.0, 1.0), (rising - falling) / 2])
+
+
+def _between_ends(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
+    """The mean curvature along (x, y): by how much the slope differs between the gages' ends.
+
+    It is exact also for functions whose curvature jumps between triangles.
+    """
+    half = L / 2 * np.array([x, y])
+
+    def slope(places: Array) -> Array:
+        return x * basis.at(places, 1, 0) + y * basis.at(places, 0, 1)
+
+    return (slope(positions + half) - slope(positions - half)) / L
+
+
+def _over_points(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
+    """The mean curvature along (x, y) by Gauss: on a bent skin it is more than a derivative."""
+    along, weights = gauss(L, _POINTS)
+    steps = np.multiply.outer(along - L / 2, (x, y))
+    xx, yy, xy = curvature_at(basis, (positions + steps[:, None]).reshape(-1, 2))
+    normal = (x * x * xx + y * y * yy + 2 * x * y * xy).reshape(_POINTS, len(positions), -1)
+    return np.einsum("q,qpn->pn", weights / L, normal)
+
 
 _SHORTEST = 1e-6  # m: shorter gages than that tell no mean, only rounding
 _ROUNDING = 1e-9  # of a depth: gages as long as elements are apart end on the rim
@@ -122,3 +185,43 @@ class SensorLayout:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         K = mean_curvature_at(basis, self.positions, self.gage_length)
         return K.reshape(3 * len(self), basis.size)
+
+
+def steepness(slope_x: Array, slope_y: Array) -> Array:
+    """How many times too large Eqs. 3-5 are on slopes (..., P) along x and y, (..., 3, P).
+
+    With W^2 = 1 + f_x^2 + f_y^2 it is xx: W (1 + f_x^2), yy: W (1 + f_y^2),
+    xy: W sqrt((1 + f_x^2) (1 + f_y^2)).
+    """
+    along_x, along_y = 1 + slope_x**2, 1 + slope_y**2
+    W = np.sqrt(along_x + along_y - 1)
+    times = np.empty((*W.shape[:-1], 3, W.shape[-1]), W.dtype)
+    times[..., 0, :] = W * along_x
+    times[..., 1, :] = W * along_y
+    times[..., 2, :] = W * np.sqrt(along_x * along_y)
+    return times
+
+
+class NormalCurvature:
+    """Coefficients to the true normal curvature of the deflected surface along the gages.
+
+    It is that of Eqs. 3-5, its first order, over the `steepness`. Gages of some length read the
+    mean of Eqs. 3-5 along them on the slope in their middle.
+    """
+
+    def __init__(self, basis: Basis, layout: SensorLayout, dtype: DTypeLike = np.float64) -> None:
+        if basis.patch.base_curvature:
+            raise Refusal(
+                f"expected a flat skin for finite slopes, got a {basis.patch.name}: on a bent one "
+                "the tangential displacement matters as much as the slope; use least-squares"
+            )
+        places = layout.positions
+        self._size = basis.size
+        self._second = layout.curvature_operator(basis).T.astype(dtype)
+        self._first = [basis.at(places, *order).T.astype(dtype) for order in ((1, 0), (0, 1))]
+
+    def __call__(self, coefficients: Array) -> Array:
+        """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
+        flat = coefficients.reshape(*coefficients.shape[:-2], self._size)
+        times = steepness(*(np.dot(flat, slope) for slope in self._first))
+        return np.dot(flat, self._second).reshape(times.shape) / times

@@ -1,18 +1,11 @@
-"""Functions that a shape is made of, by how the skin is held."""
+"""Boundary conditions: how the edges of a skin are held, and the basis for each."""
 
 from collections.abc import Callable
 from functools import partial
 
-from kappaskin.bases.basis import ORDERS as ORDERS
-from kappaskin.bases.basis import Basis as Basis
-from kappaskin.bases.basis import CurvatureMap as CurvatureMap
-from kappaskin.bases.basis import ValueMap as ValueMap
-from kappaskin.bases.beam import ClampedBasis as ClampedBasis
-from kappaskin.bases.disk import DiskBasis as DiskBasis
-from kappaskin.bases.elastic import ElasticBasis as ElasticBasis
-from kappaskin.bases.overlap import overlaps as overlaps
-from kappaskin.bases.polygon import PolygonBasis as PolygonBasis
-from kappaskin.bases.sine import SineBasis as SineBasis
+from kappaskin.bases.basis import Basis
+from kappaskin.bases.modes import DiskBasis, PolygonBasis
+from kappaskin.bases.product import ClampedBasis, ElasticBasis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.skin import Disk, Patch, Polygon
 

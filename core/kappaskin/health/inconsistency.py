@@ -1,19 +1,206 @@
-"""What channels read to how far each is from what those around it say, over the last seconds."""
+"""Inconsistency test: what each channel reads against what its neighbours predict."""
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
-from kappaskin.frames import Array, Mask
-from kappaskin.health.neighbours import Indices, Neighbours
-from kappaskin.health.window import Look
-from kappaskin.sensing import SensorLayout
+from kappaskin.frames import Array, Frame, Mask
+from kappaskin.sensing import Sensor, SensorLayout
+
+_LONG = 0.25  # s at least
+_OFTEN_UP_TO = 3000  # channels that are looked at so often; more as much less often
+_MOST_FRAMES = 64  # frames that are kept of it, evenly
+_FEWEST_FRAMES = 8  # frames, whose differences tell the noise
+_PARTS = 4  # that are averaged, each by itself
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """What C channels read for `seconds` that ended at `time` on the host's clock.
+
+    `means` (T, C) in 1/m of each part of it, of so many `frames`; NaN where a channel was not read
+    or on a rail. `noise` (C,) in 1/m from one frame to the next, NaN where it cannot be told;
+    `railed` (C,) the share of the readings that were on a rail, NaN where there were none.
+    """
+
+    time: float
+    seconds: float
+    means: Array
+    frames: float
+    noise: Array
+    railed: Array
+
+
+class Window:
+    """Takes every frame, keeps some, and looks at them four times a second at most.
+
+    Of a skin with more than 3000 channels as much less often, so that looking costs no more.
+    """
+
+    def __init__(self, sensor: Sensor) -> None:
+        self._chain = sensor.transduction
+        self._rest = float(self._chain.curvature(np.zeros(1, np.int32))[0])
+        self._long = _LONG * max(1.0, sensor.channels / _OFTEN_UP_TO)
+        # Typed as float64: in float32 counts are exact up to 24 bits.
+        counts = np.empty((_MOST_FRAMES, sensor.channels), np.float32)
+        self._counts = cast("Array", counts)
+        self._taken, self._begun, self._due = 0, -math.inf, -math.inf
+
+    def __call__(self, frame: Frame) -> Look | None:
+        """What the last quarter of a second says, where it ends with `frame`."""
+        time = frame.device_time
+        if time < self._begun:  # the clock of a device that began anew
+            self._taken, self._due = 0, time
+        if time < self._due:
+            if self._taken and len(frame.channels) < self._counts.shape[1]:
+                # Or of channels that take turns the same would be passed over every time.
+                self._counts[self._taken - 1, frame.channels] = frame.counts
+            return None
+        if not self._taken:
+            self._begun = time
+        self._due = time + self._long / _MOST_FRAMES
+        row = self._counts[self._taken]
+        if len(frame.channels) < len(row):
+            row[:] = np.nan
+        row[frame.channels] = frame.counts
+        self._taken += 1
+        seconds = time - self._begun
+        if self._taken < _MOST_FRAMES and (self._taken < _FEWEST_FRAMES or seconds < self._long):
+            return None
+        look = self._looked(self._counts[: self._taken], seconds, frame.host_time)
+        self._taken = 0
+        return look
+
+    def _looked(self, counts: Array, seconds: float, time: float) -> Look:
+        low, high = self._chain.limits
+        read, rails = ~np.isnan(counts), (counts <= low) | (counts >= high)
+        starts = np.linspace(0, len(counts), _PARTS, endpoint=False).astype(int)
+
+        def summed(values: Array) -> Array:
+            return np.add.reduceat(values, starts, axis=0, dtype=float)
+
+        with np.errstate(invalid="ignore", divide="ignore"):  # of none comes NaN
+            means = summed(np.where(read, counts, 0.0)) / summed(read.astype(float))
+            railed = rails.sum(axis=0) / read.sum(axis=0)
+        means[summed(rails.astype(float)) > 0] = np.nan
+        curvature = means * self._chain.resolution + self._rest
+        noise = _noise(counts) * self._chain.resolution
+        return Look(time, seconds, curvature, len(counts) / _PARTS, noise, railed)
+
+
+def _noise(counts: Array) -> Array:
+    """Standard deviations (C,) of white noise with second differences such as `counts` (n, C)."""
+    bends = (counts[2:] - 2 * counts[1:-1] + counts[:-2]).astype(float) ** 2
+    known = ~np.isnan(bends)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.sqrt(np.where(known, bends, 0.0).sum(axis=0) / known.sum(axis=0) / 6)
+
+
+_COUNT = 20  # elements around one, that tell of it: two rings of a grid without its corners
+_BESIDE = 8  # of them are next to it
+_CLOSE = 1.6  # distances of elements: as far as they reach on a grid
+_LENGTHS = (1.2, 2.5)  # of what bends the skin, in distances of elements
+_NOISE = 1e-3  # in power, beside what a neighbour reads
+_MISSING = 1e9  # the same, of a reading that is not there
+_ELEMENTS_AT_ONCE = 512  # elements whose weights are computed together: 15 MB each time
+
+Indices = NDArray[np.intp]
+
+
+def _covariance(apart: Array) -> Array:
+    """Covariances (3, 3, ...) of the curvatures of two elements that are `apart` (2, ...).
+
+    Of a displacement with the covariance exp(-r^2/2 l^2), the mean over the lengths l: its fourth
+    derivatives are He_m(x/l) He_n(y/l) exp(-r^2/2 l^2), m + n = 4, with Hermite's polynomials.
+    Scaled so that the variance of xx and of yy is 1, and that of xy 1/3.
+    """
+    total = np.zeros((3, 3, *apart.shape[1:]))
+    for length in _LENGTHS:
+        u, v = apart / length
+        bell = np.exp(-(u**2 + v**2) / 2) / (3 * len(_LENGTHS))
+        uu, vv = u**2 - 1, v**2 - 1
+        total[0, 0] += (uu * (uu - 4) - 2) * bell
+        total[1, 1] += (vv * (vv - 4) - 2) * bell
+        total[0, 1] += uu * vv * bell
+        total[0, 2] += (uu - 2) * u * v * bell
+        total[1, 2] += (vv - 2) * u * v * bell
+    total[2, 2] = total[1, 0] = total[0, 1]
+    total[2, :2] = total[:2, 2]
+    return total
+
+
+class Neighbours:
+    """What the P elements of a layout tell of each other: kriging from the nearest ones.
+
+    Nothing is asked of the whole skin, so that the cost grows as the number of elements. What an
+    element reads itself has no part in what it should read. `weights` (P, 3, 3 k) for the
+    `channels` (P, 3 k) around each; `spread` (P, 3) is the variance of what they leave open, in
+    units of the mean square of what they read.
+    """
+
+    def __init__(self, layout: SensorLayout) -> None:
+        P = len(layout)
+        k = min(_COUNT, P - 1)
+        apart, near = scipy.spatial.KDTree(layout.positions).query(layout.positions, k + 1)
+        near = cast("Indices", near).reshape(P, k + 1)[:, 1:]
+        pitch = float(np.median(np.reshape(apart, (P, k + 1))[:, 1:2])) if k else 1.0
+        self._at = layout.positions.T / (pitch or 1.0)
+        self.near = near
+        """The elements (P, k) around each."""
+        self.channels: Indices = (near[:, None] + P * np.arange(3)[:, None]).reshape(P, 3 * k)
+        self.beside: Indices = self.channels.reshape(P, 3, k)[:, :, :_BESIDE].reshape(P, -1)
+        """The channels (P, c) of the elements next to each."""
+        close = (np.reshape(apart, (P, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
+        self.alone: Array = _BESIDE / np.clip(close, 1, _BESIDE)
+        """How many times fewer elements are close to each (P,) than inside a grid."""
+        self.weights = np.zeros((P, 3, 3 * k))
+        self.spread = np.ones((P, 3))
+        self.leave_out(np.zeros(3 * P, bool), np.arange(P))
+
+    def touched_by(self, channels: Mask) -> Indices:
+        """The elements of which some of `channels` (3 P,) tell."""
+        return np.flatnonzero(channels[self.channels].any(axis=1))
+
+    def leave_out(self, missing: Mask, elements: Indices) -> None:
+        """Let `elements` be told of without the channels that are `missing` (3 P,)."""
+        for start in range(0, len(elements), _ELEMENTS_AT_ONCE):
+            self._weigh(missing, elements[start : start + _ELEMENTS_AT_ONCE])
+
+    def _weigh(self, missing: Mask, elements: Indices) -> None:
+        near, E = self._at[:, self.near[elements]], len(elements)
+        k = near.shape[2]
+        between = _covariance(near[:, :, :, None] - near[:, :, None])
+        S = between.transpose(2, 0, 3, 1, 4).reshape(E, 3 * k, 3 * k)
+        apart = _covariance(near - self._at[:, elements, None])
+        beside = apart.transpose(2, 1, 3, 0).reshape(E, 3 * k, 3)
+        noise = np.where(missing[self.channels[elements]], _MISSING, _NOISE)
+        S[:, np.arange(3 * k), np.arange(3 * k)] += noise
+        W = np.linalg.solve(S, beside)
+        own = np.diag(_covariance(np.zeros(2)))
+        self.weights[elements] = W.swapaxes(1, 2)
+        self.spread[elements] = np.maximum(own - np.sum(W * beside, axis=1), 0.0)
+
+    def told(self, readings: Array, elements: Indices) -> tuple[Array, Array]:
+        """What `elements` (E,) should read and the mean square around them, (T, 3, E) each.
+
+        From `readings` (T, 3 P), NaN where one of those around is.
+        """
+        around = readings.T[self.channels[elements]]  # (E, 3 k, T)
+        told = np.matmul(self.weights[elements], around)
+        power = np.einsum("ert,ert->et", around, around) / max(around.shape[1], 1)
+        spread = self.spread[elements][:, :, None] * power[:, None]
+        return told.transpose(2, 1, 0), spread.transpose(2, 1, 0)
+
 
 _KEPT = 128  # means, 16 a second
 _RECENT = 32  # of them are judged
 _OFTEN = 24  # of them at most may be explained where a channel is beyond what can be
-_FEWEST = 8  # of those at least
+_FEWEST_MEANS = 8  # of those at least
 _FORGOTTEN = 60.0  # s after which a reading that stays is what one is compared with
 _SHAPE = 2.0  # times the mean square around is the most that a shape is thought to be
 _GAIN = 0.05  # by which channels that are well may differ
@@ -33,7 +220,7 @@ def rms(values: Array) -> Array:
     count = known.sum(axis=0)
     squares = np.where(known, values, 0.0)
     total = np.einsum("tc,tc->c", squares, squares)
-    return np.where(count < _FEWEST, 0.0, np.sqrt(total / np.maximum(count, 1)))
+    return np.where(count < _FEWEST_MEANS, 0.0, np.sqrt(total / np.maximum(count, 1)))
 
 
 def _apart(values: Array) -> Array:

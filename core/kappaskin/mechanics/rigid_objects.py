@@ -1,4 +1,4 @@
-"""Rigid objects as the skin meets them: how far the underside lies above its lowest point."""
+"""Rigid objects: spheres, cylinders, wedges, punches, blocks, by the height of their underside."""
 
 import math
 from dataclasses import dataclass
