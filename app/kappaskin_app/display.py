@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.estimation import WHY
+from kappaskin.estimation import FAULTS
 from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.live import Status
 from kappaskin_app.colouring import Colouring
@@ -279,19 +279,19 @@ class Display(QObject):
     def _railed(self, estimate: Estimate, kinds: Kinds) -> Mask:
         """Which readings (3, P) stand on a rail, as far as that is known."""
         status = self._session.status
-        on_rail = kinds == WHY.index("saturated")
+        on_rail = kinds == FAULTS.index("saturated")
         if status.sensor is not None and status.region.around == "off":
             # Every channel was scanned: what lives and has no reading is at the end of its range.
             on_rail |= np.isnan(estimate.nominal) & status.sensor.layout.live & (kinds == 0)
         return on_rail
 
     def _kinds(self, estimate: Estimate) -> Kinds:
-        """Why each channel (3, P) is left out, by number in `WHY`; 0 where it is not."""
+        """Why each channel (3, P) is left out, by number in `FAULTS`; 0 where it is not."""
         found = np.zeros(estimate.curvature.shape, np.uint8)
         for finding in self._session.status.health.findings:
             if finding.element < len(estimate.suspect):  # or it is of another skin
                 row = COMPONENTS.index(finding.component)
-                found[row, finding.element] = WHY.index(finding.kind)
+                found[row, finding.element] = FAULTS.index(finding.kind)
         # What the fit itself suspects, it suspects of an element as a whole.
         whole = np.where(found.any(axis=0), 0, estimate.suspect)
         return np.maximum(found, whole)

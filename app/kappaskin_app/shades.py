@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.estimation import WHY
+from kappaskin.estimation import FAULTS
 from kappaskin.pipeline import QUANTITIES
 from kappaskin_app.theme import (
     DARK_INK,
@@ -28,14 +28,14 @@ _GROUPS = (
 )
 """Those that may share one range, or each has its own."""
 
-HEALTH_WORDS = ("well", *("on a rail" if kind == "saturated" else kind for kind in WHY[1:]))
+HEALTH_WORDS = ("well", *("on a rail" if kind == "saturated" else kind for kind in FAULTS[1:]))
 
 
 def _rgb(*colours: str) -> Colours:
     return np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in colours], np.uint8)
 
 
-# In the order of `WHY`: what is well recedes, and of the others each has another lightness too.
+# In the order of `FAULTS`: what is well recedes, and of the others each has another lightness too.
 HEALTH_COLOURS = _rgb(
     *("#5f7f8c", "#f0e060", "#d55e00", "#cc79a7", "#56b4e9"),
     *("#e69f00", "#1a1c20", "#9b30d0", "#00a070"),
@@ -90,7 +90,7 @@ class Tint:
         return tuple((colour, words) for there, colour, words in beside if there)
 
 
-HEALTH = Tint(HEALTH_COLOURS, (0.0, len(WHY) - 1.0), "", kinds=HEALTH_WORDS)
+HEALTH = Tint(HEALTH_COLOURS, (0.0, len(FAULTS) - 1.0), "", kinds=HEALTH_WORDS)
 
 
 @dataclass(frozen=True)

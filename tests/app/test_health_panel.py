@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from kappaskin import WHY, Finding, Health, Patch, Phase, SensorLayout, Status, load_scene
+from kappaskin import Finding, Health, Patch, Phase, SensorLayout, Status, load_scene
+from kappaskin.estimation import FAULTS
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.shades import SHADES
@@ -62,8 +63,8 @@ def test_a_letter_says_why_an_element_is_left_out_and_so_does_its_value(qapp) ->
     heatmap.show_marks(none, none, kinds)
     bare = heatmap.cells.grab().toImage()
     pictures = []
-    for kind in WHY[1:]:
-        kinds[5] = WHY.index(kind)
+    for kind in FAULTS[1:]:
+        kinds[5] = FAULTS.index(kind)
         heatmap.show_marks(none, none, kinds)
         pictures.append(heatmap.cells.grab().toImage())
         heatmap.show_element(5)

@@ -5,7 +5,7 @@ from kappaskin.bases.basis import Basis as Basis
 from kappaskin.bases.basis import CurvatureMap as CurvatureMap
 from kappaskin.bases.basis import ValueMap as ValueMap
 from kappaskin.bases.basis import curvature_at as curvature_at
-from kappaskin.bases.basis import terms as terms
+from kappaskin.bases.basis import curvature_terms as curvature_terms
 from kappaskin.bases.edges import EDGES as EDGES
 from kappaskin.bases.edges import basis_for as basis_for
 from kappaskin.bases.edges import check_edge as check_edge

@@ -17,7 +17,7 @@ from kappaskin.bases.cache import kept
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.skin import Outline, turn
+from kappaskin.skin import Outline, doubled_area
 
 _INWARD = 1 / 256  # of the spacing, at corners that point inward: curvature is unbounded there
 _GROWTH = 1.0  # of the spacing per distance
@@ -31,7 +31,7 @@ Triangles = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class TriangleMesh:
     """`points` (Q, 2), the first `rim` of them along the outline, and `triangles` (T, 3)."""
 
     points: Array
@@ -39,7 +39,7 @@ class Mesh:
     rim: int
 
 
-def meshed(line: Outline, spacing: float, blunt: float) -> Mesh:
+def triangulated(line: Outline, spacing: float, blunt: float) -> TriangleMesh:
     """Triangles with sides of about `spacing` inside an outline that touches x = 0 and y = 0.
 
     Towards corners wider than a right angle they are smaller, at those that point outward `blunt`
@@ -59,7 +59,7 @@ def meshed(line: Outline, spacing: float, blunt: float) -> Mesh:
             continue
         triangles = triangles[line.depth(points[triangles].mean(axis=1)) > 0]
         if smoothed == _SMOOTHINGS:
-            return Mesh(points, triangles, len(rim))
+            return TriangleMesh(points, triangles, len(rim))
         inner, smoothed = _smoothed(line, points, triangles)[len(rim) :], smoothed + 1
     raise Refusal(
         f"an outline of {len(line.corners)} corners could not be divided into triangles; leave out "
@@ -110,7 +110,7 @@ def _inside(line: Outline, rim: Array, spacing: float) -> Array:
 
 def _joined(points: Array) -> Triangles:
     triangles = Delaunay(points).simplices.astype(np.intp)
-    area = np.abs(turn(*np.moveaxis(points[triangles], 1, 0)))
+    area = np.abs(doubled_area(*np.moveaxis(points[triangles], 1, 0)))
     return triangles[area > 1e-9 * np.median(area)]  # none of points along one edge
 
 
@@ -151,7 +151,7 @@ def monomials(xi: Array) -> Array:
     return _FACTORS * powers[..., 0, _POWERS[:, 0]] * powers[..., 1, _POWERS[:, 1]]
 
 
-def chained(inverse: Array) -> Array:
+def chain_rule(inverse: Array) -> Array:
     """The chain rule (..., 6, 6): derivatives along x, y from those along xi, eta.
 
     `inverse` (..., 2, 2) holds the derivatives of xi along x and y.
@@ -191,7 +191,7 @@ class Quintics:
 
     @cached_property
     def _chained(self) -> Array:
-        return chained(self.inverse)
+        return chain_rule(self.inverse)
 
     @cached_property
     def _depths(self) -> Array:
@@ -284,7 +284,7 @@ def _made(vertices: tuple[tuple[float, float], ...], count: int, clamped: bool) 
     size = np.sqrt(Outline(corners).area)
     spacing = _SPACING / np.sqrt(max(count, _FEWEST))
     blunt = _BLUNT_CLAMPED if clamped else _BLUNT_HINGED
-    space = _Space(meshed(Outline(corners / size), spacing, blunt))
+    space = _Space(triangulated(Outline(corners / size), spacing, blunt))
     modes = _lowest(*space.energies(), space.allowed(clamped), count) / 2
     points, weights = space.quadrature()
     return {
@@ -299,7 +299,7 @@ def _made(vertices: tuple[tuple[float, float], ...], count: int, clamped: bool) 
 class _Space:
     """Argyris' functions on a mesh: the unknowns of triangle t are `unknowns` (T, 21)."""
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: TriangleMesh) -> None:
         self._mesh, corners = mesh, mesh.points[mesh.triangles]
         self.origins, self._sides = (
             corners[:, 0],
@@ -319,7 +319,7 @@ class _Space:
     def _shapes(self, side: NDArray[np.intp]) -> Array:
         """The quintics (T, 21, 21) whose unknowns are one and otherwise zero."""
         scale = np.sqrt(np.abs(np.linalg.det(self._sides)))
-        chain = chained(scale[:, None, None] * self.inverse)  # slopes per size of the triangle
+        chain = chain_rule(scale[:, None, None] * self.inverse)  # slopes per size of the triangle
         at_corners = [chain @ monomials(corner) for corner in np.array([[0, 0], [1, 0], [0, 1]])]
         along = self._mesh.points[self._ends[:, 1]] - self._mesh.points[self._ends[:, 0]]
         across = along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
@@ -338,7 +338,7 @@ class _Space:
     def energies(self) -> tuple[csc_array, csc_array]:
         """The matrices (D, D) of the bending energy and of the mean square."""
         at = monomials(triangle_quadrature()[0]) @ self.shapes[:, None]
-        w, _, _, w_xx, w_xy, w_yy = np.moveaxis(chained(self.inverse)[:, None] @ at, 2, 0)
+        w, _, _, w_xx, w_xy, w_yy = np.moveaxis(chain_rule(self.inverse)[:, None] @ at, 2, 0)
         weights = self.quadrature()[1][..., None]
 
         def product(v: Array) -> Array:
@@ -365,7 +365,7 @@ class _Space:
         return csc_array(cast("Any", block_diag(blocks)))
 
 
-def _free_at(mesh: Mesh, point: int, clamped: bool) -> Array:
+def _free_at(mesh: TriangleMesh, point: int, clamped: bool) -> Array:
     """What (6, F) of w, w_x, w_y, w_xx, w_xy, w_yy at a point of the rim its two edges leave free.
 
     Along an edge with direction t the deflection vanishes, w = w_t = w_tt = 0; clamped, its slope

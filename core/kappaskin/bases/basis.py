@@ -44,12 +44,12 @@ class Basis(Protocol):
     def free(self) -> Array | None:
         """The combinations (N, F) of functions that a fit may use; None when all.
 
-        The edges allow these and the `unseen` ones.
+        The edges allow these and the `unobservable` ones.
         """
         ...
 
     @property
-    def unseen(self) -> Array | None:
+    def unobservable(self) -> Array | None:
         """Shapes (N, q) with unit RMS along the rim that change no curvature; None when all do."""
         ...
 
@@ -85,7 +85,7 @@ class Basis(Protocol):
 _ORDERS = {"xx": ((2, 0), (0, 0)), "yy": ((0, 2), None), "xy": ((1, 1), (-1, 1))}
 
 
-def terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
+def curvature_terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
     """Which derivatives, and how much of each, make a component of curvature."""
     if component not in _ORDERS:
         raise Refusal(f"expected a component among {', '.join(COMPONENTS)}; got {component!r}")
@@ -98,7 +98,10 @@ def curvature_at(basis: Basis, positions: Array) -> Array:
     """Change of curvature xx, yy, xy (3, P, N) in 1/m per m of each function (Eqs. 3-5, 11)."""
     return np.stack(
         [
-            sum(h * basis.at(positions, *order) for h, order in terms(basis.patch, component))
+            sum(
+                h * basis.at(positions, *order)
+                for h, order in curvature_terms(basis.patch, component)
+            )
             for component in COMPONENTS
         ]
     )
@@ -108,7 +111,9 @@ class CurvatureMap:
     """The change of one curvature component on a grid, as a map from coefficients."""
 
     def __init__(self, basis: Basis, component: str, x: Array, y: Array) -> None:
-        self._terms = [(h, basis.on_grid(x, y, *o)) for h, o in terms(basis.patch, component)]
+        self._terms = [
+            (h, basis.on_grid(x, y, *o)) for h, o in curvature_terms(basis.patch, component)
+        ]
 
     def __call__(self, coefficients: Array) -> Array:
         """Curvature (..., ny, nx) in 1/m for `coefficients` (..., Ni, Nj)."""
@@ -137,7 +142,7 @@ class FunctionBasis(ABC):
         return None
 
     @property
-    def unseen(self) -> Array | None:
+    def unobservable(self) -> Array | None:
         return None
 
     @abstractmethod

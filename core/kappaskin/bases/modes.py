@@ -100,8 +100,8 @@ class DiskBasis(ModeBasis):
             raise Refusal(f"expected a disk, got a {self.patch.name}")
 
     @cached_property
-    def _modes(self) -> "_Modes":
-        return _modes(self.size, self.clamped)
+    def _modes(self) -> "_DiskModes":
+        return _disk_modes(self.size, self.clamped)
 
     def _derivative(self, positions: Array, order: Order) -> Array:
         R = self.patch.a / 2
@@ -150,7 +150,7 @@ _BY_STEPS = np.array(
 _TURNS = np.array([q - p for p, q in _STEPS])
 
 
-class _Modes:
+class _DiskModes:
     """The first `count` modes on the disk of radius 1, their radial parts as Chebyshev series."""
 
     def __init__(self, count: int, clamped: bool) -> None:
@@ -200,7 +200,7 @@ class _Modes:
         return values.view(float)[..., self._columns]
 
 
-_modes = lru_cache(8)(_Modes)
+_disk_modes = lru_cache(8)(_DiskModes)
 
 
 def _lowest(count: int, clamped: bool) -> tuple[Array, Array, NDArray[np.intp]]:

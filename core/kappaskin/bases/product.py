@@ -282,14 +282,14 @@ def _beam(s: Array, count: int, *orders: int) -> Array:
     the same with sin and sinh, over sqrt(2); cosh and sinh as decaying exponentials from either
     end, so that nothing overflows or cancels.
     """
-    modes = _modes(count, orders)
+    modes = _beam_modes(count, orders)
     ks, half = np.multiply.outer(s, modes.k), modes.k / 2
     wave = modes.waves * np.sin(ks + modes.phases)
     return wave - modes.decays * (np.exp(ks - half) + modes.far * np.exp(-ks - half))
 
 
 @dataclass(frozen=True, eq=False)
-class _Modes:
+class _BeamModes:
     """Wave numbers k (N,); phases and factors (O, 1, N) of the waves, the decays and far ends."""
 
     k: Array
@@ -300,7 +300,7 @@ class _Modes:
 
 
 @lru_cache(64)
-def _modes(count: int, orders: tuple[int, ...]) -> _Modes:
+def _beam_modes(count: int, orders: tuple[int, ...]) -> _BeamModes:
     """What the derivatives of `orders` share; k are the roots of cos k cosh k = 1 above zero."""
     k = (np.arange(1.0, count + 1) + 0.5) * np.pi  # nearly: Newton's method does the rest
     for _ in range(4):
@@ -309,7 +309,7 @@ def _modes(count: int, orders: tuple[int, ...]) -> _Modes:
     d = np.array(orders, float)[:, None, None]
     sign = np.where(np.arange(count) % 2, -1.0, 1.0)
     phase, scale = (1 + sign) * np.pi / 4, k**d / np.sqrt(2)
-    return _Modes(
+    return _BeamModes(
         k,
         phase + d * np.pi / 2,
         scale / np.sin(k / 2 + phase),
@@ -326,8 +326,8 @@ class ElasticBasis(JetProductBasis):
     when the line through its ends is taken out vanishes at both, which sines are complete for.
 
     Readings of curvature see neither a translation nor a tilt: 1, x and y (1 and x on a strip) are
-    `unseen`, and of all shapes that explain the readings `free` keeps the one whose rim is nearest
-    to rest. How far the rim may be from there is for the fit's error bar to say.
+    `unobservable`, and of all shapes that explain the readings `free` keeps the one whose rim is
+    nearest to rest. The fit's error bar says how far the rim may be from there.
     """
 
     def __post_init__(self) -> None:
@@ -378,12 +378,12 @@ class ElasticBasis(JetProductBasis):
         return [0, self.Nj] if self.patch.strip else [0, self.Nj, 1]
 
     @property
-    def unseen(self) -> Array:
+    def unobservable(self) -> Array:
         """The rigid shapes (N, 3), on a strip (N, 2), with unit RMS along the rim."""
-        return self._unseen
+        return self._unobservable
 
     @cached_property
-    def _unseen(self) -> Array:
+    def _unobservable(self) -> Array:
         points, weights = self.rim()
         mean_square = weights @ self.at(points)[:, self._rigid] ** 2 / weights.sum()
         return np.eye(self.size)[:, self._rigid] / np.sqrt(mean_square)
@@ -399,8 +399,8 @@ class ElasticBasis(JetProductBasis):
         R = self.at(points)
         others = np.delete(np.eye(self.size), self._rigid, axis=1)
         # The rigid shapes are orthogonal along the rim, by its symmetry.
-        share = (R @ self.unseen).T * weights / weights.sum() @ R @ others
-        return others - self.unseen @ share
+        share = (R @ self.unobservable).T * weights / weights.sum() @ R @ others
+        return others - self.unobservable @ share
 
 
 Overlaps = Callable[[Order, Order], Array]

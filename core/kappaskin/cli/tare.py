@@ -9,7 +9,7 @@ import numpy as np
 
 from kappaskin.calibration import Rest, Tare, Tares, Taring, data_folder
 from kappaskin.cli.common import Switch
-from kappaskin.contact import LoadSeeker
+from kappaskin.contact import LoadDetector
 from kappaskin.errors import Refusal
 from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 from kappaskin.sensing import Sensor
@@ -68,7 +68,7 @@ def _taken(source: Source, sensor: Sensor, used: Tare | None) -> Tare:
     zero = np.zeros(sensor.channels) if used is None else used.offset
     rest = Rest(zero, np.zeros(sensor.channels), used)
     now = datetime.now().astimezone()
-    return taring.tare(LoadSeeker(sensor), rest, now, source.temperature)
+    return taring.tare(LoadDetector(sensor), rest, now, source.temperature)
 
 
 def _tell(taken: Tare, before: Tare | None) -> None:

@@ -46,11 +46,11 @@ class PointForces:
     growth: Array
 
 
-Contact = Callable[[Array], PointForces]
+ForceModel = Callable[[Array], PointForces]
 """Parameters to forces: x, y of the centre of force in m and the force in N come first."""
 
 
-def ring(pattern: Array) -> Contact:
+def ring(pattern: Array) -> ForceModel:
     """x, y, F, q: the force in a `pattern` (k, 3) of x, y and share, sqrt(q) times as large."""
     share = pattern[:, 2]
     unit = pattern[:, :2] - share @ pattern[:, :2]  # x, y is the centre of force
@@ -66,7 +66,7 @@ def ring(pattern: Array) -> Contact:
     return forces
 
 
-def ends(middle: float) -> Contact:
+def ends(middle: float) -> ForceModel:
     """x, y, F, angle, length squared, share: forces at two ends, and the share `middle` between.
 
     The ends have (1/2 + share) and (1/2 - share) of the rest.
@@ -74,7 +74,7 @@ def ends(middle: float) -> Contact:
     return lambda parameters: _at_ends(parameters, np.zeros((2, 1)), middle)
 
 
-def arcs(narrow: tuple[float, float], middle: float) -> Contact:
+def arcs(narrow: tuple[float, float], middle: float) -> ForceModel:
     """The same and q: each end's force on an arc across, of half width sqrt(q) times `narrow`."""
     return lambda parameters: _at_ends(parameters, np.multiply.outer(narrow, _ARC), middle)
 
@@ -229,7 +229,7 @@ class Optimum:
     `ahead` (n,) is the step that a bound forbade.
     """
 
-    contact: Contact
+    contact: ForceModel
     parameters: Array
     covariance: Array
     cost: float
@@ -237,9 +237,9 @@ class Optimum:
     ahead: Array
 
 
-def climb(
+def optimise(
     skin: ElasticSkin,
-    contact: Contact,
+    contact: ForceModel,
     start: Array,
     prior: Prior,
     readings: Array,
@@ -248,10 +248,10 @@ def climb(
 ) -> Optimum:
     """The optimum near `start` for `readings` (R,) with weights (R,), 1 / sd or 0 where missing."""
     p, damping = start, _DAMPING
-    here = _answer(skin, contact, p, prior, readings, weight)
+    here = _linearised(skin, contact, p, prior, readings, weight)
     for _ in range(steps):
         q = np.clip(p + here.step(damping), prior.low, prior.high)
-        there = _answer(skin, contact, q, prior, readings, weight)
+        there = _linearised(skin, contact, q, prior, readings, weight)
         if not there.cost < here.cost:
             damping = max(10 * damping, 0.01)
             continue
@@ -262,7 +262,7 @@ def climb(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Here:
+class _NormalEquations:
     """The cost at some parameters, and its normal equations scaled to a diagonal of ones."""
 
     cost: float
@@ -281,9 +281,9 @@ class _Here:
         return inverse / np.multiply.outer(self.scale, self.scale)
 
 
-def _answer(
-    skin: ElasticSkin, contact: Contact, p: Array, prior: Prior, readings: Array, weight: Array
-) -> _Here:
+def _linearised(
+    skin: ElasticSkin, contact: ForceModel, p: Array, prior: Prior, readings: Array, weight: Array
+) -> _NormalEquations:
     K, slopes = skin.readings(contact(p))
     left, J, off = weight * (readings - K), weight[:, None] * slopes, (p - prior.mean) / prior.sd
     squares = float(left @ left)
@@ -291,7 +291,7 @@ def _answer(
     scale = np.sqrt(np.diag(normal))
     scale[scale == 0] = 1.0  # a parameter that nothing feels, as on the rim
     gradient = (J.T @ left - off / prior.sd) / scale
-    return _Here(
+    return _NormalEquations(
         squares + float(off @ off),
         squares,
         normal / np.multiply.outer(scale, scale),

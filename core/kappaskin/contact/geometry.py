@@ -7,7 +7,7 @@ import numpy as np
 
 from kappaskin.bases import ORDERS, Basis
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Fit, seen_through
+from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import Array, LocalGeometry, Touch
 from kappaskin.skin import Patch
 
@@ -63,7 +63,7 @@ def surface_geometry(
     return _geometry(basis.patch, positions, jet, covariance_of(at))
 
 
-class FormMap:
+class CurvatureFormMap:
     """The curvature form on the grid of `x` (nx,), `y` (ny,), as a map from coefficients."""
 
     def __init__(self, basis: Basis, x: Array, y: Array) -> None:
@@ -88,7 +88,7 @@ def _geometry(patch: Patch, positions: Array, jet: Jet, covariance: Array) -> Lo
         *_frame(patch, positions, jet),
         _matrix(xx, xy, xy, yy),
         np.array(_torsion_form(jet, H)).T,
-        seen_through(to_form, covariance),
+        propagated_covariance(to_form, covariance),
     )
 
 

@@ -9,25 +9,25 @@ import numpy as np
 from kappaskin.contact.elastic_skin import (
     EVEN,
     ROUND,
-    Contact,
     ElasticSkin,
+    ForceModel,
     Optimum,
     PointForces,
     Prior,
     arcs,
-    climb,
     ends,
+    optimise,
     ring,
 )
 from kappaskin.contact.interior import (
     Hypothesis,
     Width,
-    cylinder_of,
+    arc_widths,
+    fitted_cylinder,
+    fitted_sphere,
     least_width,
     middle,
-    narrow,
     ring_pattern,
-    sphere_of,
 )
 from kappaskin.frames import Array, Mask, Touch
 
@@ -53,7 +53,7 @@ class Hypotheses:
     readings: int
 
 
-def hypotheses(
+def fit_hypotheses(
     coarse: ElasticSkin,
     skin: ElasticSkin,
     readings: Array,
@@ -66,14 +66,14 @@ def hypotheses(
     First with few functions: a reading grows without bounds as a force comes close, and more of
     them would keep a force on the side of an element where it started.
     """
-    frame = _Frame(coarse, readings, used)
+    frame = _WeightedReadings(coarse, readings, used)
     pair, forces = coarse.best_pair(touch.position, readings, used)
     frame.trust(noise, _at(touch.position[None], np.array([touch.force])), _at(pair, forces))
     sphere, edge = frame.sphere(touch), frame.edge(pair, forces)
     cylinder = frame.cylinder(edge)
     tried = (sphere, edge, cylinder)
     noise *= frame.spread(tried)
-    frame = _Frame(skin, readings, used)
+    frame = _WeightedReadings(skin, readings, used)
     frame.trust(noise, *(o.contact(o.parameters) for o in tried))
     sphere = frame.shaped(sphere)
     edge = min((frame.edged(edge), frame.edged(cylinder)), key=_cost)
@@ -82,9 +82,9 @@ def hypotheses(
         cylinder = min(cylinder, frame.rounded(frame.beside(edge), edge), key=_cost)
     noise *= frame.spread((sphere, edge, cylinder))
     return Hypotheses(
-        sphere_of(skin, sphere),
+        fitted_sphere(skin, sphere),
         Hypothesis(edge),
-        cylinder_of(skin, cylinder),
+        fitted_cylinder(skin, cylinder),
         noise,
         int(used.sum()),
     )
@@ -98,7 +98,7 @@ def _at(points: Array, forces: Array) -> PointForces:
     return PointForces(points, forces, np.zeros((0, len(forces), 2)), np.zeros((0, len(forces))))
 
 
-class _Frame:
+class _WeightedReadings:
     """One frame's readings, each with the weight it deserves."""
 
     def __init__(self, skin: ElasticSkin, readings: Array, used: Mask) -> None:
@@ -116,7 +116,7 @@ class _Frame:
         squares = min(optimum.squares for optimum in tried)
         return math.sqrt(squares / (int(self._used.sum()) - 6))
 
-    def _climb(self, contact: Contact, start: Array, steps: int) -> Optimum:
+    def _climb(self, contact: ForceModel, start: Array, steps: int) -> Optimum:
         """x, y, F; then angle, squared length and share, if there are ends; then q."""
         n = len(start)
         mean, sd = start.copy(), np.full(n, np.inf)
@@ -127,9 +127,9 @@ class _Frame:
         if n != 6:
             low[-1] = self._least
         prior = Prior(mean, sd, low, high)
-        return climb(self.skin, contact, start, prior, self._readings, self._weight, steps)
+        return optimise(self.skin, contact, start, prior, self._readings, self._weight, steps)
 
-    def again(self, optimum: Optimum, contact: Contact, parameters: int) -> Optimum:
+    def again(self, optimum: Optimum, contact: ForceModel, parameters: int) -> Optimum:
         """The optimum of `contact` near another's, as many of its `parameters` as it has."""
         return self._climb(contact, optimum.parameters[:parameters], 4)
 
@@ -177,7 +177,7 @@ class _Frame:
     def rounded(self, cylinder: Optimum, edge: Optimum) -> Optimum:
         """The cylinder of one curvature at both ends that presses between them as an edge does."""
         share = middle(self.skin, edge)
-        return self.again(cylinder, arcs(narrow(self.skin, cylinder, share), share), 7)
+        return self.again(cylinder, arcs(arc_widths(self.skin, cylinder, share), share), 7)
 
 
 # What is held likely beforehand, in sides of the skin: a radius between these two, every factor
@@ -187,22 +187,24 @@ _RADII = (0.02, 5.0)
 _ALIGNED = 0.1  # rad between a plane's contact and the axis of a bent skin
 
 
-def log_evidence(skin: ElasticSkin, all_of: Hypotheses) -> dict[str, float]:
+def log_likelihoods(skin: ElasticSkin, all_of: Hypotheses) -> dict[str, float]:
     """Logarithms of the marginal likelihoods of all kinds, up to what they have in common."""
     sphere, cylinder = cast("Width", all_of.sphere.width), cast("Width", all_of.cylinder.width)
-    of_cylinder = peak(all_of.cylinder.best, all_of) + of_length(skin, all_of.cylinder.best)
+    of_cylinder = laplace_integral(all_of.cylinder.best, all_of) + length_prior(
+        skin, all_of.cylinder.best
+    )
     of_cylinder += _beyond_bound(all_of.cylinder.best, cylinder) - _unexplained(all_of, cylinder)
     return {
-        "sphere": peak(all_of.sphere.best, all_of)
+        "sphere": laplace_integral(all_of.sphere.best, all_of)
         + _beyond_bound(all_of.sphere.best, sphere)
-        + of_radius(skin, sphere),
-        "edge": peak(all_of.edge.best, all_of) + of_length(skin, all_of.edge.best),
-        "cylinder": of_cylinder + of_radius(skin, cylinder),
-        "plane": of_cylinder + of_plane(skin, all_of.cylinder.best, cylinder),
+        + radius_prior(skin, sphere),
+        "edge": laplace_integral(all_of.edge.best, all_of) + length_prior(skin, all_of.edge.best),
+        "cylinder": of_cylinder + radius_prior(skin, cylinder),
+        "plane": of_cylinder + plane_prior(skin, all_of.cylinder.best, cylinder),
     }
 
 
-def peak(best: Optimum, all_of: Hypotheses) -> float:
+def laplace_integral(best: Optimum, all_of: Hypotheses) -> float:
     """Laplace's integral over all parameters, their priors flat, the noise's size unknown."""
     scale = np.sqrt(np.diag(best.covariance))
     correlation = best.covariance / np.multiply.outer(scale, scale)
@@ -215,7 +217,7 @@ def _line(sd: float, likely: Array) -> float:
     return math.log(max(float(np.mean(likely)), 1e-300)) - math.log(sd * math.sqrt(2 * math.pi))
 
 
-def of_length(skin: ElasticSkin, best: Optimum) -> float:
+def length_prior(skin: ElasticSkin, best: Optimum) -> float:
     """Priors of angle, length and share."""
     square, sd = best.parameters[4], math.sqrt(best.covariance[4, 4])
     lengths = np.linspace(0, skin.side, 400)
@@ -236,13 +238,13 @@ def _unexplained(all_of: Hypotheses, width: Width) -> float:
     return max(gain - max(width.q / sd, 0.0) ** 2, 0.0) / 2
 
 
-def of_radius(skin: ElasticSkin, width: Width) -> float:
+def radius_prior(skin: ElasticSkin, width: Width) -> float:
     low, high = (math.log(share * skin.side) for share in _RADII)
     curvatures = np.exp(-np.linspace(low, high, 400))
     return _line(width.sd, width.likelihood(width.of_curvature(curvatures)))
 
 
-def of_plane(skin: ElasticSkin, best: Optimum, width: Width) -> float:
+def plane_prior(skin: ElasticSkin, best: Optimum, width: Width) -> float:
     """Of a cylinder without curvature along the base's axis; of nothing on a flat skin.
 
     There a plane of more than its size touches nothing but the edges.

@@ -162,7 +162,7 @@ def _slope(skin: ElasticSkin, forces: PointForces, place: Array) -> Array:
     return np.array([fall[1] - fall[0], fall[3] - fall[2]]) / (2 * step)
 
 
-def narrow(skin: ElasticSkin, cylinder: Optimum, middle: float) -> tuple[float, float]:
+def arc_widths(skin: ElasticSkin, cylinder: Optimum, middle: float) -> tuple[float, float]:
     """The widths of the two arcs, the stronger end's being one, for one curvature on both."""
     parameters = _resolved(skin, cylinder)
     curvatures = _inside_arcs(skin, arcs(EVEN, middle)(parameters))
@@ -184,14 +184,14 @@ def _width(skin: ElasticSkin, optimum: Optimum, curvature: float, force: float) 
     return Width(q, sd, curvature, q0, skin.bend * abs(force))
 
 
-def sphere_of(skin: ElasticSkin, sphere: Optimum) -> Hypothesis:
+def fitted_sphere(skin: ElasticSkin, sphere: Optimum) -> Hypothesis:
     """The sphere that curves as the skin inside its ring."""
     parameters = _resolved(skin, sphere)
     curvature, _ = _inside_ring(skin, sphere.contact(parameters))
     return Hypothesis(sphere, _width(skin, sphere, curvature, parameters[2]))
 
 
-def cylinder_of(skin: ElasticSkin, cylinder: Optimum) -> Hypothesis:
+def fitted_cylinder(skin: ElasticSkin, cylinder: Optimum) -> Hypothesis:
     """The cylinder that curves as the skin along the stronger of its two arcs."""
     parameters, contact = _resolved(skin, cylinder), cylinder.contact
     inside = _inside_arcs(skin, contact(parameters))

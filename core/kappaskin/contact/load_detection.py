@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin.bases import basis_for
-from kappaskin.estimation import Remembered
+from kappaskin.estimation import PatternCache
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import Sensor
 
@@ -21,7 +21,7 @@ _FAINT = 1e-6  # of the norm of the loads best seen: below it, one is not seen a
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class DetectedLoad:
     """A load of `force` in N near `position` (2,) in m; it explains this `share` of what is left.
 
     What is left is what remains of the readings without a level and slopes in each component.
@@ -33,7 +33,7 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Tables:
+class _LoadTables:
     """For the readings used: plain fields Q (R, n), loads T (R, G) without them, and T'T (G,)."""
 
     Q: Array
@@ -42,7 +42,7 @@ class _Tables:
     by_chance: float
 
 
-class LoadSeeker:
+class LoadDetector:
     """Tells a load from the offsets of the elements.
 
     Warmth shifts every reading of a component alike, or more towards one side, and so does a bent
@@ -66,18 +66,20 @@ class LoadSeeker:
         level_and_slopes = np.column_stack([np.ones(len(layout)), centred])
         self._plain = np.kron(np.eye(3), level_and_slopes)
         self._live = layout.live.ravel()
-        self._remembered = Remembered[_Tables]()
+        self._remembered = PatternCache[_LoadTables]()
 
-    def _tables(self, used: Mask) -> _Tables:
+    def _tables(self, used: Mask) -> _LoadTables:
         U, s, _ = np.linalg.svd(self._plain[used], full_matrices=False)
         Q: Array = U[:, s > _FAINT * s.max(initial=0.0)]
         T = self._T[used] - Q @ (Q.T @ self._T[used])
         squares = np.einsum("rg,rg->g", T, T)
         seen = squares > _FAINT * squares.max(initial=0.0)
         spare = len(Q) - Q.shape[1]
-        return _Tables(Q, T, np.where(seen, squares, math.inf), _by_chance(spare))
+        return _LoadTables(Q, T, np.where(seen, squares, math.inf), _by_chance(spare))
 
-    def __call__(self, readings: Array, variance: float, share: float = _SHARE) -> Found | None:
+    def __call__(
+        self, readings: Array, variance: float, share: float = _SHARE
+    ) -> DetectedLoad | None:
         """The load in `readings` (C,) in 1/m, each of which has this `variance` by noise.
 
         It must explain this `share` of what stands out, and more than is found by chance.
@@ -93,7 +95,7 @@ class LoadSeeker:
         if not explained[best] > least:
             return None
         force = float(h[best] / tables.norm[best])
-        return Found(self._points[best], force, float(explained[best] / power))
+        return DetectedLoad(self._points[best], force, float(explained[best] / power))
 
 
 def _by_chance(spare: int) -> float:

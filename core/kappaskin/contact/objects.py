@@ -8,10 +8,10 @@ import numpy as np
 import scipy
 
 from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.hypotheses import Hypotheses, hypotheses, log_evidence
+from kappaskin.contact.hypotheses import Hypotheses, fit_hypotheses, log_likelihoods
 from kappaskin.contact.interior import Hypothesis, Width
 from kappaskin.frames import Array, Touch
-from kappaskin.mechanics import Block, Cylinder, Placed, Plate, RigidObject, Sphere, Wedge
+from kappaskin.mechanics import Block, Cylinder, PlacedObject, Plate, RigidObject, Sphere, Wedge
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 
@@ -111,7 +111,7 @@ NO_OBJECT = ContactObject(
 class ObjectFinder:
     """What touches a skin: a plane, a cylinder, a sphere or an edge, by marginal likelihood.
 
-    To each kind belongs a small family of forces on the skin (`rigid_contacts`), fitted to the
+    To each kind belongs a small family of forces on the skin (`elastic_skin`), fitted to the
     readings by maximum likelihood. The kinds are weighed by Laplace's approximation of
     their marginal likelihoods, the noise's size unknown. The object's curvature is that of the
     skin between the forces. A few tens of milliseconds: for display, not for every frame. On a
@@ -142,12 +142,12 @@ class ObjectFinder:
         K = np.where(used, curvature.ravel(), 0.0)
         noise = max(noise, _QUIET * float(np.abs(K).max()))
         return _judged(
-            self._skin, hypotheses(self._coarse, self._skin, K, used, noise, touch), noise
+            self._skin, fit_hypotheses(self._coarse, self._skin, K, used, noise, touch), noise
         )
 
 
 def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObject:
-    weights = log_evidence(skin, all_of)
+    weights = log_likelihoods(skin, all_of)
     most = max(weights.values())
     total = sum(math.exp(weight - most) for weight in weights.values())
     probability = {kind: math.exp(weights[kind] - most) / total for kind in KINDS}
@@ -212,7 +212,7 @@ _SHORTEST = 0.02  # of the size: an object as short as that is drawn at least so
 _SHARP = math.radians(70)  # between the flanks of an edge, which the readings do not tell
 
 
-def placed(found: ContactObject, place: Array, size: float) -> Placed | None:
+def placed_object(found: ContactObject, place: Array, size: float) -> PlacedObject | None:
     """The object that was `found`, standing at `place` (2,) in m; None where no kind is named.
 
     What the readings do not tell of it, as how large a plane is, is of the skin's `size` in m; of
@@ -220,7 +220,7 @@ def placed(found: ContactObject, place: Array, size: float) -> Placed | None:
     """
     rigid = _rigid(found, size)
     turn = found.axis if math.isfinite(found.axis) else 0.0
-    return None if rigid is None else Placed(rigid, place, turn)
+    return None if rigid is None else PlacedObject(rigid, place, turn)
 
 
 def _rigid(found: ContactObject, size: float) -> RigidObject | None:

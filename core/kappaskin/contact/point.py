@@ -9,13 +9,13 @@ import numpy as np
 from scipy.linalg import blas
 
 from kappaskin.bases import Basis, SineBasis, basis_for
-from kappaskin.estimation import Fit, Remembered
+from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Mask, Touch
 from kappaskin.mechanics import Compliance, Plate
-from kappaskin.sensing import SensorLayout, multipliers
+from kappaskin.sensing import SensorLayout, gage_multipliers
 
 
-class Products(NamedTuple):
+class LoadProducts(NamedTuple):
     """Scalar products of T, what a unit load at a place makes of the readings, and its slopes.
 
     `tt`, `tx`, `ty`, `xx`, `xy`, `yy` are those of T, T_x and T_y with each other, `h`, `hx` and
@@ -34,19 +34,19 @@ class Products(NamedTuple):
     gives: float
 
 
-class Loads(Protocol):
+class LoadResponses(Protocol):
     """Point loads at every place, read by the same channels."""
 
     def on_grid(self, x: Array, y: Array) -> Array:
         """T'T (ny, nx) on the grid of `x` (nx,), `y` (ny,) in m."""
         ...
 
-    def at(self, x: float, y: float, h: Array) -> Products:
+    def at(self, x: float, y: float, h: Array) -> LoadProducts:
         """The products at (x, y) in m; `h` (N,) are those of each function with the readings."""
         ...
 
 
-def loads_on(basis: Basis, G: Array, C: Array) -> Loads:
+def load_responses(basis: Basis, G: Array, C: Array) -> LoadResponses:
     """The loads whose functions have the products G = M'M (N, N); C (N, N) in m/N is how they give.
 
     M (R, N) is what the channels read of unit modal forces.
@@ -67,14 +67,14 @@ class _Dense:
         functions = self._basis.at(points)
         return np.vecdot(functions @ self._G, functions).reshape(len(y), len(x))
 
-    def at(self, x: float, y: float, h: Array) -> Products:
+    def at(self, x: float, y: float, h: Array) -> LoadProducts:
         F = self._basis.jet(x, y)[:3]
         # Faster than one thin product: of a symmetric G in Fortran's order only half is read.
         GF = np.array([blas.dsymv(1.0, self._G, f) for f in F])
         (tt, tx, ty), (_, xx, xy), (_, _, yy) = (GF @ F.T).tolist()
         gives = float(F[0] @ blas.dsymv(1.0, self._C, F[0]))
         hh, hx, hy = (F @ h).tolist()
-        return Products(tt, tx, ty, xx, xy, yy, hh, hx, hy, gives)
+        return LoadProducts(tt, tx, ty, xx, xy, yy, hh, hx, hy, gives)
 
 
 # Products of two sines are sums of few waves: with t = pi x/a,
@@ -120,7 +120,7 @@ class _Sines:
         Y = np.sin(np.multiply.outer(np.arange(2 * Nj + 1), self._ky * y))
         return np.multiply.outer(Y[1], X[1]) * (Y.T @ self._squares.T @ X)
 
-    def at(self, x: float, y: float, h: Array) -> Products:
+    def at(self, x: float, y: float, h: Array) -> LoadProducts:
         Ni, Nj = self._shape
         # Cosine and sine (..., 2) of each wave.
         waves = np.exp(np.dot((x, y), self._turns)).view(float).reshape(-1, 2)
@@ -132,7 +132,7 @@ class _Sines:
         jet_x, jet_y = X[1 : Ni + 1] * self._jet_x, Y[1 : Nj + 1] * self._jet_y
         (_, hx), (hy, hh) = jet_x.T.dot(h.reshape(Ni, Nj)).dot(jet_y).tolist()
         kx, ky, sx, sy = self._kx, self._ky, math.sin(self._kx * x), math.sin(self._ky * y)
-        return Products(
+        return LoadProducts(
             sx * sy * tt,
             kx / 2 * sy * (math.cos(kx * x) * tt + sx * p_tt),
             ky / 2 * sx * (math.cos(ky * y) * tt + sy * q_tt),
@@ -165,11 +165,13 @@ def _waves(count: int, k: float) -> tuple[Array, Array, Array]:
 _SECOND = (2, 0), (0, 2), (1, 1)  # orders of the derivatives that flat skins read (Eqs. 3-5)
 _ROUNDING = 1e-15  # of the largest: a part as small is none
 
-Modal = Callable[[Array], Array]
+ModalProjection = Callable[[Array], Array]
 """Readings K (3 P,) in 1/m, zero where there is none, to M'K (N,)."""
 
 
-def modal(layout: SensorLayout, basis: Basis, compliance: Compliance, M: Array) -> Modal:
+def modal_projection(
+    layout: SensorLayout, basis: Basis, compliance: Compliance, M: Array
+) -> ModalProjection:
     """M'K for what the elements read of unit modal forces, M (3 P, N).
 
     Where the elements stand on a grid, and the functions are sines that a load does not mix, M is
@@ -196,7 +198,7 @@ def _is_grid(layout: SensorLayout) -> bool:
 class _OnGrid:
     def __init__(self, layout: SensorLayout, basis: SineBasis, compliance: Array) -> None:
         maps = [basis.on_grid(*_sides(layout), *order) for order in _SECOND]
-        terms = _products(multipliers(basis, layout.gage_length))
+        terms = _products(gage_multipliers(basis, layout.gage_length))
         self._X = np.hstack([(maps[c].X * along_x).T for c, along_x, _ in terms])
         self._Y = np.stack([maps[c].Y * along_y for c, _, along_y in terms])
         self._compliance = compliance.reshape(basis.shape)
@@ -246,10 +248,10 @@ class _Readings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Tables:
+class _ContactTables:
     """What depends on which readings are used: T'T everywhere, and on the grid (ny, nx)."""
 
-    loads: Loads
+    loads: LoadResponses
     norm: Array
     spare: int
 
@@ -271,24 +273,24 @@ class PointContact:
         compliance = plate.compliance(self.basis)
         self._gives = compliance.after(np.eye(self.basis.size))
         self._M = compliance.after(layout.curvature_operator(self.basis))
-        self._modal = modal(layout, self.basis, compliance, self._M)
+        self._modal = modal_projection(layout, self.basis, compliance, self._M)
         self._live = layout.live.ravel()
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
         self._map = self.basis.on_grid(self._x, self._y)
         points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
         self._still = np.flatnonzero(~self.patch.moves(points))
-        self._remembered = Remembered[_Tables]()
+        self._remembered = PatternCache[_ContactTables]()
         self._whole = self._remembered(self._live, self._tables)
         self._all_live = bool(self._live.all())
 
-    def _tables(self, used: Mask) -> _Tables:
+    def _tables(self, used: Mask) -> _ContactTables:
         """The tables for the readings `used` (3 P,)."""
         M = self._M[used]
-        loads = loads_on(self.basis, M.T @ M, self._gives)
+        loads = load_responses(self.basis, M.T @ M, self._gives)
         norm = loads.on_grid(self._x, self._y)
         norm[norm <= 0] = math.inf  # a load that these readings do not see explains nothing
-        return _Tables(loads, norm, max(len(M) - 3, 1))
+        return _ContactTables(loads, norm, max(len(M) - 3, 1))
 
     def __call__(self, curvature: Array, fit: Fit) -> Touch:
         """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
@@ -302,11 +304,11 @@ class PointContact:
         least = _threshold(float(cast("float", fit.spare))) * float(fit.noise) ** 2
         if not explained[row, column] > least:
             return NO_TOUCH
-        x = _highest(self._x, explained[row], column)
-        y = _highest(self._y, explained[:, column], row)
+        x = _parabola_peak(self._x, explained[row], column)
+        y = _parabola_peak(self._y, explained[:, column], row)
         return self._refined(*self.patch.inward(x, y), readings, tables.loads, fit)
 
-    def _used(self, K: Array) -> tuple[Array, _Tables, float]:
+    def _used(self, K: Array) -> tuple[Array, _ContactTables, float]:
         """The readings that are there, zero for the others, their tables and sum of squares."""
         power = float(K.dot(K))
         if self._all_live and math.isfinite(power):
@@ -315,7 +317,9 @@ class PointContact:
         known = np.where(used, K, 0.0)
         return known, self._remembered(used, self._tables), float(known.dot(known))
 
-    def _refined(self, x: float, y: float, readings: _Readings, loads: Loads, fit: Fit) -> Touch:
+    def _refined(
+        self, x: float, y: float, readings: _Readings, loads: LoadResponses, fit: Fit
+    ) -> Touch:
         x, y, place = self._climbed(x, y, readings.h, loads)
         # What a point load leaves of the readings: the noise, or more where it is none.
         spread = math.sqrt(max(readings.power - place.explained, 0.0) / readings.spare)
@@ -331,26 +335,28 @@ class PointContact:
             self._near_rim(x, y, readings.h, loads, place.explained - (_REACH * spread) ** 2),
         )
 
-    def _climbed(self, x: float, y: float, h: Array, loads: Loads) -> "tuple[float, float, _Place]":
+    def _climbed(
+        self, x: float, y: float, h: Array, loads: LoadResponses
+    ) -> "tuple[float, float, _NewtonStep]":
         """The best position from (x, y) on, and what holds at the last step to it."""
         a, b = self.patch.a, self.patch.b
-        place = _Place(loads.at(x, y, h))
+        place = _NewtonStep(loads.at(x, y, h))
         for _ in range(_STEPS):
             dx, dy = place.step
-            x, y = x + _between(-a / 50, dx, a / 50), y + _between(-b / 50, dy, b / 50)
+            x, y = x + _clamped(-a / 50, dx, a / 50), y + _clamped(-b / 50, dy, b / 50)
             x, y = self.patch.inward(x, y)
             if abs(dx) < _CONVERGED * a and abs(dy) < _CONVERGED * b:
                 break
-            place = _Place(loads.at(x, y, h))
+            place = _NewtonStep(loads.at(x, y, h))
         return x, y, place
 
-    def _near_rim(self, x: float, y: float, h: Array, loads: Loads, least: float) -> bool:
+    def _near_rim(self, x: float, y: float, h: Array, loads: LoadResponses, least: float) -> bool:
         """Whether the contact is within the shortest half wave of the functions from a held edge.
 
         Or whether a load on the rim beside it explains `least` or more of the readings, as well as
         one here: the force goes to infinity there.
         """
-        if self.basis.unseen is not None:
+        if self.basis.unobservable is not None:
             return False
         for x_rim, y_rim, share in self.patch.near_rim(x, y, _DOUBTFUL):
             if share < 1 / _FUNCTIONS:
@@ -360,7 +366,9 @@ class PointContact:
                 return True
         return False
 
-    def _displacement(self, fit: Fit, x: float, y: float, place: "_Place") -> tuple[float, float]:
+    def _displacement(
+        self, fit: Fit, x: float, y: float, place: "_NewtonStep"
+    ) -> tuple[float, float]:
         """Displacement in m at (x, y), of the fitted shape, and how far it may be off.
 
         Besides the noise, by as much as the point load's own shape disagrees: what lies between is
@@ -372,13 +380,13 @@ class PointContact:
         return fitted, math.hypot(seen, fitted - place.force * place.gives)
 
 
-class _Place:
+class _NewtonStep:
     """The best force at a place, the Gauss-Newton step from there, and the error bars.
 
     `force` is the one after the step, `gives` how far the skin does there, in m/N.
     """
 
-    def __init__(self, of: Products) -> None:
+    def __init__(self, of: LoadProducts) -> None:
         tt, tx, ty, xx, xy, yy, h, hx, hy, self.gives = of
         force, u, v = h / tt, tx / tt, ty / tt
         # The slopes without what T itself explains of them: S, with the gradient g.
@@ -395,11 +403,11 @@ class _Place:
         self.unit_sd = 1 / math.sqrt(Cx) / strength, 1 / math.sqrt(Cy) / strength, of_force
 
 
-def _between(low: float, value: float, high: float) -> float:
+def _clamped(low: float, value: float, high: float) -> float:
     return min(max(value, low), high)
 
 
-def _highest(x: Array, values: Array, i: int) -> float:
+def _parabola_peak(x: Array, values: Array, i: int) -> float:
     """Where the parabola through `values` at `x` around their largest, number `i`, is highest."""
     if not 0 < i < len(x) - 1:
         return float(x[i])

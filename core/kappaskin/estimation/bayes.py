@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from kappaskin.bases import Basis, SineBasis
-from kappaskin.estimation.estimator import Estimator, Remembered
+from kappaskin.estimation.estimator import Estimator, PatternCache
 from kappaskin.estimation.fit import Fit
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
@@ -40,7 +40,7 @@ def prior_root(basis: Basis) -> Array:
 def _on_free(basis: Basis, root: Array) -> Array:
     """The part of a covariance's `root` (N, N) on the free combinations, as a root (N, F)."""
     W = np.eye(basis.size) if basis.free is None else basis.free
-    V = W if basis.unseen is None else np.hstack([W, basis.unseen])
+    V = W if basis.unobservable is None else np.hstack([W, basis.unobservable])
     share = cast("Array", np.linalg.lstsq(V, root)[0])[: W.shape[1]]
     return W @ _triangle(share.T).T
 
@@ -57,7 +57,7 @@ _NEWTON = 3  # steps from the best of them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PosteriorSpread:
+class PosteriorUncertainty:
     """Covariance B diag(v) B^T for unit noise: B (N, F), v (F,)."""
 
     B: Array
@@ -67,7 +67,7 @@ class PosteriorSpread:
     def sd(self) -> Array:
         return np.sqrt(self.B**2 @ self.v)
 
-    def of(self, rows: Array) -> Array:
+    def covariance_of(self, rows: Array) -> Array:
         left = rows @ self.B
         return (left * self.v) @ left.swapaxes(-1, -2)
 
@@ -85,7 +85,7 @@ class PosteriorSpread:
 # readings at sigma = 0, with error bars of nothing. A density that grows as a power of both keeps
 # it from there (doi:10.1007/s11336-013-9328-2): -2 p ln (tau sigma) = -p ln gamma - 2 p ln sigma^2
 # more. With p = 1, one function that is seen among others unseen would let tau run away.
-class Evidence:
+class MarginalLikelihood:
     """The prior's scale and the noise that make readings K = A z most likely, A (R, F)."""
 
     def __init__(self, A: Array, told: bool, floor: float) -> None:
@@ -150,10 +150,10 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Solver:
+class _BayesSolver:
     """What depends on which readings are used: the evidence, and B = L V (N, F)."""
 
-    evidence: Evidence
+    evidence: MarginalLikelihood
     B: Array
 
 
@@ -171,15 +171,15 @@ class Bayes(Estimator):
 
     def _set_up(self) -> None:
         self._root = prior_root(self.basis)
-        self._solvers = Remembered[_Solver]()
+        self._solvers = PatternCache[_BayesSolver]()
         if self.readable.any():
             self._solvers(self.readable, self._made)
 
-    def _made(self, used: Mask) -> _Solver:
+    def _made(self, used: Mask) -> _BayesSolver:
         A = self.weight[used, None] * (self.M[used] @ self._root)
         told, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
-        evidence = Evidence(A, told, rounding**2)
-        return _Solver(evidence, self._root @ evidence.V)
+        evidence = MarginalLikelihood(A, told, rounding**2)
+        return _BayesSolver(evidence, self._root @ evidence.V)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         if not used.any():
@@ -191,7 +191,7 @@ class Bayes(Estimator):
         k = y.shape[1]
         z = y * (gamma[:, None] * np.sqrt(evidence.s2[:k]) / d[:, :k])
         c = (z @ B[:, :k].T).astype(self.dtype)
-        spreads = [PosteriorSpread(B, v) for v in gamma[:, None] / d]
+        spreads = [PosteriorUncertainty(B, v) for v in gamma[:, None] / d]
         spent = (1 - 1 / d).sum(axis=1)
         return Fit(
             self,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from kappaskin.bases import Basis, curvature_at
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation.fit import Fit, Spread, gathered
+from kappaskin.estimation.fit import Fit, Uncertainty, merged_fits
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
 
@@ -19,7 +19,7 @@ _SETS = 8  # that are kept: those used last
 _Made = TypeVar("_Made")
 
 
-class Remembered(Generic[_Made]):
+class PatternCache(Generic[_Made]):
     """What was made of the sets of readings that were used last."""
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ _SAFE, _SAFE_SIGMA = 0.25, 0.2
 _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 
 
-def numbers(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Array:
+def real_array(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Array:
     """A copy of `values` in this `dtype`; raises a `Refusal` where they are no real numbers."""
     if type(values) is np.ndarray and values.dtype == dtype:  # as in most frames: the fastest
         return values.copy()
@@ -102,11 +102,13 @@ class Estimator(ABC):
         self.basis, self.layout, self.rim_sd = basis, layout, rim_sd
         # Typed as float64: what holds for one holds for the other.
         self.dtype = cast("np.dtype[np.float64]", np.dtype(dtype))
-        unseen = np.empty((basis.size, 0)) if basis.unseen is None else basis.unseen
-        self.undecided = rim_sd * unseen
+        unobservable = (
+            np.empty((basis.size, 0)) if basis.unobservable is None else basis.unobservable
+        )
+        self.undecided = rim_sd * unobservable
         """Shapes (N, q) in m that no reading sees, each as far as it is expected to go."""
         self._largest = float(np.finfo(self.dtype).max) ** _SAFE
-        self.sigma = None if sigma is None else numbers(sigma, "sigma")
+        self.sigma = None if sigma is None else real_array(sigma, "sigma")
         """The standard deviations in 1/m that were told, one or (3, P); None if none were."""
         self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
         """What each reading (3 P,) is worth, 1 / sigma in m; 1 for all without a sigma."""
@@ -164,7 +166,7 @@ class Estimator(ABC):
 
         So do readings that are too large to compute with, of 4e9 in float32 and 1e77 in float64.
         """
-        K = numbers(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
+        K = real_array(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
         self._check_shape(K)
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
         if self._all_readable and _squared(K.reshape(-1)) <= self._largest**2:
@@ -187,7 +189,7 @@ class Estimator(ABC):
                 inner = error.__cause__
                 why = inner if isinstance(inner, RankDeficient) else error
                 raise RankDeficient(f"frame {first}: {why}") from why
-        return gathered(fits, np.argsort(np.argsort(which, kind="stable")))
+        return merged_fits(fits, np.argsort(np.argsort(which, kind="stable")))
 
     def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
         """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.
@@ -210,7 +212,7 @@ class Estimator(ABC):
         """Fit readings (3 P,) or (T, 3 P) of which those `used` (3 P,) are there, the rest NaN."""
 
     def _answer(
-        self, flat: Array, c: Array, spread: Spread, spare: int, steps: ArrayLike = 0
+        self, flat: Array, c: Array, spread: Uncertainty, spare: int, steps: ArrayLike = 0
     ) -> Fit:
         """The fit of `c` (..., N) or (..., Ni, Nj) to `flat` (..., 3 P), all of one `spread`."""
         frames = flat.shape[:-1]

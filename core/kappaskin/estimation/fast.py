@@ -11,10 +11,10 @@ from scipy.linalg import eigvalsh_tridiagonal
 
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation.estimator import Estimator, Remembered
+from kappaskin.estimation.estimator import Estimator, PatternCache
 from kappaskin.estimation.fit import Fit
 from kappaskin.frames import Array, Mask
-from kappaskin.sensing import SensorLayout, multipliers
+from kappaskin.sensing import SensorLayout, gage_multipliers
 
 # Of a cell: an element so far off reads 3 parts in 10^9 wrong of the shortest wave, and positions
 # that were computed otherwise, of a million cells along a side, are no farther off.
@@ -23,7 +23,7 @@ _FEW = 0.5  # of the cells of a grid must have elements
 
 
 @dataclass(frozen=True)
-class _Side:
+class _GridSide:
     """The first `count` sines along one side at the centres of its `cells`, and their cosines.
 
     `constant` along the width of a strip: one function, alike everywhere.
@@ -84,12 +84,14 @@ class Transforms:
         gage_length: float = 0.0,
     ) -> None:
         self.cells = (n, m)
-        self._x = _Side(basis.Ni, m)
-        self._y = _Side(basis.Nj, n, constant=basis.patch.strip)
+        self._x = _GridSide(basis.Ni, m)
+        self._y = _GridSide(basis.Nj, n, constant=basis.patch.strip)
         (ki, kj), (sx, cx), (sy, cy) = basis.wavenumbers, self._x.lengths, self._y.lengths
         xx, yy = np.outer(sy, -(ki**2) * sx), np.outer(-(kj**2) * sy, sx)
         at_points = np.stack([xx, yy, np.outer(kj * cy, ki * cx)])
-        self.gain = (at_points * multipliers(basis, gage_length).swapaxes(-1, -2)).astype(dtype)
+        self.gain = (at_points * gage_multipliers(basis, gage_length).swapaxes(-1, -2)).astype(
+            dtype
+        )
 
     def analysed(self, K: Array, scale: Array) -> Array:
         """M^T K (..., Nj, Ni), each channel times its `scale` (3,); one with none is not read."""
@@ -120,7 +122,7 @@ class Transforms:
 
 
 @dataclass(frozen=True, eq=False)
-class Scaled:
+class ScaledOperator:
     """A = w M D^-1/2 on the grid, whose columns have about unit length.
 
     `weights` (3, n, m) or (3, 1, 1) are w, zero where there is no reading, and `root` (Nj, Ni) is
@@ -142,7 +144,7 @@ class Scaled:
         return self.root * self.transforms.analysed(self.weights * K, np.ones(3))
 
 
-def cells_of(layout: SensorLayout) -> tuple[int, int, NDArray[np.intp] | None]:
+def grid_cells(layout: SensorLayout) -> tuple[int, int, NDArray[np.intp] | None]:
     """The m x n grid that the elements stand on, and the cell p + m q of each (P,).
 
     The cells are None when they are 0, 1, 2, ... Elements may come in any order and some may be
@@ -191,7 +193,7 @@ def _squares(a: Array, axes: int) -> Array:
     return np.vecdot(flat, flat)
 
 
-def _least_seen(A: Scaled, least: float) -> float:
+def _least_eigenvalue(A: ScaledOperator, least: float) -> float:
     """The least eigenvalue of A^T A: the share of some shape that is all the readings see of it.
 
     Conjugate gradients on A^T A y = z for a random z, in which every shape has its part. They end
@@ -227,7 +229,7 @@ def _least_of(diagonal: list[float], beside: list[float]) -> float:
     return float(eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=(0, 0))[0])
 
 
-def _conjugate_gradients(A: Scaled, K: Array) -> tuple[Array, NDArray[np.intp]] | None:
+def _conjugate_gradients(A: ScaledOperator, K: Array) -> tuple[Array, NDArray[np.intp]] | None:
     """The least-squares g (T, Nj, Ni) of A g = K (T, 3, n, m) and steps (T,); None without an end.
 
     The residual is carried along in the place of `K` (CGLS), as accurate as A allows and not A^T A.
@@ -259,7 +261,7 @@ def _conjugate_gradients(A: Scaled, K: Array) -> tuple[Array, NDArray[np.intp]] 
     return g, steps
 
 
-class _GridSpread:
+class _GridUncertainty:
     """The spread on a grid: D^-1, and what the readings add that weigh other than most.
 
     With A0 orthonormal, for the weight w0 that most readings of a channel have, and B its rows
@@ -271,7 +273,7 @@ class _GridSpread:
         usual = [np.median(w[w > 0]) if w.any() else 0.0 for w in weights]
         usual = np.array(usual).reshape(3, 1, 1)
         root = 1 / np.sqrt(np.sum((usual * transforms.gain) ** 2, axis=0))
-        self._A = Scaled(transforms, usual, root)
+        self._A = ScaledOperator(transforms, usual, root)
         share = np.divide(weights, usual, where=usual > 0, out=np.ones(weights.shape))
         self._other = np.flatnonzero(share != 1)
         self._E = 1 - share.ravel()[self._other] ** 2
@@ -324,9 +326,9 @@ class _GridSpread:
                 read[part] = self._read(g[part])
         return g.reshape(len(g), -1), read
 
-    def of(self, rows: Array) -> Array:
+    def covariance_of(self, rows: Array) -> Array:
         if rows.ndim > 2:
-            return np.stack([self.of(one) for one in rows])
+            return np.stack([self.covariance_of(one) for one in rows])
         g, read = self._seen(rows)
         return g @ g.T + read @ self._X @ read.T
 
@@ -338,14 +340,14 @@ class _GridSpread:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Solver:
+class _GridSolver:
     """What is known of the readings `used`: c = D^-1 M^T `scale` K, or with `A` the start of it."""
 
     count: int
     scale: Array
     inverse: Array
-    spread: _GridSpread
-    A: Scaled | None
+    spread: _GridUncertainty
+    A: ScaledOperator | None
 
 
 class Fast(Estimator):
@@ -355,7 +357,7 @@ class Fast(Estimator):
     D = M^T M is diagonal: three fast transforms and a division give the shape exactly. So it is
     when whole channels are dead or weigh otherwise. For single dead elements, missing readings and
     weights of their own, conjugate gradients in the unknowns D^1/2 c give it in the few steps that
-    `Fit.steps` tells. M is never made. Elements may come in any order (`cells_of`).
+    `Fit.steps` tells. M is never made. Elements may come in any order (`grid_cells`).
 
     Raises `RankDeficient` when the readings do not decide the coefficients, or hardly.
     """
@@ -364,7 +366,7 @@ class Fast(Estimator):
 
     def _set_up(self) -> None:
         sines, layout = _sines(self.basis, self.layout), self.layout
-        m, n, self._cells = cells_of(layout)
+        m, n, self._cells = grid_cells(layout)
         if sines.Ni > m or sines.Nj > n:
             raise Refusal(
                 f"expected at most {m} x {n} functions for the fast transforms of {layout}, got "
@@ -375,7 +377,7 @@ class Fast(Estimator):
         exactly = self.dtype == np.float64
         self._transforms = self._exact if exactly else Transforms(sines, m, n, self.dtype, length)
         self._least = math.sqrt(np.finfo(self.dtype).eps)  # half of the digits are left
-        self._solvers = Remembered[_Solver]()
+        self._solvers = PatternCache[_GridSolver]()
         self._whole = self._made(self.readable)
 
     def _on_grid(self, flat: Array) -> Array:
@@ -387,7 +389,7 @@ class Fast(Estimator):
         K[..., self._cells] = flat.reshape(-1, 3, len(self.layout))
         return K.reshape(-1, 3, n, m)
 
-    def _made(self, used: Mask) -> _Solver:
+    def _made(self, used: Mask) -> _GridSolver:
         count, gain = int(used.sum()), self._exact.gain
         if count < self.unknowns:
             raise self.refusal(count, count)
@@ -398,14 +400,14 @@ class Fast(Estimator):
         D = np.einsum("c,cji,cji->ji", scale, gain, gain)
         if not np.all(D > 0):
             raise self.refusal(count, int(np.count_nonzero(D > 0)))
-        inverse, spread = (1 / D).astype(self.dtype), _GridSpread(self._exact, w)
+        inverse, spread = (1 / D).astype(self.dtype), _GridUncertainty(self._exact, w)
         if even:
-            return _Solver(count, scale, inverse, spread, None)
+            return _GridSolver(count, scale, inverse, spread, None)
         root = 1 / np.sqrt(D)
-        if _least_seen(Scaled(self._exact, w, root), self._least) < self._least:
+        if _least_eigenvalue(ScaledOperator(self._exact, w, root), self._least) < self._least:
             raise self._hardly(count)
-        A = Scaled(self._transforms, w.astype(self.dtype), root.astype(self.dtype))
-        return _Solver(count, scale, inverse, spread, A)
+        A = ScaledOperator(self._transforms, w.astype(self.dtype), root.astype(self.dtype))
+        return _GridSolver(count, scale, inverse, spread, A)
 
     def predicted(self, coefficients: Array) -> Array:
         """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
@@ -415,7 +417,7 @@ class Fast(Estimator):
         on_cells = K.reshape(*frames, 3, n * m)
         return on_cells if self._cells is None else on_cells[..., self._cells]
 
-    def _solved(self, solver: _Solver, K: Array) -> tuple[Array, NDArray[np.intp]]:
+    def _solved(self, solver: _GridSolver, K: Array) -> tuple[Array, NDArray[np.intp]]:
         """Coefficients (T, Nj, Ni) and steps (T,) for readings K (T, 3, n, m)."""
         A = solver.A
         if A is None:

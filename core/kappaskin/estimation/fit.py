@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _MOST = 10_000  # coefficients: their covariance takes 800 MB
 
 
-class Spread(Protocol):
+class Uncertainty(Protocol):
     """How far the N coefficients of a frame may be off, for unit noise."""
 
     @property
@@ -25,7 +25,7 @@ class Spread(Protocol):
         """Standard deviations (N,) of the coefficients in m for noise of 1 1/m."""
         ...
 
-    def of(self, rows: Array) -> Array:
+    def covariance_of(self, rows: Array) -> Array:
         """Covariance (..., R, R) of `rows` (..., R, N) times the coefficients."""
         ...
 
@@ -34,8 +34,8 @@ class Spread(Protocol):
         ...
 
 
-class DenseSpread:
-    """The spread that a covariance (N, N) tells; it is made when first asked for."""
+class DenseUncertainty:
+    """The one that a covariance (N, N) tells; it is made when first asked for."""
 
     def __init__(self, make: Callable[[], Array]) -> None:
         self._make = make
@@ -48,14 +48,14 @@ class DenseSpread:
     def sd(self) -> Array:
         return _root(np.diag(self.covariance))
 
-    def of(self, rows: Array) -> Array:
-        return seen_through(rows, self.covariance)
+    def covariance_of(self, rows: Array) -> Array:
+        return propagated_covariance(rows, self.covariance)
 
     def sd_of(self, rows: Array) -> Array:
         return _root(np.vecdot(rows @ self.covariance, rows))
 
 
-def seen_through(rows: Array, covariance: Array) -> Array:
+def propagated_covariance(rows: Array, covariance: Array) -> Array:
     """The covariance (..., R, R) of `rows` (..., R, N) times what has this `covariance`."""
     if rows.ndim == 2:
         return rows.dot(covariance).dot(rows.T)  # of small ones in half the time
@@ -72,20 +72,20 @@ class Fit:
     """The shape that answers the readings best, of one frame or of T (leading axis).
 
     `curvature` (..., 3, P) in 1/m is what it rests on, NaN where a reading is missing or was not
-    trusted; `coefficients` (..., Ni, Nj) in m; `spreads` says how far they may be off for unit
+    trusted; `coefficients` (..., Ni, Nj) in m; `uncertainty` says how far they may be off for unit
     noise, of each frame when there are several; `spare` (...) how many readings there are beyond
-    those that the shape took. `told_noise` (...) is the noise in 1/m where the estimator knows it.
+    those that the shape took. `known_noise` (...) is the noise in 1/m where the estimator knows it.
     An iteration took `steps` (...); where it has not `converged` (...), the answer is that of
     least squares. `suspect` (..., P) says which elements were left out and why, by their number in
-    `WHY`; None where none is ever suspected.
+    `FAULTS`; None where none is ever suspected.
     """
 
     estimator: "Estimator"
     curvature: Array
     coefficients: Array
-    spreads: "Spread | Sequence[Spread]"
+    uncertainty: "Uncertainty | Sequence[Uncertainty]"
     spare: ArrayLike
-    told_noise: Array | None = None
+    known_noise: Array | None = None
     steps: ArrayLike = 0
     converged: ArrayLike = True
     suspect: "NDArray[np.uint8] | None" = None
@@ -102,8 +102,8 @@ class Fit:
         It is as the residual tells it, NaN when every reading was spent on a coefficient, or as
         the estimator knows it.
         """
-        if self.told_noise is not None:
-            return self.told_noise
+        if self.known_noise is not None:
+            return self.known_noise
         left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
         squares = np.vecdot(left, left)
         if np.count_nonzero(squares != squares):  # NaN, told in a tenth of the time of any()
@@ -113,19 +113,19 @@ class Fit:
             return np.sqrt(squares / self.spare)
         return np.sqrt(squares / np.where(np.greater(self.spare, 0), self.spare, np.nan))
 
-    def _each(self, told: Callable[[Spread], Array], shape: tuple[int, ...]) -> Array:
-        """What is `told` of the spread, of this `shape`, for each frame when there are several."""
-        if not isinstance(self.spreads, Sequence):
-            return told(self.spreads).reshape(shape)
-        once = {id(spread): spread for spread in self.spreads}
-        known = {number: told(spread) for number, spread in once.items()}
-        frames = [known[id(spread)] for spread in self.spreads]
+    def _each(self, told: Callable[[Uncertainty], Array], shape: tuple[int, ...]) -> Array:
+        """What is `told` of the one, of this `shape`, for each frame when there are several."""
+        if not isinstance(self.uncertainty, Sequence):
+            return told(self.uncertainty).reshape(shape)
+        once = {id(one): one for one in self.uncertainty}
+        known = {number: told(one) for number, one in once.items()}
+        frames = [known[id(one)] for one in self.uncertainty]
         return np.reshape(frames, (len(frames), *shape))
 
     @cached_property
     def unit_sd(self) -> Array:
         """Standard deviations (..., Ni, Nj) of the coefficients for unit noise."""
-        return self._each(lambda spread: spread.sd, self.estimator.basis.shape)
+        return self._each(lambda one: one.sd, self.estimator.basis.shape)
 
     @property
     def sd(self) -> Array:
@@ -149,12 +149,14 @@ class Fit:
 
         With several frames `rows` are those of all of them, (R, N).
         """
-        noise, spreads = self.noise, self.spreads
-        if isinstance(spreads, Sequence):
-            unit = self._each(lambda spread: spread.of(rows), (*rows.shape[:-1], rows.shape[-2]))
+        noise, uncertainty = self.noise, self.uncertainty
+        if isinstance(uncertainty, Sequence):
+            unit = self._each(
+                lambda one: one.covariance_of(rows), (*rows.shape[:-1], rows.shape[-2])
+            )
             noise = noise.reshape(noise.shape + (1,) * (unit.ndim - noise.ndim))
         else:
-            unit = spreads.of(rows)
+            unit = uncertainty.covariance_of(rows)
         seen = noise**2 * unit
         if not self.estimator.undecided.size:
             return seen
@@ -178,7 +180,7 @@ class Fit:
 
     def sd_of(self, rows: Array) -> Array:
         """Standard deviations (..., R) of `rows` (R, N) times the flattened coefficients."""
-        seen = self.noise[..., None] * self._each(lambda spread: spread.sd_of(rows), (len(rows),))
+        seen = self.noise[..., None] * self._each(lambda one: one.sd_of(rows), (len(rows),))
         return np.hypot(seen, np.linalg.norm(rows @ self.estimator.undecided, axis=-1))
 
     def surface_sd(self, positions: Array) -> Array:
@@ -186,7 +188,7 @@ class Fit:
         return self.sd_of(self.estimator.basis.at(positions))
 
 
-def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
+def merged_fits(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
     """One fit of T frames from the fits of groups of them."""
 
     def joined(parts: list[Array]) -> Array:
@@ -195,17 +197,17 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
     def of_each(name: str) -> Array:
         return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
 
-    spreads: list[Spread] = []
+    uncertainties: list[Uncertainty] = []
     for fit in fits:
-        own = fit.spreads
-        spreads.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
-    told = [fit.told_noise for fit in fits if fit.told_noise is not None]
+        own = fit.uncertainty
+        uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
+    told = [fit.known_noise for fit in fits if fit.known_noise is not None]
     suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
     return Fit(
         fits[0].estimator,
         joined([fit.curvature for fit in fits]),
         joined([fit.coefficients for fit in fits]),
-        [spreads[int(place)] for place in order],
+        [uncertainties[int(place)] for place in order],
         of_each("spare"),
         joined(told) if told else None,
         of_each("steps"),
@@ -214,7 +216,7 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
     )
 
 
-def in_time(fits: Sequence[Fit]) -> Fit:
+def stacked_fits(fits: Sequence[Fit]) -> Fit:
     """One fit of T frames from the fits of each of them."""
 
     def alone(fit: Fit) -> Fit:
@@ -222,12 +224,12 @@ def in_time(fits: Sequence[Fit]) -> Fit:
             fit,
             curvature=fit.curvature[None],
             coefficients=fit.coefficients[None],
-            spreads=[cast("Spread", fit.spreads)],
+            uncertainty=[cast("Uncertainty", fit.uncertainty)],
             spare=np.reshape(fit.spare, (1,)),
-            told_noise=None if fit.told_noise is None else np.reshape(fit.told_noise, (1,)),
+            known_noise=None if fit.known_noise is None else np.reshape(fit.known_noise, (1,)),
             steps=np.reshape(fit.steps, (1,)),
             converged=np.reshape(fit.converged, (1,)),
             suspect=None if fit.suspect is None else fit.suspect[None],
         )
 
-    return gathered([alone(fit) for fit in fits], np.arange(len(fits)))
+    return merged_fits([alone(fit) for fit in fits], np.arange(len(fits)))

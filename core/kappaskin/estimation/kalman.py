@@ -16,7 +16,7 @@ _BLOCK, _BLOCK_OF_READINGS = 16, 32  # columns that LAPACK reflects at once: the
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Learned:
+class KalmanUpdate:
     """What `absorb` made of R readings: `left` (R,) of them unexplained, and a test of the model.
 
     `score` is the slope of the log likelihood with the logarithm of the variance expected of the
@@ -32,7 +32,7 @@ class Learned:
         return (self.surprise / variance - self.spread) / 2
 
 
-class MovingModes(Remembering):
+class ModalKalmanFilter(Remembering):
     """Amplitudes x (F,) of modes and their rates, expected (2, F), with covariance root' root.
 
     Each mode is a stationary Gaussian process of Matern's class 3/2 with the rate
@@ -115,7 +115,7 @@ class MovingModes(Remembering):
         x, rate = self.mean
         return A @ x + lag * (A @ rate)
 
-    def absorb(self, A: Array, lag: Array, readings: Array) -> Learned:
+    def absorb(self, A: Array, lag: Array, readings: Array) -> KalmanUpdate:
         """Take in `readings` (R,) of A (R, F) times the modes, with unit noise, read at `lag` s."""
         ahead = readings - self.foreseen(A, lag)
         S1, S2 = self.halves
@@ -134,10 +134,10 @@ class MovingModes(Remembering):
         seen: Array = self._trsm(1.0, U, Z.T, trans_a=1).astype(float)  # 1 - V^-1, but for a turn
         seen = seen @ seen.T
         surprise = float(np.sum((Z @ left).astype(float) ** 2))
-        return Learned(left, surprise, float(np.trace(seen)), float(np.sum(seen**2)) / 2)
+        return KalmanUpdate(left, surprise, float(np.trace(seen)), float(np.sum(seen**2)) / 2)
 
 
-START = 0.1  # m/s, of a contact of which nothing is known
+START_SPEED = 0.1  # m/s, of a contact of which nothing is known
 _SLOWEST, _FASTEST = 1e-4, 30.0
 _NUDGE = 0.05  # of the logarithm of the speed, per standard deviation of its score
 _SLOW = 0.02  # of what a step tells of that logarithm, where it tells little
@@ -153,7 +153,7 @@ _RATIOS = np.exp(np.linspace(math.log(1e-4), math.log(1e14), 145))
 
 
 @dataclass(slots=True)
-class Level(Remembering):
+class SignalLevel(Remembering):
     """What is known of the noise and the signal, kept up to date.
 
     `variance` of a reading, known as from `count` readings, infinitely many when it was told; the
@@ -167,7 +167,7 @@ class Level(Remembering):
     count: float
     rounding: float
     amplitude: float = 0.0
-    speed: float = START
+    speed: float = START_SPEED
 
     @property
     def _most(self) -> float:
@@ -207,14 +207,14 @@ class Level(Remembering):
         """How much of something else `ahead` (R,) of A (R, F) tells, as an amplitude."""
         extra = self.explain(A, ahead, signal)
         self.amplitude = max(self.amplitude, extra)
-        self.speed = max(self.speed, START)
+        self.speed = max(self.speed, START_SPEED)
         return extra
 
     def surprised(self, power: float, count: int) -> bool:
         """Whether chi-squared times the variance, of `count` readings, is beyond all chance."""
         return power > self.variance * (count + _BREAK * math.sqrt(2 * count) + _BARELY)
 
-    def pace(self, learned: Learned) -> None:
+    def pace(self, learned: KalmanUpdate) -> None:
         """Move faster where readings were further off than expected, slower where nearer."""
         if self.variance and learned.information:
             root = math.sqrt(learned.information)

@@ -7,8 +7,8 @@ import numpy as np
 from scipy import linalg
 
 from kappaskin.errors import RankDeficient
-from kappaskin.estimation.estimator import Estimator, Remembered, column_lengths
-from kappaskin.estimation.fit import DenseSpread, Fit
+from kappaskin.estimation.estimator import Estimator, PatternCache, column_lengths
+from kappaskin.estimation.fit import DenseUncertainty, Fit
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import NormalCurvature
 
@@ -17,7 +17,7 @@ _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Solver:
+class _FactoredSolver:
     """The transposed operator (R, N) for the R readings `used` (3 P,), and what it is worth.
 
     It is the product of the `factors`: of one, or where rounding it would show in the residual of
@@ -26,7 +26,7 @@ class _Solver:
 
     used: Mask
     factors: tuple[Array, ...]
-    spread: DenseSpread
+    spread: DenseUncertainty
     count: int
 
 
@@ -47,7 +47,7 @@ class LeastSquares(Estimator):
             raise self.refusal(readings, readings)
         self._factor(self.readable)
         self._solver = self._made(self.readable, self._root, self._U)
-        self._reduced = Remembered[_Solver]()
+        self._reduced = PatternCache[_FactoredSolver]()
 
     def _factor(self, used: Mask) -> None:
         """U (R, F) orthonormal and root (N, F) with operator = root U^T, for the readings used."""
@@ -65,19 +65,21 @@ class LeastSquares(Estimator):
         self.condition = float(s[0] / s[-1])
         """Condition number of M with its columns scaled to unit length."""
 
-    def _made(self, used: Mask, root: Array, U: Array, inverse: Array | None = None) -> _Solver:
+    def _made(
+        self, used: Mask, root: Array, U: Array, inverse: Array | None = None
+    ) -> _FactoredSolver:
         """The solver root X U^T, whose covariance is root X root^T; X = 1 without an `inverse`."""
         left = root if inverse is None else root @ inverse
         seen = U if self.sigma is None else self.weight[used, None] * U
         factors = ((left @ seen.T).T,) if self.condition <= _MILD else (seen, left.T)
-        spread = DenseSpread(lambda: left @ root.T)
-        return _Solver(used, tuple(f.astype(self.dtype) for f in factors), spread, len(U))
+        spread = DenseUncertainty(lambda: left @ root.T)
+        return _FactoredSolver(used, tuple(f.astype(self.dtype) for f in factors), spread, len(U))
 
-    def _without(self, used: Mask) -> _Solver:
+    def _without(self, used: Mask) -> _FactoredSolver:
         """The solver for the readings `used` (3 P,), remembered for the next frames."""
         return self._solver if used is self.readable else self._reduced(used, self._downdate)
 
-    def _downdate(self, used: Mask) -> _Solver:
+    def _downdate(self, used: Mask) -> _FactoredSolver:
         # With the rows U_k of U taken out, U_r^T U_r = I - U_k^T U_k, whose inverse is
         # I + U_k^T G^-1 U_k with the small G = I - U_k U_k^T. An eigenvalue of G is the share of
         # a direction that the readings left still see.
@@ -140,7 +142,7 @@ class AsPrinted(_PerFrame):
             N: Array = A.astype(np.float64)
             return np.linalg.pinv(N.T @ N).astype(np.float64)
 
-        return self._answer(flat, c.T, DenseSpread(covariance), len(A) - self.unknowns)
+        return self._answer(flat, c.T, DenseUncertainty(covariance), len(A) - self.unknowns)
 
 
 class Direct(_PerFrame):
@@ -171,7 +173,7 @@ class Direct(_PerFrame):
             return root @ root.T
 
         c = (back @ g).T.astype(self.dtype)
-        return self._answer(flat, c, DenseSpread(covariance), len(A) - self.unknowns)
+        return self._answer(flat, c, DenseUncertainty(covariance), len(A) - self.unknowns)
 
 
 _STEPS = 4  # at most; 2 or 3 do
@@ -181,7 +183,7 @@ _CLOSE = 1e-2  # of the readings' RMS: so small must the fourth step be
 _CONTRACTS = 0.7  # a step longer than this share of the one before: it will not get there
 
 
-class FiniteSlope(Estimator):
+class FiniteSlopeLeastSquares(Estimator):
     """c <- c + M^+ (K - h(c)), from the least-squares shape on, at most four times.
 
     h(c) is `NormalCurvature`; M^+ is that of `LeastSquares`, factored once. Where the steps do not
@@ -222,9 +224,9 @@ class FiniteSlope(Estimator):
             self,
             first.curvature,
             np.where(diverged[..., None, None], first.coefficients, c),
-            first.spreads,
+            first.uncertainty,
             first.spare,
-            first.told_noise,
+            first.known_noise,
             steps,
             ~diverged,
         )

@@ -8,7 +8,12 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation.bayes import Bayes
 from kappaskin.estimation.estimator import RIM_SD, Estimator
 from kappaskin.estimation.fast import Fast
-from kappaskin.estimation.least_squares import AsPrinted, Direct, FiniteSlope, LeastSquares
+from kappaskin.estimation.least_squares import (
+    AsPrinted,
+    Direct,
+    FiniteSlopeLeastSquares,
+    LeastSquares,
+)
 from kappaskin.estimation.robust import Robust
 from kappaskin.estimation.tracking import Tracking
 from kappaskin.sensing import SensorLayout
@@ -19,7 +24,7 @@ METHODS: dict[str, type[Estimator]] = {
     "direct": Direct,
     "fast": Fast,
     "bayes": Bayes,
-    "finite-slope": FiniteSlope,
+    "finite-slope": FiniteSlopeLeastSquares,
     "robust": Robust,
     "tracking": Tracking,
 }

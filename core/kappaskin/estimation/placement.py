@@ -17,7 +17,7 @@ from scipy import linalg
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.estimator import Estimator, column_lengths
-from kappaskin.estimation.fit import Spread
+from kappaskin.estimation.fit import Uncertainty
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
 
@@ -39,9 +39,9 @@ def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
     _, s, Vt = linalg.svd(R) if len(A) else (None, np.empty(0), np.eye(A.shape[1]))
     values = np.concatenate([s, np.zeros(A.shape[1] - len(s))])
     shapes = (back @ Vt.T).T
-    if basis.unseen is not None:
-        values = np.concatenate([values, np.zeros(basis.unseen.shape[1])])
-        shapes = np.vstack([shapes, basis.unseen.T])
+    if basis.unobservable is not None:
+        values = np.concatenate([values, np.zeros(basis.unobservable.shape[1])])
+        shapes = np.vstack([shapes, basis.unobservable.T])
     shapes /= np.linalg.norm(shapes, axis=1, keepdims=True)
     return values, shapes.reshape(len(shapes), *basis.shape)
 
@@ -63,7 +63,7 @@ def predicted_sd(estimator: Estimator, noise: float, positions: Array) -> Array:
     """
     rows = estimator.basis.at(positions)
     undecided = np.linalg.norm(rows @ estimator.undecided, axis=1)
-    spread = cast("Spread", estimator.at_rest().spreads)
+    spread = cast("Uncertainty", estimator.at_rest().uncertainty)
     return np.hypot(noise * spread.sd_of(rows), undecided)
 
 
@@ -83,15 +83,15 @@ def _clustered(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout
     return _at(half * (1 + np.sign(u) * np.abs(u) ** _CROWD), layout)
 
 
-def _telling_most(det: bool) -> Placement:
+def _optimal(det: bool) -> Placement:
     return lambda layout, basis, apart: _exchanged(layout, basis, apart, det)
 
 
 PLACEMENTS: dict[str, Placement] = {
     "scene": _as_they_are,
     "clustered": _clustered,
-    "D": _telling_most(det=True),
-    "A": _telling_most(det=False),
+    "D": _optimal(det=True),
+    "A": _optimal(det=False),
 }
 """Ways to place as many elements as a scene has: where the scene has them, and others."""
 
@@ -104,7 +104,7 @@ def check_placement(layout: SensorLayout, by: str) -> None:
         raise Refusal("expected live elements where they are placed anew, got dead ones among them")
 
 
-def elements_placed(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
+def place_elements(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
     """As many elements as `layout` has, placed `by` one of `PLACEMENTS` to tell `basis`."""
     return PLACEMENTS[by](layout, basis, apart)
 

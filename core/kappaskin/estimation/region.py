@@ -118,7 +118,7 @@ class Scanner:
     @property
     def count(self) -> int:
         """How many channels each frame scans where it scans a share of all of them."""
-        return _turn_of(self._region.share, len(self._live))
+        return _elements_per_turn(self._region.share, len(self._live))
 
     def choose(self, channels: NDArray[np.intp]) -> None:
         """Scan these `channels` in the next frame."""
@@ -143,7 +143,7 @@ class Scanner:
     def _in_turn(self) -> NDArray[np.intp]:
         """The next of the elements outside, from where the last frame stopped, round and round."""
         outside = np.flatnonzero(~np.asarray(self._inside))
-        count = _turn_of(self._region.share, len(outside))
+        count = _elements_per_turn(self._region.share, len(outside))
         if not count:
             return outside[:0]
         first = np.searchsorted(outside, self._turn)
@@ -152,7 +152,7 @@ class Scanner:
         return next_ones
 
 
-def _turn_of(share: float, outside: int) -> int:
+def _elements_per_turn(share: float, outside: int) -> int:
     """How many of `outside` elements take their turn in one frame."""
     return math.ceil(share * outside - 1e-9)
 
@@ -189,7 +189,7 @@ def contact_bound(
 
 
 @dataclass(frozen=True, eq=False)
-class Bargain:
+class ScanTradeoff:
     """What scanning a region buys, and what it costs.
 
     `channels` in a frame, `scan_time` in s, `rate` in frames/s and `gain`, how many times that of
@@ -209,7 +209,7 @@ class Bargain:
         return self.rate / self.full_rate
 
 
-def bargain(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> Bargain:
+def scan_tradeoff(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> ScanTradeoff:
     """What `region` buys and costs while `contact` is where it looks, at `noise` in 1/m.
 
     Rates are those that the scans allow. An element outside counts by how often it takes its turn.
@@ -222,8 +222,8 @@ def bargain(sensor: Sensor, region: Region, contact: PointLoad, noise: float) ->
     weight = np.full(len(sensor.layout), region.share if region.by_channel else 1.0)
     if inside is not None and not inside.all():
         outside = int((~inside).sum())
-        weight[~inside] = _turn_of(region.share, outside) / outside
-    return Bargain(
+        weight[~inside] = _elements_per_turn(region.share, outside) / outside
+    return ScanTradeoff(
         len(scan.channels),
         scan.duration,
         scan.rate,

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from kappaskin._state import Memory, Remembering
 from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation.bayes import Evidence, prior_root
-from kappaskin.estimation.estimator import Estimator, Remembered, numbers
-from kappaskin.estimation.fit import Fit, in_time
+from kappaskin.estimation.bayes import MarginalLikelihood, prior_root
+from kappaskin.estimation.estimator import Estimator, PatternCache, real_array
+from kappaskin.estimation.fit import Fit, stacked_fits
 from kappaskin.estimation.least_squares import LeastSquares
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
@@ -36,19 +36,19 @@ _ENOUGH = 6  # of them: with fewer, any suspect may be a spike
 _OFTEN = 0.3  # of the frames: a suspect of fewer has spikes
 _CROSSED = 0.2  # of the squares left when two elements are swapped back
 
-WHY = ("", "spike", "stuck", "noisy", "swapped", "offset", "dead", "saturated", "drifting")
+FAULTS = ("", "spike", "stuck", "noisy", "swapped", "offset", "dead", "saturated", "drifting")
 """Why an element is left out of a fit, by number; the first of them that it is not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Judge:
+class _OutlierTest:
     """What depends on which readings are `used` (3 P,), `count` of them.
 
     U (3 P, k) of the evidence, zero where there is none; `by_press` (G, k) the squares of what each
     direction has of a load at each place, `beyond` (G,) those of what none has.
     """
 
-    evidence: Evidence
+    evidence: MarginalLikelihood
     U: Array
     by_press: Array
     beyond: Array
@@ -57,7 +57,7 @@ class _Judge:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Verdict:
+class _OutlierResult:
     """Suspected elements (P,), and by how much their readings are off, (3, P), 0 for others."""
 
     suspects: Mask
@@ -93,11 +93,11 @@ class Robust(Estimator, Remembering):
         rich = replace(cast("Any", basis), Ni=max(basis.shape[0], _FUNCTIONS), Nj=across)
         self._A: Array = self.weight[:, None] * (layout.curvature_operator(rich) @ prior_root(rich))
         self._take_presses(rich)
-        self._judges = Remembered[_Judge]()
+        self._judges = PatternCache[_OutlierTest]()
         P = len(layout)
         sensing = np.maximum(layout.live.sum(axis=0), 1)
         self._limit: Array = scipy.special.chdtri(sensing, _ALARM / P)
-        self._history = _History(P)
+        self._history = _SuspectHistory(P)
         self._judges(self.readable, self._judge)
 
     def _take_presses(self, rich: Basis) -> None:
@@ -116,29 +116,29 @@ class Robust(Estimator, Remembering):
         self._forces = np.ascontiguousarray(self._presses[..., 0])
         self._press_limit = float(scipy.special.chdtri(1, _ALARM / len(points)))
 
-    def _press(self, view: "_View", judge: _Judge) -> Array:
+    def _press(self, view: "_Residuals", judge: _OutlierTest) -> Array:
         """How much better the readings are explained (G,) with a load at each place."""
         seen = judge.beyond + judge.by_press @ (1 - view.w)
         known = seen > _UNSEEN
         return np.divide((view.r @ self._forces) ** 2, seen, where=known, out=np.zeros_like(seen))
 
-    def _judge(self, used: Mask) -> _Judge:
-        evidence = Evidence(self._A[used], self.sigma is not None, 1e-10)
+    def _judge(self, used: Mask) -> _OutlierTest:
+        evidence = MarginalLikelihood(self._A[used], self.sigma is not None, 1e-10)
         U = np.zeros((len(used), evidence.U.shape[1]))
         U[used] = evidence.U
         by_press = (self._forces.T @ U) ** 2
         beyond = np.sum(self._forces[used] ** 2, axis=0) - by_press.sum(axis=1)
-        return _Judge(evidence, U, by_press, np.maximum(beyond, 0.0), used, int(used.sum()))
+        return _OutlierTest(evidence, U, by_press, np.maximum(beyond, 0.0), used, int(used.sum()))
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Fit `curvature` (3, P), or (T, 3, P) in the order of time, in 1/m."""
-        K = numbers(curvature, "curvature", self.dtype)
+        K = real_array(curvature, "curvature", self.dtype)
         self._check_shape(K)
         there = np.abs(K) <= self._largest
         if K.ndim == 2 or (there == there[:1]).all():
             return super().__call__(K)
         # Not those together that lack the same readings: the why is told by the frames before.
-        return in_time([self._next(frame, t) for t, frame in enumerate(K)])
+        return stacked_fits([self._next(frame, t) for t, frame in enumerate(K)])
 
     def _next(self, frame: Array, number: int) -> Fit:
         try:
@@ -148,7 +148,7 @@ class Robust(Estimator, Remembering):
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
         """The fit to a skin at rest, which is no frame of the past."""
-        past, self._history = self._history, _History(len(self.layout))
+        past, self._history = self._history, _SuspectHistory(len(self.layout))
         try:
             return super().at_rest(missing)
         finally:
@@ -173,15 +173,15 @@ class Robust(Estimator, Remembering):
             suspect=np.array(why, np.uint8).reshape(*frames, P),
         )
 
-    def _told(self, flat: Array, used: Mask) -> _Verdict:
+    def _told(self, flat: Array, used: Mask) -> _OutlierResult:
         judge, P = self._judges(used, self._judge), len(self.layout)
         K = np.where(used, flat, 0.0) * self.weight
         there = cast("Mask", used.reshape(3, P).any(axis=0))
-        suspects, loads, rounds = _outrageous(K, there), list[int](), 0
+        suspects, loads, rounds = _gross_outliers(K, there), list[int](), 0
         (gamma,) = judge.evidence(K[None, used])[1]
         while suspects.sum() <= _MOST * there.sum():
             free = np.hstack([_columns(suspects), *(self._presses[:, g] for g in loads)])
-            view = _View(judge, K, free, float(gamma))
+            view = _Residuals(judge, K, free, float(gamma))
             _, (gamma,), (sigma,) = judge.evidence((K - view.explained)[None, used])
             left = judge.count - free.shape[1]
             given = self.sigma is not None
@@ -195,14 +195,14 @@ class Robust(Estimator, Remembering):
                 off[out] = view.amounts[: 3 * suspects.sum()]
                 out &= judge.used
                 off[out] /= self.weight[out]
-                return _Verdict(suspects, off.reshape(3, P), rounds, hopeless=False)
+                return _OutlierResult(suspects, off.reshape(3, P), rounds, hopeless=False)
             else:
                 suspects = found
             rounds += 1
-        return _Verdict(np.zeros(P, bool), np.zeros((3, P)), rounds, hopeless=True)
+        return _OutlierResult(np.zeros(P, bool), np.zeros((3, P)), rounds, hopeless=True)
 
     def _found(
-        self, view: "_View", judge: _Judge, suspects: Mask, variance: float
+        self, view: "_Residuals", judge: _OutlierTest, suspects: Mask, variance: float
     ) -> tuple[Mask, int | None]:
         """Which elements (P,) the rest contradicts; a place where a load would explain more."""
         if not variance:  # nothing but zeros
@@ -214,7 +214,7 @@ class Robust(Estimator, Remembering):
         return found, place if press[place] > max(most, self._press_limit) else None
 
 
-def _outrageous(K: Array, there: Mask) -> Mask:
+def _gross_outliers(K: Array, there: Mask) -> Mask:
     """The elements (P,) that read so much more than most of those `there`: suspected at once."""
     size = np.abs(K.reshape(3, -1)).max(axis=0)
     found = size > _OUTRAGEOUS * np.quantile(size[there], 1 - _MOST)
@@ -229,13 +229,13 @@ def _columns(elements: Mask) -> Array:
     return columns
 
 
-class _View:
+class _Residuals:
     """What the readings K (3 P,) tell of each other, in units of sigma, but for what is free.
 
     `free` (3 P, f) are directions in which they may be anything: whole elements, loads.
     """
 
-    def __init__(self, judge: _Judge, K: Array, free: Array, gamma: float) -> None:
+    def __init__(self, judge: _OutlierTest, K: Array, free: Array, gamma: float) -> None:
         U = judge.U
         s2 = judge.evidence.s2[: U.shape[1]]
         s2 = min(gamma, _CLEAREST / s2[0]) * s2
@@ -254,8 +254,8 @@ class _View:
     def contradiction(self, out: Mask) -> Array:
         """How far each element is from the rest (P,), chi-squared; those `out` come first."""
         P = len(out)
-        taken = _crossed(self._QF @ self._inverse, self._QF, P)
-        D: Array = np.eye(3) - _crossed(self._Uw, self._U, P) - taken
+        taken = _element_blocks(self._QF @ self._inverse, self._QF, P)
+        D: Array = np.eye(3) - _element_blocks(self._Uw, self._U, P) - taken
         r = self.r.reshape(3, P).T.copy()
         own = np.flatnonzero(out)
         block = np.arange(len(own))[:, None] + len(own) * np.arange(3)
@@ -264,13 +264,13 @@ class _View:
         return np.vecdot(r, np.linalg.solve(D, r[..., None])[..., 0])
 
 
-def _crossed(left: Array, right: Array, P: int) -> Array:
+def _element_blocks(left: Array, right: Array, P: int) -> Array:
     """The blocks (P, 3, 3) of left right^T that belong to one element each, of rows (3 P, k)."""
     left, right = (rows.reshape(3, P, -1).swapaxes(0, 1) for rows in (left, right))
     return np.matmul(left, right.swapaxes(1, 2))
 
 
-class _History(Remembering):
+class _SuspectHistory(Remembering):
     """Why some of P elements are suspected, as far as the last frames tell."""
 
     def __init__(self, P: int) -> None:
@@ -292,9 +292,9 @@ class _History(Remembering):
         self._frames.extend((frame[:3], frame[3] > 0, frame[4:]) for frame in kept)
 
     def __call__(self, K: Array, suspects: Mask, off: Array) -> NDArray[np.uint8]:
-        """Numbers (P,) of `WHY` for readings K (3, P) that are `off` (3, P) in 1/m."""
+        """Numbers (P,) of `FAULTS` for readings K (3, P) that are `off` (3, P) in 1/m."""
         self._frames.append((K, suspects, off))
-        why = np.where(suspects, WHY.index("spike"), 0).astype(np.uint8)
+        why = np.where(suspects, FAULTS.index("spike"), 0).astype(np.uint8)
         if not suspects.any():
             return why
         if len(self._frames) >= _ENOUGH:
@@ -311,11 +311,11 @@ class _History(Remembering):
         moving = np.count_nonzero(spans > 0) > np.count_nonzero(spans == 0)
         for p in suspects:
             if still[p] and moving:
-                why[p] = WHY.index("stuck")
+                why[p] = FAULTS.index("stuck")
             elif were[:, p].mean() > _OFTEN:
                 steady = offs[were[:, p], :, p]
                 drift = np.abs(steady.mean(axis=0)).max() > steady.std(axis=0).max()
-                why[p] = WHY.index("offset" if drift else "noisy")
+                why[p] = FAULTS.index("offset" if drift else "noisy")
 
     def _swapped(
         self, why: NDArray[np.uint8], K: Array, off: Array, suspects: NDArray[np.intp]
@@ -325,4 +325,4 @@ class _History(Remembering):
             both = np.isfinite(K[:, p] + K[:, q])  # channels
             crossed = (K[both, p] - told[both, q]) ** 2 + (K[both, q] - told[both, p]) ** 2
             if crossed.sum() < _CROSSED * np.sum(off[both, p] ** 2 + off[both, q] ** 2):
-                why[[p, q]] = WHY.index("swapped")
+                why[[p, q]] = FAULTS.index("swapped")

@@ -7,7 +7,7 @@ from kappaskin.frames import Array
 _ROUNDING = 1e-9  # of a wave's mean square: a sine of half the rate is zero at even steps
 
 
-def amplitudes(times: Array, values: Array, frequencies: Array) -> Array:
+def amplitude_spectrum(times: Array, values: Array, frequencies: Array) -> Array:
     """The amplitude (..., F) of a sine of each of `frequencies` (F,) in Hz that fits best.
 
     To `values` (..., T) at `times` (T,) in s, less their mean, by least squares: Lomb's and

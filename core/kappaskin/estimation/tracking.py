@@ -13,16 +13,18 @@ from kappaskin._state import Remembering
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.bayes import prior_root
-from kappaskin.estimation.estimator import Estimator, numbers
-from kappaskin.estimation.fit import Fit, in_time
-from kappaskin.estimation.kalman import START, Level, MovingModes
+from kappaskin.estimation.estimator import Estimator, real_array
+from kappaskin.estimation.fit import Fit, stacked_fits
+from kappaskin.estimation.kalman import START_SPEED, ModalKalmanFilter, SignalLevel
 from kappaskin.frames import Array, Mask
 
 _CANDIDATES = 80  # readings of which the next ones are chosen
 _AT_ONCE = 8  # of them, as good in the end as one by one
 
 
-def telling_most(A: Array, P: Array, wanted: Array, worth: Array, count: int) -> NDArray[np.intp]:
+def most_informative(
+    A: Array, P: Array, wanted: Array, worth: Array, count: int
+) -> NDArray[np.intp]:
     """Which `count` of R readings tell most, a few after the other, of what is `wanted` (q, F).
 
     The readings are A (R, F) times what has the covariance P (F, F) in units of the noise: each
@@ -71,7 +73,7 @@ _COARSE = 8  # modes that make nearly all of the displacement
 _PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin, as displacement
 
 
-class TrackedSpread:
+class TrackedUncertainty:
     """The spread that a root S tells of amplitudes of `modes` (N, F): modes S' S modes'."""
 
     def __init__(self, modes: Array, root: Array) -> None:
@@ -85,7 +87,7 @@ class TrackedSpread:
     def sd(self) -> Array:
         return np.linalg.norm(self._half, axis=0)
 
-    def of(self, rows: Array) -> Array:
+    def covariance_of(self, rows: Array) -> Array:
         half = rows @ self._half.T
         return half @ half.swapaxes(-1, -2)
 
@@ -97,9 +99,9 @@ class Tracking(Estimator, Remembering):
     """`fit = Tracking(basis, layout)`; `fit(curvature)` follows frame after frame.
 
     A Kalman filter of what the skin does: a plate under loads that nobody knows (`prior_root`),
-    each of its shapes moving the faster the finer it is (`MovingModes`). It remembers: every frame,
-    whole or not, is taken in at the times of its readings, and the answer is the shape at the last
-    of them. A frame that comes without times is read 6 ms after the one before.
+    each of its shapes moving the faster the finer it is (`ModalKalmanFilter`). It remembers: every
+    frame, whole or not, is taken in at the times of its readings, and the answer is the shape at
+    the last of them. A frame that comes without times is read 6 ms after the one before.
 
     How large shapes are, how fast they move and, without a `sigma`, the noise are found on the way:
     from the first frame by its evidence, then by what is left unexplained. Readings that are beyond
@@ -122,15 +124,15 @@ class Tracking(Estimator, Remembering):
 
     def restart(self) -> None:
         """Forget every frame."""
-        self._filter = MovingModes(self._wavenumbers, self.dtype)
-        self._level: Level | None = None
+        self._filter = ModalKalmanFilter(self._wavenumbers, self.dtype)
+        self._level: SignalLevel | None = None
         self._now = -math.inf
         self._left = np.full(self._A.shape[0], np.nan)
         self._read = np.full(self._A.shape[0], -math.inf)
 
     def recall(self, memory: Mapping[str, Array], before: str = "") -> None:
         if f"{before}_level.variance" in memory and self._level is None:
-            self._level = Level(0.0, 0.0, 0.0)
+            self._level = SignalLevel(0.0, 0.0, 0.0)
         super().recall(memory, before)
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
@@ -141,14 +143,14 @@ class Tracking(Estimator, Remembering):
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Take in the next frame (3, P) or T of them (T, 3, P), read 6 ms after each other."""
-        K = numbers(curvature, "curvature")
+        K = real_array(curvature, "curvature")
         self._check_shape(K)
         if K.ndim == 2:
             return self.follow(K, np.full(K.shape, self._next))
         if not len(K):
             none = np.empty((0, *self.basis.shape), self.dtype)
             return Fit(self, K.astype(self.dtype), none, [], np.zeros(0), np.zeros(0))
-        return in_time([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
+        return stacked_fits([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
 
     @property
     def _next(self) -> float:
@@ -163,7 +165,7 @@ class Tracking(Estimator, Remembering):
         times. A clock that goes back is that of a device that started anew. What is `held` of
         earlier frames is known already.
         """
-        frame, when = numbers(curvature, "curvature"), numbers(times, "times")
+        frame, when = real_array(curvature, "curvature"), real_array(times, "times")
         self._check_shape(frame)
         if frame.ndim != 2 or when.shape != frame.shape:
             raise Refusal(
@@ -199,7 +201,7 @@ class Tracking(Estimator, Remembering):
         S, count = x + ahead * rate, min(count, int(self.readable.sum()))
         readable = np.flatnonzero(self.readable)
         A, worth = self._A[readable], self._aged(ahead)[readable]
-        return np.sort(readable[telling_most(A, S.T @ S, self._wanted(position), worth, count)])
+        return np.sort(readable[most_informative(A, S.T @ S, self._wanted(position), worth, count)])
 
     def _wanted(self, position: Array) -> Array:
         """What is wanted of the modes (q, F): displacements in m, and the contact's place."""
@@ -230,7 +232,7 @@ class Tracking(Estimator, Remembering):
         order = used[np.argsort(t[used], kind="stable")]
         if not order.size:
             return []
-        level = cast("Level", self._level)
+        level = cast("SignalLevel", self._level)
         fastest = math.sqrt(3) * level.speed * float(self._wavenumbers.max())
         span = max(_PHASE / fastest, _SHORTEST)
         later = np.flatnonzero(np.diff((t[order] - t[order[0]]) // span)) + 1
@@ -243,11 +245,11 @@ class Tracking(Estimator, Remembering):
     def _start(self, readings: Array, A: Array) -> None:
         """Expect what the evidence of the first readings says."""
         told = (0.0, 0.0) if self.sigma is None else (1.0, math.inf)
-        self._level = Level(*told, float(np.finfo(self.dtype).eps))
-        self._filter.expect(self._level.renew(A, readings, self._signal), START)
+        self._level = SignalLevel(*told, float(np.finfo(self.dtype).eps))
+        self._filter.expect(self._level.renew(A, readings, self._signal), START_SPEED)
 
     def _advance(self, time: float) -> None:
-        level = cast("Level", self._level)
+        level = cast("SignalLevel", self._level)
         if time > self._now and math.isfinite(self._now):
             passed = min(time - self._now, _FORGOTTEN)
             self._filter.advance(passed, level.amplitude, level.speed)
@@ -255,7 +257,7 @@ class Tracking(Estimator, Remembering):
 
     def _take(self, channels: NDArray[np.intp], K: Array, t: Array) -> None:
         """Take in readings of `channels`, in the order of their times `t`."""
-        level, filter_ = cast("Level", self._level), self._filter
+        level, filter_ = cast("SignalLevel", self._level), self._filter
         self._advance(float(t[-1]))
         A, lag = self._A[channels], (t - self._now).astype(self.dtype)
         readings = (self.weight[channels] * K).astype(self.dtype)
@@ -277,7 +279,7 @@ class Tracking(Estimator, Remembering):
         level.size(filter_.mean[0], float(np.vdot(S1, S1)), self._signal)
 
     def _fitted(self) -> Fit:
-        level = cast("Level", self._level)
+        level = cast("SignalLevel", self._level)
         c = (self._modes @ self._filter.mean[0]).reshape(self.basis.shape).astype(self.dtype)
         there = self._read > self._now - _HELD
         K = np.where(there, self._left, np.nan) + self.predicted(c).ravel()
@@ -289,7 +291,7 @@ class Tracking(Estimator, Remembering):
             self,
             K.reshape(3, -1).astype(self.dtype),
             c,
-            TrackedSpread(self._modes, self._filter.halves[0]),
+            TrackedUncertainty(self._modes, self._filter.halves[0]),
             spare,
             np.array(noise),
         )

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import RankDeficient
-from kappaskin.estimation import WHY, Estimator, Fit, Spread
+from kappaskin.estimation import FAULTS, Estimator, Fit, Uncertainty
 from kappaskin.frames import COMPONENTS, Array, Mask
-from kappaskin.health.inconsistency import Contradiction, Indices, centred
+from kappaskin.health.inconsistency import InconsistencyTest, Indices, centred
 from kappaskin.sensing import Sensor
 
 _MOST_LISTED = 256  # findings that are told one by one
@@ -19,7 +19,7 @@ _MOST_LISTED = 256  # findings that are told one by one
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong with one channel: `kind` is a word of `WHY`, `figure` says by how much.
+    """What is wrong with one channel: `kind` is a word of `FAULTS`, `figure` says by how much.
 
     `since` when, in s on the clock of `Frame.host_time`. `kept` says that it is in the fit all the
     same, as no shape could be told without it.
@@ -77,10 +77,13 @@ def findings(
             int(channel),
             int(channel % P),
             COMPONENTS[int(channel) // P],
-            WHY[int(kinds[channel])],
+            FAULTS[int(kinds[channel])],
             float(since[channel]),
             _figure(
-                WHY[int(kinds[channel])], float(figures[channel, 0]), float(figures[channel, 1]), P
+                FAULTS[int(kinds[channel])],
+                float(figures[channel, 0]),
+                float(figures[channel, 1]),
+                P,
             ),
             bool(kept[channel]),
         )
@@ -89,7 +92,7 @@ def findings(
 
 
 def _figure(kind: str, first: float, second: float, elements: int) -> str:
-    """The figures that `explain` gives, with their units in words."""
+    """The figures that `classify_faults` gives, with their units in words."""
     if math.isnan(first):
         return "the device says so"
     if kind in ("dead", "stuck"):
@@ -106,7 +109,7 @@ def _figure(kind: str, first: float, second: float, elements: int) -> str:
 
 
 DEAD, STUCK, NOISY, SWAPPED, OFFSET, SATURATED, DRIFTING = (
-    WHY.index(kind)
+    FAULTS.index(kind)
     for kind in ("dead", "stuck", "noisy", "swapped", "offset", "saturated", "drifting")
 )
 
@@ -121,14 +124,16 @@ _MOST_PAIRED = 512  # channels whose pairs are looked at
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Explained:
-    """What is wrong with n channels: `kinds` (n,) by number in `WHY` and `figures` (n, 2)."""
+class ChannelFaults:
+    """What is wrong with n channels: `kinds` (n,) by number in `FAULTS` and `figures` (n, 2)."""
 
     kinds: NDArray[np.uint8]
     figures: Array
 
 
-def explain(against: Contradiction, channels: Indices, resolution: float, step: float) -> Explained:
+def classify_faults(
+    against: InconsistencyTest, channels: Indices, resolution: float, step: float
+) -> ChannelFaults:
     """What is wrong with `channels` (n,), of which one mean comes every `step` s.
 
     Figures are in 1/m: of dead and stuck ones what they read and how far the others say that they
@@ -161,7 +166,7 @@ def explain(against: Contradiction, channels: Indices, resolution: float, step: 
     crossed, partner = _partners(centred(changed), centred(told))
     kinds[crossed], figures[crossed] = SWAPPED, np.nan
     figures[crossed, 0] = channels[partner[crossed]]
-    return Explained(kinds, figures)
+    return ChannelFaults(kinds, figures)
 
 
 def _means(values: Array) -> Array:
@@ -207,25 +212,25 @@ def _partners(d: Array, p: Array) -> tuple[Mask, Indices]:
     return crossed & each_other, partner
 
 
-Kinds = NDArray[np.uint8]
+FaultCodes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LeftOut:
+class Exclusion:
     """The channels that a fit does without: of those of any of the `kinds` (3, P) all not `kept`.
 
     `ideal` is the fit at rest with every channel that such a skin has, `fit` the one without these.
     """
 
-    kinds: Kinds
+    kinds: FaultCodes
     kept: Mask
     ideal: Fit
     fit: Fit
     _out: Mask | None
-    _worst: Kinds
+    _worst: FaultCodes
 
     @classmethod
-    def none(cls, sensor: Sensor, fit: Fit, ideal: Fit) -> "LeftOut":
+    def none(cls, sensor: Sensor, fit: Fit, ideal: Fit) -> "Exclusion":
         """Nothing left out but what `sensor` itself calls dead."""
         shape = sensor.layout.live.shape
         kinds = np.zeros(shape, np.uint8)
@@ -235,7 +240,7 @@ class LeftOut:
         """The `curvature` (3, P) to fit: NaN where it is left out."""
         return curvature if self._out is None else np.where(self._out, np.nan, curvature)
 
-    def words(self, suspect: Kinds | None) -> Kinds:
+    def words(self, suspect: FaultCodes | None) -> FaultCodes:
         """What is wrong with each element (P,), of which the fit itself may `suspect` some."""
         found = self._worst
         return found if suspect is None else np.where(found > 0, found, suspect)
@@ -256,14 +261,15 @@ class LeftOut:
             return 1.0
         row = self.fit.estimator.basis.at(place[None])
         without, with_all = (
-            float(cast("Spread", fit.spreads).sd_of(row)[0]) for fit in (self.fit, self.ideal)
+            float(cast("Uncertainty", fit.uncertainty).sd_of(row)[0])
+            for fit in (self.fit, self.ideal)
         )
         return without / with_all if with_all > 0 else math.nan
 
 
-def leave_out(
-    was: LeftOut, estimator: Estimator, kinds: Kinds, badness: Array, loosest: float
-) -> LeftOut:
+def exclude(
+    was: Exclusion, estimator: Estimator, kinds: FaultCodes, badness: Array, loosest: float
+) -> Exclusion:
     """As many of the channels of any of `kinds` (C,) left out as leave a shape decided.
 
     By `badness` (C,), the worst first. A shape is decided while its error bars for unit noise have
@@ -278,7 +284,7 @@ def leave_out(
     out = np.isin(np.arange(kinds.size), worst[:count]).reshape(shape)
     kept = np.isin(np.arange(kinds.size), worst[count:]).reshape(shape)
     own = kinds.reshape(shape).copy()
-    worst_of: Kinds = own.max(axis=0)
+    worst_of: FaultCodes = own.max(axis=0)
     return replace(was, kinds=own, kept=kept, fit=fit, _out=out if count else None, _worst=worst_of)
 
 

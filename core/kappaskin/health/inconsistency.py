@@ -20,7 +20,7 @@ _PARTS = 4  # that are averaged, each by itself
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class ChannelStatistics:
     """What C channels read for `seconds` that ended at `time` on the host's clock.
 
     `means` (T, C) in 1/m of each part of it, of so many `frames`; NaN where a channel was not read
@@ -36,7 +36,7 @@ class Look:
     railed: Array
 
 
-class Window:
+class StatisticsWindow:
     """Takes every frame, keeps some, and looks at them four times a second at most.
 
     Of a skin with more than 3000 channels as much less often, so that looking costs no more.
@@ -51,7 +51,7 @@ class Window:
         self._counts = cast("Array", counts)
         self._taken, self._begun, self._due = 0, -math.inf, -math.inf
 
-    def __call__(self, frame: Frame) -> Look | None:
+    def __call__(self, frame: Frame) -> ChannelStatistics | None:
         """What the last quarter of a second says, where it ends with `frame`."""
         time = frame.device_time
         if time < self._begun:  # the clock of a device that began anew
@@ -76,7 +76,7 @@ class Window:
         self._taken = 0
         return look
 
-    def _looked(self, counts: Array, seconds: float, time: float) -> Look:
+    def _looked(self, counts: Array, seconds: float, time: float) -> ChannelStatistics:
         low, high = self._chain.limits
         read, rails = ~np.isnan(counts), (counts <= low) | (counts >= high)
         starts = np.linspace(0, len(counts), _PARTS, endpoint=False).astype(int)
@@ -90,7 +90,7 @@ class Window:
         means[summed(rails.astype(float)) > 0] = np.nan
         curvature = means * self._chain.resolution + self._rest
         noise = _noise(counts) * self._chain.resolution
-        return Look(time, seconds, curvature, len(counts) / _PARTS, noise, railed)
+        return ChannelStatistics(time, seconds, curvature, len(counts) / _PARTS, noise, railed)
 
 
 def _noise(counts: Array) -> Array:
@@ -243,7 +243,7 @@ def _largest(values: Array) -> float:
     return float(np.abs(np.nan_to_num(values)).max())
 
 
-class Contradiction:
+class InconsistencyTest:
     """How each of C channels changed, `changed` (T, C) in 1/m, and should have, `told` (T, C).
 
     Changes are those from what was read about a minute ago: offsets and old contacts contradict
@@ -278,7 +278,7 @@ class Contradiction:
     def recent(self) -> slice:
         return slice(_KEPT - _RECENT, None)
 
-    def steps(self, look: Look, missing: Mask, wrong: Mask) -> Iterator[None]:
+    def steps(self, look: ChannelStatistics, missing: Mask, wrong: Mask) -> Iterator[None]:
         """Take in what was read, without what is `missing` (C,), some of it known to be `wrong`.
 
         In steps, each after the one before.
@@ -341,7 +341,7 @@ class Contradiction:
         step: Array = np.nan_to_num(latest) * min(1.0, seconds / _FORGOTTEN)
         self.base += step
 
-    def _measure(self, look: Look) -> None:
+    def _measure(self, look: ChannelStatistics) -> None:
         heard = look.noise[~self.missing & ~np.isnan(look.noise)]
         self.usual = float(np.median(heard)) if heard.size else self.usual
         around = (self.neighbours.weights**2).sum(axis=2).T.ravel()

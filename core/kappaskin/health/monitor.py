@@ -16,10 +16,10 @@ from kappaskin.health.findings import (
     STUCK,
     SWAPPED,
     Finding,
-    explain,
+    classify_faults,
     findings,
 )
-from kappaskin.health.inconsistency import Contradiction, Look, Window
+from kappaskin.health.inconsistency import ChannelStatistics, InconsistencyTest, StatisticsWindow
 from kappaskin.sensing import Sensor
 
 _FAR = 4.0  # standard deviations: a channel that is further off is accused
@@ -37,7 +37,7 @@ _LOOSE = (NOISY, OFFSET, DRIFTING)  # what something better may be found of
 _ANSWERING = (DEAD, STUCK, SWAPPED)  # what only motion can clear
 
 
-class Monitor:
+class HealthMonitor:
     """The health of every channel of `sensor`; `monitor(frame)` says whether a look has ended.
 
     Four times a second at most it compares what each channel reads with what those around it say,
@@ -50,20 +50,20 @@ class Monitor:
     moves nothing is called that. A look is spread over the frames that follow it, so that none of
     them waits for the whole.
 
-    `kinds` (C,) are numbers in `WHY`, 0 for channels that are well; `order` (C,) is how bad each
+    `kinds` (C,) are numbers in `FAULTS`, 0 for channels that are well; `order` (C,) is how bad each
     is, the worst largest.
     """
 
     def __init__(self, sensor: Sensor) -> None:
         self.sensor = sensor
         self._dead = ~sensor.layout.live.ravel()
-        self._window = Window(sensor)
+        self._window = StatisticsWindow(sensor)
         self.begin_anew()
 
     def begin_anew(self) -> None:
         """Forget all that was read and found, as where a device began anew."""
         layout, C = self.sensor.layout, self.sensor.channels
-        self._against = Contradiction(layout)
+        self._against = InconsistencyTest(layout)
         self.kinds = np.where(layout.lacking.ravel(), DEAD, 0).astype(np.uint8)
         self._since, self._figures = np.full(C, math.nan), np.full((C, 2), math.nan)
         self._suspects = np.zeros(C, bool)
@@ -84,7 +84,7 @@ class Monitor:
             self._steps = self._take_in(look)
         return next(self._steps, False)
 
-    def _take_in(self, look: Look) -> Iterator[bool]:
+    def _take_in(self, look: ChannelStatistics) -> Iterator[bool]:
         """Steps of a look, each as long as the estimate of a frame; True after the last.
 
         They are no more than the frames that a look is made of.
@@ -121,7 +121,7 @@ class Monitor:
         """Those of `which` (C,) of which nothing better was found."""
         return which & ~self._dead & ((self.kinds == 0) | np.isin(self.kinds, _LOOSE))
 
-    def _listen(self, look: Look) -> None:
+    def _listen(self, look: ChannelStatistics) -> None:
         """Find channels noisier than all others and than those around them, in several looks."""
         P = len(self.sensor.layout)
         usual = max(self._against.usual, self.sensor.transduction.resolution)
@@ -139,7 +139,7 @@ class Monitor:
         heard = (self.kinds == NOISY) & self._loud[-1]
         self._figures[heard] = np.stack([noise, np.full(len(noise), usual)], axis=1)[heard]
 
-    def _look_at_rails(self, look: Look) -> None:
+    def _look_at_rails(self, look: ChannelStatistics) -> None:
         self._railed[:-1] = self._railed[1:]
         self._railed[-1] = np.nan_to_num(look.railed)
         share = self._railed.mean(axis=0)
@@ -162,7 +162,7 @@ class Monitor:
         self._figures[dead, 0] = rail
         self._figures[dead, 1] = np.abs(told[within])
 
-    def _suspect(self, look: Look) -> None:
+    def _suspect(self, look: ChannelStatistics) -> None:
         """Suspect the worst of those accused, and go on with those suspected before."""
         far = (self._against.distance > _FAR) & ~self._dead & (self.kinds == 0)
         far &= ~self._against.pressed
@@ -173,14 +173,14 @@ class Monitor:
         self._suspects = (self._suspects & far) | new.ravel()
         self._accused = np.where(self._suspects, self._accused + 1, 0)
 
-    def _confirm(self, look: Look) -> None:
+    def _confirm(self, look: ChannelStatistics) -> None:
         sure = self._suspects & (self._accused >= _CONFIRMED)
         far = np.isin(self.kinds, _LOOSE) & (self._against.distance > _FAR)
         channels = np.flatnonzero(sure | far)
         if not channels.size:
             return
         step = look.seconds / len(look.means)
-        told = explain(self._against, channels, self.sensor.transduction.resolution, step)
+        told = classify_faults(self._against, channels, self.sensor.transduction.resolution, step)
         since = look.time - _CONFIRMED * look.seconds
         # Of what was loud before, being off for a while tells nothing better.
         better = (self.kinds[channels] != NOISY) | ~np.isin(told.kinds, _LOOSE)

@@ -3,8 +3,8 @@
 from kappaskin.mechanics.height_maps import HeightMap as HeightMap
 from kappaskin.mechanics.height_maps import Mesh as Mesh
 from kappaskin.mechanics.indentation import Indentation as Indentation
-from kappaskin.mechanics.indentation import Placed as Placed
-from kappaskin.mechanics.indentation import Press as Press
+from kappaskin.mechanics.indentation import IndentationSolver as IndentationSolver
+from kappaskin.mechanics.indentation import PlacedObject as PlacedObject
 from kappaskin.mechanics.loads import DiscLoad as DiscLoad
 from kappaskin.mechanics.loads import GaussianLoad as GaussianLoad
 from kappaskin.mechanics.loads import LineLoad as LineLoad

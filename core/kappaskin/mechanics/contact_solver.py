@@ -39,7 +39,7 @@ _ROUNDING = 1e-14  # of what sums to it: a gap is known to that
 
 
 @dataclass(frozen=True, eq=False)
-class Support:
+class NodeCompliance:
     """How a skin gives at n `points` (n, 2) in m.
 
     `felt` are the functions (k, N) at given places, `after` what (k, N) answers to forces there,
@@ -66,7 +66,7 @@ class Underside:
 
 
 @dataclass(frozen=True, eq=False)
-class Bearing:
+class ContactForces:
     """The answer: `forces` (n,) in N, `gap` (n,) in m, `coefficients` and `modal` (N,), `depth`."""
 
     forces: Array
@@ -78,7 +78,7 @@ class Bearing:
 
 
 @dataclass(frozen=True, eq=False)
-class _Places:
+class _ActiveSet:
     """The a places that bear: what they feel, and how each gives under force on the others."""
 
     at: Indices
@@ -86,38 +86,40 @@ class _Places:
     answer: Array
     gives: Array
 
-    def joined(self, support: Support, more: Indices) -> "_Places":
+    def joined(self, support: NodeCompliance, more: Indices) -> "_ActiveSet":
         """These and the places `more` (m,)."""
         other = _places(support, more)
         between = self.answer @ other.felt.T
-        return _Places(
+        return _ActiveSet(
             np.concatenate([self.at, more]),
             np.concatenate([self.felt, other.felt]),
             np.concatenate([self.answer, other.answer]),
             np.block([[self.gives, between], [between.T, other.gives]]),
         )
 
-    def only(self, kept: Mask) -> "_Places":
+    def only(self, kept: Mask) -> "_ActiveSet":
         """Those of them that are `kept` (a,)."""
-        return _Places(self.at[kept], self.felt[kept], self.answer[kept], self.gives[kept][:, kept])
+        return _ActiveSet(
+            self.at[kept], self.felt[kept], self.answer[kept], self.gives[kept][:, kept]
+        )
 
 
-def _places(support: Support, at: Indices) -> _Places:
+def _places(support: NodeCompliance, at: Indices) -> _ActiveSet:
     felt = support.felt(at)
     answer = support.after(felt)
-    return _Places(at, felt, answer, answer @ felt.T + np.diag(support.soft[at]))
+    return _ActiveSet(at, felt, answer, answer @ felt.T + np.diag(support.soft[at]))
 
 
 @dataclass(frozen=True, eq=False)
-class _Task:
+class _ContactProblem:
     """What is asked: the object, and its `depth` in m or, where that is None, its `force` in N."""
 
-    support: Support
+    support: NodeCompliance
     under: Underside
     depth: float | None
     force: float
 
-    def balanced(self, places: _Places) -> tuple[Array, float]:
+    def balanced(self, places: _ActiveSet) -> tuple[Array, float]:
         """The forces (a,) that leave no gap at any place, pushing or pulling, and the depth."""
         e = self.under.slant[places.at]
         if not len(e):
@@ -136,12 +138,12 @@ class _Task:
             d = float((self.force + e @ for_height) / (e @ per_depth))
         return d * per_depth - for_height, d
 
-    def energy(self, places: _Places, forces: Array) -> float:
+    def energy(self, places: _ActiveSet, forces: Array) -> float:
         """What the right forces make least, in J."""
         above = self.under.height[places.at] - (self.depth or 0.0)
         return float(forces @ (places.gives @ forces / 2 + self.under.slant[places.at] * above))
 
-    def pushing(self, places: _Places, forces: Array, target: Array) -> tuple[_Places, Array]:
+    def pushing(self, places: _ActiveSet, forces: Array, target: Array) -> tuple[_ActiveSet, Array]:
         """Fewer places, and forces (a,) that only push, from those now towards the `target`."""
         kept = target > 0
         fewer, all_kept = places.only(kept), target[kept]
@@ -154,15 +156,15 @@ class _Task:
         kept = share > (step := share.min())
         return places.only(kept), (forces + step * (target - forces))[kept]
 
-    def bearing(self, places: _Places, forces: Array, depth: float, step: int) -> Bearing:
+    def bearing(self, places: _ActiveSet, forces: Array, depth: float, step: int) -> ContactForces:
         """The answer if only these places bear."""
         F, soft = np.zeros(len(self.under.slant)), self.support.soft
         F[places.at] = forces
         c = forces @ places.answer
         gap = self.support.deflection(c) + soft * F - self.under.slant * (depth - self.under.height)
-        return Bearing(F, gap, c, forces @ places.felt, depth, step)
+        return ContactForces(F, gap, c, forces @ places.felt, depth, step)
 
-    def entered(self, found: Bearing, one: bool) -> Indices:
+    def entered(self, found: ContactForces, one: bool) -> Indices:
         """The places without force that the object enters deepest, of each region or only `one`."""
         # A place's own give and another's bound what a force on the one does to the other.
         root = np.sqrt(self.support.own)
@@ -175,14 +177,17 @@ class _Task:
         return inside[np.unique(self.support.region[inside], return_index=True)[1]]
 
 
-def settle(
-    support: Support, under: Underside, start: Array, depth: float | None, force: float
-) -> Bearing:
+def solve_contact(
+    support: NodeCompliance, under: Underside, start: Array, depth: float | None, force: float
+) -> ContactForces:
     """Forces of an object at `depth` in m, or, where that is None, that bears `force` in N.
 
     From the forces `start` (n,), none below zero, whose sum along the object is then `force`.
     """
-    task, places = _Task(support, under, depth, force), _places(support, np.flatnonzero(start))
+    task, places = (
+        _ContactProblem(support, under, depth, force),
+        _places(support, np.flatnonzero(start)),
+    )
     forces, energy = start[places.at], -np.inf  # so that only one joins at first
     for step in range(1, _MOST_STEPS):
         target, d = task.balanced(places)
@@ -207,7 +212,7 @@ _REGIONS = 8  # of the grid, along each side
 _STIFFEST = 1e-9  # of the skin's own give: a thinner layer is lost in rounding
 
 
-def layer_of(plate: Plate) -> float:
+def layer_compliance(plate: Plate) -> float:
     """h/E in m^3/N of an even sheet: with D = E h^3 / (12 (1 - nu^2)) and C = E h it is h^2/C."""
     D, C = plate.rigidity, plate.stretching
     if not (D and C):
@@ -218,7 +223,7 @@ def layer_of(plate: Plate) -> float:
     return 12 * (1 - plate.poisson**2) * D / C**2
 
 
-class Nodes:
+class ContactNodes:
     """The centres of nx x ny equal cells of a skin, those that lie on it."""
 
     def __init__(self, plate: Plate, basis: Basis, nx: int, ny: int, layer: float) -> None:
@@ -264,7 +269,7 @@ class Nodes:
         found: Array = np.bincount(self.cell(points), forces, nx * ny).astype(float)
         return found.reshape(self.shape)
 
-    def support(self, keel: Array, under: Indices) -> Support:
+    def support(self, keel: Array, under: Indices) -> NodeCompliance:
         """How the skin gives at those numbered `under` of the nodes and, after them, the `keel`."""
         K = len(self.points)
         felt = self._basis.at(keel)
@@ -279,7 +284,7 @@ class Nodes:
             found[on_keel] = felt[under[at[on_keel]] - K]
             return found
 
-        return Support(
+        return NodeCompliance(
             points,
             felt_at,
             self._compliance.after,

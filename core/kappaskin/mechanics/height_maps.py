@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.rigid_objects import check_sizes
-from kappaskin.skin import turn
+from kappaskin.skin import doubled_area
 
 _MOST_PIXELS = 2**24  # pixels
 _LARGEST = 2**26  # bytes of a picture
@@ -272,7 +272,7 @@ class Mesh:
 def _lowest(triangles: Array, nx: int, ny: int) -> Array:
     """The least z (ny, nx) of `triangles` (F, 3, 3) over whole x < nx and y < ny; else infinite."""
     heights = np.full((ny, nx), np.inf)
-    seen = np.abs(turn(*np.moveaxis(triangles[..., :2], 1, 0))) > _EDGE_ON
+    seen = np.abs(doubled_area(*np.moveaxis(triangles[..., :2], 1, 0))) > _EDGE_ON
     triangles = triangles[seen]
     first = np.maximum(np.ceil(triangles[..., :2].min(axis=1)), 0).astype(int)
     last = np.minimum(np.floor(triangles[..., :2].max(axis=1)), (nx - 1, ny - 1)).astype(int)
@@ -298,8 +298,8 @@ def _lowest(triangles: Array, nx: int, ny: int) -> Array:
 def _plane(triangles: Array, place: Array) -> Array:
     """The z (P,) of each of `triangles` (P, 3, 3) at its `place` (P, 2); infinite beside it."""
     a, b, c = np.moveaxis(triangles[..., :2], 1, 0)
-    whole = turn(a, b, c)
-    s, t = turn(a, place, c) / whole, turn(a, b, place) / whole
+    whole = doubled_area(a, b, c)
+    s, t = doubled_area(a, place, c) / whole, doubled_area(a, b, place) / whole
     shares = np.column_stack([1 - s - t, s, t])
     z = np.sum(shares * triangles[..., 2], axis=1)
     return np.where((shares >= -_ON_EDGE).all(axis=1), z, np.inf)

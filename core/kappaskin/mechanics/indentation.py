@@ -14,7 +14,14 @@ import numpy as np
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
-from kappaskin.mechanics.contact_solver import Bearing, Nodes, Support, Underside, layer_of, settle
+from kappaskin.mechanics.contact_solver import (
+    ContactForces,
+    ContactNodes,
+    NodeCompliance,
+    Underside,
+    layer_compliance,
+    solve_contact,
+)
 from kappaskin.mechanics.plate import Plate
 from kappaskin.mechanics.rigid_objects import RigidObject
 from kappaskin.skin import Patch
@@ -83,7 +90,7 @@ def _turned(points: Array, angle: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class PlacedObject:
     """An object at a `place` (2,) in m, turned by `turn` in rad; up is the skin's normal there."""
 
     object_: RigidObject
@@ -117,7 +124,7 @@ class Placed:
         return _turned(points - by.position, self.turn - by.turn) + self.place
 
 
-class Press:
+class IndentationSolver:
     """Presses rigid objects into one skin, made once for it and called per frame.
 
     `nodes` (nx, ny) divide the skin; forces act at the centres of the cells that lie on it, and
@@ -135,7 +142,9 @@ class Press:
         layer: float | None = None,
     ) -> None:
         self._patch, self._shape = plate.patch, basis.shape
-        self._nodes = Nodes(plate, basis, *nodes, layer_of(plate) if layer is None else layer)
+        self._nodes = ContactNodes(
+            plate, basis, *nodes, layer_compliance(plate) if layer is None else layer
+        )
         self._deepest = min(plate.patch.a, plate.patch.b)
 
     def __call__(
@@ -155,7 +164,7 @@ class Press:
         answer `after` which it moves saves time and changes nothing else.
         """
         self._check(x, y, turn, depth, force)
-        placed = Placed(object_, np.array([x, y], float), turn)
+        placed = PlacedObject(object_, np.array([x, y], float), turn)
         keel = placed.keel(self._patch)
         height, slant = placed.over(self._patch, np.vstack([self._nodes.points, keel]))
         under = np.flatnonzero(np.isfinite(height) & (slant > 0))
@@ -171,7 +180,7 @@ class Press:
             start = _bearing_all(start, side, force)
         if force == 0:  # it touches
             depth = float(side.height.min())
-        found = settle(support, side, start, depth, force or 0.0)
+        found = solve_contact(support, side, start, depth, force or 0.0)
         return self._answer(support, side, placed, found)
 
     def _check(
@@ -189,7 +198,7 @@ class Press:
                 f"{depth}; depths are in metres"
             )
 
-    def _moved(self, support: Support, placed: Placed, after: Indentation) -> Array:
+    def _moved(self, support: NodeCompliance, placed: PlacedObject, after: Indentation) -> Array:
         """Forces (n,) to start from: those of `after`, carried along."""
         ny, nx = self._nodes.shape
         candidate = np.full(nx * ny, -1)
@@ -202,7 +211,7 @@ class Press:
         return forces
 
     def _answer(
-        self, support: Support, under: Underside, placed: Placed, found: Bearing
+        self, support: NodeCompliance, under: Underside, placed: PlacedObject, found: ContactForces
     ) -> Indentation:
         if abs(found.depth) > self._deepest:
             raise Refusal(

@@ -136,7 +136,7 @@ def is_point(load: Load) -> bool:
 _INSIDE = 1 - 1e-9  # of a load's size: one that touches an edge is on the patch, as computed
 
 
-class SpreadLoad(ABC):
+class DistributedLoad(ABC):
     """A force in N spread about (x, y) in m, alike on all sides of the two axes through it.
 
     So the mean of sin(k x) sin(l y) under it is the product at its centre times the mean of the
@@ -188,7 +188,7 @@ class SpreadLoad(ABC):
         return self.force * felt.reshape(basis.shape)
 
 
-def _check_size(load: SpreadLoad, *sizes: float) -> None:
+def _check_size(load: DistributedLoad, *sizes: float) -> None:
     if not all(0 < size < math.inf for size in sizes):
         raise Refusal(
             f"expected a load of a size above zero in metres, got {load}; for one of no size take "
@@ -215,7 +215,7 @@ def _rings(radius: Array, share: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class DiscLoad(SpreadLoad):
+class DiscLoad(DistributedLoad):
     """A force in N spread evenly over the disc of `radius` about (x, y), all in m."""
 
     x: float
@@ -240,7 +240,7 @@ class DiscLoad(SpreadLoad):
 
 
 @dataclass(frozen=True)
-class GaussianLoad(SpreadLoad):
+class GaussianLoad(DistributedLoad):
     """A force in N spread like a normal distribution of standard deviation `sd` about (x, y) in m.
 
     It must lie on the patch as far as four standard deviations from its centre: beyond them lies
@@ -269,7 +269,7 @@ class GaussianLoad(SpreadLoad):
 
 
 @dataclass(frozen=True)
-class RectangleLoad(SpreadLoad):
+class RectangleLoad(DistributedLoad):
     """A force in N spread evenly over `width` along x by `height` along y about (x, y), in m."""
 
     x: float

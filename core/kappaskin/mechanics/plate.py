@@ -6,7 +6,7 @@ from functools import reduce
 
 import numpy as np
 
-from kappaskin.bases import Basis, ElasticBasis, SineBasis, overlaps, terms
+from kappaskin.bases import Basis, ElasticBasis, SineBasis, curvature_terms, overlaps
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
@@ -151,7 +151,7 @@ class Plate:
         nu, H, overlap = self.poisson, self.patch.base_curvature, overlaps(basis)
 
         def product(left: str, right: str) -> Array:
-            first, second = terms(self.patch, left), terms(self.patch, right)
+            first, second = curvature_terms(self.patch, left), curvature_terms(self.patch, right)
             pairs = [(g * h, one, other) for g, one in first for h, other in second]
             return reduce(np.add, (gh * overlap(one, other) for gh, one, other in pairs))
 
@@ -177,7 +177,7 @@ class Plate:
         """The inverse (N, N) of the stiffness, on what the edges leave free."""
         K, bare = self._stiffness(basis)
         free = np.eye(basis.size) if basis.free is None else basis.free
-        W = free if basis.unseen is None else np.hstack([free, basis.unseen])
+        W = free if basis.unobservable is None else np.hstack([free, basis.unobservable])
         scale = np.sqrt(np.diag(W.T @ bare @ W))
         scale[scale == 0] = np.inf
         values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))

@@ -61,12 +61,12 @@ class PrandtlIshlinskii:
         rise = 1 / slopes
         return PrandtlIshlinskii(y, np.diff(rise, axis=0), rise[0], self.stretch)
 
-    def start(self) -> "Plays":
+    def start(self) -> "PlayFilter":
         """The operator at work on C channels, with every play at zero."""
-        return Plays(self)
+        return PlayFilter(self)
 
 
-class Plays(Remembering):
+class PlayFilter(Remembering):
     """The positions of all plays; called with each frame, it moves them."""
 
     REMEMBERED = ("_w",)
@@ -126,16 +126,16 @@ class StandardLinearSolid:
         if not 0 < self.time_constant < math.inf:
             raise Refusal(f"expected a time constant above zero in s, got {self.time_constant}")
 
-    def start(self) -> "Relaxing":
+    def start(self) -> "CreepFilter":
         """Curvature to reading, from rest."""
-        return Relaxing(self)
+        return CreepFilter(self)
 
-    def start_inverse(self) -> "Restoring":
+    def start_inverse(self) -> "InverseCreepFilter":
         """Reading to curvature, from rest."""
-        return Restoring(self)
+        return InverseCreepFilter(self)
 
 
-class _Slow(Remembering):
+class _CreepState(Remembering):
     """The slow part s and the curvature before, both (C,)."""
 
     REMEMBERED = ("_s", "_x", "_time")
@@ -159,7 +159,7 @@ class _Slow(Remembering):
         self._x = x
 
 
-class Relaxing(_Slow):
+class CreepFilter(_CreepState):
     """The solid at work, from curvature to reading."""
 
     def __call__(self, x: Array, time: float) -> Array:
@@ -168,8 +168,8 @@ class Relaxing(_Slow):
         return x - self._share * self._s
 
 
-class Restoring(_Slow):
-    """The solid at work backwards: the curvature that `Relaxing` reads as `y`."""
+class InverseCreepFilter(_CreepState):
+    """The solid at work backwards: the curvature that `CreepFilter` reads as `y`."""
 
     def __call__(self, y: Array, time: float) -> Array:
         """The curvature (C,) when `y` (C,) is read at `time` in s."""

@@ -22,7 +22,7 @@ _POINTS = 12  # exact to rounding for waves as short as the gage
 _DIAGONAL = 1 / math.sqrt(2)
 
 
-def multipliers(sines: SineBasis, gage_length: float) -> Array:
+def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
     """By what gages of `gage_length` in m read sines on a flat skin, (3, Ni, Nj).
 
     xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above.
@@ -187,7 +187,7 @@ class SensorLayout:
         return K.reshape(3 * len(self), basis.size)
 
 
-def steepness(slope_x: Array, slope_y: Array) -> Array:
+def slope_correction(slope_x: Array, slope_y: Array) -> Array:
     """How many times too large Eqs. 3-5 are on slopes (..., P) along x and y, (..., 3, P).
 
     With W^2 = 1 + f_x^2 + f_y^2 it is xx: W (1 + f_x^2), yy: W (1 + f_y^2),
@@ -203,10 +203,10 @@ def steepness(slope_x: Array, slope_y: Array) -> Array:
 
 
 class NormalCurvature:
-    """Coefficients to the true normal curvature of the deflected surface along the gages.
+    """The map from coefficients to the true normal curvature of the surface along the gages.
 
-    It is that of Eqs. 3-5, its first order, over the `steepness`. Gages of some length read the
-    mean of Eqs. 3-5 along them on the slope in their middle.
+    It is the first-order curvature (Eqs. 3-5) over the `slope_correction`. A gage of some length
+    reads the mean of Eqs. 3-5 along it, at the slope in its middle.
     """
 
     def __init__(self, basis: Basis, layout: SensorLayout, dtype: DTypeLike = np.float64) -> None:
@@ -223,5 +223,5 @@ class NormalCurvature:
     def __call__(self, coefficients: Array) -> Array:
         """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
         flat = coefficients.reshape(*coefficients.shape[:-2], self._size)
-        times = steepness(*(np.dot(flat, slope) for slope in self._first))
+        times = slope_correction(*(np.dot(flat, slope) for slope in self._first))
         return np.dot(flat, self._second).reshape(times.shape) / times

@@ -34,11 +34,11 @@ class Outline:
         """The angle (V,) in rad that it turns by at each corner, above zero where it is convex."""
         before = np.roll(self.along, 1, axis=0)
         onward = np.sum(before * self.along, axis=1)
-        return np.angle(onward + 1j * turn(self.corners - before, self.corners, self.ends))
+        return np.angle(onward + 1j * doubled_area(self.corners - before, self.corners, self.ends))
 
     @property
     def area(self) -> float:
-        return float(np.sum(turn(np.zeros(2), self.corners, self.ends))) / 2
+        return float(np.sum(doubled_area(np.zeros(2), self.corners, self.ends))) / 2
 
     def feet(self, positions: Array, short: float = 0.0) -> Array:
         """The place (P, V, 2) on each edge, that share `short` off its ends, nearest to each."""
@@ -61,13 +61,13 @@ class Outline:
         return np.where(self.inside(positions), distance, -distance)
 
 
-def turn(a: Array, b: Array, c: Array) -> Array:
+def doubled_area(a: Array, b: Array, c: Array) -> Array:
     """Twice the area of the triangles a, b, c (..., 2): above zero when counter-clockwise."""
     u, v = b - a, c - a
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
-def checked(vertices: ArrayLike) -> Array:
+def checked_corners(vertices: ArrayLike) -> Array:
     """The corners (V, 2) in m, counter-clockwise; refuses what is not the outline of a skin."""
     try:
         corners = np.array(vertices, float)
@@ -97,7 +97,9 @@ def checked(vertices: ArrayLike) -> Array:
 
 def _check_crossings(line: Outline) -> None:
     a, b, c, d = line.corners[:, None], line.ends[:, None], line.corners[None], line.ends[None]
-    crossed = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
+    crossed = (doubled_area(a, b, c) * doubled_area(a, b, d) < 0) & (
+        doubled_area(c, d, a) * doubled_area(c, d, b) < 0
+    )
     if crossed.any():
         i, j = np.argwhere(crossed)[0]
         raise Refusal(f"edges {i} and {j} of the outline cross; give its corners in order")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
-from kappaskin.skin.outline import Outline, checked
+from kappaskin.skin.outline import Outline, checked_corners
 
 _MARGIN = 1e-3  # of a side: how near its rim a point may be and still move with the skin
 _CORNER = 0.02  # of an edge: how near to its ends no place is looked for along it
@@ -168,7 +168,7 @@ class Polygon(Patch):
     vertices: tuple[tuple[float, float], ...]
 
     def __init__(self, vertices: ArrayLike) -> None:
-        corners = checked(vertices)
+        corners = checked_corners(vertices)
         super().__init__(*corners.max(axis=0).tolist())
         object.__setattr__(self, "vertices", tuple((x, y) for x, y in corners.tolist()))
 

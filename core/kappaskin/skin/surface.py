@@ -13,7 +13,7 @@ Indices = NDArray[np.intp]
 _HALVINGS = 24  # of a cell, until the rim is found
 
 
-def onto_rim(patch: Patch, grid: Array, on: Mask) -> tuple[Array, Indices]:
+def snapped_to_rim(patch: Patch, grid: Array, on: Mask) -> tuple[Array, Indices]:
     """The `grid` (ny, nx, 2) with every point that has a neighbour `on` the skin on it or its rim.
 
     And whose value each point shows, (ny nx): its own, or its neighbour's where there is none.
@@ -59,13 +59,13 @@ def distances(patch: Patch, surface: Array, first: Array, second: Array) -> Dist
     """Those between the places `first` and `second` (2,) in m, displaced by `surface` (ny, nx)."""
     places = first + np.linspace(0.0, 1.0, _STEPS + 1)[:, None] * (second - first)
     rest, out = patch.at_rest(places)
-    points = rest - out * between(patch, surface, places)[:, None]
+    points = rest - out * interpolated(patch, surface, places)[:, None]
     whole = points[-1] - points[0]
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return Distances(float(np.linalg.norm(whole)), float(steps.sum()), float(whole[2]))
 
 
-def between(patch: Patch, values: Array, places: Array) -> Array:
+def interpolated(patch: Patch, values: Array, places: Array) -> Array:
     """What `values` (ny, nx) on the grid of a patch are at `places` (P, 2), evenly between them.
 
     Zero where they are NaN, as off the skin.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from kappaskin.bases import CurvatureMap, SineBasis
-from kappaskin.estimation import FiniteSlope
+from kappaskin.estimation import FiniteSlopeLeastSquares
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.scenes import TABLE_1_NOISE, scaled_to
@@ -258,7 +258,7 @@ def _slopes() -> Iterator[Case]:
     slope = np.abs(basis.on_grid(*_SQUARE.grid(101, 101), dx=1)(c)).max()
     for steepest in (0.5, 0.9):
         truth = c * steepest / slope
-        skin = FiniteSlope(basis, _TENS)
+        skin = FiniteSlopeLeastSquares(basis, _TENS)
         rng = np.random.default_rng(SEED)
         K = skin.predicted(truth) + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, 3, 100))
         yield Case(f"slopes of {steepest}", "gages sense the curvature of the bent surface, which "

@@ -26,7 +26,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Estimator, Fit, gathered
+from kappaskin.estimation import Estimator, Fit, merged_fits
 from kappaskin.frames import Array
 from kappaskin.studies.stability.case import Case, Kind
 from kappaskin.studies.stability.reference import Reference
@@ -114,7 +114,7 @@ def _in_blocks(case: Case, estimator: Estimator) -> Iterator[Answer]:
     for start in range(0, len(case.curvature), _BLOCK):
         fit = estimator(case.curvature[start : start + _BLOCK])
         chosen = np.arange(0, len(fit.curvature), every)
-        kept = fit if every == 1 else gathered([fit], chosen)
+        kept = fit if every == 1 else merged_fits([fit], chosen)
         yield Answer.of(case, kept, start + chosen)
 
 
@@ -124,7 +124,7 @@ def _after_another(
     for t in range(len(case.curvature)):
         restart()
         fit = estimator(case.curvature[[t - 1, t]])
-        yield Answer.of(case, gathered([fit], np.array([1])), np.array([t]))
+        yield Answer.of(case, merged_fits([fit], np.array([1])), np.array([t]))
 
 
 def _joined(parts: list[Answer]) -> Answer:
