@@ -131,7 +131,7 @@ def test_a_stuck_channel_is_found_by_itself() -> None:
     assert not others
     (finding,) = monitor.findings(np.zeros(300, bool))
     assert (finding.kind, finding.element, finding.component) == ("stuck", 57, "xx")
-    assert finding.figure.startswith("reads +1.70 1/m while those around it tell of ")
+    assert finding.figure.startswith("reads +1.70 1/m while its neighbours predict ")
 
 
 def test_a_noisy_channel_is_found_in_two_seconds() -> None:

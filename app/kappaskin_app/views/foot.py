@@ -8,7 +8,7 @@ from kappaskin_app.views.line import Line
 from kappaskin_app.views.notice import Notice
 
 _OBJECT = (
-    "What the readings say touches the skin, with 95 % interval and the runner-up's "
+    "What the readings say touches the skin, with 95 % interval and the second guess's "
     "probability; and the principal curvatures of the skin at the contact."
 )
 

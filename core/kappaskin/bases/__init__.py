@@ -1,4 +1,4 @@
-"""Functions that a shape is made of, by the skin's shape and how its edges are held."""
+"""Bases: sets of functions on a skin that satisfy its boundary conditions."""
 
 from kappaskin.bases.basis import ORDERS as ORDERS
 from kappaskin.bases.basis import Basis as Basis

@@ -1,4 +1,4 @@
-"""Modes of a polygonal plate by finite elements: triangle mesh, quintic elements, eigenmodes."""
+"""Finite elements: a triangle mesh, Argyris' quintic elements, and modes of polygonal plates."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from scipy.spatial import Delaunay, KDTree
 from scipy.special import perm
 
 from kappaskin.bases.basis import ORDERS, Order
-from kappaskin.bases.cache import kept
+from kappaskin.bases.cache import cached
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -40,7 +40,7 @@ class TriangleMesh:
 
 
 def triangulated(line: Outline, spacing: float, blunt: float) -> TriangleMesh:
-    """Triangles with sides of about `spacing` inside an outline that touches x = 0 and y = 0.
+    """A mesh of triangles with sides of about `spacing` inside an outline.
 
     Towards corners wider than a right angle they are smaller, at those that point outward `blunt`
     of it. Points along the rim and inside it are joined by Delaunay's triangulation, where edges of
@@ -68,7 +68,7 @@ def triangulated(line: Outline, spacing: float, blunt: float) -> TriangleMesh:
 
 
 def _sizes(points: Array, around: Array, sizes: Array, most: float) -> Array:
-    """The spacing (P,) wanted at `points`: what it is `around` and more with the distance."""
+    """The spacing (P,) wanted at `points`: `sizes` at those `around`, growing with distance."""
     distance = np.linalg.norm(points[:, None] - around, axis=-1)
     return (sizes + _GROWTH * distance).min(axis=1, initial=most)
 
@@ -90,7 +90,7 @@ def _along_rim(line: Outline, spacing: float, blunt: float) -> Array:
 
 
 def _inside(line: Outline, rim: Array, spacing: float) -> Array:
-    """Centres of squares that are quartered until they are as small as wanted."""
+    """Centres of squares that are quartered until they are as small as the desired spacing."""
     sizes = np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1)
     sizes = np.maximum(sizes, np.roll(sizes, -1))
     box, side = line.corners.max(axis=0), spacing
@@ -115,7 +115,7 @@ def _joined(points: Array) -> Triangles:
 
 
 def _cut(triangles: Triangles, rim: int) -> Triangles:
-    """Which steps along the rim, each from its point to the next, are no side of a triangle."""
+    """The numbers of the rim's segments that are no side of a triangle."""
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     steps = np.sort(np.column_stack([np.arange(rim), (np.arange(rim) + 1) % rim]), axis=1)
     most = int(triangles.max()) + 1
@@ -205,7 +205,7 @@ class Quintics:
         return np.swapaxes(rows, 0, 1).reshape(-1, 3)
 
     def _searched(self, x: float, y: float) -> tuple[int, Array, float]:
-        """The triangle that (x, y) is deepest inside of, xi (2,) there, and how deep."""
+        """The triangle that (x, y) lies deepest inside, xi (2,) there, and the depth."""
         depths = (self._depths @ np.array([x, y, 1.0])).reshape(3, -1)
         deepest = depths.min(axis=0)
         t = int(deepest.argmax())
@@ -274,7 +274,7 @@ def plate_modes(vertices: tuple[tuple[float, float], ...], count: int, clamped: 
     They make the bending energy, the integral of w_xx^2 + 2 w_xy^2 + w_yy^2, stationary for a
     given mean square; along straight edges that do not move Poisson's ratio adds nothing to it.
     """
-    made = kept(f"plate {vertices} {count} {clamped}", lambda: _made(vertices, count, clamped))
+    made = cached(f"plate {vertices} {count} {clamped}", lambda: _made(vertices, count, clamped))
     functions = Quintics(made["origins"], made["inverse"], made["coefficients"])
     return PlateModes(functions, made["points"], made["weights"])
 

@@ -26,10 +26,10 @@ _MOST = 1024  # modes: more take minutes to make
 
 @dataclass(frozen=True, eq=False)
 class PointMap:
-    """A map from coefficients to values on a grid, as one dense product; NaN off the skin.
+    """A map from coefficients to values on a grid by one dense product; NaN off the skin.
 
-    It takes as long as its matrix is read: in single precision, good to a ten-millionth of the
-    coefficients, half as long.
+    Reading its matrix takes all of the time: single precision, exact to a ten-millionth of the
+    coefficients, halves it.
     """
 
     values: NDArray[np.float32]
@@ -44,7 +44,7 @@ class PointMap:
 
 @dataclass(frozen=True)
 class ModeBasis(FunctionBasis):
-    """The first Ni x Nj modes, by frequency, of a flat skin; their mean square is 1/4 as sines'."""
+    """The first Ni x Nj modes of a flat skin by frequency; their mean square is 1/4, as sines'."""
 
     def __post_init__(self) -> None:
         if not (self.Ni > 0 and self.Nj > 0 and self.size <= _MOST):
@@ -79,7 +79,7 @@ _POISSON = 0.3  # of the plate whose hinged modes these are
 
 @dataclass(frozen=True)
 class DiskBasis(ModeBasis):
-    """The plate modes of a disk, hinged or `clamped` along its rim.
+    """The vibration modes of a round plate, hinged or `clamped` along its rim.
 
     With r = 1 at the rim they are (J_m(k r) - J_m(k)/I_m(k) I_m(k r)) times cos m theta and, for
     m > 0, sin m theta. All vanish at the rim. Clamped, J_m+1(k)/J_m(k) + I_m+1(k)/I_m(k) = 0 makes
@@ -237,7 +237,7 @@ _STRAIGHT, _BLUNT = 1e-6, math.radians(35)  # turns at a corner: none, and too l
 
 @dataclass(frozen=True)
 class PolygonBasis(ModeBasis):
-    """The plate modes of a polygon, hinged or `clamped` along its edges, by finite elements.
+    """The vibration modes of a polygonal plate, hinged or `clamped`, by finite elements.
 
     They meet the edge exactly and have continuous slopes. A hinged polygon with ever more corners
     does not become a hinged round plate: where two edges meet the slope vanishes, so that it turns

@@ -18,7 +18,7 @@ _ALIKE = np.array([[1.0], [0.0], [0.0]])  # along y of a strip
 
 @dataclass(frozen=True, eq=False)
 class GridMap:
-    """A map from coefficients to values on a grid, made once and called per frame."""
+    """A map from coefficients to values on a grid, as one matrix along x and one along y."""
 
     X: Array
     Y: Array
@@ -34,7 +34,7 @@ class GridMap:
 class ProductBasis(FunctionBasis):
     """Ni x Nj products of Ni functions of x and Nj functions of y on a rectangle.
 
-    On a strip they are the Ni functions of x alone, alike along y (Nj = 1).
+    On a strip they are the Ni functions of x alone, constant along y (Nj = 1).
     """
 
     def __post_init__(self) -> None:
@@ -48,7 +48,7 @@ class ProductBasis(FunctionBasis):
 
     @abstractmethod
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
-        """The derivative of `count` functions on [0, `length`], (P, count), at `x` (P,).
+        """Derivatives (P, count) of `count` functions on [0, `length`] at `x` (P,).
 
         Of order -1 it is the integral whose values at 0 and `length` cancel, of order -2 the
         integral of that one whose mean is zero.
@@ -119,7 +119,7 @@ class ProductBasis(FunctionBasis):
 
 
 class JetProductBasis(ProductBasis):
-    """Products of functions that are told at one place of a side at a time."""
+    """Products of functions that are evaluated at one point of a side at a time."""
 
     @abstractmethod
     def _jet(self, x: float, length: float, count: int) -> Array:
@@ -132,7 +132,7 @@ class JetProductBasis(ProductBasis):
 
 
 def gauss(length: float, count: int) -> tuple[Array, Array]:
-    """Points and weights of Gauss and Legendre on [0, length]."""
+    """Gauss-Legendre points (count,) and weights (count,) on [0, length]."""
     t, w = np.polynomial.legendre.leggauss(count)
     return (t + 1) * length / 2, w * length / 2
 
@@ -230,7 +230,7 @@ def _wavenumbers(length: float, count: int) -> Array:
 
 @dataclass(frozen=True)
 class ClampedBasis(JetProductBasis):
-    """The Ni x Nj products of the modes of clamped beams: zero along the edges, with their slope.
+    """The Ni x Nj products of clamped-beam modes: value and slope vanish along the edges.
 
     Between the edges they are nearly sines, so that elements at cell centres tell them apart as
     well; a smooth shape's coefficients fall as 1/k^5, its curvature converges as N^(-5/2). Their
@@ -407,7 +407,7 @@ Overlaps = Callable[[Order, Order], Array]
 
 
 def overlaps(basis: Basis) -> Overlaps:
-    """Tells the integrals (N, N) of one derivative of each function times another of each."""
+    """A function of two orders: the integrals (N, N) of products of those derivatives in m^2."""
     if isinstance(basis, ProductBasis):
         return basis.overlap
     points, weights = basis.quadrature()

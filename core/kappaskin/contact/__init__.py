@@ -1,4 +1,4 @@
-"""From readings to contact: position, force, object, local geometry."""
+"""Contact: where it is, how hard, what object it is, and the geometry of the skin there."""
 
 from kappaskin.contact.geometry import CurvatureFormMap as CurvatureFormMap
 from kappaskin.contact.geometry import contact_geometry as contact_geometry

@@ -1,4 +1,4 @@
-"""Point forces on an elastic skin: where rigid objects press, what elements read, the best fit."""
+"""Rigid objects on an elastic skin as point forces: models, readings, and their best fit."""
 
 import math
 from collections.abc import Callable
@@ -28,16 +28,16 @@ _ARC = np.cos((np.arange(ARC) + 0.5) * np.pi / ARC)
 _AROUND = 2 * np.pi * np.arange(12) / 12
 
 ROUND = np.stack([np.cos(_AROUND), np.sin(_AROUND), np.full(12, 1 / 12)], axis=-1)
-"""The `pattern` (12, 3) of an even circle: x, y and share of the force."""
+"""The `pattern` (12, 3) of a uniform circle: x, y and share of the force."""
 EVEN = (1.0, 1.0)
-"""The `narrow` of two arcs of the same width."""
+"""Relative `widths` of two arcs of the same width."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointForces:
-    """Forces `weights` (k,) in N at `points` (k, 2) in m, with derivatives for n parameters.
+    """Forces `weights` (k,) in N at `points` (k, 2) in m, and their derivatives.
 
-    `moves` (n, k, 2) are those of the points, `growth` (n, k) those of the weights.
+    `moves` (n, k, 2) are those of the points for n parameters, `growth` (n, k) of the weights.
     """
 
     points: Array
@@ -47,11 +47,11 @@ class PointForces:
 
 
 ForceModel = Callable[[Array], PointForces]
-"""Parameters to forces: x, y of the centre of force in m and the force in N come first."""
+"""From parameters to forces; the centre of force x, y in m and the force in N come first."""
 
 
 def ring(pattern: Array) -> ForceModel:
-    """x, y, F, q: the force in a `pattern` (k, 3) of x, y and share, sqrt(q) times as large."""
+    """Parameters x, y, F, q: a `pattern` (k, 3) of x, y and share of force, scaled by sqrt(q)."""
     share = pattern[:, 2]
     unit = pattern[:, :2] - share @ pattern[:, :2]  # x, y is the centre of force
 
@@ -67,20 +67,21 @@ def ring(pattern: Array) -> ForceModel:
 
 
 def ends(middle: float) -> ForceModel:
-    """x, y, F, angle, length squared, share: forces at two ends, and the share `middle` between.
+    """Parameters x, y, F, angle, length squared, share: forces at the two ends of an edge.
 
-    The ends have (1/2 + share) and (1/2 - share) of the rest.
+    The share `middle` of the force acts between them; the ends have (1/2 + share) and
+    (1/2 - share) of the rest.
     """
     return lambda parameters: _at_ends(parameters, np.zeros((2, 1)), middle)
 
 
-def arcs(narrow: tuple[float, float], middle: float) -> ForceModel:
-    """The same and q: each end's force on an arc across, of half width sqrt(q) times `narrow`."""
-    return lambda parameters: _at_ends(parameters, np.multiply.outer(narrow, _ARC), middle)
+def arcs(widths: tuple[float, float], middle: float) -> ForceModel:
+    """Parameters of `ends` and q: forces on arcs across the ends, half width sqrt(q) `widths`."""
+    return lambda parameters: _at_ends(parameters, np.multiply.outer(widths, _ARC), middle)
 
 
 def _at_ends(parameters: Array, across: Array, middle: float) -> PointForces:
-    """Forces off the axis by `across` (2, k) times the root of the last parameter."""
+    """Forces beside the axis by `across` (2, k) times the root of the last parameter."""
     force, angle, length, share = *parameters[2:4], math.sqrt(parameters[4]), parameters[5]
     axis = np.array([math.cos(angle), math.sin(angle)])
     beside = np.array([-axis[1], axis[0]])
@@ -114,20 +115,18 @@ _FALL = 1.6  # the power with which that falls
 
 
 class ElasticSkin:
-    """A plate with elements on it, answering to point forces."""
+    """A plate with elements on it: its displacement and readings under point forces."""
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, functions: int) -> None:
         patch = plate.patch
         if patch.strip:
-            raise Refusal(
-                "a strip bends along x alone: expected a skin with two sides to tell objects by"
-            )
+            raise Refusal("object recognition needs a 2-D skin; this one is a strip")
         if not plate.rigidity:
-            raise Refusal("a drum head has no curvature to tell objects by: expected a rigidity")
-        if len(layout) > _MOST:
             raise Refusal(
-                f"expected at most {_MOST} elements to tell objects by, got {len(layout)}"
+                "object recognition needs a rigidity above zero; this skin is a drum head"
             )
+        if len(layout) > _MOST:
+            raise Refusal(f"object recognition takes at most {_MOST} elements, got {len(layout)}")
         self.patch, self.side, self._layout = patch, min(patch.a, patch.b), layout
         self._basis = basis_for(patch, edge, functions, functions)
         self._compliance = plate.compliance(self._basis)
@@ -136,7 +135,7 @@ class ElasticSkin:
         self._M: NDArray[np.float32] = M.astype(np.float32)
         self.half_wave = max(patch.a, patch.b) / functions
         self.bend = 1 / (4 * math.pi * plate.rigidity)
-        """What the curvature inside a ring or an arc loses per N and e-fold of its size, in 1/m."""
+        """Curvature in 1/m lost inside a ring or an arc per N and e-fold of its size."""
 
     def _on_skin(self, points: Array) -> Array:
         return np.array([self.patch.inward(x, y) for x, y in points.tolist()])
@@ -159,9 +158,9 @@ class ElasticSkin:
         return self._felt(points) @ self._compliance.after(modal[None])[0]
 
     def pressed(self, points: Array, gap: Array, force: float) -> Array:
-        """Forces (k,) in N, none below zero, of a rigid object that presses with `force` in all.
+        """Contact forces (k,) in N, none below zero, of a rigid object under `force` in N.
 
-        Its surface lies `gap` (k,) in m behind its tip at `points` (k, 2).
+        Its surface lies `gap` (k,) in m behind its tip at `points` (k, 2) in m.
         """
         from scipy.optimize import nnls  # slow to import, and seldom needed
 
@@ -176,9 +175,9 @@ class ElasticSkin:
         return nnls(A, b)[0]
 
     def unresolved(self, forces: PointForces) -> Array:
-        """Variance (R,) in 1/m^2 of what finer functions would add to the readings.
+        """Variance (R,) in 1/m^2 of the readings due to detail finer than the functions.
 
-        Only an element within a half wave or two of a force sees it.
+        It matters only for elements within a half wave or two of a force.
         """
         apart = self._layout.positions[:, None] - forces.points
         waves = np.hypot(apart[..., 0], apart[..., 1]) / self.half_wave
@@ -186,9 +185,10 @@ class ElasticSkin:
         return np.tile(blur.sum(axis=1), 3)
 
     def best_pair(self, around: Array, readings: Array, used: Mask) -> tuple[Array, Array]:
-        """The two points (2, 2) in m near `around` whose pushes explain the readings best.
+        """The two point forces near `around` (2,) in m that explain the readings best.
 
-        With their forces (2,) in N, of one sign. `readings` (R,) are zero where not `used`.
+        Points (2, 2) in m, and forces (2,) in N of one sign. `readings` (R,) are zero where not
+        `used` (R,).
         """
         angles = 2 * np.pi * np.arange(_ANGLES) / _ANGLES
         out = np.stack([np.multiply.outer(_SEARCHED, f(angles)).ravel() for f in (np.cos, np.sin)])
@@ -214,7 +214,7 @@ _RIDGE = 1e-12  # of the diagonal, always
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """What is known of n parameters beforehand: normal around `mean`, within `low` and `high`."""
+    """Prior of n parameters: normal with `mean` and `sd`, within the bounds `low` and `high`."""
 
     mean: Array
     sd: Array
@@ -224,9 +224,10 @@ class Prior:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Optimum:
-    """The best parameters (n,), their covariance (n, n) and cost, with the readings' part of it.
+    """The best parameters (n,) of a contact, and their covariance (n, n).
 
-    `ahead` (n,) is the step that a bound forbade.
+    `cost` is chi-squared with the prior, `squares` that of the readings alone; `ahead` (n,) is the
+    step that a bound prevented.
     """
 
     contact: ForceModel
@@ -246,7 +247,10 @@ def optimise(
     weight: Array,
     steps: int,
 ) -> Optimum:
-    """The optimum near `start` for `readings` (R,) with weights (R,), 1 / sd or 0 where missing."""
+    """The most likely parameters near `start` (n,), by damped Gauss-Newton steps.
+
+    `readings` (R,) in 1/m have the `weight` (R,), 1 / sd, or 0 where missing.
+    """
     p, damping = start, _DAMPING
     here = _linearised(skin, contact, p, prior, readings, weight)
     for _ in range(steps):
@@ -263,7 +267,7 @@ def optimise(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _NormalEquations:
-    """The cost at some parameters, and its normal equations scaled to a diagonal of ones."""
+    """Normal equations at some parameters, scaled to a diagonal of ones, and the cost there."""
 
     cost: float
     squares: float

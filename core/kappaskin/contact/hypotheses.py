@@ -32,7 +32,7 @@ from kappaskin.contact.interior import (
 from kappaskin.frames import Array, Mask, Touch
 
 SHARE = 0.2
-"""Standard deviation, known beforehand, of how unequal the forces on two ends are."""
+"""Prior standard deviation of the inequality of the forces on two ends."""
 _ANGLE = 0.9  # rad, of an axis that is not known
 
 _INEXACT = 0.02  # of a reading: that closely does a skin behave like a plate at best
@@ -44,7 +44,7 @@ _BETTER = 6.0  # chi-squared that another axis must gain
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypotheses:
-    """What may touch the skin, and the `noise` in 1/m that the best of them leaves."""
+    """The best object of each kind for a contact; `noise` in 1/m is what the best one leaves."""
 
     sphere: Hypothesis
     edge: Hypothesis
@@ -61,10 +61,10 @@ def fit_hypotheses(
     noise: float,
     touch: Touch,
 ) -> Hypotheses:
-    """The best objects for `readings` (R,), zero where not `used`, around the contact `touch`.
+    """The best objects for `readings` (R,) in 1/m, zero where not `used`, at the contact `touch`.
 
-    First with few functions: a reading grows without bounds as a force comes close, and more of
-    them would keep a force on the side of an element where it started.
+    First on the `coarse` skin: a reading grows without bound as a force comes close, and with many
+    functions a force would stay on the side of an element where it started.
     """
     frame = _WeightedReadings(coarse, readings, used)
     pair, forces = coarse.best_pair(touch.position, readings, used)
@@ -99,25 +99,25 @@ def _at(points: Array, forces: Array) -> PointForces:
 
 
 class _WeightedReadings:
-    """One frame's readings, each with the weight it deserves."""
+    """The readings of one frame, weighted by their noise and by what the models leave out."""
 
     def __init__(self, skin: ElasticSkin, readings: Array, used: Mask) -> None:
         self.skin, self._readings, self._used = skin, readings, used
         self._least, self._start = least_width(skin), (_START * skin.side) ** 2
 
     def trust(self, noise: float, *forces: PointForces) -> None:
-        """Weigh readings by the noise and by what the functions leave out close to `forces`."""
+        """Set the weights from `noise` in 1/m and from unresolved detail close to `forces`."""
         left_out = np.max([self.skin.unresolved(f) for f in forces], axis=0)
         inexact = (_INEXACT * self._readings) ** 2
         self._weight = self._used / np.sqrt(noise**2 + left_out + inexact)
 
     def spread(self, tried: tuple[Optimum, ...]) -> float:
-        """What the best of the optima leaves, in units of the noise they were weighed with."""
+        """Residual of the best of the optima, in units of the noise of the weights."""
         squares = min(optimum.squares for optimum in tried)
         return math.sqrt(squares / (int(self._used.sum()) - 6))
 
     def _climb(self, contact: ForceModel, start: Array, steps: int) -> Optimum:
-        """x, y, F; then angle, squared length and share, if there are ends; then q."""
+        """Optimise x, y, F; then angle, squared length and share, if there are ends; then q."""
         n = len(start)
         mean, sd = start.copy(), np.full(n, np.inf)
         low, high = np.full(n, -np.inf), np.full(n, np.inf)
@@ -155,7 +155,7 @@ class _WeightedReadings:
         return across if across.cost < along.cost - _BETTER else along
 
     def shaped(self, sphere: Optimum) -> Optimum:
-        """The sphere that presses where the skin's own bending lets it."""
+        """The sphere, its ring of forces as the bending of the skin shapes it."""
         sphere = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
         for _ in range(2 if self.skin.patch.base_curvature else 1):  # further from a circle
             again = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
@@ -165,7 +165,7 @@ class _WeightedReadings:
         return sphere
 
     def edged(self, near: Optimum) -> Optimum:
-        """The edge near another optimum that presses between its ends where it must."""
+        """The edge near another optimum, with the force between its ends that contact demands."""
         share = middle(self.skin, near)
         edge = self.again(near, ends(share), 6)
         return self.again(edge, ends(middle(self.skin, edge)), 6) if share else edge
@@ -175,20 +175,20 @@ class _WeightedReadings:
         return self._climb(arcs(EVEN, 0.0), np.append(edge.parameters, self._start / 10), 4)
 
     def rounded(self, cylinder: Optimum, edge: Optimum) -> Optimum:
-        """The cylinder of one curvature at both ends that presses between them as an edge does."""
+        """The cylinder with one curvature at both ends and the force between them of an edge."""
         share = middle(self.skin, edge)
         return self.again(cylinder, arcs(arc_widths(self.skin, cylinder, share), share), 7)
 
 
-# What is held likely beforehand, in sides of the skin: a radius between these two, every factor
-# alike; a length of up to one side, every length alike; any angle; and `SHARE`.
+# Priors, in sides of the skin: a radius between these two, uniform in its logarithm; a uniform
+# length of up to one side; any angle; and `SHARE`.
 _RADII = (0.02, 5.0)
 
 _ALIGNED = 0.1  # rad between a plane's contact and the axis of a bent skin
 
 
 def log_likelihoods(skin: ElasticSkin, all_of: Hypotheses) -> dict[str, float]:
-    """Logarithms of the marginal likelihoods of all kinds, up to what they have in common."""
+    """Logarithms of the marginal likelihoods of all kinds, up to a common constant."""
     sphere, cylinder = cast("Width", all_of.sphere.width), cast("Width", all_of.cylinder.width)
     of_cylinder = laplace_integral(all_of.cylinder.best, all_of) + length_prior(
         skin, all_of.cylinder.best
@@ -205,7 +205,7 @@ def log_likelihoods(skin: ElasticSkin, all_of: Hypotheses) -> dict[str, float]:
 
 
 def laplace_integral(best: Optimum, all_of: Hypotheses) -> float:
-    """Laplace's integral over all parameters, their priors flat, the noise's size unknown."""
+    """Log of Laplace's integral over all parameters: flat priors, unknown noise."""
     scale = np.sqrt(np.diag(best.covariance))
     correlation = best.covariance / np.multiply.outer(scale, scale)
     volume = np.linalg.slogdet(2 * np.pi * correlation)[1] / 2 + np.log(scale).sum()
@@ -213,12 +213,12 @@ def laplace_integral(best: Optimum, all_of: Hypotheses) -> float:
 
 
 def _line(sd: float, likely: Array) -> float:
-    """The log of a prior's mean of the likelihood `likely`, in place of its integral."""
+    """Log of the mean of the likelihood `likely` over a prior, less that of its integral."""
     return math.log(max(float(np.mean(likely)), 1e-300)) - math.log(sd * math.sqrt(2 * math.pi))
 
 
 def length_prior(skin: ElasticSkin, best: Optimum) -> float:
-    """Priors of angle, length and share."""
+    """Log correction for the priors of angle, length and share."""
     square, sd = best.parameters[4], math.sqrt(best.covariance[4, 4])
     lengths = np.linspace(0, skin.side, 400)
     likely = np.exp(-0.5 * ((lengths**2 - square) / sd) ** 2)
@@ -227,27 +227,28 @@ def length_prior(skin: ElasticSkin, best: Optimum) -> float:
 
 
 def _beyond_bound(best: Optimum, width: Width) -> float:
-    """What the likelihood rises from a width on its bound to where the readings would have it."""
+    """Rise of the log likelihood from a width on its bound to the unconstrained one."""
     return 0.5 * ((float(best.parameters[-1]) - width.q) / width.sd) ** 2
 
 
 def _unexplained(all_of: Hypotheses, width: Width) -> float:
-    """What the likelihood of a cylinder gains over an edge's beyond what its width accounts for."""
+    """Gain of a cylinder over an edge in log likelihood that its width does not explain."""
     gain = all_of.edge.best.cost - all_of.cylinder.best.cost
     sd = math.sqrt(all_of.cylinder.best.covariance[-1, -1])  # of the readings alone
     return max(gain - max(width.q / sd, 0.0) ** 2, 0.0) / 2
 
 
 def radius_prior(skin: ElasticSkin, width: Width) -> float:
+    """Log correction for the prior of the radius."""
     low, high = (math.log(share * skin.side) for share in _RADII)
     curvatures = np.exp(-np.linspace(low, high, 400))
     return _line(width.sd, width.likelihood(width.of_curvature(curvatures)))
 
 
 def plane_prior(skin: ElasticSkin, best: Optimum, width: Width) -> float:
-    """Of a cylinder without curvature along the base's axis; of nothing on a flat skin.
+    """Log correction for a plane: a cylinder without curvature along the axis of a bent skin.
 
-    There a plane of more than its size touches nothing but the edges.
+    Minus infinity on a flat skin, where a large plane touches only the edges.
     """
     if not skin.patch.base_curvature:
         return -math.inf

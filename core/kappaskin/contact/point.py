@@ -1,4 +1,4 @@
-"""Point contact: where a load acts and how large it is."""
+"""Point contact: the position and force of the point load that explains the readings best."""
 
 import math
 from collections.abc import Callable
@@ -16,10 +16,10 @@ from kappaskin.sensing import SensorLayout, gage_multipliers
 
 
 class LoadProducts(NamedTuple):
-    """Scalar products of T, what a unit load at a place makes of the readings, and its slopes.
+    """Scalar products of T, the readings of a unit load at a place, and of its derivatives.
 
     `tt`, `tx`, `ty`, `xx`, `xy`, `yy` are those of T, T_x and T_y with each other, `h`, `hx` and
-    `hy` those with the readings; `gives` in m/N is how far the load moves the skin below it.
+    `hy` those with the readings; `gives` in m/N is the displacement under the load.
     """
 
     tt: float
@@ -35,7 +35,7 @@ class LoadProducts(NamedTuple):
 
 
 class LoadResponses(Protocol):
-    """Point loads at every place, read by the same channels."""
+    """Readings of point loads anywhere on the skin, by the same channels."""
 
     def on_grid(self, x: Array, y: Array) -> Array:
         """T'T (ny, nx) on the grid of `x` (nx,), `y` (ny,) in m."""
@@ -47,7 +47,7 @@ class LoadResponses(Protocol):
 
 
 def load_responses(basis: Basis, G: Array, C: Array) -> LoadResponses:
-    """The loads whose functions have the products G = M'M (N, N); C (N, N) in m/N is how they give.
+    """The responses with G = M'M (N, N) and the compliance C (N, N) in m/N.
 
     M (R, N) is what the channels read of unit modal forces.
     """
@@ -86,7 +86,7 @@ class _Dense:
 
 
 class _Sines:
-    """Sines: every product of T and its slopes is a sum of waves along x times waves along y."""
+    """For sines: each product of T and its slopes is a sum of waves along x times waves along y."""
 
     def __init__(self, basis: SineBasis, G: Array, C: Array) -> None:
         patch, self._shape = basis.patch, basis.shape
@@ -166,13 +166,13 @@ _SECOND = (2, 0), (0, 2), (1, 1)  # orders of the derivatives that flat skins re
 _ROUNDING = 1e-15  # of the largest: a part as small is none
 
 ModalProjection = Callable[[Array], Array]
-"""Readings K (3 P,) in 1/m, zero where there is none, to M'K (N,)."""
+"""From readings K (3 P,) in 1/m, zero where missing, to M'K (N,)."""
 
 
 def modal_projection(
     layout: SensorLayout, basis: Basis, compliance: Compliance, M: Array
 ) -> ModalProjection:
-    """M'K for what the elements read of unit modal forces, M (3 P, N).
+    """The map from readings K to M'K, where M (3 P, N) are the readings of unit modal forces.
 
     Where the elements stand on a grid, and the functions are sines that a load does not mix, M is
     for each component a matrix for x times one for y: a hundredth of the numbers.
@@ -184,7 +184,7 @@ def modal_projection(
 
 
 def _sides(layout: SensorLayout) -> tuple[Array, Array]:
-    """x of the columns and y of the rows of elements, if they stand so."""
+    """x of the columns and y of the rows of elements, for a grid."""
     m = layout.shape[0] if layout.shape else 1
     return layout.positions[:m, 0], layout.positions[::m, 1]
 
@@ -240,7 +240,7 @@ NO_TOUCH = Touch(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Readings:
-    """Readings K as the contact needs them: M'K (N,), K'K, and `spare` more than it takes."""
+    """Readings K as M'K (N,) and K'K, with the degrees of freedom `spare`."""
 
     h: Array
     power: float
@@ -249,7 +249,7 @@ class _Readings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ContactTables:
-    """What depends on which readings are used: T'T everywhere, and on the grid (ny, nx)."""
+    """What depends on which readings are used: the responses, and T'T on the grid (ny, nx)."""
 
     loads: LoadResponses
     norm: Array
@@ -280,8 +280,8 @@ class PointContact:
         self._map = self.basis.on_grid(self._x, self._y)
         points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
         self._still = np.flatnonzero(~self.patch.moves(points))
-        self._remembered = PatternCache[_ContactTables]()
-        self._whole = self._remembered(self._live, self._tables)
+        self._cache = PatternCache[_ContactTables]()
+        self._whole = self._cache(self._live, self._tables)
         self._all_live = bool(self._live.all())
 
     def _tables(self, used: Mask) -> _ContactTables:
@@ -309,19 +309,19 @@ class PointContact:
         return self._refined(*self.patch.inward(x, y), readings, tables.loads, fit)
 
     def _used(self, K: Array) -> tuple[Array, _ContactTables, float]:
-        """The readings that are there, zero for the others, their tables and sum of squares."""
+        """The readings with zeros for missing ones, their tables, and their sum of squares."""
         power = float(K.dot(K))
         if self._all_live and math.isfinite(power):
             return K, self._whole, power
         used = self._live & np.isfinite(K)
         known = np.where(used, K, 0.0)
-        return known, self._remembered(used, self._tables), float(known.dot(known))
+        return known, self._cache(used, self._tables), float(known.dot(known))
 
     def _refined(
         self, x: float, y: float, readings: _Readings, loads: LoadResponses, fit: Fit
     ) -> Touch:
-        x, y, place = self._climbed(x, y, readings.h, loads)
-        # What a point load leaves of the readings: the noise, or more where it is none.
+        x, y, place = self._optimised(x, y, readings.h, loads)
+        # What a point load leaves of the readings: the noise, or more where it is no point load.
         spread = math.sqrt(max(readings.power - place.explained, 0.0) / readings.spare)
         sd_x, sd_y, sd_force = place.unit_sd
         return Touch(
@@ -335,10 +335,10 @@ class PointContact:
             self._near_rim(x, y, readings.h, loads, place.explained - (_REACH * spread) ** 2),
         )
 
-    def _climbed(
+    def _optimised(
         self, x: float, y: float, h: Array, loads: LoadResponses
     ) -> "tuple[float, float, _NewtonStep]":
-        """The best position from (x, y) on, and what holds at the last step to it."""
+        """The best position near (x, y), and the last step to it."""
         a, b = self.patch.a, self.patch.b
         place = _NewtonStep(loads.at(x, y, h))
         for _ in range(_STEPS):
@@ -351,10 +351,10 @@ class PointContact:
         return x, y, place
 
     def _near_rim(self, x: float, y: float, h: Array, loads: LoadResponses, least: float) -> bool:
-        """Whether the contact is within the shortest half wave of the functions from a held edge.
+        """Whether the contact may lie on the rim, where its force is not determined.
 
-        Or whether a load on the rim beside it explains `least` or more of the readings, as well as
-        one here: the force goes to infinity there.
+        It is within the shortest half wave of the functions from a held edge, or a load on the rim
+        beside it explains as much of the readings, `least` or more.
         """
         if self.basis.unobservable is not None:
             return False
@@ -369,10 +369,10 @@ class PointContact:
     def _displacement(
         self, fit: Fit, x: float, y: float, place: "_NewtonStep"
     ) -> tuple[float, float]:
-        """Displacement in m at (x, y), of the fitted shape, and how far it may be off.
+        """Displacement in m of the fitted shape at (x, y), and its standard deviation.
 
-        Besides the noise, by as much as the point load's own shape disagrees: what lies between is
-        finer than the fit's functions.
+        Besides the noise it includes the difference to the displacement under the point load,
+        which is finer than the fit's functions.
         """
         shape, covariance = fit.jet(x, y)
         fitted, seen = float(shape[0]), float(covariance[0, 0])
@@ -383,7 +383,7 @@ class PointContact:
 class _NewtonStep:
     """The best force at a place, the Gauss-Newton step from there, and the error bars.
 
-    `force` is the one after the step, `gives` how far the skin does there, in m/N.
+    `force` in N is that after the step, `gives` the compliance of the skin there in m/N.
     """
 
     def __init__(self, of: LoadProducts) -> None:
@@ -408,7 +408,7 @@ def _clamped(low: float, value: float, high: float) -> float:
 
 
 def _parabola_peak(x: Array, values: Array, i: int) -> float:
-    """Where the parabola through `values` at `x` around their largest, number `i`, is highest."""
+    """Maximum of the parabola through `values` at `x` around the largest, number `i`."""
     if not 0 < i < len(x) - 1:
         return float(x[i])
     before, here, after = values[i - 1 : i + 2].tolist()
@@ -417,7 +417,7 @@ def _parabola_peak(x: Array, values: Array, i: int) -> float:
 
 
 def _threshold(spare: float) -> float:
-    """What a contact must explain, in units of the noise's variance known from `spare` readings.
+    """What a contact must explain, in units of the noise variance estimated from `spare` readings.
 
     The likelihood ratio spare ln(1 + F / spare) must exceed `_SIGNIFICANT`.
     """

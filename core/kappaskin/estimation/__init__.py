@@ -1,4 +1,4 @@
-"""Estimators: from readings to coefficients with error bars; placement of elements; regions."""
+"""Estimation: readings to coefficients with error bars; element placement; scanned regions."""
 
 from kappaskin.estimation.bayes import Bayes as Bayes
 from kappaskin.estimation.estimator import RIM_SD as RIM_SD

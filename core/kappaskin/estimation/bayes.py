@@ -1,4 +1,4 @@
-"""Bayesian estimator: the prior of a plate under random loads decides what the readings do not."""
+"""Bayesian estimator, with the prior of a plate under random loads."""
 
 import math
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from kappaskin.mechanics import Plate
 
 
 def prior_root(basis: Basis) -> Array:
-    """L (N, F), L L' the covariance of the coefficients in m^2 of a plate under a white load.
+    """L (N, F) in m: L L' is the covariance of the coefficients of a plate under a white load.
 
-    White means that the load at one place tells nothing of that at another: with G the Gram matrix
-    of the functions its modal forces have the covariance G, and the plate of compliance C answers
-    with C G C. L spans what the edges leave `basis.free`, F of N directions: shapes that no reading
-    sees are left out. Scaled so that the displacement's RMS over the skin is 1 m.
+    White means that loads at two points are independent: with G the Gram matrix of the functions,
+    the modal forces have the covariance G, and the coefficients of a plate of compliance C have
+    C G C. L spans the F combinations that are `basis.free`; unobservable shapes are left out.
+    Scaled so that the displacement's RMS over the skin is 1 m.
 
     For sines on a flat skin it is the diagonal of 1 / (k_i^2 + k_j^2)^2, so scaled.
     """
@@ -38,7 +38,7 @@ def prior_root(basis: Basis) -> Array:
 
 
 def _on_free(basis: Basis, root: Array) -> Array:
-    """The part of a covariance's `root` (N, N) on the free combinations, as a root (N, F)."""
+    """The part of a covariance's `root` (N, N) in the free combinations, as a root (N, F)."""
     W = np.eye(basis.size) if basis.free is None else basis.free
     V = W if basis.unobservable is None else np.hstack([W, basis.unobservable])
     share = cast("Array", np.linalg.lstsq(V, root)[0])[: W.shape[1]]
@@ -86,7 +86,7 @@ class PosteriorUncertainty:
 # it from there (doi:10.1007/s11336-013-9328-2): -2 p ln (tau sigma) = -p ln gamma - 2 p ln sigma^2
 # more. With p = 1, one function that is seen among others unseen would let tau run away.
 class MarginalLikelihood:
-    """The prior's scale and the noise that make readings K = A z most likely, A (R, F)."""
+    """The scale of the prior and the noise that make readings K = A z most likely, A (R, F)."""
 
     def __init__(self, A: Array, told: bool, floor: float) -> None:
         U, s, Vt = linalg.svd(A, full_matrices=len(A) < A.shape[1])
@@ -151,20 +151,20 @@ class MarginalLikelihood:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _BayesSolver:
-    """What depends on which readings are used: the evidence, and B = L V (N, F)."""
+    """What depends on which readings are used: the likelihood, and B = L V (N, F)."""
 
-    evidence: MarginalLikelihood
+    likelihood: MarginalLikelihood
     B: Array
 
 
 class Bayes(Estimator):
-    """The most likely shape of a plate under a white load, given the readings.
+    """The posterior mean of the shape of a plate under a white load, given the readings.
 
     The coefficients are Gaussian with the standard deviation of a plate's under a load that is
     white in space, for sines proportional to 1/(i^2/a^2 + j^2/b^2)^2. Its scale, and the noise
     unless `sigma` is given, are those that make the readings most likely (type II maximum
-    likelihood, doi:10.1162/neco.1992.4.3.415), of each frame by itself. What the readings do not
-    decide is left to the prior, with error bars that say so: no basis is too large.
+    likelihood, doi:10.1162/neco.1992.4.3.415), of each frame by itself. The prior decides what the
+    readings do not, with error bars that show it: no basis is too large.
     """
 
     has_prior = True
@@ -178,18 +178,18 @@ class Bayes(Estimator):
     def _made(self, used: Mask) -> _BayesSolver:
         A = self.weight[used, None] * (self.M[used] @ self._root)
         told, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
-        evidence = MarginalLikelihood(A, told, rounding**2)
-        return _BayesSolver(evidence, self._root @ evidence.V)
+        likelihood = MarginalLikelihood(A, told, rounding**2)
+        return _BayesSolver(likelihood, self._root @ likelihood.V)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         if not used.any():
             raise self.refusal(0, 0)
         solver, frames = self._solvers(used, self._made), flat.shape[:-1]
-        evidence, B = solver.evidence, solver.B
-        y, gamma, sigma = evidence(np.atleast_2d(flat[..., used] * self.weight[used]))
-        d = 1 + gamma[:, None] * evidence.s2
+        likelihood, B = solver.likelihood, solver.B
+        y, gamma, sigma = likelihood(np.atleast_2d(flat[..., used] * self.weight[used]))
+        d = 1 + gamma[:, None] * likelihood.s2
         k = y.shape[1]
-        z = y * (gamma[:, None] * np.sqrt(evidence.s2[:k]) / d[:, :k])
+        z = y * (gamma[:, None] * np.sqrt(likelihood.s2[:k]) / d[:, :k])
         c = (z @ B[:, :k].T).astype(self.dtype)
         spreads = [PosteriorUncertainty(B, v) for v in gamma[:, None] / d]
         spent = (1 - 1 / d).sum(axis=1)

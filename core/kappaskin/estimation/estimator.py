@@ -1,4 +1,4 @@
-"""The estimator interface: curvature to coefficients with error bars."""
+"""The interface of all estimators: curvature to coefficients with error bars."""
 
 from abc import ABC, abstractmethod
 from collections import OrderedDict
@@ -15,18 +15,18 @@ from kappaskin.estimation.fit import Fit, Uncertainty, merged_fits
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
 
-_SETS = 8  # that are kept: those used last
+_SETS = 8  # that are cached: those used last
 _Made = TypeVar("_Made")
 
 
 class PatternCache(Generic[_Made]):
-    """What was made of the sets of readings that were used last."""
+    """A cache of results that depend on which readings there are, for the last few such sets."""
 
     def __init__(self) -> None:
         self._made: OrderedDict[bytes, _Made] = OrderedDict()
 
     def __call__(self, used: Mask, make: Callable[[Mask], _Made]) -> _Made:
-        """What `make` makes of the readings `used`; it is asked when it was not lately."""
+        """`make(used)` for the mask `used` of readings, from the cache where it is there."""
         key = used.tobytes()
         if key in self._made:
             self._made.move_to_end(key)
@@ -38,7 +38,7 @@ class PatternCache(Generic[_Made]):
 
 
 RIM_SD = 0.2e-3
-"""How far in m a rim that gives is expected to move, unless said otherwise."""
+"""Default standard deviation in m of the movement of an elastic rim."""
 
 # Powers of the largest number: the squares of readings over sigmas, added up, stay below it.
 _SAFE, _SAFE_SIGMA = 0.25, 0.2
@@ -46,7 +46,7 @@ _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as
 
 
 def real_array(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Array:
-    """A copy of `values` in this `dtype`; raises a `Refusal` where they are no real numbers."""
+    """A copy of `values` in this `dtype`; raises a `Refusal` for anything but real numbers."""
     if type(values) is np.ndarray and values.dtype == dtype:  # as in most frames: the fastest
         return values.copy()
     try:
@@ -64,7 +64,7 @@ def real_array(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> A
 
 
 def column_lengths(A: Array) -> Array:
-    """Lengths (F,) of the columns of A (R, F); infinite where nothing but rounding is left."""
+    """Lengths (F,) of the columns of A (R, F); infinite where only rounding is left."""
     length = np.linalg.norm(A, axis=0)
     length[length <= _UNSEEN * length.max(initial=0.0)] = np.inf
     return length
@@ -74,18 +74,18 @@ class Estimator(ABC):
     """`fit = LeastSquares(basis, layout)`, factored once; `fit(curvature)` is a `Fit`.
 
     `sigma`, a scalar or (3, P) in 1/m, is the standard deviation of each reading; without it all
-    readings weigh the same and their noise is estimated. An infinite sigma leaves a reading out.
-    `rim_sd` in m is how far a rim that gives is expected to move: the standard deviation of each
-    shape that no reading sees, by RMS along the rim. A frame is computed in `dtype`, which is
-    float64 or float32; the factorisation always in float64.
+    readings weigh the same and their noise is estimated. An infinite sigma excludes a reading.
+    `rim_sd` in m is the standard deviation of each unobservable movement of an elastic rim, by RMS
+    along it. Frames are computed in `dtype`, float64 or float32; the factorisation is always in
+    float64.
     """
 
     has_matrix: ClassVar = True
-    """Whether M is made, 3 P x Ni Nj numbers."""
+    """Whether it makes the curvature operator M, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
-    """Whether what the readings do not decide is left to a prior, so that no basis is too large."""
+    """Whether a prior decides what the readings do not, so that no basis is too large."""
     remembers: ClassVar = False
-    """Whether frames depend on earlier ones: each is to be followed once, in order."""
+    """Whether a fit depends on earlier frames: `follow` each frame once, in order."""
 
     def __init__(
         self,
@@ -106,22 +106,22 @@ class Estimator(ABC):
             np.empty((basis.size, 0)) if basis.unobservable is None else basis.unobservable
         )
         self.undecided = rim_sd * unobservable
-        """Shapes (N, q) in m that no reading sees, each as far as it is expected to go."""
+        """Unobservable shapes (N, q) in m, each one standard deviation large."""
         self._largest = float(np.finfo(self.dtype).max) ** _SAFE
         self.sigma = None if sigma is None else real_array(sigma, "sigma")
-        """The standard deviations in 1/m that were told, one or (3, P); None if none were."""
+        """The given standard deviations in 1/m, one or (3, P); None if none were given."""
         self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
-        """What each reading (3 P,) is worth, 1 / sigma in m; 1 for all without a sigma."""
+        """Weight 1 / sigma (3 P,) of each reading in m; 1 without a sigma."""
         self.readable: Mask = layout.live.ravel() & (self.weight > 0)
-        """Which readings (3 P,) are used when they are there."""
+        """Which readings (3 P,) are used when they are present."""
         self._all_readable = bool(self.readable.all())
         self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
-        """How many numbers there are to tell: the coefficients less what the edges decide."""
+        """Number of unknowns: the coefficients less what the boundary conditions decide."""
         self._set_up()
 
     @abstractmethod
     def _set_up(self) -> None:
-        """Make once what no frame changes; raises a `Refusal` when no shape can be told."""
+        """Compute once what no frame changes; raises a `Refusal` when no shape is determined."""
 
     def _weights(self, sigma: float | Array) -> Array:
         sigma = np.asarray(sigma)
@@ -149,7 +149,7 @@ class Estimator(ABC):
         return self.M.T.astype(self.dtype)
 
     def predicted(self, coefficients: Array) -> Array:
-        """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
+        """Readings (..., 3, P) in 1/m that `coefficients` (..., Ni, Nj) in m would cause."""
         frames = coefficients.shape[:-2]
         flat = coefficients.reshape(*frames, self.basis.size)
         return np.dot(flat, self._M_T).reshape(*frames, 3, len(self.layout))
@@ -164,7 +164,8 @@ class Estimator(ABC):
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading.
 
-        So do readings that are too large to compute with, of 4e9 in float32 and 1e77 in float64.
+        So do readings too large to compute with: 4e9 in float32, 1e77 in float64. Raises
+        `RankDeficient` when the readings do not determine the shape.
         """
         K = real_array(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
         self._check_shape(K)
@@ -194,13 +195,13 @@ class Estimator(ABC):
     def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
         """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.
 
-        Both are NaN where nothing was read; `held` (3, P) has what is known of earlier frames too.
-        What remembers nothing itself fits that.
+        Both are NaN where nothing was read; `held` (3, P) also has the readings held from earlier
+        frames. An estimator without memory fits `held`.
         """
         return self(held)
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
-        """The fit to a skin at rest, of which only the readings `missing` (3, P) are not there."""
+        """The fit to a skin at rest, without the readings `missing` (3, P)."""
         return self(self._rest(missing))
 
     def _rest(self, missing: Mask | None) -> Array:
@@ -209,7 +210,7 @@ class Estimator(ABC):
 
     @abstractmethod
     def _fit(self, flat: Array, used: Mask) -> Fit:
-        """Fit readings (3 P,) or (T, 3 P) of which those `used` (3 P,) are there, the rest NaN."""
+        """Fit readings (3 P,) or (T, 3 P), of which those `used` (3 P,) are there, the rest NaN."""
 
     def _answer(
         self, flat: Array, c: Array, spread: Uncertainty, spare: int, steps: ArrayLike = 0
@@ -227,7 +228,7 @@ class Estimator(ABC):
         )
 
     def _moves_as_a_whole(self) -> bool:
-        """Whether the basis has a function that changes no curvature anywhere; only arcs may."""
+        """Whether a function of the basis changes no curvature anywhere; only arcs may have one."""
         patch, W = self.basis.patch, self.basis.free
         if not (patch.strip and patch.base_curvature):
             return False
@@ -236,7 +237,7 @@ class Estimator(ABC):
         return bool(np.isinf(column_lengths(bends if W is None else bends @ W)).any())
 
     def refusal(self, readings: int, rank: int) -> RankDeficient:
-        """Why `readings` of them, which determine `rank` coefficients, do not decide a shape."""
+        """The error for `readings` readings that determine only `rank` coefficients."""
         (Ni, Nj), N, layout = self.basis.shape, self.unknowns, self.layout
         bound = "at most " if readings < N else ""
         what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
@@ -272,6 +273,6 @@ class Estimator(ABC):
 
 
 def _squared(a: Array) -> float:
-    """The sum of squares of `a`: of all that tells whether it is finite and small, the fastest."""
+    """Sum of squares of `a`: the fastest test of whether it is finite and small."""
     with np.errstate(over="ignore"):
         return float(a.dot(a))

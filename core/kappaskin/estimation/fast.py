@@ -26,7 +26,7 @@ _FEW = 0.5  # of the cells of a grid must have elements
 class _GridSide:
     """The first `count` sines along one side at the centres of its `cells`, and their cosines.
 
-    `constant` along the width of a strip: one function, alike everywhere.
+    `constant` along the width of a strip: one constant function.
     """
 
     count: int
@@ -42,9 +42,9 @@ class _GridSide:
         return sines, np.where(last, 0.0, sines)
 
     def analysed(self, K: Array, axis: int, cosines: bool, spend: bool = False) -> Array:
-        """Components of `K` along the unit sines or cosines; a last cosine of none is left out.
+        """Components of `K` along the unit sines or cosines, without a last, vanishing cosine.
 
-        They take the place of `K` when it may be spent.
+        With `spend` they may overwrite `K`.
         """
         # Slow to import, and only needed here.
         from scipy.fft import dct, dst
@@ -68,7 +68,7 @@ class _GridSide:
 class Transforms:
     """M of `basis` on a regular grid of m x n elements, and its transpose, computed in `dtype`.
 
-    Their gages are `gage_length` in m long.
+    The gages of the elements are `gage_length` in m long.
 
     The sampled sines and cosines are orthogonal (DST-II and DCT-II), so that M c is one factor per
     function and channel, `gain` (3, Nj, Ni), and a fast transform per channel. Readings here are
@@ -94,7 +94,7 @@ class Transforms:
         )
 
     def analysed(self, K: Array, scale: Array) -> Array:
-        """M^T K (..., Nj, Ni), each channel times its `scale` (3,); one with none is not read."""
+        """M^T K (..., Nj, Ni), each component times its `scale` (3,); one with zero is skipped."""
         total = np.zeros((*K.shape[:-3], *self.gain.shape[1:]), self.gain.dtype)
         for channel in np.flatnonzero(scale):
             cosines = bool(channel == 2)
@@ -145,10 +145,10 @@ class ScaledOperator:
 
 
 def grid_cells(layout: SensorLayout) -> tuple[int, int, NDArray[np.intp] | None]:
-    """The m x n grid that the elements stand on, and the cell p + m q of each (P,).
+    """The m x n grid of the elements, and the cell p + m q (P,) of each.
 
     The cells are None when they are 0, 1, 2, ... Elements may come in any order and some may be
-    left out, but none of the first column and row all together.
+    missing, but not all of the first column or row.
     """
     P, sides = layout.positions, np.array([layout.patch.a, layout.patch.b])
     least = np.maximum(P.min(axis=0), _FEW * sides / (2 * len(P)))
@@ -177,13 +177,13 @@ _MISSING = 4096  # readings that may be missing when error bars are asked for
 
 
 def _parts(count: int, readings: int) -> list[slice]:
-    """`count` frames of so many `readings` in parts that are computed together; at least one."""
+    """Slices of `count` frames of so many `readings` that are computed together; at least one."""
     length = max(1, _AT_ONCE // readings)
     return [slice(start, start + length) for start in range(0, max(count, 1), length)]
 
 
 def _joined(parts: list[NDArray[_Number]]) -> NDArray[_Number]:
-    """All frames of the parts; those of a single one are not copied."""
+    """The frames of all parts; a single part is not copied."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
@@ -194,7 +194,7 @@ def _squares(a: Array, axes: int) -> Array:
 
 
 def _least_eigenvalue(A: ScaledOperator, least: float) -> float:
-    """The least eigenvalue of A^T A: the share of some shape that is all the readings see of it.
+    """The least eigenvalue of A^T A: the share of the worst observable shape that is read.
 
     Conjugate gradients on A^T A y = z for a random z, in which every shape has its part. They end
     when no part of z is left, so that every eigenvalue has been met; those of their tridiagonal
@@ -262,7 +262,7 @@ def _conjugate_gradients(A: ScaledOperator, K: Array) -> tuple[Array, NDArray[np
 
 
 class _GridUncertainty:
-    """The spread on a grid: D^-1, and what the readings add that weigh other than most.
+    """Uncertainty on a grid: D^-1, corrected for readings of another weight than most.
 
     With A0 orthonormal, for the weight w0 that most readings of a channel have, and B its rows
     that have another weight w, A^T A = 1 - B^T E B with E = 1 - (w/w0)^2, 1 for a missing reading.
@@ -341,7 +341,7 @@ class _GridUncertainty:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _GridSolver:
-    """What is known of the readings `used`: c = D^-1 M^T `scale` K, or with `A` the start of it."""
+    """The solution for the readings used: c = D^-1 M^T `scale` K, or, with `A`, by iteration."""
 
     count: int
     scale: Array
@@ -354,12 +354,12 @@ class Fast(Estimator):
     """The least-squares shape of a flat skin with a regular grid of elements, in O(P log P).
 
     At the centres of an m x n grid sines and cosines are orthogonal up to i = m and j = n, so that
-    D = M^T M is diagonal: three fast transforms and a division give the shape exactly. So it is
-    when whole channels are dead or weigh otherwise. For single dead elements, missing readings and
-    weights of their own, conjugate gradients in the unknowns D^1/2 c give it in the few steps that
-    `Fit.steps` tells. M is never made. Elements may come in any order (`grid_cells`).
+    D = M^T M is diagonal: three fast transforms and a division give the shape exactly, also when
+    whole components are dead or have another weight. With single dead elements, missing readings
+    or individual weights, conjugate gradients in the unknowns D^1/2 c need a few steps
+    (`Fit.steps`). M is never made. Elements may come in any order (`grid_cells`).
 
-    Raises `RankDeficient` when the readings do not decide the coefficients, or hardly.
+    Raises `RankDeficient` when the readings do not determine the coefficients, or hardly.
     """
 
     has_matrix = False
@@ -457,7 +457,7 @@ class Fast(Estimator):
 
 
 def _sines(basis: Basis, layout: SensorLayout) -> SineBasis:
-    """The sines of a flat skin that fast transforms are for; raises a `Refusal` for other ones."""
+    """`basis` as sines on a flat skin; raises a `Refusal` for any other basis."""
     if not isinstance(basis, SineBasis):
         raise Refusal(
             f"expected sines (a hinged rectangle) for the fast transforms, got "

@@ -1,4 +1,4 @@
-"""What every estimator answers: the shape of a frame or of several, and how well it is known."""
+"""Fits: the coefficients of one frame or several, with residual, noise and error bars."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,11 +18,11 @@ _MOST = 10_000  # coefficients: their covariance takes 800 MB
 
 
 class Uncertainty(Protocol):
-    """How far the N coefficients of a frame may be off, for unit noise."""
+    """Uncertainty of the N coefficients of a frame, for unit noise."""
 
     @property
     def sd(self) -> Array:
-        """Standard deviations (N,) of the coefficients in m for noise of 1 1/m."""
+        """Standard deviations (N,) of the coefficients in m, for a noise of 1 1/m."""
         ...
 
     def covariance_of(self, rows: Array) -> Array:
@@ -35,7 +35,7 @@ class Uncertainty(Protocol):
 
 
 class DenseUncertainty:
-    """The one that a covariance (N, N) tells; it is made when first asked for."""
+    """Uncertainty with a full covariance (N, N), computed when first needed."""
 
     def __init__(self, make: Callable[[], Array]) -> None:
         self._make = make
@@ -56,7 +56,7 @@ class DenseUncertainty:
 
 
 def propagated_covariance(rows: Array, covariance: Array) -> Array:
-    """The covariance (..., R, R) of `rows` (..., R, N) times what has this `covariance`."""
+    """Covariance (..., R, R) of `rows` (..., R, N) times what has this `covariance` (..., N, N)."""
     if rows.ndim == 2:
         return rows.dot(covariance).dot(rows.T)  # of small ones in half the time
     return rows @ covariance @ rows.mT
@@ -69,15 +69,14 @@ def _root(variance: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The shape that answers the readings best, of one frame or of T (leading axis).
+    """The shape that explains the readings best, of one frame or of T (leading axis).
 
-    `curvature` (..., 3, P) in 1/m is what it rests on, NaN where a reading is missing or was not
-    trusted; `coefficients` (..., Ni, Nj) in m; `uncertainty` says how far they may be off for unit
-    noise, of each frame when there are several; `spare` (...) how many readings there are beyond
-    those that the shape took. `known_noise` (...) is the noise in 1/m where the estimator knows it.
-    An iteration took `steps` (...); where it has not `converged` (...), the answer is that of
-    least squares. `suspect` (..., P) says which elements were left out and why, by their number in
-    `FAULTS`; None where none is ever suspected.
+    `curvature` (..., 3, P) in 1/m are the readings used, NaN where one is missing or excluded;
+    `coefficients` (..., Ni, Nj) in m; `uncertainty` theirs for unit noise, of each frame when there
+    are several; `spare` (...) the degrees of freedom left, readings less unknowns. `known_noise`
+    (...) in 1/m is the noise where the estimator knows it. An iteration took `steps` (...); where
+    it has not `converged` (...), the result is that of least squares. `suspect` (..., P) says which
+    elements were excluded and why, as numbers in `FAULTS`; None where the estimator excludes none.
     """
 
     estimator: "Estimator"
@@ -92,21 +91,20 @@ class Fit:
 
     @cached_property
     def residual(self) -> Array:
-        """What the shape leaves of the readings, (..., 3, P) in 1/m; NaN where it rests on none."""
+        """Residual (..., 3, P) in 1/m, readings less those of the shape; NaN where none is used."""
         return self.curvature - self.estimator.predicted(self.coefficients)
 
     @cached_property
     def noise(self) -> Array:
-        """Standard deviation (...) of a reading in 1/m; 1 where the fit was told each one's sigma.
+        """Standard deviation (...) of a reading in 1/m; 1 where each one's sigma was given.
 
-        It is as the residual tells it, NaN when every reading was spent on a coefficient, or as
-        the estimator knows it.
+        Estimated from the residual, NaN without a degree of freedom, or as the estimator knows it.
         """
         if self.known_noise is not None:
             return self.known_noise
         left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
         squares = np.vecdot(left, left)
-        if np.count_nonzero(squares != squares):  # NaN, told in a tenth of the time of any()
+        if np.count_nonzero(squares != squares):  # NaN, found in a tenth of the time of any()
             left = np.where(np.isnan(left), 0.0, left)
             squares = np.vecdot(left, left)
         if isinstance(self.spare, int) and self.spare > 0:  # as in most frames: the fastest
@@ -114,7 +112,7 @@ class Fit:
         return np.sqrt(squares / np.where(np.greater(self.spare, 0), self.spare, np.nan))
 
     def _each(self, told: Callable[[Uncertainty], Array], shape: tuple[int, ...]) -> Array:
-        """What is `told` of the one, of this `shape`, for each frame when there are several."""
+        """`told(uncertainty)` in this `shape`, for each frame when there are several."""
         if not isinstance(self.uncertainty, Sequence):
             return told(self.uncertainty).reshape(shape)
         once = {id(one): one for one in self.uncertainty}
@@ -136,7 +134,7 @@ class Fit:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients in m^2; made on demand."""
+        """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients in m^2."""
         if (N := self.estimator.basis.size) > _MOST:
             raise Refusal(
                 f"expected at most {_MOST} coefficients whose covariance is made, got {N} x {N} "
@@ -147,7 +145,7 @@ class Fit:
     def covariance_of(self, rows: Array) -> Array:
         """Covariance (..., R, R) of `rows` (..., R, N) times the flattened coefficients.
 
-        With several frames `rows` are those of all of them, (R, N).
+        With several frames, `rows` (R, N) are the same for all of them.
         """
         noise, uncertainty = self.noise, self.uncertainty
         if isinstance(uncertainty, Sequence):
@@ -168,9 +166,9 @@ class Fit:
         return {}
 
     def jet(self, x: float, y: float) -> tuple[Array, Array]:
-        """The shape of one frame at (x, y) in m: its derivatives (6,) in the order of `ORDERS`.
+        """Derivatives (6,) of the shape of one frame at (x, y) in m, in the order of `ORDERS`.
 
-        With their covariance (6, 6); the last place's are remembered.
+        And their covariance (6, 6). Those of the last point are cached.
         """
         if (x, y) not in self._jets:
             rows = self.estimator.basis.jet(x, y)
@@ -189,7 +187,7 @@ class Fit:
 
 
 def merged_fits(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
-    """One fit of T frames from the fits of groups of them."""
+    """One fit of T frames from fits of groups of them: frame t is number `order[t]` of all."""
 
     def joined(parts: list[Array]) -> Array:
         return np.concatenate(parts)[order]
@@ -217,7 +215,7 @@ def merged_fits(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
 
 
 def stacked_fits(fits: Sequence[Fit]) -> Fit:
-    """One fit of T frames from the fits of each of them."""
+    """One fit of T frames from T fits of one frame each."""
 
     def alone(fit: Fit) -> Fit:
         return replace(

@@ -17,10 +17,10 @@ _BLOCK, _BLOCK_OF_READINGS = 16, 32  # columns that LAPACK reflects at once: the
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KalmanUpdate:
-    """What `absorb` made of R readings: `left` (R,) of them unexplained, and a test of the model.
+    """The result of an update with R readings: `left` (R,), unexplained, and a test of the model.
 
     `score` is the slope of the log likelihood with the logarithm of the variance expected of the
-    readings, `information` how much the readings tell of that (Fisher's). Both for unit noise.
+    readings, `information` the Fisher information on it. Both for unit noise.
     """
 
     left: Array
@@ -33,11 +33,11 @@ class KalmanUpdate:
 
 
 class ModalKalmanFilter(Remembering):
-    """Amplitudes x (F,) of modes and their rates, expected (2, F), with covariance root' root.
+    """Amplitudes (F,) of modes and their rates: `mean` (2, F), covariance root' root (2 F, 2 F).
 
     Each mode is a stationary Gaussian process of Matern's class 3/2 with the rate
     lambda = sqrt(3) speed wavenumber, as of a shape that moves past with that speed. It has one
-    derivative, decays when nothing is read, and so has a bounded covariance for ever
+    derivative, decays without readings, and so its covariance stays bounded
     (doi:10.1109/MLSP.2010.5589113). Variances are in units of that of a reading.
 
     Only roots of covariances are kept, changed by orthogonal reflections (LAPACK's tpqrt, of a
@@ -74,13 +74,13 @@ class ModalKalmanFilter(Remembering):
         return upper
 
     def expect(self, amplitude: float, speed: float) -> None:
-        """Expect another `amplitude` of each mode on top, as when something else touches."""
+        """Add the variance of another `amplitude` of each mode, as for a new contact."""
         still = np.full(len(self._k), amplitude)
         moving = amplitude * self._rates(speed)
         self.root = self._triangle(self._stacked(still, 0 * still, moving), self.root)
 
     def advance(self, seconds: float, amplitude: float, speed: float) -> None:
-        """Let `seconds` pass for modes that have this `amplitude`."""
+        """Predict the modes, of this `amplitude`, `seconds` later."""
         rate = self._rates(speed)
         x = rate * seconds
         decay = np.exp(-x)
@@ -111,12 +111,12 @@ class ModalKalmanFilter(Remembering):
         return self.root[:, :F], self.root[:, F:]
 
     def foreseen(self, A: Array, lag: Array) -> Array:
-        """What readings A (R, F) of the modes would have been `lag` (R,) s from now."""
+        """Predicted readings (R,), A (R, F) times the modes, `lag` (R,) s from now."""
         x, rate = self.mean
         return A @ x + lag * (A @ rate)
 
     def absorb(self, A: Array, lag: Array, readings: Array) -> KalmanUpdate:
-        """Take in `readings` (R,) of A (R, F) times the modes, with unit noise, read at `lag` s."""
+        """Update with `readings` (R,), A (R, F) times modes + unit noise, `lag` (R,) s from now."""
         ahead = readings - self.foreseen(A, lag)
         S1, S2 = self.halves
         Z, R = S1 @ A.T + (S2 @ A.T) * lag, len(readings)  # their covariance is V = 1 + Z'Z
@@ -140,7 +140,7 @@ class ModalKalmanFilter(Remembering):
 START_SPEED = 0.1  # m/s, of a contact of which nothing is known
 _SLOWEST, _FASTEST = 1e-4, 30.0
 _NUDGE = 0.05  # of the logarithm of the speed, per standard deviation of its score
-_SLOW = 0.02  # of what a step tells of that logarithm, where it tells little
+_SLOW = 0.02  # of the information of a step on that logarithm, where it is little
 _SWIFT = 0.3  # of the logarithm at most
 _MEMORY = 3000.0  # readings over which the noise is averaged
 _FEW = 30.0  # of them that still count when something new touches
@@ -154,11 +154,11 @@ _RATIOS = np.exp(np.linspace(math.log(1e-4), math.log(1e14), 145))
 
 @dataclass(slots=True)
 class SignalLevel(Remembering):
-    """What is known of the noise and the signal, kept up to date.
+    """Running estimates of the noise and of the signal.
 
-    `variance` of a reading, known as from `count` readings, infinitely many when it was told; the
-    `amplitude` of modes in units of its root, and the `speed` in m/s with which they move. Of a
-    number, a share as large as `rounding` is not known.
+    `variance` of the noise of a reading, known as from `count` readings, infinite when it was
+    given; the `amplitude` of the modes in units of its root, and the `speed` in m/s with which they
+    move. `rounding` is the relative rounding error of a number.
     """
 
     REMEMBERED = ("variance", "count", "rounding", "amplitude", "speed")
@@ -171,17 +171,17 @@ class SignalLevel(Remembering):
 
     @property
     def _most(self) -> float:
-        """Of the signal's variance over the noise's, what can be computed with."""
+        """The largest ratio of signal to noise variance that can be computed with."""
         return self.rounding**-1.5
 
     def explain(self, A: Array, readings: Array, signal: float) -> float:
-        """The amplitude in units of the noise that makes `readings` (R,) likeliest, with the noise.
+        """The most likely amplitude for `readings` (R,), in units of the noise; updates the noise.
 
         Readings A (R, F) of modes have the covariance variance (1 + amplitude^2 A A'), the variance
-        being known as from `count` others (Student's t). An amplitude is expected of which the
-        signal is ten times the noise, give or take three e-folds of its square; of readings that
-        see next to nothing of the modes, as on a rim that is held, one with that `signal`, which is
-        the variance of a usual reading for unit amplitude.
+        being known as from `count` others (Student's t). The prior expects a signal of ten times
+        the noise, within three e-folds of its square. Where the readings see next to nothing of the
+        modes, as on a held rim, `signal` takes its place, the variance of a typical reading for
+        unit amplitude.
         """
         U, s, _ = np.linalg.svd(A.astype(float), full_matrices=False)
         R, seen = len(readings), float(s @ s) / len(readings)
@@ -204,18 +204,18 @@ class SignalLevel(Remembering):
         return math.sqrt(squares[best])
 
     def renew(self, A: Array, ahead: Array, signal: float) -> float:
-        """How much of something else `ahead` (R,) of A (R, F) tells, as an amplitude."""
+        """The amplitude of what is new in the innovation `ahead` (R,) of readings A (R, F)."""
         extra = self.explain(A, ahead, signal)
         self.amplitude = max(self.amplitude, extra)
         self.speed = max(self.speed, START_SPEED)
         return extra
 
     def surprised(self, power: float, count: int) -> bool:
-        """Whether chi-squared times the variance, of `count` readings, is beyond all chance."""
+        """Whether `power`, chi-squared times the variance, of `count` readings is beyond chance."""
         return power > self.variance * (count + _BREAK * math.sqrt(2 * count) + _BARELY)
 
     def pace(self, learned: KalmanUpdate) -> None:
-        """Move faster where readings were further off than expected, slower where nearer."""
+        """Update the speed: faster where readings were further off than expected, else slower."""
         if self.variance and learned.information:
             root = math.sqrt(learned.information)
             score = learned.score(self.variance) / root
@@ -224,9 +224,9 @@ class SignalLevel(Remembering):
             self.speed = min(max(self.speed * math.exp(step), _SLOWEST), _FASTEST)
 
     def weigh(self, power: float, readings: Array) -> None:
-        """Learn the noise: what was ahead of `readings` (R,) times what was left averages to it.
+        """Update the noise, the mean product `power` of innovation and residual of `readings` (R,).
 
-        That holds for any weights which a right model gives (doi:10.1256/qj.05.108).
+        It has that mean whatever the weights, if the model is right (doi:10.1256/qj.05.108).
         """
         if not math.isinf(self.count):
             known, count = min(self.count, _MEMORY), len(readings)
@@ -235,9 +235,9 @@ class SignalLevel(Remembering):
             self.count = known + count
 
     def size(self, x: Array, undecided: float, signal: float) -> None:
-        """Learn the amplitude from the modes x (F,), `undecided` the sum of their variances.
+        """Update the amplitude from the modes x (F,); `undecided` is the sum of their variances.
 
-        Both count as far as readings decided them (MacKay, doi:10.1162/neco.1992.4.3.415).
+        Both count as far as the readings determined them (MacKay, doi:10.1162/neco.1992.4.3.415).
         `signal` is the variance of a reading for unit amplitude.
         """
         decided = len(x) - undecided / self.amplitude**2

@@ -1,4 +1,4 @@
-"""Least-squares estimators: factored once, per frame, and for finite slopes."""
+"""Least-squares estimators: factored once, solved per frame, and for finite slopes."""
 
 from dataclasses import dataclass
 from typing import cast
@@ -18,10 +18,10 @@ _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FactoredSolver:
-    """The transposed operator (R, N) for the R readings `used` (3 P,), and what it is worth.
+    """The transposed solution operator (R, N) for the R readings `used` (3 P,).
 
-    It is the product of the `factors`: of one, or where rounding it would show in the residual of
-    two, (R, F) and (F, N).
+    It is the product of the `factors`: one, or two, (R, F) and (F, N), where rounding of a single
+    one would show in the residual.
     """
 
     used: Mask
@@ -31,14 +31,14 @@ class _FactoredSolver:
 
 
 class LeastSquares(Estimator):
-    """`fit = LeastSquares(basis, layout)`; `fit(curvature)` is the least-squares shape (Eq. 6).
+    """The least-squares shape (Eq. 6): `fit = LeastSquares(basis, layout)`; `fit(curvature)`.
 
     The normal equations of Eq. 6 square the condition number, so they are never formed: the
     columns of M are scaled to unit length and factored, M = Q R by Householder reflections and
     R = U S V^T, once. Missing readings (NaN) are taken out by an update of that factorisation.
 
     Where the basis leaves only some combinations free, c = W g, only those are fitted. Raises
-    `RankDeficient` when the readings do not decide the coefficients.
+    `RankDeficient` when the readings do not determine the coefficients.
     """
 
     def _set_up(self) -> None:
@@ -76,7 +76,7 @@ class LeastSquares(Estimator):
         return _FactoredSolver(used, tuple(f.astype(self.dtype) for f in factors), spread, len(U))
 
     def _without(self, used: Mask) -> _FactoredSolver:
-        """The solver for the readings `used` (3 P,), remembered for the next frames."""
+        """The solver for the readings `used` (3 P,), cached for the next frames."""
         return self._solver if used is self.readable else self._reduced(used, self._downdate)
 
     def _downdate(self, used: Mask) -> _FactoredSolver:
@@ -105,7 +105,7 @@ class LeastSquares(Estimator):
 
 
 class _PerFrame(Estimator):
-    """An estimator that factors nothing: A = M with its weights is solved anew in each call."""
+    """Base of estimators that factor nothing: the weighted M is solved in each call."""
 
     def _set_up(self) -> None:
         self._A = (self.weight[:, None] * self._columns()).astype(self.dtype)
@@ -114,7 +114,7 @@ class _PerFrame(Estimator):
         return self.M
 
     def _rows(self, flat: Array, used: Mask) -> tuple[Array, Array]:
-        """Of the readings used: A (R, F) and K (R, T), weighted."""
+        """Weighted operator (R, F) and readings (R, T) of those used."""
         weight = self.weight[used].astype(self.dtype)
         return self._A[used], (flat[..., used] * weight).T
 
@@ -122,8 +122,8 @@ class _PerFrame(Estimator):
 class AsPrinted(_PerFrame):
     """c = (M^T M)^-1 M^T K, the normal equations of Eq. 6 as the paper prints them.
 
-    They square the condition number, and nothing tells when that has eaten every digit: kept to
-    show what it costs. Refuses only where the elimination itself divides by zero.
+    They square the condition number, and nothing shows when that has eaten every digit: for
+    teaching and comparison. Raises `RankDeficient` only where the elimination divides by zero.
     """
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
@@ -148,8 +148,8 @@ class AsPrinted(_PerFrame):
 class Direct(_PerFrame):
     """The least-squares shape by a general solver (LAPACK's gelsd) in every frame.
 
-    The columns of M are scaled to unit length first. Raises `RankDeficient` when the readings do
-    not decide the coefficients.
+    For comparison. The columns of M are scaled to unit length first. Raises `RankDeficient` when
+    the readings do not determine the coefficients.
     """
 
     def _columns(self) -> Array:
@@ -184,11 +184,12 @@ _CONTRACTS = 0.7  # a step longer than this share of the one before: it will not
 
 
 class FiniteSlopeLeastSquares(Estimator):
-    """c <- c + M^+ (K - h(c)), from the least-squares shape on, at most four times.
+    """Least squares for finite slopes: gages sense the curvature of the deflected surface.
 
-    h(c) is `NormalCurvature`; M^+ is that of `LeastSquares`, factored once. Where the steps do not
-    shrink, as when slopes are near one and noise is large, the answer is that of least squares and
-    `Fit.converged` says no.
+    c <- c + M^+ (K - h(c)), from the least-squares shape on, at most four times. h(c) is
+    `NormalCurvature`; M^+ is that of `LeastSquares`, factored once. Where the steps do not shrink,
+    as when slopes are near one and noise is large, the result is that of least squares and
+    `Fit.converged` is false.
     """
 
     def _set_up(self) -> None:

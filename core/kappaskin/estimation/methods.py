@@ -1,4 +1,4 @@
-"""From curvature to coefficients: several estimators that answer alike."""
+"""The estimators by name."""
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -28,11 +28,11 @@ METHODS: dict[str, type[Estimator]] = {
     "robust": Robust,
     "tracking": Tracking,
 }
-"""Ways from readings to coefficients, the default first."""
+"""Estimators by name, the default first."""
 
 
 def check_method(method: str) -> None:
-    """Refuse a method that there is not."""
+    """Raise a `Refusal` for an unknown `method`."""
     if method not in METHODS:
         raise Refusal(f"expected a method among {', '.join(METHODS)}; got {method!r}")
 
@@ -45,6 +45,6 @@ def estimator_for(
     rim_sd: float = RIM_SD,
     dtype: DTypeLike = np.float64,
 ) -> Estimator:
-    """The estimator of this name; raises a `Refusal` when there is none or it cannot be made."""
+    """The estimator named `method`; raises a `Refusal` for an unknown or impossible one."""
     check_method(method)
     return METHODS[method](basis, layout, sigma, rim_sd, dtype)

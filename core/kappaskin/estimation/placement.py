@@ -23,13 +23,12 @@ from kappaskin.sensing import SensorLayout
 
 
 def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
-    """How much is read of each of F shapes, (F,), the best seen first; the shapes (F, Ni, Nj) in m.
+    """Singular values (F,) of the live readings, the best observed first, and shapes (F, Ni, Nj).
 
-    The singular values are those of M W of the live readings, its columns scaled to unit length:
-    the first over the last is `LeastSquares.condition`. Where the readings do not decide all
-    coefficients the last values are zero, or rounding, and any mixture of the last shapes leaves
-    the readings as they are; the rigid motions of a rim that gives are among them. Each shape is
-    scaled so that the squares of its coefficients add up to 1 m^2.
+    They are those of M W with columns scaled to unit length: the first over the last is
+    `LeastSquares.condition`. Where the readings do not determine all coefficients the last values
+    are zero, or rounding, and no mixture of the last shapes changes the readings; the rigid motions
+    of an elastic rim are among them. The squared coefficients of each shape, in m, sum to 1 m^2.
     """
     W = np.eye(basis.size) if basis.free is None else basis.free
     M_W = layout.curvature_operator(basis)[layout.live.ravel()] @ W
@@ -53,13 +52,13 @@ _MOST_CANDIDATES = 10_000
 _RIDGE = 1e-9  # of what a reading tells on average, so that too few elements are no error
 
 Placement = Callable[[SensorLayout, Basis, float], SensorLayout]
-"""Elements, functions to tell and how far elements are apart in m at least, to as many elements."""
+"""A function of layout, basis to determine, and least distance in m; a layout as large."""
 
 
 def predicted_sd(estimator: Estimator, noise: float, positions: Array) -> Array:
-    """Standard deviation (P,) of the displacement in m at `positions` (P, 2) by `noise` in 1/m.
+    """Standard deviation (P,) in m of the displacement at `positions` (P, 2), for `noise` in 1/m.
 
-    From the covariance alone: nothing is simulated. What the functions cannot make is not in it.
+    From the covariance alone, without simulation. What the basis cannot represent is not in it.
     """
     rows = estimator.basis.at(positions)
     undecided = np.linalg.norm(rows @ estimator.undecided, axis=1)
@@ -93,11 +92,11 @@ PLACEMENTS: dict[str, Placement] = {
     "D": _optimal(det=True),
     "A": _optimal(det=False),
 }
-"""Ways to place as many elements as a scene has: where the scene has them, and others."""
+"""Placements by name: as in the scene, clustered in the middle, D-optimal, A-optimal."""
 
 
 def check_placement(layout: SensorLayout, by: str) -> None:
-    """Refuse what no elements can be placed `by` on."""
+    """Raise a `Refusal` for a layout whose elements cannot be placed `by` this name."""
     if by != "scene" and layout.patch.strip:
         raise Refusal("expected a skin with two sides to place elements on, got a strip")
     if by != "scene" and not layout.live.all():
@@ -105,12 +104,15 @@ def check_placement(layout: SensorLayout, by: str) -> None:
 
 
 def place_elements(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
-    """As many elements as `layout` has, placed `by` one of `PLACEMENTS` to tell `basis`."""
+    """As many elements as `layout` has, placed by the name `by` to determine `basis`.
+
+    At least `apart` in m from each other where the placement is optimal.
+    """
     return PLACEMENTS[by](layout, basis, apart)
 
 
 def _candidates(layout: SensorLayout, apart: float) -> Array:
-    """Places (C, 2) on the skin at least `apart` in m from each other."""
+    """Candidate places (C, 2) in m on the skin, at least `apart` in m from each other."""
     patch = layout.patch
     m, n = (math.floor(side / apart + 1e-9) for side in (patch.a, patch.b))
     places = np.empty((0, 2))
@@ -143,9 +145,9 @@ def _exchanged(layout: SensorLayout, basis: Basis, apart: float, det: bool) -> S
 
 
 def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, Array]:
-    """What elements at `places` read of F functions, (C, 3, F), each of unit size over the places.
+    """Readings (C, 3, F) of F functions by elements at `places`, each function scaled to unit size.
 
-    With their mean products over the skin (F, F), scaled alike.
+    And the mean products (F, F) of the functions over the skin, scaled alike.
     """
     W = np.eye(basis.size) if basis.free is None else basis.free
     M = _at(places, layout).curvature_operator(basis) @ W
@@ -157,7 +159,7 @@ def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, A
 
 
 def _nearest(positions: Array, places: Array) -> NDArray[np.intp]:
-    """The numbers (P,) of different `places` (C, 2), each the nearest one left to a position."""
+    """The numbers (P,) of different `places` (C, 2), the nearest free one for each position."""
     left, chosen = np.ones(len(places), bool), list[int]()
     for position in positions:
         away = np.where(left, np.hypot(*(places - position).T), np.inf)
@@ -169,7 +171,7 @@ def _nearest(positions: Array, places: Array) -> NDArray[np.intp]:
 def _exchange(
     rows: Array, products: Array, chosen: NDArray[np.intp], free: Mask, n: int, det: bool
 ) -> bool:
-    """Whether element `n` of those `chosen` is better off elsewhere; then it is moved there.
+    """Move element `n` of those `chosen` to a better free place; whether there was one.
 
     With M'M = A of the others and a place's rows r (3, F), det(A + r'r) = det(A) det(1 + r V r'),
     V = A^-1, and trace((A + r'r)^-1 G) = trace(V G) - trace((1 + r V r')^-1 r V G V r').

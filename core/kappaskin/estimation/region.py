@@ -1,4 +1,4 @@
-"""A region of interest to the scans that read it, and to what they buy and cost."""
+"""Scanned regions: which channels the next frame reads, and what accuracy that gives."""
 
 import math
 from dataclasses import dataclass
@@ -26,17 +26,17 @@ class Region:
     """Which elements every frame scans while the others take turns, or which channels it scans.
 
     `around` is "off" (every frame scans everything), "elements" (those in `elements`), or "skin" or
-    "intrinsic": the elements within `radius` m of the contact that the skin itself, or a
-    force/torque sensor at the base of the fingertip, reports, and everything while there is none.
-    `share` of the other elements are scanned besides in each frame, so that each of them comes up
-    every 1 / share frames. With a share of 0 none do, until what is held of them has expired and
-    the readings left decide no shape; then everything is scanned once.
+    "intrinsic": the elements within `radius` m of the contact as reported by the skin itself or by
+    a force/torque sensor at the base of the fingertip, and everything while there is none. A
+    `share` of the other elements is scanned besides in each frame, so that each is scanned every
+    1 / share frames. With a share of 0 none are, until the readings held of them have expired and
+    those left determine no shape; then everything is scanned once.
 
-    Or `around` is "turns": every frame scans a `share` of all channels, in turn; or "adaptive":
-    as many, those that tell most of the contact and the surface, as an estimator that knows it
-    chooses (`Tracking`); with any other they take turns.
+    Or `around` is "turns": every frame scans a `share` of all channels, in turn; or "adaptive": as
+    many, the most informative about the contact and the surface as chosen by the estimator
+    (`Tracking`); with any other estimator they take turns.
 
-    `rate` is asked for, in frames/s; the scan may allow fewer.
+    `rate` is the requested frame rate in 1/s; the scan may allow less.
     """
 
     around: str = OFF
@@ -68,7 +68,7 @@ class Region:
         return self.around in (TURNS, ADAPTIVE)
 
     def chosen(self, count: int) -> Mask:
-        """Which of `count` elements are in `elements`."""
+        """Mask (count,) of the `elements`; raises a `Refusal` for one that does not exist."""
         try:
             elements = [index(p) for p in self.elements]
         except TypeError as error:
@@ -81,7 +81,7 @@ class Region:
 
 
 class Scanner:
-    """The scan of each next frame: the region, and the other elements in turn."""
+    """Makes the scan of each next frame: the region, and the other elements in turn."""
 
     def __init__(self, sensor: Sensor, region: Region) -> None:
         self._sensor, self._region = sensor, region
@@ -97,12 +97,12 @@ class Scanner:
 
     @property
     def rate(self) -> float:
-        """Frames/s asked for."""
+        """Requested frame rate in 1/s."""
         return self._region.rate
 
     @property
     def inside(self) -> Mask | None:
-        """The elements (P,) that every frame scans; None while that is all of them."""
+        """The elements (P,) that every frame scans; None while it scans all."""
         return self._inside
 
     def follow(self, centre: Array) -> None:
@@ -117,15 +117,15 @@ class Scanner:
 
     @property
     def count(self) -> int:
-        """How many channels each frame scans where it scans a share of all of them."""
+        """Number of channels in a frame that scans a share of all."""
         return _elements_per_turn(self._region.share, len(self._live))
 
     def choose(self, channels: NDArray[np.intp]) -> None:
-        """Scan these `channels` in the next frame."""
+        """Scan these `channels` (C,) in the next frame."""
         self._chosen = channels
 
     def __call__(self) -> Scan:
-        """The next frame's scan; its channels run upwards."""
+        """The scan of the next frame, its channels in increasing order."""
         if self._region.by_channel:
             chosen, self._chosen = self._chosen, None
             return self._sensor.scan(self._next_channels() if chosen is None else chosen)
@@ -141,7 +141,7 @@ class Scanner:
         return np.sort(self._live[next_ones])
 
     def _in_turn(self) -> NDArray[np.intp]:
-        """The next of the elements outside, from where the last frame stopped, round and round."""
+        """The next of the elements outside the region, from where the last frame stopped."""
         outside = np.flatnonzero(~np.asarray(self._inside))
         count = _elements_per_turn(self._region.share, len(outside))
         if not count:
@@ -153,7 +153,7 @@ class Scanner:
 
 
 def _elements_per_turn(share: float, outside: int) -> int:
-    """How many of `outside` elements take their turn in one frame."""
+    """How many of `outside` elements are scanned in one frame."""
     return math.ceil(share * outside - 1e-9)
 
 
@@ -163,9 +163,9 @@ def contact_bound(
     """The Cramer-Rao bound (3,): standard deviations of x and y in m and of the force in N.
 
     No unbiased estimate of a point load from one frame with Gaussian `noise` in 1/m is better: the
-    bound is the inverse of J'WJ / noise^2, with J the slopes of the readings in the three unknowns
-    and W the `weight` (P,) of each element, how often a frame reads it; 1 when left out. Infinite
-    where the readings do not decide.
+    bound is the inverse of J'WJ / noise^2, with J the derivatives of the readings in the three
+    unknowns and W the `weight` (P,) of each element, how often a frame reads it; None means 1.
+    Infinite where the readings do not determine them.
     """
     layout = sensor.layout
     across = 1 if layout.patch.strip else _FUNCTIONS
@@ -190,11 +190,11 @@ def contact_bound(
 
 @dataclass(frozen=True, eq=False)
 class ScanTradeoff:
-    """What scanning a region buys, and what it costs.
+    """The gain in rate and the loss in accuracy of scanning a region.
 
-    `channels` in a frame, `scan_time` in s, `rate` in frames/s and `gain`, how many times that of
-    full scans it is. `bound` (3,) is what one frame tells of the contact at best, standard
-    deviations of x and y in m and of the force in N; `full_bound` (3,) with everything scanned.
+    `channels` in a frame, `scan_time` in s, frame rate `rate` in 1/s and `gain`, its ratio to that
+    of full scans. `bound` (3,) are the least standard deviations of x and y in m and of the force
+    in N from one frame; `full_bound` (3,) with everything scanned.
     """
 
     channels: int
@@ -210,9 +210,9 @@ class ScanTradeoff:
 
 
 def scan_tradeoff(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> ScanTradeoff:
-    """What `region` buys and costs while `contact` is where it looks, at `noise` in 1/m.
+    """The tradeoff of `region` for a `contact` inside it, at `noise` in 1/m.
 
-    Rates are those that the scans allow. An element outside counts by how often it takes its turn.
+    Rates are those that the scans allow. An element outside counts by how often it is scanned.
     """
     scanner = Scanner(sensor, region)
     if region.around in (SKIN, INTRINSIC):

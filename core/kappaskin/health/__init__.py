@@ -1,4 +1,4 @@
-"""Health of the channels: dead, stuck, noisy, saturated, swapped or drifting ones."""
+"""Health: which channels are dead, stuck, noisy, saturated, swapped or drifting."""
 
 from kappaskin.health.findings import Exclusion as Exclusion
 from kappaskin.health.findings import FaultCodes as FaultCodes

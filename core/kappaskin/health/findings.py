@@ -1,4 +1,4 @@
-"""Findings: what is wrong with each channel, and what its exclusion costs in accuracy."""
+"""Findings: the fault of each channel, and what its exclusion costs in accuracy."""
 
 import math
 from contextlib import suppress
@@ -14,15 +14,15 @@ from kappaskin.frames import COMPONENTS, Array, Mask
 from kappaskin.health.inconsistency import InconsistencyTest, Indices, centred
 from kappaskin.sensing import Sensor
 
-_MOST_LISTED = 256  # findings that are told one by one
+_MOST_LISTED = 256  # findings that are listed one by one
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong with one channel: `kind` is a word of `FAULTS`, `figure` says by how much.
+    """The fault of one channel: `kind` is a word of `FAULTS`, `figure` says by how much.
 
-    `since` when, in s on the clock of `Frame.host_time`. `kept` says that it is in the fit all the
-    same, as no shape could be told without it.
+    `since` when, in s on the clock of `Frame.host_time`. `kept` means that it is in the fit all the
+    same, as the shape is not determined without it.
     """
 
     channel: int
@@ -34,17 +34,17 @@ class Finding:
     kept: bool = False
 
     def __str__(self) -> str:
-        kept = "; kept, as no shape can be told without it" if self.kept else ""
+        kept = "; kept, as the shape is not determined without it" if self.kept else ""
         return f"{self.component} of element {self.element} {self.kind}: {self.figure}{kept}"
 
 
 @dataclass(frozen=True)
 class Health:
-    """All that is wrong with the channels of a skin now.
+    """The faults of all channels of a skin now.
 
-    `findings` are told one by one, upwards, at most 256 of the `count` there are. Leaving them out
-    makes the error bars of the shape `cost` times as wide, and that of the displacement at the
-    contact `contact_cost` times, NaN where there is no contact. `kept` of them are in the fit all
+    `findings` are the first of them by channel, at most 256 of the `count` there are. Their
+    exclusion makes the error bars of the shape `cost` times as wide, and that of the displacement
+    at the contact `contact_cost` times, NaN without a contact. `kept` of them are in the fit all
     the same.
     """
 
@@ -56,21 +56,21 @@ class Health:
 
     def __str__(self) -> str:
         if not self.count:
-            return "no channel is found wanting"
+            return "all channels OK"
         out = self.count - self.kept
-        words = [f"{out} channel{'' if out == 1 else 's'} left out"]
+        words = [f"{out} channel{'' if out == 1 else 's'} excluded"]
         words.append(f"error bars {100 * (self.cost - 1):+.0f} %")
         if math.isfinite(self.contact_cost):
             words.append(f"at the contact {100 * (self.contact_cost - 1):+.0f} %")
         if self.kept:
-            words.append(f"{self.kept} found wanting, but no shape can be told without")
+            words.append(f"{self.kept} faulty but kept: without, the shape is not determined")
         return ", ".join(words)
 
 
 def findings(
     kinds: NDArray[np.uint8], since: Array, figures: Array, kept: NDArray[np.bool_]
 ) -> tuple[Finding, ...]:
-    """What is found of C channels: `kinds`, `since` and `kept` (C,), `figures` (C, 2)."""
+    """The findings for C channels with `kinds`, `since` and `kept` (C,), `figures` (C, 2)."""
     P = len(kinds) // 3
     return tuple(
         Finding(
@@ -92,20 +92,20 @@ def findings(
 
 
 def _figure(kind: str, first: float, second: float, elements: int) -> str:
-    """The figures that `classify_faults` gives, with their units in words."""
+    """The figures of `classify_faults` in words and units."""
     if math.isnan(first):
         return "the device says so"
     if kind in ("dead", "stuck"):
-        return f"reads {first:+.2f} 1/m while those around it tell of {second:.2f} 1/m of motion"
+        return f"reads {first:+.2f} 1/m while its neighbours predict {second:.2f} 1/m of motion"
     if kind == "noisy":
-        return f"{first:.2g} 1/m of noise, others have {second:.2g} 1/m"
+        return f"noise {first:.2g} 1/m, other channels {second:.2g} 1/m"
     if kind == "saturated":
         return f"on a rail for {100 * first:.0f} % of the last second"
     if kind == "swapped":
         other = int(first)
         return f"reads what {COMPONENTS[other // elements]} of element {other % elements} should"
-    trend = f", going by {second:+.2g} 1/m a minute" if kind == "drifting" else ""
-    return f"{first:+.2f} 1/m off what those around it say{trend}"
+    trend = f", drifting by {second:+.2g} 1/m a minute" if kind == "drifting" else ""
+    return f"{first:+.2f} 1/m off the prediction of its neighbours{trend}"
 
 
 DEAD, STUCK, NOISY, SWAPPED, OFFSET, SATURATED, DRIFTING = (
@@ -113,46 +113,48 @@ DEAD, STUCK, NOISY, SWAPPED, OFFSET, SATURATED, DRIFTING = (
     for kind in ("dead", "stuck", "noisy", "swapped", "offset", "saturated", "drifting")
 )
 
-_STILL = 0.25  # of how the others say that it moves: a channel that moves less does not answer
-_MOVED = 4.0  # times what is left open, that others say it moves: what it does then is told by
+_STILL = 0.25  # of the predicted motion: a channel that moves less does not respond
+_MOVED = 4.0  # times the error of the prediction: motion that is large enough to judge by
 _AT_REST = 0.1  # of the same: one that stays nearer to zero is dead
 _COUNTS = 5.0  # resolutions, within which zero is zero
 _CROSSED = 0.2  # of the squares left where two channels are swapped back
 _STEADY = 2.0  # times its scatter is what a channel is off by, or it is noise
 _LINE = 0.8  # of the scatter that a line explains; of a step it explains 0.75 at most
-_MOST_PAIRED = 512  # channels whose pairs are looked at
+_MOST_PAIRED = 512  # channels whose pairs are compared
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelFaults:
-    """What is wrong with n channels: `kinds` (n,) by number in `FAULTS` and `figures` (n, 2)."""
+    """The faults of n channels: `kinds` (n,) by number in `FAULTS` and `figures` (n, 2)."""
 
     kinds: NDArray[np.uint8]
     figures: Array
 
 
 def classify_faults(
-    against: InconsistencyTest, channels: Indices, resolution: float, step: float
+    test: InconsistencyTest, channels: Indices, resolution: float, step: float
 ) -> ChannelFaults:
-    """What is wrong with `channels` (n,), of which one mean comes every `step` s.
+    """The faults of `channels` (n,), which have one mean every `step` s.
 
-    Figures are in 1/m: of dead and stuck ones what they read and how far the others say that they
-    move; of noisy ones their noise and the usual one; of swapped ones the channel that reads what
-    they should, and NaN; of drifting ones and offsets what they are off by, and by how much more
-    each minute.
+    Figures are in 1/m: for dead and stuck channels their reading and the predicted motion; for
+    noisy ones their noise and the median noise; for swapped ones the channel that reads what they
+    should, and NaN; for drifting ones and offsets how far they are off, and the drift per minute.
+    `resolution` in 1/m is that of one count.
     """
-    changed, told = against.changed[:, channels], against.told[:, channels]
-    left = changed - told
-    changed, told = (np.where(np.isnan(left), np.nan, values) for values in (changed, told))
-    lately = _amounts(told[against.recent]) > _MOVED * against.left_open[channels]
-    moves, should = (
-        np.where(lately, _amounts(values[against.recent]), _amounts(values))
-        for values in (changed, told)
+    changed, predicted = test.changed[:, channels], test.predicted[:, channels]
+    left = changed - predicted
+    changed, predicted = (
+        np.where(np.isnan(left), np.nan, values) for values in (changed, predicted)
     )
-    still = (moves < _STILL * should) & (should > _MOVED * against.left_open[channels])
-    reads = against.reads[channels]
+    lately = _amounts(predicted[test.recent]) > _MOVED * test.left_open[channels]
+    moves, should = (
+        np.where(lately, _amounts(values[test.recent]), _amounts(values))
+        for values in (changed, predicted)
+    )
+    still = (moves < _STILL * should) & (should > _MOVED * test.left_open[channels])
+    reads = test.reads[channels]
     rest = np.maximum(_AT_REST * should, _COUNTS * resolution)
-    off, scatter = _means(left[against.recent]), _amounts(left[against.recent])
+    off, scatter = _means(left[test.recent]), _amounts(left[test.recent])
     line, slope = _trend(left)
     kinds = np.select(
         [still & (np.abs(reads) < rest), still, np.abs(off) < _STEADY * scatter, line > _LINE],
@@ -162,27 +164,27 @@ def classify_faults(
     figures = np.stack([off, slope * 60 / step], axis=1)
     figures[still] = np.stack([reads, should], axis=1)[still]
     loud = kinds == NOISY
-    figures[loud] = np.stack([scatter, np.full(len(scatter), against.usual)], axis=1)[loud]
-    crossed, partner = _partners(centred(changed), centred(told))
+    figures[loud] = np.stack([scatter, np.full(len(scatter), test.usual)], axis=1)[loud]
+    crossed, partner = _partners(centred(changed), centred(predicted))
     kinds[crossed], figures[crossed] = SWAPPED, np.nan
     figures[crossed, 0] = channels[partner[crossed]]
     return ChannelFaults(kinds, figures)
 
 
 def _means(values: Array) -> Array:
-    """Means (n,) of what is known of `values` (T, n)."""
+    """Means (n,) of `values` (T, n) without NaN."""
     known = ~np.isnan(values)
     return np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
 
 
 def _amounts(values: Array) -> Array:
-    """Standard deviations (n,) of what is known of `values` (T, n)."""
+    """Standard deviations (n,) of `values` (T, n) without NaN."""
     apart, known = centred(values), np.count_nonzero(~np.isnan(values), axis=0)
     return np.sqrt(np.sum(apart**2, axis=0) / np.maximum(known, 1))
 
 
 def _trend(left: Array) -> tuple[Array, Array]:
-    """How much of the scatter of `left` (T, n) a line explains, and its slope, (n,) each."""
+    """The share of the scatter of `left` (T, n) that a line explains, and its slope, (n,) each."""
     time = np.where(np.isnan(left), np.nan, np.arange(len(left))[:, None])
     t, r = centred(time), centred(left)
     tt, tr, rr = (np.sum(a * b, axis=0) for a, b in ((t, t), (t, r), (r, r)))
@@ -191,9 +193,9 @@ def _trend(left: Array) -> tuple[Array, Array]:
 
 
 def _partners(d: Array, p: Array) -> tuple[Mask, Indices]:
-    """Which of n channels read what another one should and it what they should, and which one.
+    """Which of n channels are swapped in pairs, and with which one.
 
-    Of how they move, `d` (T, n), and how they should, `p` (T, n).
+    From their changes `d` (T, n) and the predicted ones `p` (T, n).
     """
     n = int(d.shape[1])
     crossed = cast("Mask", np.zeros(n, bool))
@@ -217,9 +219,9 @@ FaultCodes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exclusion:
-    """The channels that a fit does without: of those of any of the `kinds` (3, P) all not `kept`.
+    """The channels excluded from a fit: those with a fault in `kinds` (3, P) that are not `kept`.
 
-    `ideal` is the fit at rest with every channel that such a skin has, `fit` the one without these.
+    `ideal` is the fit at rest with every channel of such a skin, `fit` the one without these.
     """
 
     kinds: FaultCodes
@@ -231,29 +233,29 @@ class Exclusion:
 
     @classmethod
     def none(cls, sensor: Sensor, fit: Fit, ideal: Fit) -> "Exclusion":
-        """Nothing left out but what `sensor` itself calls dead."""
+        """No exclusion but of the channels that `sensor` itself reports as dead."""
         shape = sensor.layout.live.shape
         kinds = np.zeros(shape, np.uint8)
         return cls(kinds, np.zeros(shape, bool), ideal, fit, None, kinds[0])
 
     def __call__(self, curvature: Array) -> Array:
-        """The `curvature` (3, P) to fit: NaN where it is left out."""
+        """The `curvature` (3, P) to fit: NaN where it is excluded."""
         return curvature if self._out is None else np.where(self._out, np.nan, curvature)
 
     def words(self, suspect: FaultCodes | None) -> FaultCodes:
-        """What is wrong with each element (P,), of which the fit itself may `suspect` some."""
+        """The fault of each element (P,), of which the fit itself may `suspect` some."""
         found = self._worst
         return found if suspect is None else np.where(found > 0, found, suspect)
 
     @property
     def cost(self) -> float:
-        """How many times as wide the error bars of the shape are, by root mean square."""
+        """Factor by which the error bars of the shape are wider, by root mean square."""
         return float(np.linalg.norm(self.fit.unit_sd) / np.linalg.norm(self.ideal.unit_sd))
 
     def cost_at(self, place: Array) -> float:
-        """How many times as wide the error bar of the displacement at `place` (2,) is.
+        """Factor by which the error bar of the displacement at `place` (2,) in m is wider.
 
-        NaN where there is no place, and where the edge holds the skin; 1 where nothing is left out.
+        NaN for a place of NaN, and where the edge holds the skin; 1 without an exclusion.
         """
         if not np.isfinite(place).all():
             return math.nan
@@ -270,10 +272,10 @@ class Exclusion:
 def exclude(
     was: Exclusion, estimator: Estimator, kinds: FaultCodes, badness: Array, loosest: float
 ) -> Exclusion:
-    """As many of the channels of any of `kinds` (C,) left out as leave a shape decided.
+    """Exclude as many channels with a fault in `kinds` (C,) as the shape is determined without.
 
-    By `badness` (C,), the worst first. A shape is decided while its error bars for unit noise have
-    a norm of at most `loosest`.
+    By `badness` (C,), the worst first. A shape is determined while its error bars for unit noise
+    have a norm of at most `loosest`. `was` is the exclusion before.
     """
     shape = was.kinds.shape
     if np.array_equal(kinds.reshape(shape), was.kinds):
@@ -289,7 +291,7 @@ def exclude(
 
 
 def _most(estimator: Estimator, worst: NDArray[np.intp], loosest: float) -> tuple[Fit, int]:
-    """The fit at rest without the most of the `worst` channels that it can be told without."""
+    """The fit at rest without as many of the `worst` channels as possible, and their number."""
     fit, least, most = estimator.at_rest(), 0, len(worst)
     count = most
     while least < most:

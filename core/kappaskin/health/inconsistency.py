@@ -13,19 +13,19 @@ from kappaskin.frames import Array, Frame, Mask
 from kappaskin.sensing import Sensor, SensorLayout
 
 _LONG = 0.25  # s at least
-_OFTEN_UP_TO = 3000  # channels that are looked at so often; more as much less often
+_OFTEN_UP_TO = 3000  # channels that are evaluated so often; more as much less often
 _MOST_FRAMES = 64  # frames that are kept of it, evenly
-_FEWEST_FRAMES = 8  # frames, whose differences tell the noise
+_FEWEST_FRAMES = 8  # whose differences give the noise
 _PARTS = 4  # that are averaged, each by itself
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelStatistics:
-    """What C channels read for `seconds` that ended at `time` on the host's clock.
+    """Statistics of C channels over `seconds` that ended at `time` in s on the host's clock.
 
-    `means` (T, C) in 1/m of each part of it, of so many `frames`; NaN where a channel was not read
-    or on a rail. `noise` (C,) in 1/m from one frame to the next, NaN where it cannot be told;
-    `railed` (C,) the share of the readings that were on a rail, NaN where there were none.
+    `means` (T, C) in 1/m over each of T parts, of `frames` frames each; NaN where a channel was not
+    read or on a rail. `noise` (C,) in 1/m from frame to frame, NaN where unknown; `railed` (C,) the
+    share of the readings on a rail, NaN where there were none.
     """
 
     time: float
@@ -37,9 +37,9 @@ class ChannelStatistics:
 
 
 class StatisticsWindow:
-    """Takes every frame, keeps some, and looks at them four times a second at most.
+    """Collects frames, and computes their statistics four times a second at most.
 
-    Of a skin with more than 3000 channels as much less often, so that looking costs no more.
+    With more than 3000 channels less often in proportion, so that it costs no more.
     """
 
     def __init__(self, sensor: Sensor) -> None:
@@ -52,7 +52,7 @@ class StatisticsWindow:
         self._taken, self._begun, self._due = 0, -math.inf, -math.inf
 
     def __call__(self, frame: Frame) -> ChannelStatistics | None:
-        """What the last quarter of a second says, where it ends with `frame`."""
+        """The statistics of the last quarter of a second where it ends with `frame`, else None."""
         time = frame.device_time
         if time < self._begun:  # the clock of a device that began anew
             self._taken, self._due = 0, time
@@ -72,11 +72,11 @@ class StatisticsWindow:
         seconds = time - self._begun
         if self._taken < _MOST_FRAMES and (self._taken < _FEWEST_FRAMES or seconds < self._long):
             return None
-        look = self._looked(self._counts[: self._taken], seconds, frame.host_time)
+        statistics = self._statistics(self._counts[: self._taken], seconds, frame.host_time)
         self._taken = 0
-        return look
+        return statistics
 
-    def _looked(self, counts: Array, seconds: float, time: float) -> ChannelStatistics:
+    def _statistics(self, counts: Array, seconds: float, time: float) -> ChannelStatistics:
         low, high = self._chain.limits
         read, rails = ~np.isnan(counts), (counts <= low) | (counts >= high)
         starts = np.linspace(0, len(counts), _PARTS, endpoint=False).astype(int)
@@ -94,14 +94,14 @@ class StatisticsWindow:
 
 
 def _noise(counts: Array) -> Array:
-    """Standard deviations (C,) of white noise with second differences such as `counts` (n, C)."""
+    """Standard deviations (C,) of white noise, from the second differences of `counts` (n, C)."""
     bends = (counts[2:] - 2 * counts[1:-1] + counts[:-2]).astype(float) ** 2
     known = ~np.isnan(bends)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.sqrt(np.where(known, bends, 0.0).sum(axis=0) / known.sum(axis=0) / 6)
 
 
-_COUNT = 20  # elements around one, that tell of it: two rings of a grid without its corners
+_COUNT = 20  # neighbours that predict an element: two rings of a grid without its corners
 _BESIDE = 8  # of them are next to it
 _CLOSE = 1.6  # distances of elements: as far as they reach on a grid
 _LENGTHS = (1.2, 2.5)  # of what bends the skin, in distances of elements
@@ -113,7 +113,7 @@ Indices = NDArray[np.intp]
 
 
 def _covariance(apart: Array) -> Array:
-    """Covariances (3, 3, ...) of the curvatures of two elements that are `apart` (2, ...).
+    """Covariances (3, 3, ...) of the curvatures of two elements at the distance `apart` (2, ...).
 
     Of a displacement with the covariance exp(-r^2/2 l^2), the mean over the lengths l: its fourth
     derivatives are He_m(x/l) He_n(y/l) exp(-r^2/2 l^2), m + n = 4, with Hermite's polynomials.
@@ -135,12 +135,11 @@ def _covariance(apart: Array) -> Array:
 
 
 class Neighbours:
-    """What the P elements of a layout tell of each other: kriging from the nearest ones.
+    """Prediction of each of P elements from its k nearest neighbours, by kriging.
 
-    Nothing is asked of the whole skin, so that the cost grows as the number of elements. What an
-    element reads itself has no part in what it should read. `weights` (P, 3, 3 k) for the
-    `channels` (P, 3 k) around each; `spread` (P, 3) is the variance of what they leave open, in
-    units of the mean square of what they read.
+    The cost grows as the number of elements. An element's own readings do not enter its
+    prediction. `weights` (P, 3, 3 k) are those of the `channels` (P, 3 k) around each; `spread`
+    (P, 3) is the variance of the prediction in units of the mean square of their readings.
     """
 
     def __init__(self, layout: SensorLayout) -> None:
@@ -157,17 +156,17 @@ class Neighbours:
         """The channels (P, c) of the elements next to each."""
         close = (np.reshape(apart, (P, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
         self.alone: Array = _BESIDE / np.clip(close, 1, _BESIDE)
-        """How many times fewer elements are close to each (P,) than inside a grid."""
+        """Ratio (P,) of the close neighbours inside a grid to those of each element."""
         self.weights = np.zeros((P, 3, 3 * k))
         self.spread = np.ones((P, 3))
-        self.leave_out(np.zeros(3 * P, bool), np.arange(P))
+        self.exclude(np.zeros(3 * P, bool), np.arange(P))
 
-    def touched_by(self, channels: Mask) -> Indices:
-        """The elements of which some of `channels` (3 P,) tell."""
+    def affected_by(self, channels: Mask) -> Indices:
+        """The elements that some of `channels` (3 P,) predict."""
         return np.flatnonzero(channels[self.channels].any(axis=1))
 
-    def leave_out(self, missing: Mask, elements: Indices) -> None:
-        """Let `elements` be told of without the channels that are `missing` (3 P,)."""
+    def exclude(self, missing: Mask, elements: Indices) -> None:
+        """Predict `elements` without the channels that are `missing` (3 P,)."""
         for start in range(0, len(elements), _ELEMENTS_AT_ONCE):
             self._weigh(missing, elements[start : start + _ELEMENTS_AT_ONCE])
 
@@ -185,25 +184,25 @@ class Neighbours:
         self.weights[elements] = W.swapaxes(1, 2)
         self.spread[elements] = np.maximum(own - np.sum(W * beside, axis=1), 0.0)
 
-    def told(self, readings: Array, elements: Indices) -> tuple[Array, Array]:
-        """What `elements` (E,) should read and the mean square around them, (T, 3, E) each.
+    def predict(self, readings: Array, elements: Indices) -> tuple[Array, Array]:
+        """Predicted readings of `elements` (E,) and their variance, (T, 3, E) each.
 
-        From `readings` (T, 3 P), NaN where one of those around is.
+        From `readings` (T, 3 P) in 1/m, NaN where one of the neighbours is.
         """
         around = readings.T[self.channels[elements]]  # (E, 3 k, T)
-        told = np.matmul(self.weights[elements], around)
+        predicted = np.matmul(self.weights[elements], around)
         power = np.einsum("ert,ert->et", around, around) / max(around.shape[1], 1)
         spread = self.spread[elements][:, :, None] * power[:, None]
-        return told.transpose(2, 1, 0), spread.transpose(2, 1, 0)
+        return predicted.transpose(2, 1, 0), spread.transpose(2, 1, 0)
 
 
 _KEPT = 128  # means, 16 a second
-_RECENT = 32  # of them are judged
-_OFTEN = 24  # of them at most may be explained where a channel is beyond what can be
+_RECENT = 32  # of them are tested
+_OFTEN = 24  # of them at most may be explained for a channel that is inconsistent
 _FEWEST_MEANS = 8  # of those at least
 _FORGOTTEN = 60.0  # s after which a reading that stays is what one is compared with
 _SHAPE = 2.0  # times the mean square around is the most that a shape is thought to be
-_GAIN = 0.05  # by which channels that are well may differ
+_GAIN = 0.05  # by which healthy channels may differ
 _FAR = 4.0  # standard deviations
 # Of what elements beside one change, what a point load on it makes its own reading differ by at
 # most: 1.6 times, with 25 x 25 functions, where it presses on 10 x 10 elements; in a corner, with
@@ -211,11 +210,11 @@ _FAR = 4.0  # standard deviations
 _SHARP = 2.0
 _SAME = 0.99  # of the correlation of what a channel reads and should, where a load presses on it
 _USUAL = 1.4826  # standard deviations are so many times the median of the amounts
-_FINE = 0.01  # of the largest change anywhere: finer than that nothing is foretold
+_FINE = 0.01  # of the largest change anywhere: the precision of any prediction
 
 
 def rms(values: Array) -> Array:
-    """Root mean squares (C,) of what is known of `values` (T, C); zero where too little is."""
+    """Root mean squares (C,) of `values` (T, C) without NaN; zero where too few are known."""
     known = ~np.isnan(values)
     count = known.sum(axis=0)
     squares = np.where(known, values, 0.0)
@@ -223,15 +222,15 @@ def rms(values: Array) -> Array:
     return np.where(count < _FEWEST_MEANS, 0.0, np.sqrt(total / np.maximum(count, 1)))
 
 
-def _apart(values: Array) -> Array:
-    """`values` (T, C) less the means of what is known of them."""
+def _centred_known(values: Array) -> Array:
+    """`values` (T, C) less their means over what is not NaN."""
     known = ~np.isnan(values)
     return values - np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
 
 
 def centred(values: Array) -> Array:
-    """`values` (T, C) less their means; zero where one is not known."""
-    return np.nan_to_num(_apart(values))
+    """`values` (T, C) less their means; zero for NaN."""
+    return np.nan_to_num(_centred_known(values))
 
 
 def _median(values: Array) -> float:
@@ -244,15 +243,15 @@ def _largest(values: Array) -> float:
 
 
 class InconsistencyTest:
-    """How each of C channels changed, `changed` (T, C) in 1/m, and should have, `told` (T, C).
+    """Changes of C channels, `changed` (T, C) in 1/m, against those `predicted` (T, C) for them.
 
-    Changes are those from what was read about a minute ago: offsets and old contacts contradict
-    nothing. A channel that is `missing` tells nothing of others, and is told of by them.
-    `open` (T, C) in 1/m^2 is the variance of what the others leave open. `distance` (C,) is how far
-    a channel was off in the last two seconds, in standard deviations, zero where nothing is known;
-    `off` (C,) the same in 1/m. `beyond` (C,) is above one where for a quarter of the time a channel
-    was further off than four of them and a point load on its element could explain. What is no
-    further off, and always reads more than it should, may be `pressed` (C,) by such a load.
+    Changes are relative to the readings of about a minute ago: offsets and old contacts are
+    consistent. A `missing` channel predicts no others, but is predicted by them. `variance` (T, C)
+    in 1/m^2 is that of the prediction. `distance` (C,) is how far a channel was off in the last two
+    seconds, in standard deviations, zero where unknown; `off` (C,) the same in 1/m. `beyond` (C,)
+    is above one where for a quarter of the time a channel was further off than four standard
+    deviations and a point load on its element explain. A channel that is no further off, and always
+    reads more than predicted, may be `pressed` (C,) by such a load.
     """
 
     def __init__(self, layout: SensorLayout) -> None:
@@ -261,15 +260,17 @@ class InconsistencyTest:
         self._every = np.arange(len(layout))
         self.missing = np.zeros(C, bool)
         self.reads: Array = np.full(C, np.nan)
-        """What each channel (C,) read last, in 1/m."""
+        """Last reading (C,) of each channel in 1/m."""
         self.base: Array = np.full(C, np.nan)
-        """What that is compared with, in 1/m."""
-        self.changed, self.told, self.open = (np.full((_KEPT, C), np.nan) for _ in range(3))
+        """Reference (C,) of the changes in 1/m."""
+        self.changed, self.predicted, self.variance = (
+            np.full((_KEPT, C), np.nan) for _ in range(3)
+        )
         self._beside = np.zeros((_KEPT, len(layout)))
-        """How much an element next to each changed at most, in 1/m."""
-        self._alike = np.zeros(_KEPT)  # in 1/m, how far off channels are that have nothing wrong
+        """Largest change (T, P) in 1/m of the elements next to each."""
+        self._typical = np.zeros(_KEPT)  # in 1/m, how far off healthy channels are
         self.usual = 0.0
-        """Noise in 1/m that half of the channels have, of those whose noise can be told."""
+        """Median noise in 1/m of the channels whose noise is known."""
         self.distance, self.off, self.left_open = np.zeros(C), np.zeros(C), np.zeros(C)
         self.beyond = np.zeros(C)
         self.pressed = np.zeros(C, bool)
@@ -278,111 +279,113 @@ class InconsistencyTest:
     def recent(self) -> slice:
         return slice(_KEPT - _RECENT, None)
 
-    def steps(self, look: ChannelStatistics, missing: Mask, wrong: Mask) -> Iterator[None]:
-        """Take in what was read, without what is `missing` (C,), some of it known to be `wrong`.
+    def steps(self, statistics: ChannelStatistics, missing: Mask, wrong: Mask) -> Iterator[None]:
+        """Update with `statistics`, without the `missing` (C,) channels, some of them `wrong` (C,).
 
-        In steps, each after the one before.
+        In steps that may be spread over frames.
         """
-        known = ~np.isnan(look.means)
+        known = ~np.isnan(statistics.means)
         with np.errstate(invalid="ignore"):  # of none comes NaN
-            reads = np.where(known, look.means, 0.0).sum(axis=0) / known.sum(axis=0)
+            reads = np.where(known, statistics.means, 0.0).sum(axis=0) / known.sum(axis=0)
         self.reads = np.where(np.isnan(reads), self.reads, reads)
         self.base = np.where(np.isnan(self.base), reads, self.base)
-        T = self._push(look.means - self.base)
+        T = self._push(statistics.means - self.base)
         yield
         self._compare(T)
         yield
         unread = np.isnan(self.changed[self.recent]).all(axis=0)
-        self.leave_out(missing | unread)
-        self._forget(look.seconds, wrong)
+        self.exclude(missing | unread)
+        self._follow(statistics.seconds, wrong)
         yield
-        self._measure(look)
+        self._measure(statistics)
         yield
 
     def _push(self, changed: Array) -> int:
-        """Take in the newest changes (T, C); T."""
+        """Append the newest changes (T, C); returns T."""
         T = len(changed)
-        for ring in (self.changed, self.told, self.open):
+        for ring in (self.changed, self.predicted, self.variance):
             ring[:-T] = ring[T:]
         self.changed[-T:] = changed
-        self._tell(self._every, slice(_KEPT - T, None))
+        self._predict(self._every, slice(_KEPT - T, None))
         heard = np.nan_to_num(np.where(self.missing, 0.0, np.abs(self.changed[-T:])))
         self._beside[:-T] = self._beside[T:]
         self._beside[-T:] = heard[:, self.neighbours.beside].max(axis=2, initial=0.0)
         return T
 
     def _compare(self, T: int) -> None:
-        """How far off the channels that have nothing wrong were in the newest T."""
-        self._alike[:-T] = self._alike[T:]
-        self._alike[-T:] = [
-            np.hypot(_USUAL * _median(np.abs(now - told)), _FINE * _largest(now))
-            for now, told in zip(self.changed[-T:], self.told[-T:], strict=True)
+        """Compute how far off healthy channels were in the newest T means."""
+        self._typical[:-T] = self._typical[T:]
+        self._typical[-T:] = [
+            np.hypot(_USUAL * _median(np.abs(now - predicted)), _FINE * _largest(now))
+            for now, predicted in zip(self.changed[-T:], self.predicted[-T:], strict=True)
         ]
 
-    def _tell(self, elements: Indices, when: slice) -> None:
+    def _predict(self, elements: Indices, when: slice) -> None:
         heard = np.where(self.missing, 0.0, self.changed[when])
-        told, spread = self.neighbours.told(heard, elements)
+        predicted, spread = self.neighbours.predict(heard, elements)
         P = len(self._every)
-        for ring, new in ((self.told, told), (self.open, spread)):
+        for ring, new in ((self.predicted, predicted), (self.variance, spread)):
             ring.reshape(_KEPT, 3, P)[when][:, :, elements] = new
 
-    def leave_out(self, missing: Mask) -> None:
-        """Let the `missing` (C,) channels tell nothing of others, and others something again."""
+    def exclude(self, missing: Mask) -> None:
+        """Exclude exactly the `missing` (C,) channels from all predictions."""
         changed = missing != self.missing
         if changed.any():
             self.missing = missing.copy()
-            elements = self.neighbours.touched_by(changed)
-            self.neighbours.leave_out(missing, elements)
-            self._tell(elements, slice(None))
+            elements = self.neighbours.affected_by(changed)
+            self.neighbours.exclude(missing, elements)
+            self._predict(elements, slice(None))
 
-    def _forget(self, seconds: float, wrong: Mask) -> None:
-        """Let what is compared with follow what is read, or where it is not trusted is told."""
-        latest = cast("Array", np.where(wrong, self.told[-1], self.changed[-1]))
+    def _follow(self, seconds: float, wrong: Mask) -> None:
+        """Let the reference follow the readings, or the predictions of channels known as wrong."""
+        latest = cast("Array", np.where(wrong, self.predicted[-1], self.changed[-1]))
         step: Array = np.nan_to_num(latest) * min(1.0, seconds / _FORGOTTEN)
         self.base += step
 
-    def _measure(self, look: ChannelStatistics) -> None:
-        heard = look.noise[~self.missing & ~np.isnan(look.noise)]
+    def _measure(self, statistics: ChannelStatistics) -> None:
+        heard = statistics.noise[~self.missing & ~np.isnan(statistics.noise)]
         self.usual = float(np.median(heard)) if heard.size else self.usual
         around = (self.neighbours.weights**2).sum(axis=2).T.ravel()
-        white = np.fmax(look.noise, self.usual) ** 2 + self.usual**2 * around
-        white /= look.frames
-        left = (self.changed - self.told)[self.recent]
-        s2 = _SHAPE * self.open[self.recent] + (_GAIN * self.told[self.recent]) ** 2
-        s2 += white + self._alike[self.recent, None] ** 2
+        white = np.fmax(statistics.noise, self.usual) ** 2 + self.usual**2 * around
+        white /= statistics.frames
+        left = (self.changed - self.predicted)[self.recent]
+        s2 = _SHAPE * self.variance[self.recent] + (_GAIN * self.predicted[self.recent]) ** 2
+        s2 += white + self._typical[self.recent, None] ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
             self.distance = rms(left / np.sqrt(s2))
             sharp = _SHARP * np.tile(self.neighbours.alone * self._beside[self.recent], 3)
             beyond = np.nan_to_num(np.abs(left) / (_FAR * np.sqrt(s2) + sharp))
         self.beyond = np.partition(beyond, _OFTEN, axis=0)[_OFTEN]
-        changed, told = (np.nan_to_num(ring[self.recent]) for ring in (self.changed, self.told))
-        own, alike = (np.einsum("tc,tc->c", changed, other) for other in (changed, told))
-        same = alike**2 > _SAME**2 * own * np.einsum("tc,tc->c", told, told)
+        changed, predicted = (
+            np.nan_to_num(ring[self.recent]) for ring in (self.changed, self.predicted)
+        )
+        own, alike = (np.einsum("tc,tc->c", changed, other) for other in (changed, predicted))
+        same = alike**2 > _SAME**2 * own * np.einsum("tc,tc->c", predicted, predicted)
         self.pressed = (self.beyond <= 1) & same & (alike > 0) & (alike < own)
         self.off, self.left_open = rms(left), rms(np.sqrt(s2))
 
-    def answer(self) -> tuple[Array, Array, Array]:
-        """How each channel moved otherwise than told, how it should, and how sure that is.
+    def motion(self) -> tuple[Array, Array, Array]:
+        """RMS (C,) in 1/m of the motion not predicted, of that predicted, and of its error.
 
-        In the last two seconds, (C,) each in 1/m, whatever its offset.
+        In the last two seconds, without offsets.
         """
-        changed, told = self.changed[self.recent], self.told[self.recent]
-        left = changed - told
-        told = np.where(np.isnan(left), np.nan, told)
-        return rms(_apart(left)), rms(_apart(told)), self.left_open
+        changed, predicted = self.changed[self.recent], self.predicted[self.recent]
+        left = changed - predicted
+        predicted = np.where(np.isnan(left), np.nan, predicted)
+        return rms(_centred_known(left)), rms(_centred_known(predicted)), self.left_open
 
-    def begin_anew(self, channels: Mask) -> None:
-        """Compare some `channels` (C,) with what those around them tell of them now."""
-        left = (self.changed - self.told)[self.recent][:, channels]
+    def rebase(self, channels: Mask) -> None:
+        """Set the reference of `channels` (C,) so that they agree with their neighbours now."""
+        left = (self.changed - self.predicted)[self.recent][:, channels]
         known = ~np.isnan(left)
         shift = np.where(known, left, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
         self.base[channels] += shift
         self.changed[:, channels] -= shift
 
-    def levels(self, channels: Indices) -> tuple[Array, Array]:
-        """What `channels` (n,) should read now, and the variance left open, (n,) each."""
+    def predicted_levels(self, channels: Indices) -> tuple[Array, Array]:
+        """Predicted readings of `channels` (n,) now, in 1/m, and their variance, (n,) each."""
         P = len(self._every)
         reads = np.where(self.missing, 0.0, np.nan_to_num(self.reads))
-        told, spread = self.neighbours.told(reads[None], channels % P)
+        predicted, spread = self.neighbours.predict(reads[None], channels % P)
         row, each = channels // P, np.arange(len(channels))
-        return told[0, row, each], spread[0, row, each]
+        return predicted[0, row, each], spread[0, row, each]

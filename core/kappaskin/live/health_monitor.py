@@ -24,7 +24,7 @@ class Watching:
         """Begin anew where other effects are simulated: they may shift every channel."""
         spoilt = (scene.effects, scene.choice, scene.seed)
         if spoilt != self._spoilt and self._monitor is not None:
-            self._monitor.begin_anew()
+            self._monitor.reset()
         self._spoilt = spoilt
 
     def __call__(self, frame: Frame) -> bool:

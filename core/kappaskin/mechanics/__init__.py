@@ -1,4 +1,4 @@
-"""The shape that a load makes: plates, loads, rigid objects."""
+"""Mechanics: the shape of a skin under loads and under rigid objects."""
 
 from kappaskin.mechanics.height_maps import HeightMap as HeightMap
 from kappaskin.mechanics.height_maps import Mesh as Mesh

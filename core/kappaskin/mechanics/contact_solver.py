@@ -1,4 +1,4 @@
-"""Where a rigid object bears on a skin: forces that push and never pull, by active sets.
+"""Contact solver: the forces between a skin and a rigid object, by an active-set method.
 
 At n places the forces F in N, the deflection w = G F in m and the object's underside, at e (d - h)
 below the skin at rest when its depth is d, leave a gap g and meet
@@ -40,12 +40,12 @@ _ROUNDING = 1e-14  # of what sums to it: a gap is known to that
 
 @dataclass(frozen=True, eq=False)
 class NodeCompliance:
-    """How a skin gives at n `points` (n, 2) in m.
+    """How a skin gives under forces at n `points` (n, 2) in m.
 
-    `felt` are the functions (k, N) at given places, `after` what (k, N) answers to forces there,
-    `deflection` (n,) in m that of coefficients (N,), `soft` (n,) in m/N the layer's compression
-    per force, `own` (n,) in m/N how far a place gives under a force on it alone, `region` (n,) the
-    number of the part of the skin that it is in.
+    `felt` gives the functions (k, N) at k of them, `after` the coefficients (k, N) per N of force
+    there, `deflection` the deflection (n,) in m for coefficients (N,). `soft` (n,) in m/N is the
+    compression of the layer per force, `own` (n,) in m/N how far a point gives under a force on it
+    alone, `region` (n,) the number of the part of the skin that it lies in.
     """
 
     points: Array
@@ -59,7 +59,7 @@ class NodeCompliance:
 
 @dataclass(frozen=True, eq=False)
 class Underside:
-    """The object over the n places: `height` h (n,) in m above its lowest point, `slant` e (n,)."""
+    """The object above n points: `height` h (n,) in m over its lowest point, `slant` e (n,)."""
 
     height: Array
     slant: Array
@@ -67,7 +67,10 @@ class Underside:
 
 @dataclass(frozen=True, eq=False)
 class ContactForces:
-    """The answer: `forces` (n,) in N, `gap` (n,) in m, `coefficients` and `modal` (N,), `depth`."""
+    """The solution: `forces` (n,) in N, `gap` (n,) in m, `coefficients` (N,) in m, `depth` in m.
+
+    `modal` (N,) in N are the modal forces, `steps` the linear systems solved.
+    """
 
     forces: Array
     gap: Array
@@ -79,7 +82,7 @@ class ContactForces:
 
 @dataclass(frozen=True, eq=False)
 class _ActiveSet:
-    """The a places that bear: what they feel, and how each gives under force on the others."""
+    """The points in contact: their functions, and how each gives under force on the others."""
 
     at: Indices
     felt: Array
@@ -112,7 +115,7 @@ def _places(support: NodeCompliance, at: Indices) -> _ActiveSet:
 
 @dataclass(frozen=True, eq=False)
 class _ContactProblem:
-    """What is asked: the object, and its `depth` in m or, where that is None, its `force` in N."""
+    """A skin, an object, and its `depth` in m or, where that is None, its `force` in N."""
 
     support: NodeCompliance
     under: Underside
@@ -120,7 +123,7 @@ class _ContactProblem:
     force: float
 
     def balanced(self, places: _ActiveSet) -> tuple[Array, float]:
-        """The forces (a,) that leave no gap at any place, pushing or pulling, and the depth."""
+        """The forces (a,) that leave no gap at any point, pushing or pulling, and the depth."""
         e = self.under.slant[places.at]
         if not len(e):
             return e, cast("float", self.depth)
@@ -139,12 +142,12 @@ class _ContactProblem:
         return d * per_depth - for_height, d
 
     def energy(self, places: _ActiveSet, forces: Array) -> float:
-        """What the right forces make least, in J."""
+        """The energy in J that the forces of the solution minimise."""
         above = self.under.height[places.at] - (self.depth or 0.0)
         return float(forces @ (places.gives @ forces / 2 + self.under.slant[places.at] * above))
 
     def pushing(self, places: _ActiveSet, forces: Array, target: Array) -> tuple[_ActiveSet, Array]:
-        """Fewer places, and forces (a,) that only push, from those now towards the `target`."""
+        """Fewer points, and forces (a,) that only push, between `forces` and the `target`."""
         kept = target > 0
         fewer, all_kept = places.only(kept), target[kept]
         if self.depth is None and len(all_kept):
@@ -157,7 +160,7 @@ class _ContactProblem:
         return places.only(kept), (forces + step * (target - forces))[kept]
 
     def bearing(self, places: _ActiveSet, forces: Array, depth: float, step: int) -> ContactForces:
-        """The answer if only these places bear."""
+        """The solution if these are all the points in contact."""
         F, soft = np.zeros(len(self.under.slant)), self.support.soft
         F[places.at] = forces
         c = forces @ places.answer
@@ -165,7 +168,7 @@ class _ContactProblem:
         return ContactForces(F, gap, c, forces @ places.felt, depth, step)
 
     def entered(self, found: ContactForces, one: bool) -> Indices:
-        """The places without force that the object enters deepest, of each region or only `one`."""
+        """The points without force deepest inside the object, per region or only `one`."""
         # A place's own give and another's bound what a force on the one does to the other.
         root = np.sqrt(self.support.own)
         known = _ROUNDING * (abs(found.depth) + root * (root @ found.forces))
@@ -180,9 +183,10 @@ class _ContactProblem:
 def solve_contact(
     support: NodeCompliance, under: Underside, start: Array, depth: float | None, force: float
 ) -> ContactForces:
-    """Forces of an object at `depth` in m, or, where that is None, that bears `force` in N.
+    """Contact forces of an object at `depth` in m, or, where that is None, under `force` in N.
 
-    From the forces `start` (n,), none below zero, whose sum along the object is then `force`.
+    `start` (n,) in N are forces to start from, none below zero; with a given `force` they sum to it
+    along the object. Raises a `Refusal` where the method does not end in a few seconds.
     """
     task, places = (
         _ContactProblem(support, under, depth, force),
@@ -213,7 +217,7 @@ _STIFFEST = 1e-9  # of the skin's own give: a thinner layer is lost in rounding
 
 
 def layer_compliance(plate: Plate) -> float:
-    """h/E in m^3/N of an even sheet: with D = E h^3 / (12 (1 - nu^2)) and C = E h it is h^2/C."""
+    """h/E = h^2/C in m^3/N of a uniform sheet: D = E h^3 / (12 (1 - nu^2)), C = E h."""
     D, C = plate.rigidity, plate.stretching
     if not (D and C):
         raise Refusal(
@@ -224,7 +228,7 @@ def layer_compliance(plate: Plate) -> float:
 
 
 class ContactNodes:
-    """The centres of nx x ny equal cells of a skin, those that lie on it."""
+    """Contact nodes: the centres of nx x ny equal cells, as far as they lie on the skin."""
 
     def __init__(self, plate: Plate, basis: Basis, nx: int, ny: int, layer: float) -> None:
         if not (nx > 0 and ny > 0 and nx * ny * basis.size <= _MOST):
@@ -251,26 +255,26 @@ class ContactNodes:
         return np.einsum("pn,pn->p", felt, self._compliance.after(felt))
 
     def _map(self, x: Array, y: Array) -> Callable[[Array], Array]:
-        """The deflection (K,) of all nodes for coefficients (N,)."""
+        """A map from coefficients (N,) to the deflection (K,) in m of all nodes."""
         if not isinstance(self._basis, ProductBasis):
             return lambda c: self._felt @ c  # a mode's own map is in single precision
         values, shape = self._basis.on_grid(x, y), self._basis.shape
         return lambda c: values(c.reshape(shape)).ravel()[self._cells]
 
     def cell(self, points: Array) -> Indices:
-        """The cell, counted row by row, that each of `points` (P, 2) lies in or next to."""
+        """Number (P,), row by row, of the cell that each of `points` (P, 2) lies in or next to."""
         (ny, nx) = self.shape
         column, row = np.clip((points / self._sides).astype(int), 0, (nx - 1, ny - 1)).T
         return row * nx + column
 
     def summed(self, points: Array, forces: Array) -> Array:
-        """What of `forces` (P,) at `points` (P, 2) acts in each cell, (ny, nx) in N."""
+        """The sum (ny, nx) in N of the `forces` (P,) at `points` (P, 2) in each cell."""
         ny, nx = self.shape
         found: Array = np.bincount(self.cell(points), forces, nx * ny).astype(float)
         return found.reshape(self.shape)
 
     def support(self, keel: Array, under: Indices) -> NodeCompliance:
-        """How the skin gives at those numbered `under` of the nodes and, after them, the `keel`."""
+        """The compliance at the points `under` of the nodes followed by the `keel` (k, 2) in m."""
         K = len(self.points)
         felt = self._basis.at(keel)
         points = np.vstack([self.points, keel])[under]

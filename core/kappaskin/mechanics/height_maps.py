@@ -29,12 +29,12 @@ _NO_ARRAY = (OSError, ValueError, TypeError, OverflowError, EOFError, SyntaxErro
 
 @dataclass(frozen=True, eq=False)
 class HeightMap:
-    """An object `length` along x by `width` along y in m with `heights` (ny, nx) in m below.
+    """An object of `length` along x by `width` along y in m, whose underside has `heights` in m.
 
-    They are those of its underside at the centres of equal pixels, counted from any level,
-    infinite where there is none; row 0 has the least y, column 0 the least x. In between they are
-    bilinear. Details finer than the pitch of a skin's nodes are felt only where a node meets them,
-    and at the lowest pixel of each of 8 x 8 blocks.
+    `heights` (ny, nx) are those at the centres of equal pixels, above any level, infinite where
+    there is no object; row 0 has the least y, column 0 the least x. Between them it is bilinear.
+    Details finer than the pitch of a skin's nodes touch it only where a node meets them, and at
+    the lowest pixel of each of 8 x 8 blocks.
     """
 
     heights: Array = field(repr=False)
@@ -56,10 +56,11 @@ class HeightMap:
 
     @classmethod
     def read(cls, path: str | Path, length: float, width: float, relief: float) -> "HeightMap":
-        """The stamp in an NPY file (ny, nx) or a grey PNG picture, `relief` in m high in all.
+        """A stamp from an NPY file (ny, nx) or a grey PNG picture, with `relief` in m in all.
 
-        The brightest pixels stand out furthest towards the skin. An array's row 0 has the least y,
-        as `heights`; a picture's first row is the one on top, with the largest y.
+        The brightest pixels stand out furthest towards the skin. Row 0 of an array has the least y,
+        as in `heights`; the top row of a picture has the largest y. Raises a `Refusal` for a file
+        that holds neither.
         """
         reader = _READERS.get(Path(path).suffix.lower())
         if reader is None:
@@ -113,7 +114,7 @@ class HeightMap:
 
 
 def _blocks(count: int) -> Iterator[tuple[int, int]]:
-    """Where each of the blocks begins and ends that divide `count` pixels."""
+    """First and last pixel of each of the blocks that divide `count` pixels."""
     blocks = min(count, _BLOCKS)
     return pairwise(count * block // blocks for block in range(blocks + 1))
 
@@ -192,10 +193,9 @@ _UNREADABLE = (
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A closed surface of `vertices` (V, 3) in m and `faces` (F, 3), pressed along -z.
+    """A closed triangle mesh of `vertices` (V, 3) in m and `faces` (F, 3), pressed along -z.
 
-    Its centre is that of its box. Only its underside matters, seen from below; 256 pixels
-    along its longer side map it.
+    Its centre is that of its box. Its underside is mapped with 256 pixels along its longer side.
     """
 
     vertices: Array = field(repr=False)
@@ -234,7 +234,7 @@ class Mesh:
 
     @classmethod
     def read(cls, path: str | Path, unit: float = 1.0) -> "Mesh":
-        """The object in an STL, PLY or OBJ file whose lengths are in `unit`, in m: 1e-3 for mm."""
+        """The mesh in an STL, PLY or OBJ file whose unit of length is `unit` in m: 1e-3 for mm."""
         import trimesh  # slow to import, and seldom needed
 
         if Path(path).suffix.lower() not in _FILES:

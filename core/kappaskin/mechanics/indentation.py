@@ -1,4 +1,4 @@
-"""Indentation: the shape of a skin into which a rigid object is pressed to a depth or by a force.
+"""Indentation: a rigid object pressed into a skin, to a given depth or by a given force.
 
 The skin is the plate of `kappaskin.mechanics.plate`, whose midsurface gives at the nodes of a grid
 and below the object's keel by w = Phi C Phi' F. A Kirchhoff plate meets a rigid object with forces
@@ -29,13 +29,14 @@ from kappaskin.skin import Patch
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Indentation:
-    """The forces under an object at n places, and what follows from them.
+    """The contact forces under an object at n points, and the shape of the skin.
 
-    `points` (n, 2) in m are the nodes of the skin under the object, then its keel. There are the
-    `forces` (n,) in N along the skin's normal, the `gap` (n,) in m along it, and the `compression`
-    (n,) in m of the skin's own thickness, by which its midsurface stays behind the object. `nodal`
-    (ny, nx) in N has every force at the node next to it, whose share of the skin is `node_area` in
-    m^2. `modal` (Ni, Nj) in N makes `coefficients` (Ni, Nj) in m.
+    `points` (n, 2) in m are the nodes of the skin under the object, then its keel. At each of them
+    act the `forces` (n,) in N along the skin's normal; `gap` (n,) in m is the distance along it,
+    and `compression` (n,) in m that of the skin's thickness, by which its midsurface stays behind
+    the object. `nodal` (ny, nx) in N are the forces summed at the nodes, each of which stands for
+    `node_area` in m^2. `modal` (Ni, Nj) in N are the modal forces, `coefficients` (Ni, Nj) in m the
+    deflection.
 
     The object is at `position` (2,) in m, its `turn` in rad; it bears `force` in N in all and
     stands `depth` in m below the skin at rest; above it, when below zero. `residual` is the
@@ -66,12 +67,12 @@ class Indentation:
 
     @property
     def patch(self) -> Mask:
-        """Which nodes (ny, nx) bear force."""
+        """Which nodes (ny, nx) are in contact."""
         return self.nodal > 0
 
     @property
     def area(self) -> float:
-        """What the nodes that bear force cover of the skin, in m^2."""
+        """Area of the contact patch in m^2."""
         return float(np.count_nonzero(self.nodal)) * self.node_area
 
     @property
@@ -91,21 +92,21 @@ def _turned(points: Array, angle: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class PlacedObject:
-    """An object at a `place` (2,) in m, turned by `turn` in rad; up is the skin's normal there."""
+    """A rigid object at `place` (2,) in m on the skin, turned by `turn` in rad about the normal."""
 
     object_: RigidObject
     place: Array
     turn: float
 
     def keel(self, patch: Patch) -> Array:
-        """Its keel's points (k, 2) on the skin."""
+        """Points (k, 2) in m of its keel, as far as they lie on the skin."""
         points = _turned(self.object_.keel(), self.turn) + self.place
         return points[patch.moves(points)]
 
     def over(self, patch: Patch, points: Array) -> tuple[Array, Array]:
-        """Its height (P,) in m above the skin at rest when it touches its own place, and the slant.
+        """Height (P,) in m above the skin at rest when it just touches its place, and slant (P,).
 
-        That is the cosine (P,) between the normals at `points` (P, 2) and at its place.
+        The slant is the cosine between the normals at `points` (P, 2) in m and at its place.
         """
         (origin,), (up,) = patch.at_rest(self.place[None])
         space, normals = patch.at_rest(points)
@@ -114,24 +115,24 @@ class PlacedObject:
         return self.object_.height(_turned(beside, -self.turn)) - away @ up, normals @ up
 
     def meets(self, patch: Patch) -> bool:
-        """Whether any of the usual nodes of the skin, or of its keel on it, lies below it."""
+        """Whether any of the default nodes of the skin, or a point of its keel, lies under it."""
         cells = np.stack(np.meshgrid(*patch.cell_centres(*_NODES)), axis=-1).reshape(-1, 2)
         height, slant = self.over(patch, np.vstack([cells[patch.moves(cells)], self.keel(patch)]))
         return bool((np.isfinite(height) & (slant > 0)).any())
 
     def carried(self, points: Array, by: Indentation) -> Array:
-        """Where `points` (P, 2) under the same object as it was `by` are now."""
+        """Where `points` (P, 2) in m under the object at the indentation `by` are now."""
         return _turned(points - by.position, self.turn - by.turn) + self.place
 
 
 class IndentationSolver:
-    """Presses rigid objects into one skin, made once for it and called per frame.
+    """`press = IndentationSolver(plate, basis)`, built once; `press(object_, x, y, depth=...)`.
 
-    `nodes` (nx, ny) divide the skin; forces act at the centres of the cells that lie on it, and
-    at the points of the object's keel. `layer` in m^3/N is the thickness of the skin over its
-    Young's modulus; left out, it is that of an even sheet with the plate's rigidity and axial
-    stiffness, 0.25 mm thick unless these say otherwise. The skin bends as a plate does, to first
-    order; what of an object overhangs the skin's rim meets nothing there. There is no friction.
+    `nodes` (nx, ny) divide the skin; forces act at the centres of the cells that lie on it and at
+    the points of the object's keel. `layer` in m^3/N is the thickness of the skin over its Young's
+    modulus; None means that of a uniform sheet with the plate's rigidity and axial stiffness,
+    0.25 mm thick unless these say otherwise. The skin bends as a plate does, to first order; the
+    part of an object that overhangs the rim meets nothing. There is no friction.
     """
 
     def __init__(
@@ -158,10 +159,11 @@ class IndentationSolver:
         force: float | None = None,
         after: Indentation | None = None,
     ) -> Indentation:
-        """The skin under an object at (x, y) in m that is turned by `turn` in rad from x to y.
+        """The indentation by an object at (x, y) in m that is turned by `turn` in rad from x to y.
 
-        Either its `depth` in m is given, or the `force` in N that it bears. To start from the
-        answer `after` which it moves saves time and changes nothing else.
+        Either its `depth` in m is given or the `force` in N on it. Starting from the previous
+        indentation, `after`, saves time and changes nothing else. Raises a `Refusal` for an object
+        beside the skin.
         """
         self._check(x, y, turn, depth, force)
         placed = PlacedObject(object_, np.array([x, y], float), turn)
@@ -199,7 +201,7 @@ class IndentationSolver:
             )
 
     def _moved(self, support: NodeCompliance, placed: PlacedObject, after: Indentation) -> Array:
-        """Forces (n,) to start from: those of `after`, carried along."""
+        """Forces (n,) in N to start from: those of `after`, moved with the object."""
         ny, nx = self._nodes.shape
         candidate = np.full(nx * ny, -1)
         # Where a cell has a node and a point of the keel, the latter.
@@ -239,7 +241,7 @@ class IndentationSolver:
 
 
 def _bearing_all(forces: Array, under: Underside, force: float) -> Array:
-    """The `forces` (n,) scaled to bear `force` in N in all; if none, one at the lowest place."""
+    """The `forces` (n,) scaled to sum to `force` in N; without any, one at the lowest point."""
     if not forces.any():
         forces[np.argmin(under.height)] = 1.0
     return forces * (force / (under.slant @ forces))

@@ -16,17 +16,17 @@ from kappaskin.skin import Patch, Polygon
 
 
 class Load(Protocol):
-    """A force in N somewhere on a patch; positive pushes along the normal."""
+    """A force in N on a patch; positive presses inward."""
 
     @property
     def force(self) -> float: ...
 
     def centre(self) -> Array:
-        """Its point of application (2,) in m."""
+        """Point of application (2,) in m."""
         ...
 
     def check(self, patch: Patch) -> None:
-        """Refuse a load that does not lie on `patch`."""
+        """Raise a `Refusal` for a load that does not lie on `patch`."""
         ...
 
     def shifted(self, dx: float, dy: float) -> "Load":
@@ -38,12 +38,12 @@ class Load(Protocol):
         ...
 
     def modal(self, basis: Basis) -> Array:
-        """The force times each function's mean under the load, (Ni, Nj) in N."""
+        """Modal forces (Ni, Nj) in N: the force times each function's mean under the load."""
         ...
 
 
 def check_on(load: Load, patch: Patch, points: ArrayLike) -> None:
-    """Refuse a `load` of no finite force, or whose `points` (P, 2) are not all on `patch`."""
+    """Raise a `Refusal` for an infinite force, or `points` (P, 2) in m that are off `patch`."""
     if not math.isfinite(load.force):
         raise Refusal(f"expected a finite force in N, got {load.force}")
     if not patch.contains(np.asarray(points)).all():
@@ -83,7 +83,7 @@ class PointLoad:
 
 @dataclass(frozen=True)
 class LineLoad:
-    """A force in N spread evenly along the line from (x0, y0) to (x1, y1) in m."""
+    """A force in N, uniform along the line from (x0, y0) to (x1, y1) in m."""
 
     x0: float
     y0: float
@@ -100,7 +100,7 @@ class LineLoad:
             check_on(self, patch, self._along())
 
     def _along(self) -> Array:
-        """The points (G, 2) that stand for the line."""
+        """Quadrature points (G, 2) of the line in m."""
         s = _LINE[0][:, None]
         return (1 - s) * (self.x0, self.y0) + s * (self.x1, self.y1)
 
@@ -127,7 +127,7 @@ class LineLoad:
 
 
 def is_point(load: Load) -> bool:
-    """Whether all of the force acts at one point."""
+    """Whether the whole force acts at one point."""
     if isinstance(load, LineLoad):
         return (load.x0, load.y0) == (load.x1, load.y1)
     return isinstance(load, PointLoad)
@@ -137,10 +137,10 @@ _INSIDE = 1 - 1e-9  # of a load's size: one that touches an edge is on the patch
 
 
 class DistributedLoad(ABC):
-    """A force in N spread about (x, y) in m, alike on all sides of the two axes through it.
+    """A force in N distributed about (x, y) in m, symmetric about the two axes through it.
 
-    So the mean of sin(k x) sin(l y) under it is the product at its centre times the mean of the
-    wave cos(k x) cos(l y) about it: a multiplier per function (Eq. 9, extended).
+    By the symmetry, the mean of sin(k x) sin(l y) under the load is the product at its centre times
+    the mean of cos(k x) cos(l y) about it: a multiplier per function (Eq. 9, extended).
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every kind is a dataclass
@@ -150,17 +150,17 @@ class DistributedLoad(ABC):
 
     @abstractmethod
     def _wave(self, k: Array, l: Array) -> Array:
-        """The mean of cos(k x) cos(l y) under the load when it is centred on x = y = 0."""
+        """Mean of cos(k x) cos(l y) under the load when it is centred on x = y = 0."""
 
     @abstractmethod
     def _rim(self) -> Array:
-        """Points (P, 2) in m all round it, counted from its centre."""
+        """Points (P, 2) in m on its rim, relative to its centre."""
 
     @abstractmethod
     def _quadrature(self, count: int) -> tuple[Array, Array]:
-        """Points (Q, 2) in m, counted from its centre, and weights (Q,) whose sum is one.
+        """Points (Q, 2) in m, relative to its centre, and weights (Q,) whose sum is one.
 
-        They take the mean of functions with up to `count` half waves across the load to rounding.
+        Exact to rounding for functions with up to `count` half waves across the load.
         """
 
     def centre(self) -> Array:
@@ -208,7 +208,7 @@ def _circle(count: int) -> Array:
 
 
 def _rings(radius: Array, share: Array) -> tuple[Array, Array]:
-    """Points on circles of `radius` (C,) that carry `share` (C,), four times as many on each."""
+    """Points (Q, 2) on circles of `radius` (C,), and weights (Q,) that sum to `share` (C,)."""
     round_it = _circle(4 * len(radius))
     points = np.multiply.outer(radius, round_it).reshape(-1, 2)
     return points, np.repeat(share, len(round_it)) / len(round_it)
@@ -216,7 +216,7 @@ def _rings(radius: Array, share: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class DiscLoad(DistributedLoad):
-    """A force in N spread evenly over the disc of `radius` about (x, y), all in m."""
+    """A force in N, uniform over the disc of `radius` about (x, y), all in m."""
 
     x: float
     y: float
@@ -241,10 +241,10 @@ class DiscLoad(DistributedLoad):
 
 @dataclass(frozen=True)
 class GaussianLoad(DistributedLoad):
-    """A force in N spread like a normal distribution of standard deviation `sd` about (x, y) in m.
+    """A force in N, distributed as a Gaussian of standard deviation `sd` about (x, y), all in m.
 
-    It must lie on the patch as far as four standard deviations from its centre: beyond them lies
-    exp(-8), less than 0.04 %, of its force, and what of that lies off the patch is not told apart.
+    It must lie on the patch up to four standard deviations from its centre: exp(-8), less than
+    0.04 %, of its force lies beyond, and whether that is on the patch makes no difference.
     """
 
     x: float
@@ -270,7 +270,7 @@ class GaussianLoad(DistributedLoad):
 
 @dataclass(frozen=True)
 class RectangleLoad(DistributedLoad):
-    """A force in N spread evenly over `width` along x by `height` along y about (x, y), in m."""
+    """A force in N, uniform over `width` along x by `height` along y about (x, y), all in m."""
 
     x: float
     y: float

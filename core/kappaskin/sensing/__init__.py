@@ -1,4 +1,4 @@
-"""What an element reads: layout, electronics, scan, hysteresis; a sensor's description."""
+"""Sensing: what the elements read, the electronics, hysteresis, and a sensor's description."""
 
 from kappaskin.sensing.hysteresis import PrandtlIshlinskii as PrandtlIshlinskii
 from kappaskin.sensing.hysteresis import StandardLinearSolid as StandardLinearSolid

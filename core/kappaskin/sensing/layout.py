@@ -23,7 +23,7 @@ _DIAGONAL = 1 / math.sqrt(2)
 
 
 def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
-    """By what gages of `gage_length` in m read sines on a flat skin, (3, Ni, Nj).
+    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on a flat skin.
 
     xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above.
     """
@@ -38,9 +38,10 @@ def _sinc(t: Array) -> Array:
 
 
 def mean_curvature_at(basis: Basis, positions: Array, gage_length: float) -> Array:
-    """What gages of `gage_length` in m, their middles at `positions`, read of each function.
+    """Mean curvature xx, yy, xy (3, P, N) in 1/m per m of each function along the gages.
 
-    xx, yy, xy (3, P, N) in 1/m per m, as `curvature_at` has it of gages without a length.
+    The middles of the gages, `gage_length` in m, are at `positions` (P, 2) in m. Without a length
+    it is `curvature_at`.
     """
     if not gage_length:
         return curvature_at(basis, positions)
@@ -54,9 +55,9 @@ def mean_curvature_at(basis: Basis, positions: Array, gage_length: float) -> Arr
 
 
 def _between_ends(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
-    """The mean curvature along (x, y): by how much the slope differs between the gages' ends.
+    """Mean curvature along (x, y), from the difference of slope between the ends of the gages.
 
-    It is exact also for functions whose curvature jumps between triangles.
+    Exact also for functions whose curvature jumps between triangles.
     """
     half = L / 2 * np.array([x, y])
 
@@ -67,7 +68,7 @@ def _between_ends(basis: Basis, positions: Array, L: float, x: float, y: float) 
 
 
 def _over_points(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
-    """The mean curvature along (x, y) by Gauss: on a bent skin it is more than a derivative."""
+    """Mean curvature along (x, y) by quadrature: on a bent skin it is not only a derivative."""
     along, weights = gauss(L, _POINTS)
     steps = np.multiply.outer(along - L / 2, (x, y))
     xx, yy, xy = curvature_at(basis, (positions + steps[:, None]).reshape(-1, 2))
@@ -75,12 +76,12 @@ def _over_points(basis: Basis, positions: Array, L: float, x: float, y: float) -
     return np.einsum("q,qpn->pn", weights / L, normal)
 
 
-_SHORTEST = 1e-6  # m: shorter gages than that tell no mean, only rounding
+_SHORTEST = 1e-6  # m: the mean over a shorter gage is lost in rounding
 _ROUNDING = 1e-9  # of a depth: gages as long as elements are apart end on the rim
 
 
 def _channels(patch: Patch, elements: int) -> Mask:
-    """All channels (3, P); on a strip, which bends along x only, those of xx."""
+    """The channels (3, P) that the patch has: all; on a strip, which bends along x only, xx."""
     live = np.ones((3, elements), bool)
     live[1:] = not patch.strip
     return live
@@ -88,11 +89,11 @@ def _channels(patch: Patch, elements: int) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class SensorLayout:
-    """P elements at `positions` (P, 2) in m; each senses curvature xx, yy and xy.
+    """P elements at `positions` (P, 2) in m; each senses the curvature xx, yy and xy.
 
-    `live` (3, P) is False for the channels that are dead. `shape` is (m, n) for a regular grid,
-    with element `p + m q` in column p (along x) and row q (along y), and None otherwise. Each reads
-    the mean over gages of `gage_length` in m along x, along y and along both diagonals.
+    `live` (3, P) is False for dead channels. `shape` is (m, n) for a regular grid, with element
+    p + m q in column p (along x) and row q (along y), and None otherwise. Each element reads the
+    mean over gages of `gage_length` in m along x, along y and along both diagonals.
     """
 
     patch: Patch
@@ -138,9 +139,9 @@ class SensorLayout:
 
     @classmethod
     def regular(cls, patch: Patch, m: int, n: int) -> "SensorLayout":
-        """Elements at the centres of an m x n tiling; those off a disk or a polygon are left out.
+        """Elements at the centres of an m x n tiling, without those off a disk or a polygon.
 
-        A layout that lacks some has no shape.
+        A layout that lacks some has no `shape`.
         """
         x, y = patch.cell_centres(m, n)
         positions = np.column_stack([np.tile(x, n), np.repeat(y, m)])
@@ -170,7 +171,7 @@ class SensorLayout:
 
     @property
     def lacking(self) -> Mask:
-        """The channels (3, P) that are dead, of those that there are on this patch."""
+        """The dead channels (3, P), of those that this patch has."""
         return _channels(self.patch, len(self)) & ~self.live
 
     def __len__(self) -> int:
@@ -188,7 +189,7 @@ class SensorLayout:
 
 
 def slope_correction(slope_x: Array, slope_y: Array) -> Array:
-    """How many times too large Eqs. 3-5 are on slopes (..., P) along x and y, (..., 3, P).
+    """The factor (..., 3, P) by which Eqs. 3-5 are too large on slopes (..., P) along x and y.
 
     With W^2 = 1 + f_x^2 + f_y^2 it is xx: W (1 + f_x^2), yy: W (1 + f_y^2),
     xy: W sqrt((1 + f_x^2) (1 + f_y^2)).

@@ -15,10 +15,10 @@ from kappaskin.sensing.transduction import Transduction
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """One frame's work: `channels` (C,) one after the other, times in s.
+    """The scan of one frame: `channels` (C,) one after the other, times in s.
 
-    Each takes `settling_time` for what the multiplexer switched to settle, then `conversion_time`;
-    the converter holds its input when the conversion begins, so that is when a channel is read.
+    Each channel takes `settling_time` after the multiplexer has switched, then `conversion_time`;
+    the converter holds its input when the conversion begins: that is when the channel is read.
     """
 
     channels: NDArray[np.intp]
@@ -56,16 +56,16 @@ class Scan:
 
     @property
     def rate(self) -> float:
-        """Frames/s when one scan follows the other."""
+        """Frame rate in 1/s when one scan follows the other."""
         return 1 / self.duration
 
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """A sensor, real or simulated: a skin held as `edge` says, its elements, its electronics.
+    """A sensor, real or simulated: skin, boundary condition `edge`, elements and electronics.
 
-    `rate` in frames/s. What channel c of its wire reads is number `channel_map[c]` of the (3, P)
-    array, a permutation (3 P,); without one each is its own.
+    `rate` in frames/s. Channel c of the device is number `channel_map[c]` of the flattened (3, P)
+    array, a permutation (3 P,); None means the same order.
     """
 
     layout: SensorLayout
@@ -103,7 +103,7 @@ class Sensor:
         return 3 * len(self.layout)
 
     def scan(self, channels: ArrayLike | None = None) -> Scan:
-        """The scan of `channels` (C,) in their order; of all of them when left out."""
+        """The scan of `channels` (C,) in this order; None means all of them."""
         every = np.arange(self.channels)
         chosen = every if channels is None else np.asarray(channels)
         if chosen.size and not (chosen.dtype.kind in "iu" and chosen.max() < self.channels):
@@ -123,7 +123,7 @@ class Sensor:
         return None if self.layout.live.all() else ~self.layout.live.ravel()
 
     def nominal(self, frame: Frame) -> Array:
-        """Curvature (3 P,) in 1/m as Eq. 8 reads it; NaN where dead, unscanned or on a rail."""
+        """Curvature (3 P,) in 1/m by Eq. 8; NaN where dead, not scanned or on a rail."""
         flat = np.empty(self.channels)
         flat.fill(np.nan)
         flat[frame.channels] = self.transduction.curvature(frame.counts)

@@ -1,4 +1,4 @@
-"""The skin's own coordinates and outline."""
+"""The skin: its own coordinates, its outline, and surfaces on it."""
 
 from kappaskin.skin.outline import Outline as Outline
 from kappaskin.skin.outline import doubled_area as doubled_area

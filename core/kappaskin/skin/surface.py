@@ -1,4 +1,4 @@
-"""Surfaces on a skin's grid: values between its points, its rim, distances along it."""
+"""Surfaces on the grid of a skin: interpolation, the rim, and distances along the skin."""
 
 from dataclasses import dataclass
 
@@ -14,9 +14,10 @@ _HALVINGS = 24  # of a cell, until the rim is found
 
 
 def snapped_to_rim(patch: Patch, grid: Array, on: Mask) -> tuple[Array, Indices]:
-    """The `grid` (ny, nx, 2) with every point that has a neighbour `on` the skin on it or its rim.
+    """The `grid` (ny, nx, 2) in m with the points just outside the skin moved on to its rim.
 
-    And whose value each point shows, (ny nx): its own, or its neighbour's where there is none.
+    `on` (ny, nx) says which points lie on the skin. Also the number (ny nx,) of the point whose
+    value each one shows: its own, or for a moved point that of its neighbour on the skin.
     """
     ny, nx = on.shape
     moved, shown = grid.copy(), np.arange(on.size).reshape(ny, nx)
@@ -45,9 +46,10 @@ _STEPS = 256  # of the line along the skin
 
 @dataclass(frozen=True)
 class Distances:
-    """From a first place to a second, in m: `straight`, `along` the skin, and how much `higher`.
+    """Distances between two points of a bent skin, in m.
 
-    Along the line that is straight in the skin's own coordinates, on the skin as it is bent.
+    `straight` through the air, `along` the skin on the line that is straight in its own
+    coordinates, and how much `higher` the second point is than the first.
     """
 
     straight: float
@@ -56,7 +58,7 @@ class Distances:
 
 
 def distances(patch: Patch, surface: Array, first: Array, second: Array) -> Distances:
-    """Those between the places `first` and `second` (2,) in m, displaced by `surface` (ny, nx)."""
+    """Distances between `first` and `second` (2,) in m, with displacement `surface` (ny, nx)."""
     places = first + np.linspace(0.0, 1.0, _STEPS + 1)[:, None] * (second - first)
     rest, out = patch.at_rest(places)
     points = rest - out * interpolated(patch, surface, places)[:, None]
@@ -66,9 +68,9 @@ def distances(patch: Patch, surface: Array, first: Array, second: Array) -> Dist
 
 
 def interpolated(patch: Patch, values: Array, places: Array) -> Array:
-    """What `values` (ny, nx) on the grid of a patch are at `places` (P, 2), evenly between them.
+    """`values` (ny, nx) on the grid of a patch, interpolated at `places` (P, 2) in m: (P,).
 
-    Zero where they are NaN, as off the skin.
+    Bilinear; NaN, as off the skin, counts as zero.
     """
     ny, nx = values.shape
     known = np.nan_to_num(values)
