@@ -23,11 +23,6 @@ from kappaskin.estimation.placement import check_placement as check_placement
 from kappaskin.estimation.placement import place_elements as place_elements
 from kappaskin.estimation.placement import predicted_sd as predicted_sd
 from kappaskin.estimation.placement import singular_values as singular_values
-from kappaskin.estimation.region import ADAPTIVE as ADAPTIVE
-from kappaskin.estimation.region import INTRINSIC as INTRINSIC
-from kappaskin.estimation.region import OFF as OFF
-from kappaskin.estimation.region import SKIN as SKIN
-from kappaskin.estimation.region import TURNS as TURNS
 from kappaskin.estimation.region import Region as Region
 from kappaskin.estimation.region import Scanner as Scanner
 from kappaskin.estimation.region import ScanTradeoff as ScanTradeoff

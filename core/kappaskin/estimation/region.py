@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from operator import index
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,6 @@ from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import PointLoad
 from kappaskin.sensing import Scan, Sensor
 
-OFF, ELEMENTS, SKIN, INTRINSIC = "off", "elements", "skin", "intrinsic"
-TURNS, ADAPTIVE = "turns", "adaptive"
-_AROUND = (ELEMENTS, SKIN, INTRINSIC, TURNS, ADAPTIVE)
 _FUNCTIONS = 15  # along each side, of the shape a point load makes: Table 1's definition
 _SINGULAR = 1e-6  # share of the best seen direction below which one is not seen at all
 
@@ -39,6 +37,13 @@ class Region:
     `rate` is the requested frame rate in 1/s; the scan may allow less.
     """
 
+    OFF: ClassVar = "off"
+    ELEMENTS: ClassVar = "elements"
+    SKIN: ClassVar = "skin"
+    INTRINSIC: ClassVar = "intrinsic"
+    TURNS: ClassVar = "turns"
+    ADAPTIVE: ClassVar = "adaptive"
+
     around: str = OFF
     elements: tuple[int, ...] = ()
     radius: float = 0.025
@@ -46,10 +51,10 @@ class Region:
     rate: float = 500.0
 
     def __post_init__(self) -> None:
-        if self.around not in (OFF, *_AROUND):
+        if self.around not in (self.OFF, *_AROUND):
             raise Refusal(
-                f"expected a region around {', '.join(_AROUND[:-1])} or {_AROUND[-1]}, or {OFF}, "
-                f"got {self.around!r}"
+                f"expected a region around {', '.join(_AROUND[:-1])} or {_AROUND[-1]}, or "
+                f"{self.OFF}, got {self.around!r}"
             )
         for name in ("radius", "rate"):
             value = getattr(self, name)
@@ -59,13 +64,13 @@ class Region:
             raise Refusal(f"expected Region.share between 0 and 1, got {self.share}")
         if self.by_channel and not self.share:
             raise Refusal(f"expected Region.share above zero for {self.around}, got 0")
-        if self.around == ELEMENTS and not self.elements:
+        if self.around == self.ELEMENTS and not self.elements:
             raise Refusal("expected at least one element in the region, got none; choose some")
 
     @property
     def by_channel(self) -> bool:
         """Whether frames scan a share of all channels."""
-        return self.around in (TURNS, ADAPTIVE)
+        return self.around in (self.TURNS, self.ADAPTIVE)
 
     def chosen(self, count: int) -> Mask:
         """Mask (count,) of the `elements`; raises a `Refusal` for one that does not exist."""
@@ -80,13 +85,18 @@ class Region:
         return np.isin(np.arange(count), elements)
 
 
+_AROUND = (Region.ELEMENTS, Region.SKIN, Region.INTRINSIC, Region.TURNS, Region.ADAPTIVE)
+
+
 class Scanner:
     """Makes the scan of each next frame: the region, and the other elements in turn."""
 
     def __init__(self, sensor: Sensor, region: Region) -> None:
         self._sensor, self._region = sensor, region
         self._all = sensor.scan()
-        self._inside = region.chosen(len(sensor.layout)) if region.around == ELEMENTS else None
+        self._inside = (
+            region.chosen(len(sensor.layout)) if region.around == Region.ELEMENTS else None
+        )
         self._turn = 0
         self._live = np.flatnonzero(sensor.layout.live.ravel())
         self._chosen: NDArray[np.intp] | None = None
@@ -215,7 +225,7 @@ def scan_tradeoff(sensor: Sensor, region: Region, contact: PointLoad, noise: flo
     Rates are those that the scans allow. An element outside counts by how often it is scanned.
     """
     scanner = Scanner(sensor, region)
-    if region.around in (SKIN, INTRINSIC):
+    if region.around in (Region.SKIN, Region.INTRINSIC):
         scanner.follow(contact.centre())
     scan, full = scanner(), sensor.scan()
     inside = scanner.inside
