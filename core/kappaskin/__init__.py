@@ -44,34 +44,34 @@ if TYPE_CHECKING:
     from kappaskin.contact import PointContact as PointContact
     from kappaskin.contact import Wrench as Wrench
     from kappaskin.contact import local_geometry as local_geometry
-    from kappaskin.contact import placed as placed
+    from kappaskin.contact import placed_object as placed_object
     from kappaskin.errors import Damaged as Damaged
     from kappaskin.errors import RankDeficient as RankDeficient
     from kappaskin.errors import Refusal as Refusal
     from kappaskin.errors import SourceError as SourceError
     from kappaskin.errors import lacking as lacking
+    from kappaskin.estimation import FAULTS as FAULTS
     from kappaskin.estimation import METHODS as METHODS
     from kappaskin.estimation import PLACEMENTS as PLACEMENTS
-    from kappaskin.estimation import WHY as WHY
     from kappaskin.estimation import AsPrinted as AsPrinted
-    from kappaskin.estimation import Bargain as Bargain
     from kappaskin.estimation import Bayes as Bayes
     from kappaskin.estimation import Direct as Direct
     from kappaskin.estimation import Estimator as Estimator
     from kappaskin.estimation import Fast as Fast
-    from kappaskin.estimation import FiniteSlope as FiniteSlope
+    from kappaskin.estimation import FiniteSlopeLeastSquares as FiniteSlopeLeastSquares
     from kappaskin.estimation import Fit as Fit
     from kappaskin.estimation import LeastSquares as LeastSquares
     from kappaskin.estimation import Region as Region
     from kappaskin.estimation import Robust as Robust
     from kappaskin.estimation import Scanner as Scanner
+    from kappaskin.estimation import ScanTradeoff as ScanTradeoff
     from kappaskin.estimation import Tracking as Tracking
-    from kappaskin.estimation import amplitudes as amplitudes
-    from kappaskin.estimation import bargain as bargain
+    from kappaskin.estimation import amplitude_spectrum as amplitude_spectrum
     from kappaskin.estimation import contact_bound as contact_bound
-    from kappaskin.estimation import elements_placed as elements_placed
     from kappaskin.estimation import estimator_for as estimator_for
+    from kappaskin.estimation import place_elements as place_elements
     from kappaskin.estimation import predicted_sd as predicted_sd
+    from kappaskin.estimation import scan_tradeoff as scan_tradeoff
     from kappaskin.estimation import singular_values as singular_values
     from kappaskin.frames import COMPONENTS as COMPONENTS
     from kappaskin.frames import OVERTAKEN as OVERTAKEN
@@ -83,7 +83,7 @@ if TYPE_CHECKING:
     from kappaskin.frames import Truth as Truth
     from kappaskin.health import Finding as Finding
     from kappaskin.health import Health as Health
-    from kappaskin.health import Monitor as Monitor
+    from kappaskin.health import HealthMonitor as HealthMonitor
     from kappaskin.live import LONGEST_NOTE as LONGEST_NOTE
     from kappaskin.live import Computed as Computed
     from kappaskin.live import Engine as Engine
@@ -95,7 +95,7 @@ if TYPE_CHECKING:
     from kappaskin.mechanics import GaussianLoad as GaussianLoad
     from kappaskin.mechanics import LineLoad as LineLoad
     from kappaskin.mechanics import Load as Load
-    from kappaskin.mechanics import Placed as Placed
+    from kappaskin.mechanics import PlacedObject as PlacedObject
     from kappaskin.mechanics import Plate as Plate
     from kappaskin.mechanics import PointLoad as PointLoad
     from kappaskin.mechanics import RectangleLoad as RectangleLoad
@@ -167,9 +167,9 @@ if TYPE_CHECKING:
     from kappaskin.skin import Distances as Distances
     from kappaskin.skin import Patch as Patch
     from kappaskin.skin import Polygon as Polygon
-    from kappaskin.skin import between as between
     from kappaskin.skin import distances as distances
-    from kappaskin.skin import onto_rim as onto_rim
+    from kappaskin.skin import interpolated as interpolated
+    from kappaskin.skin import snapped_to_rim as snapped_to_rim
     from kappaskin.sources import LISTS as LISTS
     from kappaskin.sources import Port as Port
     from kappaskin.sources import serial_ports as serial_ports
@@ -207,19 +207,20 @@ else:
             "cli.system": "examine",
             "contact": (
                 "ContactObject ForceTorqueSensor IntrinsicContact IntrinsicTouch NO_OBJECT "
-                "ObjectFinder PointContact Wrench local_geometry placed"
+                "ObjectFinder PointContact Wrench local_geometry placed_object"
             ),
             "errors": "Damaged RankDeficient Refusal SourceError lacking",
             "estimation": (
-                "AsPrinted Bargain Bayes Direct Estimator Fast FiniteSlope Fit LeastSquares "
-                "METHODS PLACEMENTS Region Robust Scanner Tracking WHY amplitudes bargain "
-                "contact_bound elements_placed estimator_for predicted_sd singular_values"
+                "AsPrinted Bayes Direct Estimator FAULTS Fast FiniteSlopeLeastSquares Fit "
+                "LeastSquares METHODS PLACEMENTS Region Robust ScanTradeoff Scanner Tracking "
+                "amplitude_spectrum contact_bound estimator_for place_elements predicted_sd "
+                "scan_tradeoff singular_values"
             ),
             "frames": "COMPONENTS Estimate Event Frame LocalGeometry OVERTAKEN Touch Truth",
-            "health": "Finding Health Monitor",
+            "health": "Finding Health HealthMonitor",
             "live": "Computed Engine LONGEST_NOTE Left Status orphans_folder",
             "mechanics": (
-                "Compliance DiscLoad GaussianLoad LineLoad Load Placed Plate PointLoad "
+                "Compliance DiscLoad GaussianLoad LineLoad Load PlacedObject Plate PointLoad "
                 "RectangleLoad"
             ),
             "pipeline": "ErrorBars Pipeline QUANTITIES Quantities Setup of_form",
@@ -239,7 +240,7 @@ else:
                 "Amplifier Converter FIRST_GENERATION HalfBridge Multiplexer SECOND_GENERATION "
                 "Scan Sensor SensorLayout Transduction"
             ),
-            "skin": "Disk Distances Patch Polygon between distances onto_rim",
+            "skin": "Disk Distances Patch Polygon distances interpolated snapped_to_rim",
             "sources": "LISTS Port serial_ports",
             "studies": (
                 "Check Cost CostMeasurement Design EffectCost EffectCosts FIGURES Prospect Refused "

@@ -216,7 +216,7 @@ class Estimate:
     missing; `fresh` (3, P) which
     readings this frame brought: the others are held from earlier ones; `coefficients`
     (Ni, Nj) in m; `surface` (ny, nx) in m, NaN off the skin; `noise` is the standard deviation of
-    a reading in 1/m as the residual tells it; `suspect` (P,) numbers in `WHY` why an element was
+    a reading in 1/m as the residual tells it; `suspect` (P,) numbers in `FAULTS` why an element was
     left out, 0 if it was not; `converged` is False where an iteration gave up for least squares;
     `fit_time` in s is what the fit took. `geometry` is that of the skin at the contact.
     `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a

@@ -8,7 +8,8 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import WHY, Patch, SensorLayout
+from kappaskin import Patch, SensorLayout
+from kappaskin.estimation import FAULTS
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
 from kappaskin_app.features.membrane.element_cells import ElementCells
 from kappaskin_app.shell.scale import Ranges
@@ -39,10 +40,10 @@ def test_colours_go_both_ways_from_a_skin_at_rest() -> None:
 
 
 def test_each_kind_of_fault_has_one_colour_of_its_own() -> None:
-    kinds = np.arange(len(WHY), dtype=float)
+    kinds = np.arange(len(FAULTS), dtype=float)
     assert HEALTH.rgb(kinds, "#000000").tolist() == HEALTH_COLOURS.tolist()
-    assert len(np.unique(HEALTH_COLOURS, axis=0)) == len(WHY)
-    assert len(HEALTH.kinds) == len(WHY)
+    assert len(np.unique(HEALTH_COLOURS, axis=0)) == len(FAULTS)
+    assert len(HEALTH.kinds) == len(FAULTS)
 
 
 def test_a_reading_on_a_rail_has_its_own_colour_and_an_entry_in_the_legend() -> None:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from kappaskin import WHY, Finding, Health, Patch, Phase, SensorLayout, Status, load_scene
+from kappaskin import Finding, Health, Patch, Phase, SensorLayout, Status, load_scene
+from kappaskin.estimation import FAULTS
 from kappaskin_app.features.health.map_testing import MapTesting
 from kappaskin_app.features.health.panel import HealthPanel
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
@@ -32,12 +33,12 @@ def test_findings_are_listed_with_their_age_and_figure(qapp) -> None:
         ["57", "yy", "stuck", "30 s", "reads \N{MINUS SIGN}1.70 1/m"],
     ]
     assert panel.words.text() == (
-        "1 channel left out, error bars +8 %, at the contact +30 %, 1 found wanting, but no shape "
-        "can be told without."
+        "1 channel excluded, error bars +8 %, at the contact +30 %, 1 faulty but kept: without, "
+        "the shape is not determined."
     )
     panel._show(Health(), 130.0)  # noqa: SLF001
     assert told(panel) == []
-    assert panel.words.text() == "No channel is found wanting."
+    assert panel.words.text() == "All channels OK."
 
 
 def test_a_finding_that_is_chosen_is_pointed_at(qapp, qtbot) -> None:
@@ -62,8 +63,8 @@ def test_a_letter_says_why_an_element_is_left_out_and_so_does_its_value(qapp) ->
     heatmap.show_marks(none, none, kinds)
     bare = heatmap.cells.grab().toImage()
     pictures = []
-    for kind in WHY[1:]:
-        kinds[5] = WHY.index(kind)
+    for kind in FAULTS[1:]:
+        kinds[5] = FAULTS.index(kind)
         heatmap.show_marks(none, none, kinds)
         pictures.append(heatmap.cells.grab().toImage())
         heatmap.show_element(5)
@@ -104,7 +105,7 @@ def test_what_is_found_is_shown_in_the_list_on_the_heatmap_and_on_the_skin(
     qtbot.keyClick(failing, Qt.Key.Key_F3)
     assert failing.health.isVisible()
     until(lambda: {"44", "45"} <= {row[0] for row in told(failing.health)})
-    assert "channels left out, error bars +" in failing.health.words.text()
+    assert "channels excluded, error bars +" in failing.health.words.text()
     until(lambda: failing.membrane.out.actor.visibility)
     failing.selection.point(44)
     until(lambda: failing.heatmaps["xx"].value.text().endswith(", dead"))

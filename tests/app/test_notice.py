@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import WHY, Pipeline, Setup, Simulator, Touch, load_scene
+from kappaskin import Pipeline, Setup, Simulator, Touch, load_scene
+from kappaskin.estimation import FAULTS
 from kappaskin_app.shell.notice import Notice, warnings
 from kappaskin_app.theme import DARK, LIGHT
 
@@ -17,7 +18,7 @@ ESTIMATE = Pipeline(SCENE.sensor(), Setup())(Simulator(SCENE).frame(0, lambda: 0
 
 def suspecting(**why: int) -> np.ndarray:
     """Codes (100,) that call so many elements, from the first on, by what they are left out for."""
-    codes = [WHY.index(kind) for kind, count in why.items() for _ in range(count)]
+    codes = [FAULTS.index(kind) for kind, count in why.items() for _ in range(count)]
     return np.array(codes + [0] * (100 - len(codes)), np.uint8)
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from kappaskin import Patch, Placed, load_scene
+from kappaskin import Patch, load_scene
+from kappaskin.mechanics import PlacedObject
 from kappaskin_app.features.membrane.sheet import underside
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.shell.window import MainWindow
@@ -20,7 +21,7 @@ def test_an_object_touches_the_drawn_skin_and_enters_it_nowhere(patch: Patch, ti
     x, y = np.meshgrid(*patch.grid(65, 65))
     skin.height = -times * 1.5 * np.sin(np.pi * x / patch.a) * np.sin(np.pi * y / patch.b)
     place = np.array([0.55 * patch.a, 0.5 * patch.b])
-    points = underside(Placed(BALL, place, 0.0), skin, times)
+    points = underside(PlacedObject(BALL, place, 0.0), skin, times)
     assert points is not None
     rest, out = skin.at_rest(place[None])
     above = (points - rest) @ out[0]

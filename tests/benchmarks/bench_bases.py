@@ -22,7 +22,7 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.bases.argyris import plate_modes
-from kappaskin.bases.disk import _modes as disk_modes
+from kappaskin.bases.modes import _disk_modes as disk_modes
 
 WIDE, TALL = np.array([0, 0.5, 1.5, 2, 1.5, 0.5]), np.array([1, 0, 0, 1, 2, 2]) * math.sqrt(3) / 2
 SKINS = {

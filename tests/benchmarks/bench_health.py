@@ -4,14 +4,15 @@ import time
 
 import numpy as np
 
-from kappaskin import Monitor, Pipeline, Setup, Simulator, load_scene
+from kappaskin import Pipeline, Setup, Simulator, load_scene
+from kappaskin.health import HealthMonitor
 
 
 def test_watching_costs_a_small_part_of_an_estimate(figure, ratio) -> None:
     scene = load_scene("circle")
     simulator = Simulator(scene)
     frames = [simulator.frame(n, time.monotonic) for n in range(2000)]
-    monitor, pipeline = Monitor(scene.sensor()), Pipeline(scene.sensor(), Setup())
+    monitor, pipeline = HealthMonitor(scene.sensor()), Pipeline(scene.sensor(), Setup())
     spent: list[tuple[float, bool]] = []
     for frame in frames:
         began = time.process_time()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Plate, basis_for
-from kappaskin.mechanics import Block, Cylinder, HeightMap, Press, Punch, Sphere, Wedge
+from kappaskin.mechanics import Block, Cylinder, HeightMap, IndentationSolver, Punch, Sphere, Wedge
 
 PATCH = Patch(0.1, 0.1)
 STAMP = HeightMap(np.random.default_rng(0).uniform(0, 2e-4, (64, 64)), 0.03, 0.03)
@@ -35,7 +35,7 @@ def path():
 @pytest.mark.parametrize("edge", ["hinged", "clamped"])
 def test_a_dragged_object_takes_less_than_fifty_products(edge, figure, ratio) -> None:
     basis = basis_for(PATCH, edge, 15, 15)
-    press = Press(Plate(PATCH), basis)
+    press = IndentationSolver(Plate(PATCH), basis)
     felt = basis.at(np.random.default_rng(0).uniform(0, 0.1, (4096, 2)))
     for object_, asked in OBJECTS:
         dragged, put, product, steps = [], [], [], []

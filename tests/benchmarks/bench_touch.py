@@ -17,7 +17,7 @@ from kappaskin import (
     SineBasis,
 )
 from kappaskin.contact import contact_geometry
-from kappaskin.contact.products import _Dense
+from kappaskin.contact.point import _Dense
 
 PATCH = Patch(0.1, 0.1)
 PLATE, LAYOUT = Plate(PATCH), SensorLayout.regular(PATCH, 10, 10)
@@ -85,9 +85,9 @@ def test_contact_and_geometry_take_a_tenth_of_scipys_contact(medians, figure, ra
 def by_whole_matrices(monkeypatch):
     """The same contact from M (300 x 225) and M'M, as on skins that are no grid of sines."""
     with monkeypatch.context() as patched:
-        patched.setattr("kappaskin.contact.point.loads_on", _Dense)
+        patched.setattr("kappaskin.contact.point.load_responses", _Dense)
         dense = lambda layout, basis, C, M: lambda K: K @ M  # noqa: E731
-        patched.setattr("kappaskin.contact.point.modal", dense)
+        patched.setattr("kappaskin.contact.point.modal_projection", dense)
         contact = PointContact(PLATE, LAYOUT)
         K, fit = next(frames())
         contact(K, fit)

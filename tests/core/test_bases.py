@@ -20,9 +20,8 @@ from kappaskin import (
     edges_of,
 )
 from kappaskin.bases import ORDERS, ElasticBasis, curvature_at, overlaps
-from kappaskin.bases.beam import ClampedBasis
-from kappaskin.bases.disk import DiskBasis
-from kappaskin.bases.polygon import PolygonBasis
+from kappaskin.bases.modes import DiskBasis, PolygonBasis
+from kappaskin.bases.product import ClampedBasis
 
 MIXED = [(2, 1), (1, 2), (2, 2)]
 
@@ -285,7 +284,7 @@ def test_an_inextensible_arc_has_no_mean_and_nothing_else_is_barred(held_skin):
 )
 def test_elsewhere_all_functions_are_free_and_seen(held_skin):
     assert held_skin.basis().free is None
-    assert held_skin.basis().unseen is None
+    assert held_skin.basis().unobservable is None
 
 
 @pytest.mark.where(which=lambda held_skin: held_skin.edge == "elastic")
@@ -298,14 +297,16 @@ def test_what_no_reading_sees_is_how_a_rim_that_gives_moves_as_a_whole(held_skin
         :, : 2 if held_skin.patch.strip else 3
     ]
 
-    unseen, free = basis.unseen, basis.free
+    unobservable, free = basis.unobservable, basis.free
 
     curvature = curvature_at(basis, inside(held_skin.patch))
-    np.testing.assert_allclose(curvature @ unseen, 0, atol=1e-12 * np.abs(curvature).max())
-    np.testing.assert_allclose(unseen.T @ mean @ unseen, np.eye(unseen.shape[1]), atol=1e-12)
-    np.testing.assert_allclose(unseen.T @ mean @ free, 0, atol=1e-12)
-    assert np.linalg.matrix_rank(np.hstack([unseen, free])) == basis.size
-    spanned = np.linalg.lstsq(basis.at(inside(held_skin.patch)) @ unseen, rigid)
+    np.testing.assert_allclose(curvature @ unobservable, 0, atol=1e-12 * np.abs(curvature).max())
+    np.testing.assert_allclose(
+        unobservable.T @ mean @ unobservable, np.eye(unobservable.shape[1]), atol=1e-12
+    )
+    np.testing.assert_allclose(unobservable.T @ mean @ free, 0, atol=1e-12)
+    assert np.linalg.matrix_rank(np.hstack([unobservable, free])) == basis.size
+    spanned = np.linalg.lstsq(basis.at(inside(held_skin.patch)) @ unobservable, rigid)
     np.testing.assert_allclose(spanned[1], 0, atol=1e-24)
 
 
@@ -417,7 +418,7 @@ def functions(held_skin, N):
     points, weights = held_skin.basis(sizes(held_skin)[-1], sizes(held_skin)[-1]).quadrature()
     F, bent = basis.at(points), basis.at(points, 2, 0) + basis.at(points, 0, 2)
     k4 = weights @ bent[:, -1] ** 2 / (weights @ F[:, -1] ** 2)
-    parts = [part for part in (basis.free, basis.unseen) if part is not None]
+    parts = [part for part in (basis.free, basis.unobservable) if part is not None]
     return F @ np.hstack(parts) if parts else F, float(k4) ** 0.25
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from kappaskin import Bayes, LeastSquares, Patch, Refusal, SensorLayout, SineBasis, load_scene
-from kappaskin.estimation.prior import prior_root
+from kappaskin.estimation.bayes import prior_root
 
 pytestmark = pytest.mark.slow
 

@@ -272,7 +272,7 @@ def test_noise_alone_is_no_object_in_2000_frames():
 def test_nothing_touches_without_a_contact():
     found = PAPER.find(np.zeros((3, 100)))
 
-    assert found.describe() == "nothing touches"
+    assert found.describe() == "no contact"
     assert found.kind == ""
     assert np.isnan([*found.position, found.force, found.radius, found.axis]).all()
 
@@ -420,7 +420,7 @@ def test_a_plane_flattens_a_fingertip(finger):
     found = finger.skin.finds(finger.curvature(plane), 5)
 
     assert all(one.kind == "plane" for one in found)
-    assert all(one.describe().startswith("plane; runner-up") for one in found)
+    assert all(one.describe().startswith("plane; second guess") for one in found)
 
 
 @pytest.mark.parametrize("kind", ["cylinder", "sphere"])
@@ -460,12 +460,12 @@ def test_a_touch_that_flattens_nothing_is_not_called_a_plane(finger):
 def test_one_line_describes_it():
     rod, ball = PAPER.find(noisy(RODS[0])), PAPER.find(noisy(BALLS[0]))
 
-    text = r"{}, radius [\d.]+ mm \([\d.]+ to [\d.]+\){}; runner-up \w+ \d+ %"
+    text = r"{}, radius [\d.]+ mm \([\d.]+ to [\d.]+\){}; second guess \w+ \d+ %"
     for found, pattern in (
         (rod, text.format("cylinder", r", \d+ mm long, axis \d+ deg")),
         (ball, text.format("sphere", "")),
         (replace(ball, kind=""), "cannot tell: fits none of these objects, sphere the least badly"),
-        (replace(rod, kind="edge"), r"edge, \d+ mm long, axis \d+ deg; runner-up \w+ \d+ %"),
+        (replace(rod, kind="edge"), r"edge, \d+ mm long, axis \d+ deg; second guess \w+ \d+ %"),
         (replace(ball, radius_95=(0.05, math.inf)), r"sphere, radius above 50 mm; .*"),
         (replace(ball, radius_95=(0.0, 2.756)), r"sphere, radius below 2756 mm; .*"),
         (replace(ball, radius_95=(0.0, math.inf)), r"sphere, radius unknown; .*"),
@@ -516,9 +516,9 @@ def test_a_skin_that_cannot_tell_is_refused():
     strip, patch = Patch(0.1, 0.01, strip=True), Patch(SIDE, SIDE)
     drum = Plate(patch, rigidity=0.0, tension=1.0)
     for plate, elements, why in (
-        (Plate(strip), (20, 1), "a strip bends along x alone"),
-        (drum, (10, 10), "a drum head has no curvature"),
-        (Plate(patch), (60, 40), "at most 2000 elements to tell objects by, got 2400"),
+        (Plate(strip), (20, 1), "needs a 2-D skin; this one is a strip"),
+        (drum, (10, 10), "this skin is a drum head"),
+        (Plate(patch), (60, 40), "at most 2000 elements, got 2400"),
     ):
         with pytest.raises(Refusal, match=why):
             ObjectFinder(plate, SensorLayout.regular(plate.patch, *elements))

@@ -117,7 +117,7 @@ def test_failing_channels_are_told_with_what_leaving_them_out_costs(engine) -> N
     assert 1.03 < status.health.cost < 1.2
     assert status.health.contact_cost > 1.0
     assert status.health.kept == 0
-    assert "channels left out, error bars +" in str(status.health)
+    assert "channels excluded, error bars +" in str(status.health)
     engine.connect("sim:circle")
     state(engine, STREAMING)
     assert wait_for(lambda: engine.status().health.count == 0)

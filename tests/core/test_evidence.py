@@ -7,12 +7,16 @@ import pytest
 from scipy import stats
 
 from kappaskin import Patch, Plate, SensorLayout
-from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.evidence import of_length, of_plane, of_radius, peak
-from kappaskin.contact.hypotheses import SHARE, Hypotheses
+from kappaskin.contact.elastic_skin import ElasticSkin, Optimum, ends
+from kappaskin.contact.hypotheses import (
+    SHARE,
+    Hypotheses,
+    laplace_integral,
+    length_prior,
+    plane_prior,
+    radius_prior,
+)
 from kappaskin.contact.interior import Hypothesis, Width
-from kappaskin.contact.optimise import Optimum
-from kappaskin.contact.rigid_contacts import ends
 
 SIDE = 0.1
 BENT, FLAT = (
@@ -35,7 +39,7 @@ def optimum(
 def test_length_angle_and_share_are_as_likely_as_their_priors_say(length, share) -> None:
     best = optimum(length=length, share=share)
 
-    told = of_length(FLAT, best)
+    told = length_prior(FLAT, best)
 
     of_square = stats.uniform.pdf(length, 0, SIDE) / (2 * length)  # the density of its square
     expected = stats.norm.logpdf(share, 0, SHARE) - math.log(math.pi) + math.log(of_square)
@@ -46,7 +50,7 @@ def test_length_angle_and_share_are_as_likely_as_their_priors_say(length, share)
 def test_a_radius_is_as_likely_as_any_multiple_of_it(k0: float) -> None:
     width = Width(q=4e-6, sd=0.05 * 4e-6, k0=k0, q0=4e-6, bend=k0)
 
-    told = of_radius(FLAT, width)
+    told = radius_prior(FLAT, width)
 
     by_q = width.bend / (2 * width.q)  # of the curvature
     expected = stats.loguniform.pdf(1 / k0, 0.02 * SIDE, 5 * SIDE) * by_q / k0**2
@@ -58,21 +62,21 @@ def test_the_volume_of_a_peak_is_that_of_its_normal_distribution() -> None:
     all_of = Hypotheses(Hypothesis(best), Hypothesis(best), Hypothesis(best), 0.2, 300)
 
     at_the_top = stats.multivariate_normal(cov=best.covariance, allow_singular=True).logpdf
-    assert peak(best, all_of) == pytest.approx(-at_the_top(np.zeros(6)))
+    assert laplace_integral(best, all_of) == pytest.approx(-at_the_top(np.zeros(6)))
 
 
 def test_of_all_but_three_readings_each_halves_the_log_of_what_is_left() -> None:
     one, other = optimum(squares=90.0), optimum(squares=120.0)
     all_of = Hypotheses(Hypothesis(one), Hypothesis(one), Hypothesis(one), 0.2, 300)
 
-    better = peak(one, all_of) - peak(other, all_of)
+    better = laplace_integral(one, all_of) - laplace_integral(other, all_of)
 
     assert better == pytest.approx(297 / 2 * math.log(120 / 90))
 
 
 def test_a_plane_lies_along_the_axis_of_a_bent_skin_and_on_no_flat_one() -> None:
     along, askew, turned = (
-        of_plane(BENT, optimum(angle), WIDTH)
+        plane_prior(BENT, optimum(angle), WIDTH)
         for angle in (math.pi / 2, math.pi / 2 + 0.3, -math.pi / 2)
     )
 
@@ -81,4 +85,4 @@ def test_a_plane_lies_along_the_axis_of_a_bent_skin_and_on_no_flat_one() -> None
         stats.norm.logpdf(0.3, 0, spread) - stats.norm.logpdf(0, 0, spread)
     )
     assert turned == pytest.approx(along)
-    assert of_plane(FLAT, optimum(), WIDTH) == -math.inf
+    assert plane_prior(FLAT, optimum(), WIDTH) == -math.inf

@@ -5,7 +5,6 @@ import pytest
 
 from kappaskin import (
     Disk,
-    FiniteSlope,
     LeastSquares,
     Patch,
     Refusal,
@@ -15,6 +14,7 @@ from kappaskin import (
     load_scene,
     local_geometry,
 )
+from kappaskin.estimation import FiniteSlopeLeastSquares
 
 SQUARE = Patch(0.1, 0.1)
 TENS = SensorLayout.regular(SQUARE, 10, 10)
@@ -67,7 +67,7 @@ class Case:
 def test_four_steps_take_away_what_slopes_cost(name, linear, finite):
     case = Case(name)
 
-    answer = FiniteSlope(EIGHT, TENS)(case.K)
+    answer = FiniteSlopeLeastSquares(EIGHT, TENS)(case.K)
 
     assert case.errors(LeastSquares(EIGHT, TENS)(case.K)) == pytest.approx(linear, abs=6e-4)
     assert case.errors(answer) == pytest.approx(finite, abs=6e-5)
@@ -78,7 +78,7 @@ def test_four_steps_take_away_what_slopes_cost(name, linear, finite):
 def test_the_prediction_is_the_true_normal_curvature():
     answer = LeastSquares(EIGHT, TENS)(Case("off-centre").K)
 
-    predicted = FiniteSlope(EIGHT, TENS).predicted(answer.coefficients)
+    predicted = FiniteSlopeLeastSquares(EIGHT, TENS).predicted(answer.coefficients)
 
     np.testing.assert_allclose(predicted, on_a_slope(EIGHT, answer.coefficients), rtol=1e-12)
     # The Gauss frame's first vector is along x: an independent way to kappa_xx.
@@ -89,7 +89,7 @@ def test_the_prediction_is_the_true_normal_curvature():
 def test_flat_enough_it_is_least_squares():
     K = 1e-4 * Case("centre").K
 
-    answer, plain = FiniteSlope(EIGHT, TENS)(K), LeastSquares(EIGHT, TENS)(K)
+    answer, plain = FiniteSlopeLeastSquares(EIGHT, TENS)(K), LeastSquares(EIGHT, TENS)(K)
 
     scale = np.abs(plain.coefficients).max()
     np.testing.assert_allclose(answer.coefficients, plain.coefficients, rtol=0, atol=1e-7 * scale)
@@ -102,7 +102,7 @@ def test_steep_skins_are_solved_or_the_linear_answer_is_given_and_said_to_be(ste
     c[0, 0], c[1, 2] = 4.7e-3 * steepness, 1e-3 * steepness
     K = on_a_slope(basis, c)
 
-    answer, plain = FiniteSlope(basis, TENS)(K), LeastSquares(basis, TENS)(K)
+    answer, plain = FiniteSlopeLeastSquares(basis, TENS)(K), LeastSquares(basis, TENS)(K)
 
     off = np.abs(answer.coefficients - c).max() / np.abs(c).max()
     if answer.converged:
@@ -116,7 +116,7 @@ def test_noise_ten_times_the_signal_does_not_run_away():
     rng = np.random.default_rng(0)
     K = Case("centre").K + rng.normal(0, 22.0, (200, 3, 100))
 
-    answer, plain = FiniteSlope(EIGHT, TENS)(K), LeastSquares(EIGHT, TENS)(K)
+    answer, plain = FiniteSlopeLeastSquares(EIGHT, TENS)(K), LeastSquares(EIGHT, TENS)(K)
 
     assert np.abs(answer.coefficients).max() < 2 * np.abs(plain.coefficients).max()
     gave_up = ~answer.converged
@@ -130,7 +130,7 @@ def test_it_works_on_any_flat_outline():
     c[0, 0] = 3e-3
     K = on_a_slope(basis, c, layout)
 
-    answer, plain = FiniteSlope(basis, layout)(K), LeastSquares(basis, layout)(K)
+    answer, plain = FiniteSlopeLeastSquares(basis, layout)(K), LeastSquares(basis, layout)(K)
 
     assert np.abs(answer.coefficients - c).max() < 0.01 * np.abs(plain.coefficients - c).max()
 
@@ -138,4 +138,4 @@ def test_it_works_on_any_flat_outline():
 def test_bent_skins_are_refused_with_the_reason():
     patch = Patch(0.04, 0.03, 12.9e-3)
     with pytest.raises(Refusal, match=r"expected a flat skin .*tangential.* use least-squares"):
-        FiniteSlope(SineBasis(patch, 4, 4), SensorLayout.regular(patch, 8, 8))
+        FiniteSlopeLeastSquares(SineBasis(patch, 4, 4), SensorLayout.regular(patch, 8, 8))

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, Plate, PointContact, PointLoad, SensorLayout, basis_for
-from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.hypotheses import hypotheses
-from kappaskin.contact.interior import narrow
-from kappaskin.contact.optimise import Optimum
-from kappaskin.contact.rigid_contacts import EVEN, ROUND, arcs, ends, ring
+from kappaskin.contact.elastic_skin import EVEN, ROUND, ElasticSkin, Optimum, arcs, ends, ring
+from kappaskin.contact.hypotheses import fit_hypotheses
+from kappaskin.contact.interior import arc_widths
 
 SQUARE = Patch(0.1, 0.1)
 LAYOUT = SensorLayout.regular(SQUARE, 6, 6)
@@ -83,7 +81,7 @@ def test_the_arcs_of_an_object_seen_from_its_other_end_change_places(share, midd
     def widths(angle, share):
         p = np.array([0.05, 0.045, 0.2, angle, 0.04**2, share, 0.01**2])
         found = Optimum(arcs(EVEN, middle), p, np.eye(7), 0.0, 0.0, np.zeros(7))
-        return narrow(SKIN, found, middle)
+        return arc_widths(SKIN, found, middle)
 
     one, other = widths(0.4, share), widths(0.4 + math.pi, -share)
 
@@ -115,6 +113,6 @@ def test_a_cylinder_explains_an_edge_as_well_for_an_edge_is_the_narrowest(seed):
     fit = LeastSquares(basis_for(SQUARE, "hinged", 8, 8), layout)(K)
     touch = PointContact(Plate(SQUARE), layout)(K, fit)
 
-    found = hypotheses(coarse, fine, K.ravel(), np.ones(300, bool), float(fit.noise), touch)
+    found = fit_hypotheses(coarse, fine, K.ravel(), np.ones(300, bool), float(fit.noise), touch)
 
     assert found.cylinder.best.cost < found.edge.best.cost + 1

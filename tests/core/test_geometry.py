@@ -24,7 +24,7 @@ from kappaskin import (
 )
 from kappaskin.bases import ORDERS
 from kappaskin.contact import surface_geometry
-from kappaskin.estimation.fit import DenseSpread
+from kappaskin.estimation.fit import DenseUncertainty
 
 FLAT = Patch(0.1, 0.08)
 BENT = Patch(0.1, 0.08, 0.045)
@@ -48,7 +48,10 @@ class Surface:
 
     def geometry(self, positions):
         return surface_geometry(
-            self, np.ones((1, 1)), positions, DenseSpread(lambda: np.zeros((1, 1))).of
+            self,
+            np.ones((1, 1)),
+            positions,
+            DenseUncertainty(lambda: np.zeros((1, 1))).covariance_of,
         )
 
 
@@ -160,7 +163,9 @@ def test_with_slight_slopes_the_curvature_form_is_that_of_equations_3_to_5():
     basis, c = sine_surface(FLAT)
     c = 1e-4 * c
 
-    K = surface_geometry(basis, c, HERE, DenseSpread(lambda: np.zeros((12, 12))).of).curvature_form
+    K = surface_geometry(
+        basis, c, HERE, DenseUncertainty(lambda: np.zeros((12, 12))).covariance_of
+    ).curvature_form
 
     for (i, j), order in {(0, 0): (2, 0), (1, 1): (0, 2), (0, 1): (1, 1), (1, 0): (1, 1)}.items():
         np.testing.assert_allclose(K[:, i, j], basis.at(HERE, *order) @ c.ravel(), atol=1e-8)
@@ -276,14 +281,18 @@ def test_the_curl_of_the_torsion_is_the_gaussian_curvature(patch):
     zero = np.zeros((12, 12))
 
     def turning(x, y):  # T metric: how the frame spins per step in x and in y
-        g = surface_geometry(basis, c, np.array([[x, y]]), DenseSpread(lambda: zero).of)
+        g = surface_geometry(
+            basis, c, np.array([[x, y]]), DenseUncertainty(lambda: zero).covariance_of
+        )
         return (g.torsion_form[:, None] @ g.metric)[0, 0]
 
     h = 1e-5
     for x, y in [(0.031, 0.052), (0.07, 0.015), (0.02, 0.03)]:
         curl = (turning(x + h, y)[1] - turning(x - h, y)[1]) / (2 * h)
         curl -= (turning(x, y + h)[0] - turning(x, y - h)[0]) / (2 * h)
-        g = surface_geometry(basis, c, np.array([x, y]), DenseSpread(lambda: zero).of)
+        g = surface_geometry(
+            basis, c, np.array([x, y]), DenseUncertainty(lambda: zero).covariance_of
+        )
         # Gauss's Theorema Egregium: bending from inside, without a normal.
         assert -curl == pytest.approx(g.gaussian * np.linalg.det(g.metric), rel=1e-4)
 
@@ -298,7 +307,9 @@ def test_gauss_and_bonnet_hold_around_a_rectangle(patch):
 
     def at(x, y):
         positions = np.stack(np.broadcast_arrays(x, y), axis=-1).reshape(-1, 2)
-        return surface_geometry(basis, c, positions, DenseSpread(lambda: np.zeros((12, 12))).of)
+        return surface_geometry(
+            basis, c, positions, DenseUncertainty(lambda: np.zeros((12, 12))).covariance_of
+        )
 
     def spin(geometry, axis):
         return np.einsum("pi,pi->p", geometry.torsion_form, geometry.metric[:, :, axis])
@@ -314,7 +325,9 @@ def test_gauss_and_bonnet_hold_around_a_rectangle(patch):
 
 def test_an_umbilic_point_has_directions_and_error_bars():
     basis = SineBasis(FLAT, 3, 3)
-    flat = surface_geometry(basis, np.zeros((3, 3)), HERE[:3], DenseSpread(lambda: np.eye(9)).of)
+    flat = surface_geometry(
+        basis, np.zeros((3, 3)), HERE[:3], DenseUncertainty(lambda: np.eye(9)).covariance_of
+    )
 
     for values in (flat.principal, flat.principal_sd, flat.directions, flat.angle, flat.mean_sd):
         assert np.isfinite(values).all()
@@ -326,10 +339,10 @@ def test_one_point_and_many_points_are_answered_alike():
     basis, c = sine_surface(BENT)
     covariance = np.diag(np.linspace(1, 2, 12)) * 1e-8
 
-    many = surface_geometry(basis, c, HERE, DenseSpread(lambda: covariance).of)
+    many = surface_geometry(basis, c, HERE, DenseUncertainty(lambda: covariance).covariance_of)
 
     for p, here in enumerate(HERE):
-        one = surface_geometry(basis, c, here, DenseSpread(lambda: covariance).of)
+        one = surface_geometry(basis, c, here, DenseUncertainty(lambda: covariance).covariance_of)
         for field in fields(one):
             ours, theirs = getattr(one, field.name), getattr(many, field.name)[p]
             assert ours.shape == theirs.shape
@@ -356,7 +369,9 @@ def test_the_error_bars_are_the_scatter_of_noisy_shapes(name):
     told = np.array([getattr(g, f"{name}_sd") for g in all_of]).mean(axis=0)
     # The standard error of a standard deviation over 2500 draws is 1.4 %.
     np.testing.assert_allclose(values.std(axis=0), told, rtol=0.05)
-    exact = surface_geometry(basis, c, here, DenseSpread(lambda: np.zeros((64, 64))).of)
+    exact = surface_geometry(
+        basis, c, here, DenseUncertainty(lambda: np.zeros((64, 64))).covariance_of
+    )
     np.testing.assert_allclose(values.mean(axis=0), getattr(exact, name), atol=0.1 * told.min())
 
 
@@ -366,7 +381,7 @@ def test_the_error_bars_are_those_of_how_the_curvature_changes_with_each_coeffic
     step = 1e-7
 
     def form(shape):
-        unsure = DenseSpread(lambda: np.zeros((12, 12))).of
+        unsure = DenseUncertainty(lambda: np.zeros((12, 12))).covariance_of
         K = surface_geometry(basis, shape, HERE[:3], unsure).curvature_form
         return np.stack([K[:, 0, 0], K[:, 1, 1], K[:, 0, 1]], axis=-1)
 
@@ -374,7 +389,9 @@ def test_the_error_bars_are_those_of_how_the_curvature_changes_with_each_coeffic
         (form(c + step * one.reshape(4, 3)) - form(c - step * one.reshape(4, 3))) / (2 * step)
         for one in np.eye(12)
     ]
-    told = surface_geometry(basis, c, HERE[:3], DenseSpread(lambda: np.eye(12)).of).covariance
+    told = surface_geometry(
+        basis, c, HERE[:3], DenseUncertainty(lambda: np.eye(12)).covariance_of
+    ).covariance
 
     expected = np.einsum("npi,npj->pij", changes, changes)
     np.testing.assert_allclose(told, expected, rtol=1e-6, atol=1e-6 * expected.max())

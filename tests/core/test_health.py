@@ -8,11 +8,9 @@ import pytest
 
 from kappaskin import (
     SCENES,
-    WHY,
     Frame,
     GaussianLoad,
     GaussianNoise,
-    Monitor,
     Orbit,
     Patch,
     Plate,
@@ -25,7 +23,9 @@ from kappaskin import (
     Stimulus,
     load_scene,
 )
-from kappaskin.health.window import Window
+from kappaskin.estimation import FAULTS
+from kappaskin.health import HealthMonitor
+from kappaskin.health.inconsistency import StatisticsWindow
 
 pytestmark = pytest.mark.slow
 
@@ -47,7 +47,7 @@ def frames_of(name: str, seconds: float) -> list[Frame]:
 
 def watched(frames, spoil=None, sensor=None):
     """What a monitor says of frames that `spoil` changed: (time, kinds) of each look."""
-    monitor, looks = Monitor(sensor or ROUND.sensor()), []
+    monitor, looks = HealthMonitor(sensor or ROUND.sensor()), []
     for frame in frames:
         counts = frame.counts.copy()
         if spoil is not None:
@@ -93,7 +93,7 @@ def test_a_point_held_on_the_element_in_a_corner_accuses_nobody(at) -> None:
     scene = load_scene("centre")
     pressed = replace(scene, stimuli=(Stimulus(PointLoad(*at, 0.5)),))
     free, held = Simulator(replace(scene, stimuli=())), Simulator(pressed)
-    scan, monitor = scene.sensor().scan(), Monitor(scene.sensor())
+    scan, monitor = scene.sensor().scan(), HealthMonitor(scene.sensor())
     for n in range(round(8 * RATE)):
         time = n / RATE
         simulator = held if 1.0 <= time < 6.0 else free
@@ -113,8 +113,8 @@ def test_a_dead_element_is_found_once_the_load_comes_by() -> None:
 
 @pytest.mark.parametrize("every", [1, 7, 40])
 def test_each_look_ends_before_the_next_however_few_frames_come(every) -> None:
-    frames, monitor = frames_of("circle", 8)[::every], Monitor(ROUND.sensor())
-    window, begun, ended = Window(ROUND.sensor()), 0, 0
+    frames, monitor = frames_of("circle", 8)[::every], HealthMonitor(ROUND.sensor())
+    window, begun, ended = StatisticsWindow(ROUND.sensor()), 0, 0
     for frame in frames:
         begun += window(frame) is not None
         ended += monitor(frame)
@@ -131,7 +131,7 @@ def test_a_stuck_channel_is_found_by_itself() -> None:
     assert not others
     (finding,) = monitor.findings(np.zeros(300, bool))
     assert (finding.kind, finding.element, finding.component) == ("stuck", 57, "xx")
-    assert finding.figure.startswith("reads +1.70 1/m while those around it tell of ")
+    assert finding.figure.startswith("reads +1.70 1/m while its neighbours predict ")
 
 
 def test_a_noisy_channel_is_found_in_two_seconds() -> None:
@@ -215,7 +215,7 @@ def test_elements_bent_too_far_are_saturated_while_they_are() -> None:
 
     kinds = np.array([kinds for _, kinds in looks])
 
-    assert set(np.unique(kinds)) == {0, WHY.index("saturated")}
+    assert set(np.unique(kinds)) == {0, FAULTS.index("saturated")}
     assert (kinds.max(axis=0) > 0).reshape(3, 100)[0, [44, 45, 54, 55]].all()
     assert not kinds[-1].any()
 
@@ -262,7 +262,7 @@ def test_a_channel_that_recovers_is_trusted_again_in_two_turns_of_the_load(spoil
     _, looks = watched(frames_of("circle", 22), for_a_while)
 
     bad = np.array([kinds for time, kinds in looks if 7.0 < time < 9.0])
-    assert WHY.index(until) in bad
+    assert FAULTS.index(until) in bad
     assert not looks[-1][1].any()
 
 

@@ -514,7 +514,7 @@ def test_the_covariance_is_what_noise_does(missing):
     answer = fit(K)
 
     error = (answer.coefficients - some_shape(fit)).reshape(20_000, -1)
-    z = whitened(answer.spreads[0].covariance, error)
+    z = whitened(answer.uncertainty[0].covariance, error)
     # Each entry of the sample covariance has a standard error of at most sqrt(2 / 20000) = 0.01.
     np.testing.assert_allclose(z.T @ z / 20_000, np.eye(12), atol=0.05)
     np.testing.assert_allclose(z.mean(axis=0), 0, atol=5 / np.sqrt(20_000))

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import METHODS, WHY, LeastSquares, Pipeline, Setup, Simulator, SineBasis, load_scene
+from kappaskin import METHODS, LeastSquares, Pipeline, Setup, Simulator, SineBasis, load_scene
+from kappaskin.estimation import FAULTS
 
 SCENE = replace(load_scene("centre"), effects=())
 SENSOR = SCENE.sensor()
 FRAME = Simulator(SCENE).frame(0, lambda: 0.0)
-STUCK, DEAD = WHY.index("stuck"), WHY.index("dead")
+STUCK, DEAD = FAULTS.index("stuck"), FAULTS.index("dead")
 OUT = [27, 63, 144, 45, 244]
 
 
@@ -36,7 +37,7 @@ def test_what_is_left_out_changes_no_shape_whatever_it_reads(method) -> None:
 
     np.testing.assert_allclose(shape.surface, expected.surface, atol=1e-12)
     assert shape.error_rms < 0.05e-3
-    assert [WHY[k] for k in shape.suspect[[27, 63, 44, 45]]] == ["stuck"] * 4
+    assert [FAULTS[k] for k in shape.suspect[[27, 63, 44, 45]]] == ["stuck"] * 4
     assert shape.curvature.ravel()[OUT] == pytest.approx(3000 * SCENE.transduction.resolution)
     assert np.isnan(shape.residual.ravel()[OUT]).all()
 
@@ -54,7 +55,9 @@ def test_the_cost_is_that_of_the_estimators_own_error_bars() -> None:
     ratio = np.linalg.norm(without.unit_sd) / np.linalg.norm(whole.unit_sd)
     assert pipeline.left_out.cost == pytest.approx(ratio, rel=1e-12)
     row = fit.basis.at(place[None])
-    at = np.sqrt((without.spreads.of(row) / whole.spreads.of(row)).item())
+    at = np.sqrt(
+        (without.uncertainty.covariance_of(row) / whole.uncertainty.covariance_of(row)).item()
+    )
     assert pipeline.left_out.cost_at(place) == pytest.approx(at, rel=1e-12)
     assert at > 1
     assert np.isnan(pipeline.left_out.cost_at(np.full(2, np.nan)))
@@ -105,4 +108,4 @@ def test_the_robust_estimator_goes_on_beside_the_monitor() -> None:
 
     suspect = pipeline(replace(FRAME, counts=counts)).suspect
 
-    assert {p: WHY[suspect[p]] for p in np.flatnonzero(suspect)} == {27: "stuck", 66: "spike"}
+    assert {p: FAULTS[suspect[p]] for p in np.flatnonzero(suspect)} == {27: "stuck", 66: "spike"}

@@ -3,15 +3,8 @@
 import numpy as np
 import pytest
 
-from kappaskin import (
-    LeastSquares,
-    Patch,
-    Refusal,
-    SensorLayout,
-    SineBasis,
-    elements_placed,
-    predicted_sd,
-)
+from kappaskin import LeastSquares, Patch, Refusal, SensorLayout, SineBasis, predicted_sd
+from kappaskin.estimation import place_elements
 
 PATCH = Patch(0.1, 0.08)
 BASIS = SineBasis(PATCH, 4, 3)
@@ -44,7 +37,7 @@ CRITERIA = pytest.mark.parametrize(("by", "bad"), [("D", volume), ("A", variance
 
 @CRITERIA
 def test_placed_elements_tell_more_than_a_grid(by, bad):
-    placed = elements_placed(GRID, BASIS, by, APART)
+    placed = place_elements(GRID, BASIS, by, APART)
 
     assert len(placed) == len(GRID)
     assert bad(operator(placed)) < bad(operator(GRID))
@@ -54,7 +47,7 @@ def test_placed_elements_tell_more_than_a_grid(by, bad):
 def test_no_exchange_of_one_element_gains_anything_more(by, bad):
     everywhere = SensorLayout.regular(PATCH, 10, 8)
     rows = operator(everywhere).reshape(3, 80, -1)
-    placed = elements_placed(GRID, BASIS, by, APART).positions
+    placed = place_elements(GRID, BASIS, by, APART).positions
     chosen = {int(np.hypot(*(everywhere.positions - place).T).argmin()) for place in placed}
 
     def told(numbers):
@@ -68,14 +61,14 @@ def test_no_exchange_of_one_element_gains_anything_more(by, bad):
 
 @CRITERIA
 def test_placed_elements_stand_apart(by, bad):
-    places = elements_placed(GRID, BASIS, by, APART).positions
+    places = place_elements(GRID, BASIS, by, APART).positions
 
     away = np.hypot(*(places[:, None] - places).T)
     assert away[~np.eye(len(places), dtype=bool)].min() > APART - 1e-12
 
 
 def test_each_criterion_is_best_at_what_it_asks_for():
-    D, A = (elements_placed(GRID, BASIS, by, APART) for by in ("D", "A"))
+    D, A = (place_elements(GRID, BASIS, by, APART) for by in ("D", "A"))
 
     assert volume(operator(D)) < volume(operator(A))
     assert variance(operator(A)) < variance(operator(D))
@@ -84,7 +77,7 @@ def test_each_criterion_is_best_at_what_it_asks_for():
 def test_clustered_elements_are_the_same_ones_nearer_to_the_middle():
     middle = np.array([PATCH.a, PATCH.b]) / 2
 
-    clustered = elements_placed(GRID, BASIS, "clustered", APART).positions - middle
+    clustered = place_elements(GRID, BASIS, "clustered", APART).positions - middle
 
     grid = GRID.positions - middle
     assert (np.abs(clustered) < np.abs(grid)).all()
@@ -92,7 +85,7 @@ def test_clustered_elements_are_the_same_ones_nearer_to_the_middle():
 
 
 def test_elements_stay_where_the_scene_has_them():
-    assert elements_placed(GRID, BASIS, "scene", APART) is GRID
+    assert place_elements(GRID, BASIS, "scene", APART) is GRID
 
 
 def test_what_is_predicted_is_the_spread_of_many_draws():
@@ -108,4 +101,4 @@ def test_what_is_predicted_is_the_spread_of_many_draws():
 @pytest.mark.parametrize("apart", [0.03, 0.0005])
 def test_too_few_or_too_many_places_are_refused(apart):
     with pytest.raises(Refusal, match="expected a distance apart that leaves more than 16 places"):
-        elements_placed(GRID, BASIS, "D", apart)
+        place_elements(GRID, BASIS, "D", apart)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Plate, SineBasis
-from kappaskin.estimation.prior import prior_root
+from kappaskin.estimation.bayes import prior_root
 
 
 def test_the_displacement_is_1_m_rms_over_the_skin(held_skin):
@@ -32,7 +32,7 @@ def test_it_is_how_a_plate_answers_to_many_loads_at_random_places(held_skin):
     basis = held_skin.basis()
     points, weights = basis.quadrature()
     V = np.eye(basis.size) if basis.free is None else basis.free
-    kept = np.hstack([V, basis.unseen]) if basis.unseen is not None else V
+    kept = np.hstack([V, basis.unobservable]) if basis.unobservable is not None else V
     loads = np.sqrt(weights)[:, None] * basis.at(points)  # independent, one at each point
     answers = Plate(basis.patch).compliance(basis).after(loads)
     answers = np.linalg.lstsq(kept, answers.T)[0][: V.shape[1]].T @ V.T

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Patch, Plate, SensorLayout, SineBasis
-from kappaskin.contact.modal import modal
-from kappaskin.contact.products import loads_on
+from kappaskin.contact.point import load_responses, modal_projection
 
 OBLONG = Patch(0.1, 0.07)
 BASIS = SineBasis(OBLONG, 7, 5)
@@ -24,7 +23,7 @@ class Whole:
         self.basis, compliance = basis, plate.compliance(basis)
         self.M = compliance.after(layout.curvature_operator(basis))
         self.C = compliance.after(np.eye(basis.size))
-        self.loads = loads_on(basis, self.M.T @ self.M, self.C)
+        self.loads = load_responses(basis, self.M.T @ self.M, self.C)
 
     def products(self, x, y, K):
         place = np.array([[x, y]])
@@ -80,7 +79,9 @@ def test_readings_on_a_grid_meet_the_functions_as_by_the_whole_matrix(patch, gag
     compliance = plate.compliance(basis)
     M = compliance.after(layout.curvature_operator(basis))
     K = np.random.default_rng(0).normal(size=len(M))
-    small = modal(layout, basis, compliance, np.full_like(M, np.nan))  # which need not be read
+    small = modal_projection(
+        layout, basis, compliance, np.full_like(M, np.nan)
+    )  # which need not be read
 
     np.testing.assert_allclose(small(K), K @ M, rtol=0, atol=1e-13 * np.abs(K @ M).max())
 
@@ -106,4 +107,4 @@ def test_what_is_no_product_of_small_matrices_is_met_by_the_whole_one(plate, lay
     M = compliance.after(layout.curvature_operator(basis))
     K = np.random.default_rng(0).normal(size=len(M))
 
-    np.testing.assert_array_equal(modal(layout, basis, compliance, M)(K), K @ M)
+    np.testing.assert_array_equal(modal_projection(layout, basis, compliance, M)(K), K @ M)

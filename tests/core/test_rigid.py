@@ -11,7 +11,7 @@ from scipy import linalg
 from scipy.optimize import brentq, lsq_linear, nnls
 
 from kappaskin import Disk, Patch, Plate, PointLoad, Polygon, Refusal, basis_for
-from kappaskin.mechanics import Block, Cylinder, HeightMap, Press, Punch, Sphere, Wedge
+from kappaskin.mechanics import Block, Cylinder, HeightMap, IndentationSolver, Punch, Sphere, Wedge
 
 pytestmark = pytest.mark.slow
 
@@ -32,12 +32,12 @@ each_object = pytest.mark.parametrize("make", OBJECTS.values(), ids=OBJECTS.keys
 
 @cache
 def pressing(held, nodes=(32, 24)):
-    return Press(Plate(held.patch), held.basis(8, 7), nodes)
+    return IndentationSolver(Plate(held.patch), held.basis(8, 7), nodes)
 
 
 @cache
 def on_square(edge="hinged", modes=15, nodes=64):
-    return Press(Plate(SQUARE), basis_for(SQUARE, edge, modes, modes), (nodes, nodes))
+    return IndentationSolver(Plate(SQUARE), basis_for(SQUARE, edge, modes, modes), (nodes, nodes))
 
 
 def deflection(press_on, answer):
@@ -61,7 +61,7 @@ def beam(R, depth, H, EI):
 @pytest.mark.parametrize("R", [1.0, 4.0])
 def test_a_strip_bears_on_a_cylinder_at_the_two_ends_of_contact_alone(R):
     strip, n = Patch(0.1, 0.02, strip=True), 801
-    press = Press(Plate(strip), basis_for(strip, "hinged", 200, 1), (n, 1))
+    press = IndentationSolver(Plate(strip), basis_for(strip, "hinged", 200, 1), (n, 1))
     c, end = beam(R, 1e-3 / R, 0.05, D * 0.02)
 
     answer = press(Cylinder(R, 0.3), 0.05, 0.01, math.pi / 2, depth=1e-3 / R)
@@ -77,7 +77,7 @@ def test_a_strip_bears_on_a_cylinder_at_the_two_ends_of_contact_alone(R):
 
 def test_a_strip_that_hardly_bends_touches_a_cylinder_along_one_line():
     strip = Patch(0.1, 0.02, strip=True)
-    press = Press(Plate(strip), basis_for(strip, "hinged", 200, 1), (801, 1))
+    press = IndentationSolver(Plate(strip), basis_for(strip, "hinged", 200, 1), (801, 1))
     R, H = 1.0, 0.05
     deepest = H**2 / (3 * R)
 
@@ -117,7 +117,7 @@ def ring(R, depth, rim, clamped, nu=0.3):
 @pytest.mark.parametrize(("edge", "R", "depth"), [("clamped", 0.5, 1e-3), ("hinged", 1.0, 1e-3)])
 def test_a_sphere_bears_on_a_disk_along_the_ring_that_holds_it(edge, R, depth):
     disk = Disk(0.05)
-    press = Press(Plate(disk), basis_for(disk, edge, 20, 20), (80, 80))
+    press = IndentationSolver(Plate(disk), basis_for(disk, edge, 20, 20), (80, 80))
     c, force = ring(R, depth, 0.05, edge == "clamped")
 
     answer = press(Sphere(R), 0.05, 0.05, depth=depth)
@@ -324,7 +324,7 @@ def test_the_answer_is_of_one_piece():
 def test_two_other_solvers_agree(held, make):
     edge, patch = held
     plate, basis = Plate(patch), basis_for(patch, edge, 8, 8)
-    answer = Press(plate, basis, (24, 24))(make(0.1), 0.045, 0.055, 0.3, depth=3e-3)
+    answer = IndentationSolver(plate, basis, (24, 24))(make(0.1), 0.045, 0.055, 0.3, depth=3e-3)
     E, nu, h = 12 * (1 - 0.3**2) * D / 0.25e-3**3, 0.3, 0.25e-3
     assert Plate.of_material(patch, E, nu, h).rigidity == pytest.approx(D)
 
@@ -349,7 +349,7 @@ def test_two_other_solvers_agree(held, make):
 
 def test_a_bent_skin_falls_away_below_a_flat_block():
     bent = Patch(0.04, 0.03, 12.9e-3)
-    press = Press(Plate(bent), basis_for(bent, "clamped", 8, 8), (32, 24))
+    press = IndentationSolver(Plate(bent), basis_for(bent, "clamped", 8, 8), (32, 24))
 
     answer = press(Block(0.1, 0.1), 0.02, 0.015, depth=0.0)
 
@@ -362,7 +362,7 @@ def test_a_bent_skin_falls_away_below_a_flat_block():
 
 def test_a_bent_skin_bears_along_the_push_what_the_object_bears():
     bent = Patch(0.04, 0.03, 12.9e-3)
-    press = Press(Plate(bent), basis_for(bent, "clamped", 8, 8), (64, 48))
+    press = IndentationSolver(Plate(bent), basis_for(bent, "clamped", 8, 8), (64, 48))
 
     answer = press(Block(0.03, 0.01), 0.02, 0.015, force=3.0)
 
@@ -373,7 +373,7 @@ def test_a_bent_skin_bears_along_the_push_what_the_object_bears():
 
 def test_a_skin_over_a_fluid_keeps_its_volume_under_an_object():
     basis = basis_for(SQUARE, "hinged", 9, 9)
-    press = Press(Plate(SQUARE, fluid=True), basis, (32, 32))
+    press = IndentationSolver(Plate(SQUARE, fluid=True), basis, (32, 32))
 
     answer = press(Sphere(0.05), 0.04, 0.05, depth=3e-3)
 
@@ -387,8 +387,8 @@ def test_a_drum_bears_a_sphere_once_its_thickness_is_known():
     basis, drum = basis_for(SQUARE, "hinged", 15, 15), Plate(SQUARE, rigidity=0.0, tension=20.0)
 
     with pytest.raises(Refusal, match="give the layer"):
-        Press(drum, basis)
-    answer = Press(drum, basis, layer=1e-13)(Sphere(0.05), 0.05, 0.05, force=1.0)
+        IndentationSolver(drum, basis)
+    answer = IndentationSolver(drum, basis, layer=1e-13)(Sphere(0.05), 0.05, 0.05, force=1.0)
 
     assert answer.residual < 1e-6
     assert (answer.forces > 0).sum() > 4
@@ -397,7 +397,7 @@ def test_a_drum_bears_a_sphere_once_its_thickness_is_known():
 @pytest.mark.parametrize("side", [1e-3, 1.0, 10.0])
 def test_skins_of_any_size_answer(side):
     patch = Patch(side, side)
-    press = Press(Plate(patch), basis_for(patch, "hinged", 15, 15))
+    press = IndentationSolver(Plate(patch), basis_for(patch, "hinged", 15, 15))
 
     answer = press(Sphere(side), 0.4 * side, 0.5 * side, depth=0.06 * side)
 
@@ -417,7 +417,7 @@ def test_what_overhangs_the_rim_meets_nothing_there(make):
 
 def test_an_object_in_the_notch_of_a_polygon_touches_its_arms_only():
     notched = Polygon([(0, 0), (0.1, 0), (0.1, 0.05), (0.05, 0.05), (0.05, 0.1), (0, 0.1)])
-    press = Press(Plate(notched), basis_for(notched, "hinged", 6, 6), (32, 32))
+    press = IndentationSolver(Plate(notched), basis_for(notched, "hinged", 6, 6), (32, 32))
 
     answer = press(Block(0.06, 0.06), 0.065, 0.065, depth=1e-4)
 
@@ -473,17 +473,17 @@ def test_a_push_that_cannot_be_is_refused(asked, said):
 @pytest.mark.parametrize("nodes", [(0, 4), (4, -1), (10**5, 10**5)])
 def test_nodes_that_cannot_be_are_refused(nodes):
     with pytest.raises(Refusal, match=f"nodes for 16 functions, got {nodes[0]} x {nodes[1]}"):
-        Press(Plate(SQUARE), basis_for(SQUARE, "hinged", 4, 4), nodes)
+        IndentationSolver(Plate(SQUARE), basis_for(SQUARE, "hinged", 4, 4), nodes)
 
 
 @pytest.mark.parametrize("layer", [0.0, -1e-13, math.nan, math.inf])
 def test_a_layer_that_cannot_be_is_refused(layer):
     with pytest.raises(Refusal, match="layer above zero"):
-        Press(Plate(SQUARE), basis_for(SQUARE, "hinged", 4, 4), layer=layer)
+        IndentationSolver(Plate(SQUARE), basis_for(SQUARE, "hinged", 4, 4), layer=layer)
 
 
 def test_what_would_take_minutes_is_refused():
-    press = Press(Plate(SQUARE, fluid=True), basis_for(SQUARE, "hinged", 9, 9))
+    press = IndentationSolver(Plate(SQUARE, fluid=True), basis_for(SQUARE, "hinged", 9, 9))
 
     with pytest.raises(Refusal, match="more than 1024 places"):
         press(Block(0.2, 0.2), 0.05, 0.05, depth=5e-3)

@@ -14,7 +14,7 @@ from PIL import Image
 
 from kappaskin import Refusal
 from kappaskin.mechanics import Block, Cylinder, HeightMap, Mesh, Punch, Sphere, Wedge
-from kappaskin.mechanics import mesh as meshes
+from kappaskin.mechanics import height_maps as meshes
 
 
 def of_triangles(mesh):

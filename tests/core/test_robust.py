@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    WHY,
     LeastSquares,
     Patch,
     Plate,
@@ -19,6 +18,7 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
+from kappaskin.estimation import FAULTS
 
 pytestmark = pytest.mark.slow
 
@@ -139,7 +139,7 @@ def test_an_element_that_stands_still_while_others_move_is_stuck():
     def spoil(K, t):
         K[:, 44] = 3.0, -2.0, 1.0
 
-    assert WHY[history_of(spoil)[44]] == "stuck"
+    assert FAULTS[history_of(spoil)[44]] == "stuck"
 
 
 def test_an_element_that_is_off_now_and_then_has_spikes():
@@ -147,21 +147,21 @@ def test_an_element_that_is_off_now_and_then_has_spikes():
         if t % 13 == 0:
             K[:, 71] += 20.0
 
-    assert WHY[history_of(spoil)[71]] == "spike"
+    assert FAULTS[history_of(spoil)[71]] == "spike"
 
 
 def test_an_element_that_is_off_every_which_way_is_noisy():
     def spoil(K, t):
         K[:, 23] += np.random.default_rng(1000 + t).normal(0, 20, 3)
 
-    assert WHY[history_of(spoil)[23]] == "noisy"
+    assert FAULTS[history_of(spoil)[23]] == "noisy"
 
 
 def test_an_element_that_is_off_by_the_same_has_an_offset():
     def spoil(K, t):
         K[:, 23] += 6.0
 
-    assert WHY[history_of(spoil)[23]] == "offset"
+    assert FAULTS[history_of(spoil)[23]] == "offset"
 
 
 def test_elements_with_their_cables_swapped_are_named_in_the_first_frame():
@@ -171,7 +171,7 @@ def test_elements_with_their_cables_swapped_are_named_in_the_first_frame():
     suspect = Robust(EIGHT, TENS)(K).suspect
 
     assert np.flatnonzero(suspect).tolist() == [12, 44]
-    assert {WHY[suspect[12]], WHY[suspect[44]]} == {"swapped"}
+    assert {FAULTS[suspect[12]], FAULTS[suspect[44]]} == {"swapped"}
 
 
 def test_a_dead_channel_keeps_no_element_from_being_named_stuck_or_swapped():
@@ -184,7 +184,7 @@ def test_a_dead_channel_keeps_no_element_from_being_named_stuck_or_swapped():
         K[:, [44, 12]] = K[:, [12, 44]]
         suspect = fit(K).suspect
 
-    assert [WHY[suspect[p]] for p in (12, 30, 44)] == ["swapped", "stuck", "swapped"]
+    assert [FAULTS[suspect[p]] for p in (12, 30, 44)] == ["swapped", "stuck", "swapped"]
 
 
 def test_on_a_strip_which_has_one_channel_an_element_is_named_stuck():
@@ -195,7 +195,7 @@ def test_on_a_strip_which_has_one_channel_an_element_is_named_stuck():
         K[:, 8] = 7.0
         suspect = fit(K).suspect
 
-    assert WHY[suspect[8]] == "stuck"
+    assert FAULTS[suspect[8]] == "stuck"
 
 
 def test_two_halves_of_a_skin_may_be_read_in_turn():

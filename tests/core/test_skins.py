@@ -43,9 +43,9 @@ def read(held_skin, basis, c):
 
 def at_rest(fit, values, positions):
     """The values (P,) less what no reading sees of them: how the whole skin moved."""
-    if fit.basis.unseen is None:
+    if fit.basis.unobservable is None:
         return values
-    rigid = fit.basis.at(positions) @ fit.basis.unseen
+    rigid = fit.basis.at(positions) @ fit.basis.unobservable
     return values - rigid @ np.linalg.lstsq(rigid, values)[0]
 
 

@@ -24,7 +24,7 @@ from kappaskin import (
     singular_values,
 )
 from kappaskin.estimation import METHODS
-from kappaskin.estimation.fit import DenseSpread
+from kappaskin.estimation.fit import DenseUncertainty
 from kappaskin.studies import run_stability
 from kappaskin.studies.stability.gallery import CaseKind, gallery
 from kappaskin.studies.stability.reference import least_squares, reference_of
@@ -201,14 +201,16 @@ def judged(case, estimator, method="least-squares"):
 class WithoutBars(LeastSquares):
     def _fit(self, flat, used):
         N = self.basis.size
-        return replace(super()._fit(flat, used), spreads=DenseSpread(lambda: np.zeros((N, N))))
+        return replace(
+            super()._fit(flat, used), uncertainty=DenseUncertainty(lambda: np.zeros((N, N)))
+        )
 
 
 class BarsOfNothing(WithoutBars):
     def _fit(self, flat, used):
         N = self.basis.size
-        nothing = DenseSpread(lambda: np.full((N, N), np.nan))
-        return replace(super()._fit(flat, used), spreads=nothing)
+        nothing = DenseUncertainty(lambda: np.full((N, N), np.nan))
+        return replace(super()._fit(flat, used), uncertainty=nothing)
 
 
 class Pseudo(AsPrinted):
@@ -216,7 +218,7 @@ class Pseudo(AsPrinted):
 
     def _fit(self, flat, used):
         c = np.linalg.pinv(self.M[used], rcond=1e-9) @ flat[..., used].T
-        bars = DenseSpread(lambda: np.linalg.pinv(self.M[used].T @ self.M[used], rcond=1e-15))
+        bars = DenseUncertainty(lambda: np.linalg.pinv(self.M[used].T @ self.M[used], rcond=1e-15))
         return self._answer(flat, c.T, bars, int(used.sum()) - self.unknowns)
 
 
@@ -435,11 +437,12 @@ def test_the_rigid_motions_of_a_rim_that_gives_are_among_the_unseen():
 
     values, shapes = singular_values(basis, SensorLayout.regular(patch, 8, 8))
 
-    q = basis.unseen.shape[1]
+    q = basis.unobservable.shape[1]
     assert np.all(values[-q:] == 0)
     assert np.all(values[:-q] > 1e-3)
     np.testing.assert_allclose(
-        shapes[-q:].reshape(q, -1).T, basis.unseen / np.linalg.norm(basis.unseen, axis=0)
+        shapes[-q:].reshape(q, -1).T,
+        basis.unobservable / np.linalg.norm(basis.unobservable, axis=0),
     )
 
 

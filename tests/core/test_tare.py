@@ -26,7 +26,7 @@ from kappaskin import (
 )
 from kappaskin.calibration import DriftWatch, Rest, Taring
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.contact import LoadSeeker
+from kappaskin.contact import LoadDetector
 from kappaskin.scenes.effects.flicker import FlickerNoise
 from kappaskin.scenes.effects.temperature import Temperature
 
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.slow
 
 SCENE = replace(load_scene("centre"), stimuli=(), rate=100.0)
 SENSOR = SCENE.sensor()
-SEEKER = LoadSeeker(SENSOR)
+SEEKER = LoadDetector(SENSOR)
 C = SENSOR.channels
 NOW = datetime(2026, 11, 22, 1, 2, 3, tzinfo=UTC)
 OFF = Tolerance(gain_sd=0.0, offset_sd=1.0, seed=3)
@@ -62,7 +62,7 @@ def taken(scene, pipeline=None, frames=None, seeker=None, temperature=math.nan):
             break
         estimate = pipeline(frame)
         taring.take(estimate.device_time, estimate.host_time, estimate.nominal)
-    seeker = seeker or LoadSeeker(pipeline.sensor)
+    seeker = seeker or LoadDetector(pipeline.sensor)
     return taring.tare(seeker, pipeline.rest(), NOW, temperature)
 
 
@@ -274,7 +274,7 @@ def test_offsets_at_random_are_seldom_a_load():
 
 def test_offsets_at_random_are_seldom_a_load_on_a_strip():
     sensor = load_scene("fingertip").sensor()
-    seeker, rng = LoadSeeker(sensor), np.random.default_rng(0)
+    seeker, rng = LoadDetector(sensor), np.random.default_rng(0)
     assert sum(seeker(rng.normal(size=sensor.channels), 0.0) is not None for _ in range(2000)) < 3
 
 

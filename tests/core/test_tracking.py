@@ -22,9 +22,9 @@ from kappaskin import (
     Tracking,
     load_scene,
 )
-from kappaskin.estimation.choosing import telling_most
-from kappaskin.estimation.kalman import MovingModes
-from kappaskin.estimation.prior import prior_root
+from kappaskin.estimation.bayes import prior_root
+from kappaskin.estimation.kalman import ModalKalmanFilter
+from kappaskin.estimation.tracking import most_informative
 
 pytestmark = pytest.mark.slow
 
@@ -62,7 +62,7 @@ def some_readings(seed=0):
 
 def filtered(dtype=np.float64):
     A, y = some_readings()
-    modes = MovingModes(K_MODES, dtype)
+    modes = ModalKalmanFilter(K_MODES, dtype)
     modes.expect(AMPLITUDE, SPEED)
     for n, t in enumerate(TIMES):
         if n:
@@ -108,7 +108,7 @@ def test_the_filter_is_the_regression_of_a_gaussian_process_on_all_readings_at_o
 
 def test_the_score_is_the_slope_of_the_likelihood():
     A, y = some_readings()
-    modes = MovingModes(K_MODES, np.float64)
+    modes = ModalKalmanFilter(K_MODES, np.float64)
     modes.expect(AMPLITUDE, SPEED)
 
     learned = modes.absorb(A[0], np.zeros(4), y[0])
@@ -174,7 +174,7 @@ def displacement_rows(basis=FOURS):
 
 def one_frame_sd(rows):
     """The greatest standard deviation of least squares on one frame."""
-    return NOISE * LeastSquares(FOURS, SIXES)(np.zeros((3, 36))).spreads.sd_of(rows).max()
+    return NOISE * LeastSquares(FOURS, SIXES)(np.zeros((3, 36))).uncertainty.sd_of(rows).max()
 
 
 def test_the_first_frame_is_sound(held_skin):
@@ -207,7 +207,7 @@ def test_a_still_load_is_averaged_to_the_shape_of_least_squares_with_the_right_e
     mean, bars = plain(total / 800), last.sd_of(rows)
     apart = rows @ (last.coefficients - mean.coefficients).ravel()
     assert (np.abs(apart) < 4 * bars).all()
-    assert (bars < 0.4 * NOISE * mean.spreads.sd_of(rows)).all()
+    assert (bars < 0.4 * NOISE * mean.uncertainty.sd_of(rows)).all()
     assert 0.9 < np.mean(np.abs(z) < 1.96) <= 1
     assert float(last.noise) == pytest.approx(NOISE, rel=0.05)
 
@@ -484,7 +484,7 @@ def test_twenty_thousand_steps_leave_the_covariance_definite_and_where_it_was(dt
     rng = np.random.default_rng(0)
     A = rng.normal(size=(9, 1, 6)).astype(dtype)  # one reading at a time, in turn
     k, lag = np.linspace(20, 200, 6), np.zeros(1, dtype)
-    modes = MovingModes(k, dtype)
+    modes = ModalKalmanFilter(k, dtype)
     modes.expect(1e4, SPEED)
     seen = []
     for n in range(20_001):
@@ -506,7 +506,7 @@ def test_the_readings_chosen_are_those_that_tell_most_eight_by_eight():
     B, rows, worth = rng.normal(size=(14, 5)), rng.normal(size=(2, 5)), rng.uniform(0.5, 1, 14)
     P = np.cov(rng.normal(size=(5, 20)))
 
-    chosen = telling_most(B, P, rows, worth, 11).tolist()
+    chosen = most_informative(B, P, rows, worth, 11).tolist()
 
     left = list(range(14))
     for first in (0, 8):

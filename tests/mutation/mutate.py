@@ -44,12 +44,22 @@ MEMORY = 8 * 2**30  # bytes that a change may have a test ask for
 _ARGUMENTS = ["-x", "-q", "--assert=plain", "--rootdir", str(ROOT)]
 
 ROOMS = {
-    "touch": ("touch/*", "touch products contact_object evidence footing placing skins tare"),
+    "touch": (
+        "contact/point contact/load_detection contact/objects contact/hypotheses contact/interior "
+        "contact/elastic_skin",
+        "touch products contact_object evidence footing placing skins tare",
+    ),
     "wire": (
         "sources/wire sources/decoder sources/accounting sources/interpreter",
         "wire wire_vectors diagnosis interpreter",
     ),
-    "fit": ("fit/*", "estimators least_squares fast bayes prior robust tracking finite_slope"),
+    "fit": (
+        "estimation/estimator estimation/fit estimation/least_squares estimation/methods "
+        "estimation/fast estimation/bayes estimation/kalman estimation/tracking estimation/robust "
+        "estimation/placement",
+        "estimators least_squares fast bayes prior robust tracking finite_slope placement "
+        "stability",
+    ),
     "scene": ("scene/*", "motion scene scene_file scene_write plan simulate"),
 }
 """Room -> its files, and the names of the tests in `tests/core` that are to notice a change."""

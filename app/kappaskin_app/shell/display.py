@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from kappaskin.contact import ContactObject
-from kappaskin.estimation import WHY
+from kappaskin.estimation import FAULTS
 from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
@@ -173,7 +173,7 @@ class Display(QObject):
     def railed(self, estimate: Estimate, kinds: Kinds) -> Mask:
         """Which readings (3, P) stand on a rail, as far as that is known."""
         status = self._session.status
-        on_rail = kinds == WHY.index("saturated")
+        on_rail = kinds == FAULTS.index("saturated")
         if status.sensor is not None and status.region.around == "off":
             # Every channel was scanned: what lives and has no reading is at the end of its range.
             on_rail |= np.isnan(estimate.nominal) & status.sensor.layout.live & (kinds == 0)
@@ -185,7 +185,7 @@ class Display(QObject):
         for finding in self._session.status.health.findings:
             if finding.element < len(estimate.suspect):  # or it is of another skin
                 row = COMPONENTS.index(finding.component)
-                found[row, finding.element] = WHY.index(finding.kind)
+                found[row, finding.element] = FAULTS.index(finding.kind)
         # What the fit itself suspects, it suspects of an element as a whole.
         whole = np.where(found.any(axis=0), 0, estimate.suspect)
         return np.maximum(found, whole)

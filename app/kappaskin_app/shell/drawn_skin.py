@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.skin import Patch, between, onto_rim
+from kappaskin.skin import Patch, interpolated, snapped_to_rim
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -52,7 +52,7 @@ class DrawnSkin:
         """Which points (ny, nx) are on the skin."""
         self._shown: Indices | None = None
         if not self.on.all():
-            grid, self._shown = onto_rim(patch, grid, self.on)
+            grid, self._shown = snapped_to_rim(patch, grid, self.on)
         self._rest, self._out = self.at_rest(grid.reshape(-1, 2))
         self.shares: Array = grid.reshape(-1, 2) / (patch.a, patch.b)
         """Where each point (points, 2) is, as shares of the sides."""
@@ -144,7 +144,7 @@ class DrawnSkin:
 
     def height_at(self, positions: Array) -> Array:
         """How far out (k,) in mm the skin is drawn at `positions`, evenly between its points."""
-        return between(self.patch, self.height, positions)
+        return interpolated(self.patch, self.height, positions)
 
     def place(self, positions: Array, above: float = 0.0) -> tuple[Array, Array]:
         """Points `above` mm over the drawn skin at `positions`, and the normals at rest there."""

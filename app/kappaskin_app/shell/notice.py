@@ -3,7 +3,7 @@
 import numpy as np
 from PySide6.QtWidgets import QLabel, QWidget
 
-from kappaskin.estimation import WHY
+from kappaskin.estimation import FAULTS
 from kappaskin.frames import Estimate
 from kappaskin_app.theme import LIGHT, Theme
 
@@ -25,9 +25,9 @@ def _left_out(estimate: Estimate) -> str:
     if not len(out):
         return ""
     if len(out) > _NAMED:
-        kinds = [WHY[kind] for kind in np.unique(estimate.suspect[out])]
+        kinds = [FAULTS[kind] for kind in np.unique(estimate.suspect[out])]
         return f"{len(out)} elements left out ({', '.join(kinds)})"
-    named = ", ".join(f"{element} ({WHY[estimate.suspect[element]]})" for element in out)
+    named = ", ".join(f"{element} ({FAULTS[estimate.suspect[element]]})" for element in out)
     return f"element{'s' if len(out) > 1 else ''} {named} left out"
 
 

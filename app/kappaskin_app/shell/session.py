@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Bargain, Region, bargain
+from kappaskin.estimation import Region, ScanTradeoff, scan_tradeoff
 from kappaskin.frames import Estimate
 from kappaskin.live import Engine, Left, Status
 from kappaskin.mechanics import PointLoad
@@ -297,7 +297,7 @@ class Session(QObject):
         self.refused.emit(why)
         self.preparing.emit(False)
 
-    def bargain(self) -> Bargain | None:
+    def bargain(self) -> ScanTradeoff | None:
         """What scanning the region in use buys and costs, while a contact tells where it is."""
         region, estimate, sensor = self.status.region, self.estimate, self.status.sensor
         if region.around == "off" or estimate is None or sensor is None:
@@ -308,7 +308,7 @@ class Session(QObject):
         try:
             x, y = (float(place) for place in touch.position)
             contact = PointLoad(x, y, touch.force)
-            return bargain(sensor, region, contact, estimate.noise)
+            return scan_tradeoff(sensor, region, contact, estimate.noise)
         except Refusal:  # elements chosen on another skin: the status says so
             return None
 

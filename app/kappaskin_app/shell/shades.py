@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.estimation import WHY
+from kappaskin.estimation import FAULTS
 from kappaskin.pipeline import QUANTITIES
 from kappaskin_app.theme import (
     DIVERGING,
@@ -25,7 +25,7 @@ _GROUPS = (
 )
 """Those that may share one range, or each has its own."""
 
-HEALTH_WORDS = ("well", *("on a rail" if kind == "saturated" else kind for kind in WHY[1:]))
+HEALTH_WORDS = ("well", *("on a rail" if kind == "saturated" else kind for kind in FAULTS[1:]))
 
 
 # In the order of `WHY`: what is well recedes, and of the others each has another lightness too.
@@ -35,7 +35,7 @@ HEALTH_COLOURS = rgb_of(
 )
 
 
-HEALTH = Tint(HEALTH_COLOURS, (0.0, len(WHY) - 1.0), "", kinds=HEALTH_WORDS)
+HEALTH = Tint(HEALTH_COLOURS, (0.0, len(FAULTS) - 1.0), "", kinds=HEALTH_WORDS)
 
 
 @dataclass(frozen=True)

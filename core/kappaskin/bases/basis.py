@@ -1,5 +1,8 @@
-"""What every basis answers, and the curvature that follows from it."""
+"""The interface of a basis, and the curvature of its functions."""
 
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -10,11 +13,11 @@ from kappaskin.skin import Patch
 
 Order = tuple[int, int]
 ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-"""Orders of derivatives along x and y, as every basis tells them at one point."""
+"""Orders of the derivatives along x and y that `Basis.jet` gives."""
 
 
 class ValueMap(Protocol):
-    """A map from coefficients to values on a grid, made once and called per frame."""
+    """A map from coefficients to values on a grid, built once and called per frame."""
 
     def __call__(self, coefficients: Array) -> Array:
         """Values (..., ny, nx) for `coefficients` (..., Ni, Nj); NaN off the skin."""
@@ -22,10 +25,10 @@ class ValueMap(Protocol):
 
 
 class Basis(Protocol):
-    """Ni x Nj functions on a patch that meet its edge conditions, one or some of them together.
+    """Ni x Nj functions on a patch; they, or combinations of them, meet its boundary conditions.
 
-    Coefficients are (Ni, Nj) arrays in metres; flattened, j runs fastest. Where functions are no
-    products they are the first Ni Nj, in the order of their frequencies, row by row.
+    Coefficients are (Ni, Nj) arrays in m; flattened, N = Ni Nj with j running fastest. Functions
+    that are not products are ordered by frequency, row by row.
     """
 
     @property
@@ -39,39 +42,39 @@ class Basis(Protocol):
 
     @property
     def free(self) -> Array | None:
-        """The combinations (N, F) of functions that a fit may use; None when all.
+        """The combinations (N, F) of functions that a fit may use; None for all of them.
 
-        The edges allow these and the `unseen` ones.
+        The boundary conditions allow these and the `unobservable` ones.
         """
         ...
 
     @property
-    def unseen(self) -> Array | None:
-        """Shapes (N, q) with unit RMS along the rim that change no curvature; None when all do."""
+    def unobservable(self) -> Array | None:
+        """Shapes (N, q) without curvature, of unit RMS along the rim; None where there are none."""
         ...
 
     def at(self, positions: Array, dx: int = 0, dy: int = 0) -> Array:
-        """Every function's derivative of order `dx`, `dy`, (P, N), at `positions` (P, 2).
+        """Derivatives (P, N) of order `dx`, `dy` of every function at `positions` (P, 2) in m.
 
-        Off a disk or a polygon it is NaN. `dx` = -1 is the integral along x, zero on average at
-        the two ends, and `dx` = -2 the integral of that one along x, zero on average between them.
+        NaN off a disk or a polygon. `dx` = -1 is the integral along x whose values at the two ends
+        cancel; `dx` = -2 is the integral of that one along x with zero mean.
         """
         ...
 
     def jet(self, x: float, y: float) -> Array:
-        """Every function's derivatives at one point, (6, N), in the order of `ORDERS`."""
+        """Derivatives (6, N) of every function at one point, in the order of `ORDERS`."""
         ...
 
     def value(self, x: float, y: float, coefficients: Array) -> float:
-        """The value at one point of the shape with `coefficients` (Ni, Nj)."""
+        """The value at one point of the shape with `coefficients` (Ni, Nj) in m."""
         ...
 
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> ValueMap:
-        """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""
+        """The map from coefficients to a derivative on the grid of `x` (nx,), `y` (ny,) in m."""
         ...
 
     def quadrature(self) -> tuple[Array, Array]:
-        """Points (Q, 2) in m and weights (Q,) in m^2 that integrate products of two functions."""
+        """Points (Q, 2) in m and weights (Q,) in m^2, exact for products of two functions."""
         ...
 
 
@@ -82,8 +85,8 @@ class Basis(Protocol):
 _ORDERS = {"xx": ((2, 0), (0, 0)), "yy": ((0, 2), None), "xy": ((1, 1), (-1, 1))}
 
 
-def terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
-    """Which derivatives, and how much of each, make a component of curvature."""
+def curvature_terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
+    """The factors and derivative orders whose sum is a `component` of curvature."""
     if component not in _ORDERS:
         raise Refusal(f"expected a component among {', '.join(COMPONENTS)}; got {component!r}")
     plain, bent = _ORDERS[component]
@@ -92,22 +95,71 @@ def terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
 
 
 def curvature_at(basis: Basis, positions: Array) -> Array:
-    """Change of curvature xx, yy, xy (3, P, N) in 1/m per m of each function (Eqs. 3-5, 11)."""
+    """Curvature change xx, yy, xy (3, P, N) in 1/m per m of each function (Eqs. 3-5, 11)."""
     return np.stack(
         [
-            sum(h * basis.at(positions, *order) for h, order in terms(basis.patch, component))
+            sum(
+                h * basis.at(positions, *order)
+                for h, order in curvature_terms(basis.patch, component)
+            )
             for component in COMPONENTS
         ]
     )
 
 
 class CurvatureMap:
-    """The change of one curvature component on a grid, as a map from coefficients."""
+    """A map from coefficients to the change of one curvature component on a grid."""
 
     def __init__(self, basis: Basis, component: str, x: Array, y: Array) -> None:
-        self._terms = [(h, basis.on_grid(x, y, *o)) for h, o in terms(basis.patch, component)]
+        self._terms = [
+            (h, basis.on_grid(x, y, *o)) for h, o in curvature_terms(basis.patch, component)
+        ]
 
     def __call__(self, coefficients: Array) -> Array:
         """Curvature (..., ny, nx) in 1/m for `coefficients` (..., Ni, Nj)."""
         first, *others = (h * values(coefficients) for h, values in self._terms)
         return sum(others, first)
+
+
+@dataclass(frozen=True)
+class FunctionBasis(ABC):
+    """Common base of the bases: Ni x Nj functions, all free and all observable by default."""
+
+    patch: Patch
+    Ni: int
+    Nj: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.Ni, self.Nj
+
+    @property
+    def size(self) -> int:
+        return self.Ni * self.Nj
+
+    @property
+    def free(self) -> Array | None:
+        return None
+
+    @property
+    def unobservable(self) -> Array | None:
+        return None
+
+    @abstractmethod
+    def _place(self, x: float, y: float) -> Array:
+        """Every function's derivatives at one point, (6, N), in the order of `ORDERS`."""
+
+    @cached_property
+    def _last(self) -> dict[tuple[float, float], Array]:
+        return {}
+
+    def jet(self, x: float, y: float) -> Array:
+        """Derivatives (6, N) of every function at one point; the last point's are cached."""
+        if (x, y) not in self._last:
+            self._last.clear()
+            self._last[x, y] = self._place(x, y)
+        return self._last[x, y]
+
+    def value(self, x: float, y: float, coefficients: Array) -> float:
+        """The value at one point of the shape with `coefficients` (Ni, Nj)."""
+        return float(self.jet(x, y)[0].dot(coefficients.ravel()))

@@ -1,4 +1,4 @@
-"""Arrays that take seconds to compute, kept in the user's folder of caches for the next process."""
+"""Disk cache of arrays that take seconds to compute, in the user's cache folder."""
 
 import hashlib
 import io
@@ -13,20 +13,20 @@ import scipy
 
 from kappaskin.frames import Array
 
-_MEANING = 1  # another number for whatever makes other arrays of the same question
+_MEANING = 1  # to be changed by whatever makes other arrays of the same key
 _MOST = 16  # files
 _MARK = hashlib.sha256().digest_size  # bytes: what a file begins with
 _LARGEST = 64_000_000  # bytes of one: more is read no faster than it is computed
 
 
-def kept(question: str, compute: Callable[[], dict[str, Array]]) -> dict[str, Array]:
-    """What `compute` answers to `question`, by name, the same bits whether kept or computed.
+def cached(key: str, compute: Callable[[], dict[str, Array]]) -> dict[str, Array]:
+    """The arrays of `compute()`, by name: read from the cache where `key` is there.
 
-    A file that is damaged or of other versions is not used; where none can be written, it is
-    computed every time.
+    The same bits whether cached or computed. A damaged file and those of other versions of numpy
+    or scipy are not used; where none can be written, the arrays are computed every time.
     """
-    asked = f"{_MEANING} {np.__version__} {scipy.__version__} {question}"
-    file = _folder() / f"{hashlib.sha256(asked.encode()).hexdigest()[:24]}.npz"
+    versioned = f"{_MEANING} {np.__version__} {scipy.__version__} {key}"
+    file = _folder() / f"{hashlib.sha256(versioned.encode()).hexdigest()[:24]}.npz"
     with suppress(OSError):
         data = file.read_bytes()
         if data.startswith(_mark(data[_MARK:])):

@@ -1,13 +1,14 @@
-"""Bases whose functions are products of one in x and one in y: values, slopes, grids."""
+"""Product bases on a rectangle: sines, clamped beams, and sines with an elastic rim."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kappaskin.bases.basis import ORDERS, Order
-from kappaskin.bases.functions import FunctionBasis
+from kappaskin.bases.basis import ORDERS, Basis, FunctionBasis, Order
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
@@ -17,7 +18,7 @@ _ALIKE = np.array([[1.0], [0.0], [0.0]])  # along y of a strip
 
 @dataclass(frozen=True, eq=False)
 class GridMap:
-    """A map from coefficients to values on a grid, made once and called per frame."""
+    """A map from coefficients to values on a grid, as one matrix along x and one along y."""
 
     X: Array
     Y: Array
@@ -33,7 +34,7 @@ class GridMap:
 class ProductBasis(FunctionBasis):
     """Ni x Nj products of Ni functions of x and Nj functions of y on a rectangle.
 
-    On a strip they are the Ni functions of x alone, alike along y (Nj = 1).
+    On a strip they are the Ni functions of x alone, constant along y (Nj = 1).
     """
 
     def __post_init__(self) -> None:
@@ -47,7 +48,7 @@ class ProductBasis(FunctionBasis):
 
     @abstractmethod
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
-        """The derivative of `count` functions on [0, `length`], (P, count), at `x` (P,).
+        """Derivatives (P, count) of `count` functions on [0, `length`] at `x` (P,).
 
         Of order -1 it is the integral whose values at 0 and `length` cancel, of order -2 the
         integral of that one whose mean is zero.
@@ -118,7 +119,7 @@ class ProductBasis(FunctionBasis):
 
 
 class JetProductBasis(ProductBasis):
-    """Products of functions that are told at one place of a side at a time."""
+    """Products of functions that are evaluated at one point of a side at a time."""
 
     @abstractmethod
     def _jet(self, x: float, length: float, count: int) -> Array:
@@ -131,6 +132,288 @@ class JetProductBasis(ProductBasis):
 
 
 def gauss(length: float, count: int) -> tuple[Array, Array]:
-    """Points and weights of Gauss and Legendre on [0, length]."""
+    """Gauss-Legendre points (count,) and weights (count,) on [0, length]."""
     t, w = np.polynomial.legendre.leggauss(count)
     return (t + 1) * length / 2, w * length / 2
+
+
+@dataclass(frozen=True)
+class SineBasis(ProductBasis):
+    """The Ni x Nj products sin(i pi x/a) sin(j pi y/b), zero along the edges (Eq. 1).
+
+    The ends of a bent skin are pinned and it is inextensible, so that f has no mean along the arc;
+    with `sliding` ends it may have one.
+    """
+
+    sliding: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self._pinned and self.Ni < 2:
+            raise Refusal(
+                "a pinned inextensible arc cannot bend in its first function alone: expected at "
+                "least 2 functions along x, got 1; use more, or let the ends slide"
+            )
+
+    @property
+    def _pinned(self) -> bool:
+        return self.patch.base_curvature > 0 and not self.sliding
+
+    @property
+    def free(self) -> Array | None:
+        """On a pinned arc, c_1 = - sum over odd i >= 3 of c_i / i leaves Ni - 1 of Ni."""
+        return self._inextensible if self._pinned else None
+
+    @cached_property
+    def _inextensible(self) -> Array:
+        i = np.arange(1, self.Ni + 1)
+        return self._without_mean(np.where(i % 2, 1 / i, 0.0))
+
+    @cached_property
+    def wavenumbers(self) -> tuple[Array, Array]:
+        """Wave numbers i pi/a (Ni,) and j pi/b (Nj,) in rad/m; 0 along y of a strip."""
+        ki, kj = _wavenumbers(self.patch.a, self.Ni), _wavenumbers(self.patch.b, self.Nj)
+        return ki, kj * (not self.patch.strip)
+
+    @cached_property
+    def laplacian(self) -> Array:
+        """Eigenvalues k_i^2 + k_j^2 of minus the Laplacian, (Ni, Nj) in 1/m^2."""
+        ki, kj = self.wavenumbers
+        return np.add.outer(ki**2, kj**2)
+
+    def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
+        k = _wavenumbers(length, count)
+        kx = np.multiply.outer(x, k)
+        if derivative == 0:
+            return np.sin(kx)
+        end = np.cos(k * length)
+        if derivative == -2:
+            tilt = np.multiply.outer(x - length / 2, (1 + end) / (2 * k))
+            return tilt - np.sin(kx) / k**2 + (1 - end) / (k**3 * length)
+        if derivative == -1:
+            return ((1 + end) / 2 - np.cos(kx)) / k
+        return k * np.cos(kx) if derivative == 1 else -(k**2) * np.sin(kx)
+
+    @cached_property
+    def _waves(self) -> "_Waves":
+        return _Waves(*self.wavenumbers)
+
+    def _factors(self, x: float, y: float) -> tuple[Array, Array]:
+        factors = self._waves(x, y)
+        return factors[:, : self.Ni], factors[:, self.Ni :]
+
+
+class _Waves:
+    """Sines of x and of y with their derivatives, all from one exponential."""
+
+    def __init__(self, ki: Array, kj: Array) -> None:
+        k = np.concatenate([ki, kj])
+        of_y = np.arange(len(k)) >= len(ki)
+        self._turns = 1j * np.stack([k * ~of_y, k * of_y])
+        order = np.array([[dx] * len(ki) + [dy] * len(kj) for dx, dy in ORDERS], np.intp)
+        cosines = (order % 2 == 1) | (k == 0)  # on a strip: one, which is the cosine of nothing
+        self._which: NDArray[np.intp] = 2 * np.arange(len(k)) + ~cosines
+        self._times: Array = k**order * np.where(order == 2, -1, 1)
+
+    def __call__(self, x: float, y: float) -> Array:
+        """Derivatives (6, Ni + Nj) along x and y, in the order of `ORDERS`."""
+        values = np.exp(np.dot((x, y), self._turns)).view(float).take(self._which)
+        values *= self._times
+        return values
+
+
+@lru_cache(64)
+def _wavenumbers(length: float, count: int) -> Array:
+    """The wave numbers i pi/length (count,) in rad/m, from i = 1 on."""
+    return np.arange(1.0, count + 1) * np.pi / length
+
+
+@dataclass(frozen=True)
+class ClampedBasis(JetProductBasis):
+    """The Ni x Nj products of clamped-beam modes: value and slope vanish along the edges.
+
+    Between the edges they are nearly sines, so that elements at cell centres tell them apart as
+    well; a smooth shape's coefficients fall as 1/k^5, its curvature converges as N^(-5/2). Their
+    mean square is a sine's, 1/2 along each side. A bent skin is inextensible: f has no mean along
+    the arc.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.patch.base_curvature and self.Ni < 2:
+            raise Refusal(
+                "a clamped inextensible arc cannot bend in its first function alone: expected at "
+                "least 2 functions along x, got 1"
+            )
+
+    @property
+    def free(self) -> Array | None:
+        """On an arc, that the mean along x vanishes leaves Ni - 1 of Ni."""
+        return self._inextensible if self.patch.base_curvature else None
+
+    @cached_property
+    def _inextensible(self) -> Array:
+        ends = self._along_x(np.array([0.0, self.patch.a]), -1)
+        return self._without_mean(ends[1] - ends[0])
+
+    def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
+        s, ends = x / length - 0.5, np.array([-0.5, 0.5])
+        values = _beam(s, count, derivative)[0]
+        if derivative < 0:
+            middle = _beam(ends, count, -1)[0].mean(axis=0)
+            if derivative == -1:
+                values -= middle
+            else:
+                third = _beam(ends, count, -3)[0]
+                values -= np.multiply.outer(s, middle) + third[1] - third[0]
+        return values * length**-derivative
+
+    def _jet(self, x: float, length: float, count: int) -> Array:
+        jet = _beam(np.array([x / length - 0.5]), count, 0, 1, 2)[:, 0]
+        jet[1] /= length
+        jet[2] /= length**2
+        return jet
+
+
+def _beam(s: Array, count: int, *orders: int) -> Array:
+    """The derivatives (O, S, N) of the first `count` modes of a clamped beam of length 1.
+
+    With `s` (S,) from -1/2 to 1/2, even ones are cos(k s)/cos(k/2) - cosh(k s)/cosh(k/2), odd ones
+    the same with sin and sinh, over sqrt(2); cosh and sinh as decaying exponentials from either
+    end, so that nothing overflows or cancels.
+    """
+    modes = _beam_modes(count, orders)
+    ks, half = np.multiply.outer(s, modes.k), modes.k / 2
+    wave = modes.waves * np.sin(ks + modes.phases)
+    return wave - modes.decays * (np.exp(ks - half) + modes.far * np.exp(-ks - half))
+
+
+@dataclass(frozen=True, eq=False)
+class _BeamModes:
+    """Wave numbers k (N,); phases and factors (O, 1, N) of the waves, the decays and far ends."""
+
+    k: Array
+    phases: Array
+    waves: Array
+    decays: Array
+    far: Array
+
+
+@lru_cache(64)
+def _beam_modes(count: int, orders: tuple[int, ...]) -> _BeamModes:
+    """What the derivatives of `orders` share; k are the roots of cos k cosh k = 1 above zero."""
+    k = (np.arange(1.0, count + 1) + 0.5) * np.pi  # nearly: Newton's method does the rest
+    for _ in range(4):
+        sech = 2 * np.exp(-k) / (1 + np.exp(-2 * k))
+        k -= (np.cos(k) - sech) / (sech * np.tanh(k) - np.sin(k))
+    d = np.array(orders, float)[:, None, None]
+    sign = np.where(np.arange(count) % 2, -1.0, 1.0)
+    phase, scale = (1 + sign) * np.pi / 4, k**d / np.sqrt(2)
+    return _BeamModes(
+        k,
+        phase + d * np.pi / 2,
+        scale / np.sin(k / 2 + phase),
+        scale / (1 + sign * np.exp(-k)),
+        sign * (-1.0) ** d,
+    )
+
+
+@dataclass(frozen=True)
+class ElasticBasis(JetProductBasis):
+    """The Ni x Nj products of 1, 2x/a - 1, sin(pi x/a), sin(2 pi x/a) ... and the same along y.
+
+    Every shape with finite bending energy is a sum of them: along x, what is left of a function
+    when the line through its ends is taken out vanishes at both, which sines are complete for.
+
+    Readings of curvature see neither a translation nor a tilt: 1, x and y (1 and x on a strip) are
+    `unobservable`, and of all shapes that explain the readings `free` keeps the one whose rim is
+    nearest to rest. The fit's error bar says how far the rim may be from there.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.patch.base_curvature:
+            raise Refusal(
+                f"expected a flat skin for a rim that gives, got a base radius of "
+                f"{self.patch.radius:g} m; hold its edges, or let its ends slide"
+            )
+        least = (3, 1) if self.patch.strip else (2, 2)
+        if self.Ni < least[0] or self.Nj < least[1]:
+            raise Refusal(
+                "a translation and a tilt bend nothing: expected at least "
+                f"{least[0]} x {least[1]} functions, got {self.Ni} x {self.Nj}"
+            )
+
+    def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
+        if derivative < 0:
+            raise Refusal("a flat skin needs no integral along x; expected an order of at least 0")
+        k = np.arange(1.0, count - 1) * (np.pi / length)
+        lines = np.zeros((len(x), 2))
+        lines[:, 0] = derivative == 0
+        lines[:, 1] = (2 * x / length - 1, 2 / length, 0)[derivative]
+        waves = k**derivative * np.sin(np.multiply.outer(x, k) + derivative * np.pi / 2)
+        return np.hstack([lines, waves])
+
+    def _jet(self, x: float, length: float, count: int) -> Array:
+        jet = np.zeros((3, count))
+        jet[:2, :2] = (1, 2 * x / length - 1), (0, 2 / length)
+        k = np.arange(1.0, count - 1) * (np.pi / length)
+        jet[0, 2:] = sine = np.sin(k * x)
+        jet[1, 2:], jet[2, 2:] = k * np.cos(k * x), -(k**2) * sine
+        return jet
+
+    def rim(self) -> tuple[Array, Array]:
+        """Points (Q, 2) in m and weights (Q,) in m that integrate products along the rim."""
+        (a, b), strip = (self.patch.a, self.patch.b), self.patch.strip
+        x, along_x = gauss(a, 2 * self.Ni + 16)
+        y, along_y = gauss(b, 1 if strip else 2 * self.Nj + 16)
+        sides = [(end, y, along_y) for end in (0.0, a)]
+        sides += [] if strip else [(x, end, along_x) for end in (0.0, b)]
+        points = [np.column_stack(np.broadcast_arrays(*side[:2])) for side in sides]
+        return np.vstack(points), np.concatenate([side[2] for side in sides])
+
+    @property
+    def _rigid(self) -> list[int]:
+        """Which functions are 1, x and, but on a strip, y."""
+        return [0, self.Nj] if self.patch.strip else [0, self.Nj, 1]
+
+    @property
+    def unobservable(self) -> Array:
+        """The rigid shapes (N, 3), on a strip (N, 2), with unit RMS along the rim."""
+        return self._unobservable
+
+    @cached_property
+    def _unobservable(self) -> Array:
+        points, weights = self.rim()
+        mean_square = weights @ self.at(points)[:, self._rigid] ** 2 / weights.sum()
+        return np.eye(self.size)[:, self._rigid] / np.sqrt(mean_square)
+
+    @property
+    def free(self) -> Array:
+        """Every other function less the rigid shape nearest to it along the rim, (N, N - 3)."""
+        return self._nearest_to_rest
+
+    @cached_property
+    def _nearest_to_rest(self) -> Array:
+        points, weights = self.rim()
+        R = self.at(points)
+        others = np.delete(np.eye(self.size), self._rigid, axis=1)
+        # The rigid shapes are orthogonal along the rim, by its symmetry.
+        share = (R @ self.unobservable).T * weights / weights.sum() @ R @ others
+        return others - self.unobservable @ share
+
+
+Overlaps = Callable[[Order, Order], Array]
+
+
+def overlaps(basis: Basis) -> Overlaps:
+    """A function of two orders: the integrals (N, N) of products of those derivatives in m^2."""
+    if isinstance(basis, ProductBasis):
+        return basis.overlap
+    points, weights = basis.quadrature()
+
+    @cache
+    def at(order: Order) -> Array:
+        return basis.at(points, *order)
+
+    return lambda one, other: (at(one).T * weights) @ at(other)

@@ -1,7 +1,7 @@
 """A second of readings to a tare, or to the reason why there is none; and how far a tare wandered.
 
 A tare is refused while the skin moves or is loaded. What can be told apart and what cannot is said
-in `LoadSeeker`: against the tare before, or a calibration, a load need only stand out of what the
+in `LoadDetector`: against the tare before, or a calibration, a load need only stand out of what the
 elements have wandered since. Where neither is known, it must stand out of how far the elements are
 off by themselves: a fainter one is taken for their offsets.
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.calibration.tare import Tare
-from kappaskin.contact import LoadSeeker
+from kappaskin.contact import LoadDetector
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, OVERTAKEN, Array
 from kappaskin.sensing import Sensor
@@ -80,7 +80,7 @@ class Taring:
         enough = span >= SECONDS and len(self._times) >= _FEWEST
         return enough or now > self._begun + _PATIENCE
 
-    def tare(self, seeker: LoadSeeker, rest: Rest, date: datetime, temperature: float) -> Tare:
+    def tare(self, seeker: LoadDetector, rest: Rest, date: datetime, temperature: float) -> Tare:
         """The tare, or a `Refusal` that says why there is none; temperature NaN if not known."""
         n = len(self._times)
         if n < _FEWEST:
@@ -127,7 +127,7 @@ class _Found:
     noise: float
 
 
-def _still(sensor: Sensor, seeker: LoadSeeker, readings: Array) -> _Found:
+def _still(sensor: Sensor, seeker: LoadDetector, readings: Array) -> _Found:
     """What `readings` (n, C) are on average, if they hold still but for noise."""
     used = ~np.isnan(readings).all(axis=0)
     # A channel may be missing in a frame or two: its mean stands for it.
@@ -148,7 +148,7 @@ def _parts(readings: Array, count: int) -> Array:
 
 
 def _check_still(
-    sensor: Sensor, seeker: LoadSeeker, off: Array, noise: float, frames: float
+    sensor: Sensor, seeker: LoadDetector, off: Array, noise: float, frames: float
 ) -> None:
     """Refuse when a part of the time, of so many `frames`, is too far `off` (n, C) the mean."""
     squares = np.nanmean(off**2, axis=1)
@@ -171,7 +171,7 @@ def _named(sensor: Sensor, channel: int) -> str:
     return f"{COMPONENTS[component]} of element {element} at ({x:.0f}, {y:.0f}) mm"
 
 
-def _check_unloaded(sensor: Sensor, seeker: LoadSeeker, found: _Found, rest: Rest) -> None:
+def _check_unloaded(sensor: Sensor, seeker: LoadDetector, found: _Found, rest: Rest) -> None:
     load = seeker(found.mean - rest.zero - rest.remanence, found.noise**2)
     if load is None:
         return
@@ -211,7 +211,7 @@ class Drift:
 class DriftWatch:
     """Averages the readings of a tared skin, and tells the drift in them while nothing presses."""
 
-    def __init__(self, seeker: LoadSeeker) -> None:
+    def __init__(self, seeker: LoadDetector) -> None:
         self._seeker = seeker
         self._told = Drift()
         self._next: Drift | None = None

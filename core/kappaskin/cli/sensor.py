@@ -119,7 +119,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
     """
     # All of it before the source is opened: while modules load, readings wait.
     from kappaskin.calibration import Tares, Taring, data_folder
-    from kappaskin.contact import LoadSeeker
+    from kappaskin.contact import LoadDetector
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
     from kappaskin.sources import open_source
 
@@ -134,7 +134,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
         taring = Taring(sensor, time.monotonic())
         _take_readings(opened, sensor, taring)
         now = datetime.now().astimezone()
-        taken = taring.tare(LoadSeeker(sensor), _rest(sensor, used), now, opened.temperature)
+        taken = taring.tare(LoadDetector(sensor), _rest(sensor, used), now, opened.temperature)
     _print_tare(taken, used)
     if sensor.simulated:
         print("not saved: the sensor is simulated")

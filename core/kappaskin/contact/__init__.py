@@ -1,6 +1,6 @@
-"""From readings to contact: position, force, object, local geometry."""
+"""Contact: where it is, how hard, what object it is, and the geometry of the skin there."""
 
-from kappaskin.contact.geometry import FormMap as FormMap
+from kappaskin.contact.geometry import CurvatureFormMap as CurvatureFormMap
 from kappaskin.contact.geometry import contact_geometry as contact_geometry
 from kappaskin.contact.geometry import local_geometry as local_geometry
 from kappaskin.contact.geometry import surface_geometry as surface_geometry
@@ -8,11 +8,11 @@ from kappaskin.contact.intrinsic import ForceTorqueSensor as ForceTorqueSensor
 from kappaskin.contact.intrinsic import IntrinsicContact as IntrinsicContact
 from kappaskin.contact.intrinsic import IntrinsicTouch as IntrinsicTouch
 from kappaskin.contact.intrinsic import Wrench as Wrench
-from kappaskin.contact.load_detection import LoadSeeker as LoadSeeker
+from kappaskin.contact.load_detection import LoadDetector as LoadDetector
 from kappaskin.contact.objects import KINDS as KINDS
 from kappaskin.contact.objects import NO_OBJECT as NO_OBJECT
 from kappaskin.contact.objects import ContactObject as ContactObject
 from kappaskin.contact.objects import ObjectFinder as ObjectFinder
-from kappaskin.contact.placement import placed as placed
+from kappaskin.contact.objects import placed_object as placed_object
 from kappaskin.contact.point import NO_TOUCH as NO_TOUCH
 from kappaskin.contact.point import PointContact as PointContact

@@ -1,17 +1,109 @@
-"""From point forces to what the elements read and how far the skin gives, finely resolved."""
+"""Rigid objects on an elastic skin as point forces: models, readings, and their best fit."""
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
 from kappaskin.bases import basis_for
-from kappaskin.contact.rigid_contacts import PointForces
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
+
+# A thin skin touches a rigid object only where it can press without being bent further than the
+# object is: a sphere on a ring, inside which the skin takes the sphere's curvature; a straight edge
+# at its two ends, between which the skin arches away from it; a cylinder at its two ends along an
+# arc across its axis, where one curvature asks for the pressure 1 / sqrt(1 - (t / a)^2), even in
+# the angle. A foam below presses the skin back on to the object in between as well. The last
+# parameter of ring and arcs is q, the square of the ring's radius or of the arc's half width: the
+# readings are nearly linear in it, so that noise may take it below zero.
+
+ARC = 4
+"""Points on an arc."""
+_ARC = np.cos((np.arange(ARC) + 0.5) * np.pi / ARC)
+_AROUND = 2 * np.pi * np.arange(12) / 12
+
+ROUND = np.stack([np.cos(_AROUND), np.sin(_AROUND), np.full(12, 1 / 12)], axis=-1)
+"""The `pattern` (12, 3) of a uniform circle: x, y and share of the force."""
+EVEN = (1.0, 1.0)
+"""Relative `widths` of two arcs of the same width."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointForces:
+    """Forces `weights` (k,) in N at `points` (k, 2) in m, and their derivatives.
+
+    `moves` (n, k, 2) are those of the points for n parameters, `growth` (n, k) of the weights.
+    """
+
+    points: Array
+    weights: Array
+    moves: Array
+    growth: Array
+
+
+ForceModel = Callable[[Array], PointForces]
+"""From parameters to forces; the centre of force x, y in m and the force in N come first."""
+
+
+def ring(pattern: Array) -> ForceModel:
+    """Parameters x, y, F, q: a `pattern` (k, 3) of x, y and share of force, scaled by sqrt(q)."""
+    share = pattern[:, 2]
+    unit = pattern[:, :2] - share @ pattern[:, :2]  # x, y is the centre of force
+
+    def forces(parameters: Array) -> PointForces:
+        force, c = parameters[2], math.sqrt(parameters[3])
+        moves, growth = np.zeros((4, *unit.shape)), np.zeros((4, len(unit)))
+        moves[0, :, 0] = moves[1, :, 1] = 1
+        moves[3] = unit / (2 * c)
+        growth[2] = share
+        return PointForces(parameters[:2] + c * unit, force * share, moves, growth)
+
+    return forces
+
+
+def ends(middle: float) -> ForceModel:
+    """Parameters x, y, F, angle, length squared, share: forces at the two ends of an edge.
+
+    The share `middle` of the force acts between them; the ends have (1/2 + share) and
+    (1/2 - share) of the rest.
+    """
+    return lambda parameters: _at_ends(parameters, np.zeros((2, 1)), middle)
+
+
+def arcs(widths: tuple[float, float], middle: float) -> ForceModel:
+    """Parameters of `ends` and q: forces on arcs across the ends, half width sqrt(q) `widths`."""
+    return lambda parameters: _at_ends(parameters, np.multiply.outer(widths, _ARC), middle)
+
+
+def _at_ends(parameters: Array, across: Array, middle: float) -> PointForces:
+    """Forces beside the axis by `across` (2, k) times the root of the last parameter."""
+    force, angle, length, share = *parameters[2:4], math.sqrt(parameters[4]), parameters[5]
+    axis = np.array([math.cos(angle), math.sin(angle)])
+    beside = np.array([-axis[1], axis[0]])
+    k, n, rest, sign = across.shape[1], len(parameters), 1 - middle, np.array([1.0, -1.0])
+    of_end = rest * (0.5 + sign * share)
+    if middle:
+        across = np.vstack([across, across.mean(axis=0)])
+        sign, of_end = np.append(sign, 0.0), np.append(of_end, middle)
+    sign, growth, off = np.repeat(sign, k), np.zeros((n, across.size)), across.ravel()
+    place, a = sign / 2 - rest * share, math.sqrt(parameters[6]) if n > 6 else 0.0
+    u, v = place * length, off * a
+    moves = np.zeros((n, across.size, 2))
+    moves[0, :, 0] = moves[1, :, 1] = 1
+    moves[3] = np.multiply.outer(u, beside) - np.multiply.outer(v, axis)
+    moves[4] = np.multiply.outer(place / (2 * length), axis)
+    moves[5] = -rest * length * axis
+    if n > 6:
+        moves[6] = np.multiply.outer(off / (2 * a), beside)
+    growth[2], growth[5] = np.repeat(of_end, k) / k, rest * sign * force / k
+    points = parameters[:2] + np.multiply.outer(u, axis) + np.multiply.outer(v, beside)
+    return PointForces(points, force * growth[2], moves, growth)
+
 
 _MOST = 2000  # elements: 100 MB
 _SEARCHED = np.array([0.025, 0.045, 0.07, 0.1, 0.14, 0.19, 0.26, 0.35])  # of the shorter side
@@ -23,20 +115,18 @@ _FALL = 1.6  # the power with which that falls
 
 
 class ElasticSkin:
-    """A plate with elements on it, answering to point forces."""
+    """A plate with elements on it: its displacement and readings under point forces."""
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, functions: int) -> None:
         patch = plate.patch
         if patch.strip:
-            raise Refusal(
-                "a strip bends along x alone: expected a skin with two sides to tell objects by"
-            )
+            raise Refusal("object recognition needs a 2-D skin; this one is a strip")
         if not plate.rigidity:
-            raise Refusal("a drum head has no curvature to tell objects by: expected a rigidity")
-        if len(layout) > _MOST:
             raise Refusal(
-                f"expected at most {_MOST} elements to tell objects by, got {len(layout)}"
+                "object recognition needs a rigidity above zero; this skin is a drum head"
             )
+        if len(layout) > _MOST:
+            raise Refusal(f"object recognition takes at most {_MOST} elements, got {len(layout)}")
         self.patch, self.side, self._layout = patch, min(patch.a, patch.b), layout
         self._basis = basis_for(patch, edge, functions, functions)
         self._compliance = plate.compliance(self._basis)
@@ -45,7 +135,7 @@ class ElasticSkin:
         self._M: NDArray[np.float32] = M.astype(np.float32)
         self.half_wave = max(patch.a, patch.b) / functions
         self.bend = 1 / (4 * math.pi * plate.rigidity)
-        """What the curvature inside a ring or an arc loses per N and e-fold of its size, in 1/m."""
+        """Curvature in 1/m lost inside a ring or an arc per N and e-fold of its size."""
 
     def _on_skin(self, points: Array) -> Array:
         return np.array([self.patch.inward(x, y) for x, y in points.tolist()])
@@ -68,9 +158,9 @@ class ElasticSkin:
         return self._felt(points) @ self._compliance.after(modal[None])[0]
 
     def pressed(self, points: Array, gap: Array, force: float) -> Array:
-        """Forces (k,) in N, none below zero, of a rigid object that presses with `force` in all.
+        """Contact forces (k,) in N, none below zero, of a rigid object under `force` in N.
 
-        Its surface lies `gap` (k,) in m behind its tip at `points` (k, 2).
+        Its surface lies `gap` (k,) in m behind its tip at `points` (k, 2) in m.
         """
         from scipy.optimize import nnls  # slow to import, and seldom needed
 
@@ -85,9 +175,9 @@ class ElasticSkin:
         return nnls(A, b)[0]
 
     def unresolved(self, forces: PointForces) -> Array:
-        """Variance (R,) in 1/m^2 of what finer functions would add to the readings.
+        """Variance (R,) in 1/m^2 of the readings due to detail finer than the functions.
 
-        Only an element within a half wave or two of a force sees it.
+        It matters only for elements within a half wave or two of a force.
         """
         apart = self._layout.positions[:, None] - forces.points
         waves = np.hypot(apart[..., 0], apart[..., 1]) / self.half_wave
@@ -95,9 +185,10 @@ class ElasticSkin:
         return np.tile(blur.sum(axis=1), 3)
 
     def best_pair(self, around: Array, readings: Array, used: Mask) -> tuple[Array, Array]:
-        """The two points (2, 2) in m near `around` whose pushes explain the readings best.
+        """The two point forces near `around` (2,) in m that explain the readings best.
 
-        With their forces (2,) in N, of one sign. `readings` (R,) are zero where not `used`.
+        Points (2, 2) in m, and forces (2,) in N of one sign. `readings` (R,) are zero where not
+        `used` (R,).
         """
         angles = 2 * np.pi * np.arange(_ANGLES) / _ANGLES
         out = np.stack([np.multiply.outer(_SEARCHED, f(angles)).ravel() for f in (np.cos, np.sin)])
@@ -114,3 +205,100 @@ class ElasticSkin:
         explained = np.where(one * two > 0, one * h[:, None] + two * h, -np.inf)
         i, j = np.unravel_index(int(np.argmax(explained)), explained.shape)
         return points[[i, j]], np.array([one[i, j], two[i, j]])
+
+
+_GAIN = 0.05  # of chi-squared: less is not worth a step
+_DAMPING = 1e-3  # of the diagonal, at first
+_RIDGE = 1e-12  # of the diagonal, always
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """Prior of n parameters: normal with `mean` and `sd`, within the bounds `low` and `high`."""
+
+    mean: Array
+    sd: Array
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Optimum:
+    """The best parameters (n,) of a contact, and their covariance (n, n).
+
+    `cost` is chi-squared with the prior, `squares` that of the readings alone; `ahead` (n,) is the
+    step that a bound prevented.
+    """
+
+    contact: ForceModel
+    parameters: Array
+    covariance: Array
+    cost: float
+    squares: float
+    ahead: Array
+
+
+def optimise(
+    skin: ElasticSkin,
+    contact: ForceModel,
+    start: Array,
+    prior: Prior,
+    readings: Array,
+    weight: Array,
+    steps: int,
+) -> Optimum:
+    """The most likely parameters near `start` (n,), by damped Gauss-Newton steps.
+
+    `readings` (R,) in 1/m have the `weight` (R,), 1 / sd, or 0 where missing.
+    """
+    p, damping = start, _DAMPING
+    here = _linearised(skin, contact, p, prior, readings, weight)
+    for _ in range(steps):
+        q = np.clip(p + here.step(damping), prior.low, prior.high)
+        there = _linearised(skin, contact, q, prior, readings, weight)
+        if not there.cost < here.cost:
+            damping = max(10 * damping, 0.01)
+            continue
+        gain, p, here, damping = here.cost - there.cost, q, there, damping / 10
+        if gain < _GAIN:
+            break
+    return Optimum(contact, p, here.covariance, here.cost, here.squares, here.step(0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _NormalEquations:
+    """Normal equations at some parameters, scaled to a diagonal of ones, and the cost there."""
+
+    cost: float
+    squares: float
+    normal: Array
+    gradient: Array
+    scale: Array
+
+    def step(self, damping: float) -> Array:
+        held = self.normal + (damping + _RIDGE) * np.eye(len(self.scale))
+        return np.linalg.solve(held, self.gradient) / self.scale
+
+    @property
+    def covariance(self) -> Array:
+        inverse = np.linalg.inv(self.normal + _RIDGE * np.eye(len(self.scale)))
+        return inverse / np.multiply.outer(self.scale, self.scale)
+
+
+def _linearised(
+    skin: ElasticSkin, contact: ForceModel, p: Array, prior: Prior, readings: Array, weight: Array
+) -> _NormalEquations:
+    K, slopes = skin.readings(contact(p))
+    left, J, off = weight * (readings - K), weight[:, None] * slopes, (p - prior.mean) / prior.sd
+    squares = float(left @ left)
+    normal = J.T @ J + np.diag(prior.sd**-2)
+    scale = np.sqrt(np.diag(normal))
+    scale[scale == 0] = 1.0  # a parameter that nothing feels, as on the rim
+    gradient = (J.T @ left - off / prior.sd) / scale
+    return _NormalEquations(
+        squares + float(off @ off),
+        squares,
+        normal / np.multiply.outer(scale, scale),
+        gradient,
+        scale,
+    )

@@ -1,4 +1,4 @@
-"""From the shape fitted to the readings to the skin's local geometry, anywhere on it."""
+"""Local geometry of the deflected skin: frame, metric, curvature and torsion forms."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 from kappaskin.bases import ORDERS, Basis
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Fit, seen_through
+from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import Array, LocalGeometry, Touch
 from kappaskin.skin import Patch
 
@@ -20,10 +20,10 @@ NO_GEOMETRY = LocalGeometry(
 
 
 def local_geometry(fit: Fit, positions: Array) -> LocalGeometry:
-    """The geometry at `positions` (P, 2) or (2,) in m of the skin that `fit` found in one frame.
+    """Geometry of the skin at `positions` (P, 2) or (2,) in m, for the `fit` of one frame.
 
-    The error bars are of first order and come from the noise of the readings alone: what is finer
-    than the fit's functions, as right under a point load, is not in them.
+    The error bars are of first order and come from the noise of the readings alone: detail finer
+    than the basis, as right under a point load, is not in them.
     """
     basis, c = fit.estimator.basis, fit.coefficients
     if c.ndim != 2:
@@ -35,7 +35,7 @@ def local_geometry(fit: Fit, positions: Array) -> LocalGeometry:
 
 
 def contact_geometry(fit: Fit, touch: Touch) -> LocalGeometry:
-    """The geometry of the skin at the contact; NaN when there is none."""
+    """Geometry of the skin at the contact; NaN when there is none."""
     return local_geometry(fit, touch.position) if touch.present else NO_GEOMETRY
 
 
@@ -45,7 +45,7 @@ def surface_geometry(
     positions: Array,
     covariance_of: Callable[[Array], Array],
 ) -> LocalGeometry:
-    """The geometry at `positions` (P, 2) or (2,) in m of the shape with `coefficients` (Ni, Nj).
+    """Geometry at `positions` (P, 2) or (2,) in m of the shape with `coefficients` (Ni, Nj) in m.
 
     `covariance_of` rows (..., 6, N) is that (..., 6, 6) of their products with the flattened
     coefficients: displacement, both slopes and three second derivatives, in the order of `ORDERS`.
@@ -63,8 +63,8 @@ def surface_geometry(
     return _geometry(basis.patch, positions, jet, covariance_of(at))
 
 
-class FormMap:
-    """The curvature form on the grid of `x` (nx,), `y` (ny,), as a map from coefficients."""
+class CurvatureFormMap:
+    """A map from coefficients to the curvature form on the grid of `x` (nx,), `y` (ny,) in m."""
 
     def __init__(self, basis: Basis, x: Array, y: Array) -> None:
         self._maps = [basis.on_grid(x, y, *order) for order in ORDERS]
@@ -88,7 +88,7 @@ def _geometry(patch: Patch, positions: Array, jet: Jet, covariance: Array) -> Lo
         *_frame(patch, positions, jet),
         _matrix(xx, xy, xy, yy),
         np.array(_torsion_form(jet, H)).T,
-        seen_through(to_form, covariance),
+        propagated_covariance(to_form, covariance),
     )
 
 

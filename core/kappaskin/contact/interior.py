@@ -1,4 +1,4 @@
-"""From the forces of a contact to the skin between them, and so to how the object curves."""
+"""Curvature of the object: that of the skin between the forces of its contact."""
 
 import math
 from dataclasses import dataclass, field
@@ -6,9 +6,16 @@ from typing import cast
 
 import numpy as np
 
-from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.optimise import Optimum
-from kappaskin.contact.rigid_contacts import ARC, EVEN, ROUND, PointForces, arcs, ends
+from kappaskin.contact.elastic_skin import (
+    ARC,
+    EVEN,
+    ROUND,
+    ElasticSkin,
+    Optimum,
+    PointForces,
+    arcs,
+    ends,
+)
 from kappaskin.frames import Array
 
 _LEAST = 3e-3  # of a side: as narrow as a ring or an arc is made
@@ -23,7 +30,7 @@ _TRIAL = 0.2  # of the force: between the ends, to see what it does
 
 @dataclass(frozen=True, slots=True)
 class Width:
-    """How the object's curvature follows from q, the squared width of its contact on the skin.
+    """The relation of the object's curvature to q, the squared width of its contact.
 
     The skin inside a ring or an arc that is e times as wide is bent `bend` less:
     curvature(q) = k0 - bend / 2 ln(q / q0).
@@ -36,23 +43,23 @@ class Width:
     bend: float
 
     def curvature(self, q: float) -> float:
-        """In 1/m; infinite where the width vanishes."""
+        """Curvature in 1/m for `q` in m^2; infinite where the width vanishes."""
         return self.k0 - self.bend / 2 * math.log(q / self.q0) if q > 0 else math.inf
 
     def of_curvature(self, curvature: Array) -> Array:
-        """The q that an object of that curvature makes."""
+        """The q in m^2 of an object of that `curvature` in 1/m."""
         return self.q0 * np.exp(np.minimum(2 * (self.k0 - curvature) / self.bend, 100.0))
 
     def likelihood(self, q: Array) -> Array:
-        """How likely q is, against the likeliest."""
+        """Likelihood of `q` relative to the maximum."""
         return np.exp(-0.5 * ((q - self.q) / self.sd) ** 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """The best object of a kind, with a `width` unless it has none.
+    """The best object of a kind, with its `width` if it has one.
 
-    `between` (2,) in m is the way from one end to the other, `slopes` (2,) the change of slope.
+    `between` (2,) in m is the vector from one end to the other, `slopes` (2,) the change of slope.
     """
 
     best: Optimum
@@ -61,32 +68,32 @@ class Hypothesis:
     slopes: Array = field(default_factory=lambda: np.zeros(2))
 
     def axis(self, radius: float) -> float:
-        """Angle in rad of the axis, were that the radius in m.
+        """Angle in rad of the axis for that `radius` in m.
 
-        Where the skin slopes across, a cylinder touches beside its axis by slope times radius.
+        Where the skin slopes, a cylinder touches beside its axis by slope times radius.
         """
         x, y = self.between + radius * self.slopes
         return math.atan2(y, x)
 
 
 def least_width(skin: ElasticSkin) -> float:
-    """The smallest q in m^2 that a ring or an arc is made with."""
+    """The smallest q in m^2 of a ring or an arc."""
     return (_LEAST * skin.side) ** 2
 
 
 def _resolved(skin: ElasticSkin, optimum: Optimum) -> Array:
-    """The parameters with a width that the functions resolve."""
+    """The parameters, with at least the width that the functions resolve."""
     return np.append(optimum.parameters[:-1], max(optimum.parameters[-1], skin.half_wave**2))
 
 
 def _rise(skin: ElasticSkin, forces: PointForces, centre: Array, points: Array) -> Array:
-    """How much further along the force the skin gives at `centre` (2,) than at `points` (k, 2)."""
+    """Displacement along the force in m at `centre` (2,), less that at `points` (k, 2)."""
     gives = skin.gives(forces, np.vstack([centre, points]))
     return math.copysign(1.0, forces.weights.sum()) * (gives[0] - gives[1:])
 
 
 def _inside_ring(skin: ElasticSkin, forces: PointForces) -> tuple[float, Array]:
-    """The object's curvature in 1/m where it presses on and in a ring, and its tilt (2,)."""
+    """Curvature in 1/m of an object that presses on a ring, and its tilt (2,)."""
     centre = np.abs(forces.weights) @ forces.points / np.abs(forces.weights).sum()
     out = forces.points - centre
     rise = _rise(skin, forces, centre, forces.points)
@@ -99,10 +106,10 @@ def _inside_ring(skin: ElasticSkin, forces: PointForces) -> tuple[float, Array]:
 
 
 def ring_pattern(skin: ElasticSkin, sphere: Optimum) -> Array:
-    """Where a sphere with the curvature found so far presses, (k, 3): x, y, share; radius one.
+    """The force pattern (k, 3) of a sphere of the curvature so far: x, y, share; radius one.
 
-    A contact problem: forces >= 0 on a grid of places that leave no place pressed in deeper than
-    it is by them, by non-negative least squares.
+    A contact problem, solved by non-negative least squares: forces >= 0 on a grid of points, such
+    that no point is pressed in less deep than the sphere is.
     """
     q = sphere.parameters[-1]
     if q < (_WIDE * skin.half_wave) ** 2 and not skin.patch.base_curvature:
@@ -120,7 +127,7 @@ def ring_pattern(skin: ElasticSkin, sphere: Optimum) -> Array:
 
 
 def _parts(forces: PointForces) -> list[Array]:
-    """The points of each arc, that of the middle last if there is one."""
+    """The points of each arc, that in the middle last if there is one."""
     return np.split(forces.points, len(forces.points) // ARC)
 
 
@@ -135,7 +142,7 @@ def _inside_arcs(skin: ElasticSkin, forces: PointForces) -> tuple[float, float]:
 
 
 def middle(skin: ElasticSkin, edge: Optimum) -> float:
-    """The share of the force that keeps the skin from sinking in between the ends."""
+    """Share of the force between the ends that keeps the skin from rising into the edge."""
     gaps: list[float] = []
     for share in (0.0, _TRIAL):
         forces = ends(share)(edge.parameters[:6])
@@ -149,14 +156,14 @@ def middle(skin: ElasticSkin, edge: Optimum) -> float:
 
 
 def _slope(skin: ElasticSkin, forces: PointForces, place: Array) -> Array:
-    """The skin's slope (2,) at `place` (2,), downward being along the force."""
+    """Slope (2,) of the skin at `place` (2,) in m, downward along the force."""
     step = skin.half_wave / 4
     fall = _rise(skin, forces, place, place + step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]))
     return np.array([fall[1] - fall[0], fall[3] - fall[2]]) / (2 * step)
 
 
-def narrow(skin: ElasticSkin, cylinder: Optimum, middle: float) -> tuple[float, float]:
-    """The widths of the two arcs, the stronger end's being one, for one curvature on both."""
+def arc_widths(skin: ElasticSkin, cylinder: Optimum, middle: float) -> tuple[float, float]:
+    """Relative widths of the two arcs, one at the stronger end, for one curvature on both."""
     parameters = _resolved(skin, cylinder)
     curvatures = _inside_arcs(skin, arcs(EVEN, middle)(parameters))
     force, share = abs(parameters[2]), parameters[5]
@@ -177,15 +184,15 @@ def _width(skin: ElasticSkin, optimum: Optimum, curvature: float, force: float) 
     return Width(q, sd, curvature, q0, skin.bend * abs(force))
 
 
-def sphere_of(skin: ElasticSkin, sphere: Optimum) -> Hypothesis:
-    """The sphere that curves as the skin inside its ring."""
+def fitted_sphere(skin: ElasticSkin, sphere: Optimum) -> Hypothesis:
+    """The sphere, with the curvature of the skin inside its ring."""
     parameters = _resolved(skin, sphere)
     curvature, _ = _inside_ring(skin, sphere.contact(parameters))
     return Hypothesis(sphere, _width(skin, sphere, curvature, parameters[2]))
 
 
-def cylinder_of(skin: ElasticSkin, cylinder: Optimum) -> Hypothesis:
-    """The cylinder that curves as the skin along the stronger of its two arcs."""
+def fitted_cylinder(skin: ElasticSkin, cylinder: Optimum) -> Hypothesis:
+    """The cylinder, with the curvature of the skin along the stronger of its two arcs."""
     parameters, contact = _resolved(skin, cylinder), cylinder.contact
     inside = _inside_arcs(skin, contact(parameters))
     base = skin.patch.base_curvature * math.sin(parameters[3]) ** 2

@@ -1,4 +1,4 @@
-"""A force and a moment at the base of the fingertip to the contact: intrinsic contact sensing.
+"""Intrinsic contact sensing: the contact from a force and a moment at the fingertip's base.
 
 What touches a fingertip at one place exerts a force p there and, when it is soft, a torque q about
 the normal. Their wrench at the base and the known surface decide the place (Bicchi, Salisbury and
@@ -26,7 +26,7 @@ _PIECES = 24  # of a line load, at the points of Gauss: exact to rounding
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """What a force/torque sensor reads: `force` (3,) in N, `moment` (3,) in N m about itself."""
+    """A reading of a force/torque sensor: `force` (3,) in N, `moment` (3,) in N m about itself."""
 
     force: Array
     moment: Array
@@ -34,7 +34,7 @@ class Wrench:
 
 @dataclass(frozen=True)
 class ForceTorqueSensor:
-    """A sensor of six axes at `origin` in m, which carries the skin.
+    """A six-axis sensor at `origin` in m that carries the skin.
 
     Its axes are parallel to the skin's; `force_noise` in N and `moment_noise` in N m are the
     standard deviations of each axis.
@@ -53,7 +53,7 @@ class ForceTorqueSensor:
                 raise Refusal(f"expected ForceTorqueSensor.{name} of at least zero, got {value}")
 
     def read(self, patch: Patch, loads: Iterable[Load], rng: np.random.Generator) -> Wrench:
-        """What `loads` on the skin at rest make it read; a load above zero presses inward."""
+        """The reading, with noise from `rng`, for `loads` on the skin at rest."""
         force, moment = rng.normal(0, self.force_noise, 3), rng.normal(0, self.moment_noise, 3)
         for load in loads:
             points, shares = _pieces(load)
@@ -65,7 +65,7 @@ class ForceTorqueSensor:
 
 
 def _pieces(load: Load) -> tuple[Array, Array]:
-    """Points (Q, 2) in m and shares (Q,) of the force there that stand for `load`."""
+    """Points (Q, 2) in m and shares (Q,) of the force that replace `load`."""
     if not isinstance(load, LineLoad):
         return load.centre()[None], np.ones(1)
     t, w = (np.asarray(v, float) for v in np.polynomial.legendre.leggauss(_PIECES))
@@ -75,7 +75,7 @@ def _pieces(load: Load) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IntrinsicTouch:
-    """A contact told by the base: where, and what is exerted there on the skin.
+    """A contact found from the base: its position, and the force and torque on the skin.
 
     `position` (2,) in m on the patch; `pressure` in N, the normal force, inward; `traction` (2,) in
     N, the tangential one along x and y; `torque` in N m about the outward normal; each with its
@@ -103,13 +103,13 @@ def _no_touch(reason: str) -> IntrinsicTouch:
 
 
 def _across(r: Array | tuple[float, float, float]) -> Array:
-    """The matrix (3, 3) of r x; many times faster than `np.cross` for one vector."""
+    """The matrix (3, 3) of the cross product r x; much faster than `np.cross` for one vector."""
     x, y, z = r
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 class IntrinsicContact:
-    """The contact on a patch, flat or bent, that explains a wrench; `find(wrench)` is the touch.
+    """Finds the contact on a patch, flat or bent, that explains a wrench: `find(wrench)`.
 
     With the contact at c, the outward normal n and the torque q n, F = p and M = c x p + q n.
 
@@ -128,7 +128,7 @@ class IntrinsicContact:
         self._least = max(_LEAST, _SIGNIFICANT * sensor.force_noise)
 
     def __call__(self, wrench: Wrench) -> IntrinsicTouch:
-        """The contact, or NaN and the reason when the wrench is not that of one on the skin."""
+        """The contact; NaN and a reason when the wrench is not that of one on the skin."""
         F = np.asarray(wrench.force, float)
         M = np.asarray(wrench.moment, float)
         if F.shape != (3,) or M.shape != (3,):
@@ -148,9 +148,9 @@ class IntrinsicContact:
         return _no_touch(f"expected a press above {self._least:.3g} N, got {pressure:.3g} N")
 
     def _place(self, F: Array, M: Array, most: float) -> Array | None:
-        """Where on the whole surface (2,) the wrench about the patch's origin says, if anywhere.
+        """Position (2,) in m on the extended surface for the wrench about the patch's origin.
 
-        `most` is the force in N that presses where it does so straight.
+        None where there is none. `most` in N is the largest normal force.
         """
         R, middle = self.patch.radius, self.patch.a / 2
         if math.isinf(R):
@@ -167,7 +167,7 @@ class IntrinsicContact:
         return np.array([middle + R * angle, (about_axis @ t + R * F[1]) / (F @ n)])
 
     def _judged(self, place: Array, F: Array, M: Array) -> IntrinsicTouch:
-        """The touch at `place`, or why it is none."""
+        """The contact at `place` (2,) in m, or the reason why it is none."""
         at, n = self.patch.at_rest(place)
         arm, t = at - self.sensor.origin, np.array([n[2], 0.0, -n[0]])
         pressure, traction = -float(F @ n), np.array([F @ t, F[1]])

@@ -1,4 +1,4 @@
-"""Readings of unknown zero to the load in them, if they hold one that offsets cannot imitate."""
+"""Load detection: a load in readings whose zero is unknown, as opposed to offsets."""
 
 import math
 from dataclasses import dataclass
@@ -8,23 +8,23 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin.bases import basis_for
-from kappaskin.estimation import Remembered
+from kappaskin.estimation import PatternCache
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import Sensor
 
 _FUNCTIONS = 15  # along each side, of the shape a point load makes
 _SEARCHED = 21  # places along each side
 _SIGNIFICANT = 30.0  # drop of chi-squared below which a load may be noise found by searching
-_SHARE = 0.5  # of what stands out, that a load explains and nothing else does
+_SHARE = 0.5  # of what stands out: so much a load explains and nothing else does
 _CHANCE = 1e-4  # of a load found in offsets that know nothing of each other
 _FAINT = 1e-6  # of the norm of the loads best seen: below it, one is not seen at all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """A load of `force` in N near `position` (2,) in m; it explains this `share` of what is left.
+class DetectedLoad:
+    """A load of `force` in N near `position` (2,) in m; it explains this `share` of the readings.
 
-    What is left is what remains of the readings without a level and slopes in each component.
+    Of their squares, once a level and two slopes in each component are taken out.
     """
 
     position: Array
@@ -33,8 +33,8 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Tables:
-    """For the readings used: plain fields Q (R, n), loads T (R, G) without them, and T'T (G,)."""
+class _LoadTables:
+    """For the readings used: level and slopes Q (R, n), loads T (R, G) without them, T'T (G,)."""
 
     Q: Array
     T: Array
@@ -42,15 +42,15 @@ class _Tables:
     by_chance: float
 
 
-class LoadSeeker:
-    """Tells a load from the offsets of the elements.
+class LoadDetector:
+    """Distinguishes a load from the offsets of the elements.
 
-    Warmth shifts every reading of a component alike, or more towards one side, and so does a bent
-    mount: a level and two slopes for each component, which are taken out first. What else elements
-    are off by differs from one to the next at random. A load is a displacement that bends the skin
-    in all three components at once, and its readings look like those of a point load: one explains
-    three quarters of what the whole hand leaves, and more of any smaller contact, but an eighth of
-    a smooth change that is no load, and a few per cent of what is random.
+    Warmth shifts all readings of a component alike, or more towards one side, and so does a bent
+    mount: a level and two slopes for each component, which are taken out first. Other offsets
+    differ at random from element to element. A load bends the skin in all three components at once,
+    and its readings resemble those of a point load, which explains three quarters of the readings
+    of a whole hand and more of any smaller contact, but an eighth of a smooth change that is no
+    load, and a few per cent of random offsets.
     """
 
     def __init__(self, sensor: Sensor, edge: str = "") -> None:
@@ -66,24 +66,26 @@ class LoadSeeker:
         level_and_slopes = np.column_stack([np.ones(len(layout)), centred])
         self._plain = np.kron(np.eye(3), level_and_slopes)
         self._live = layout.live.ravel()
-        self._remembered = Remembered[_Tables]()
+        self._cache = PatternCache[_LoadTables]()
 
-    def _tables(self, used: Mask) -> _Tables:
+    def _tables(self, used: Mask) -> _LoadTables:
         U, s, _ = np.linalg.svd(self._plain[used], full_matrices=False)
         Q: Array = U[:, s > _FAINT * s.max(initial=0.0)]
         T = self._T[used] - Q @ (Q.T @ self._T[used])
         squares = np.einsum("rg,rg->g", T, T)
         seen = squares > _FAINT * squares.max(initial=0.0)
         spare = len(Q) - Q.shape[1]
-        return _Tables(Q, T, np.where(seen, squares, math.inf), _by_chance(spare))
+        return _LoadTables(Q, T, np.where(seen, squares, math.inf), _by_chance(spare))
 
-    def __call__(self, readings: Array, variance: float, share: float = _SHARE) -> Found | None:
-        """The load in `readings` (C,) in 1/m, each of which has this `variance` by noise.
+    def __call__(
+        self, readings: Array, variance: float, share: float = _SHARE
+    ) -> DetectedLoad | None:
+        """The load in `readings` (C,) in 1/m with noise of `variance`; None where there is none.
 
-        It must explain this `share` of what stands out, and more than is found by chance.
+        It must explain this `share` of what the level and slopes leave, and more than chance.
         """
         used: NDArray[np.bool_] = self._live & np.isfinite(readings)
-        tables = self._remembered(used, self._tables)
+        tables = self._cache(used, self._tables)
         read = readings[used]
         K: Array = read - tables.Q @ (tables.Q.T @ read)
         power, h = float(K @ K), K @ tables.T
@@ -93,11 +95,11 @@ class LoadSeeker:
         if not explained[best] > least:
             return None
         force = float(h[best] / tables.norm[best])
-        return Found(self._points[best], force, float(explained[best] / power))
+        return DetectedLoad(self._points[best], force, float(explained[best] / power))
 
 
 def _by_chance(spare: int) -> float:
-    """The share that one load explains of `spare` random numbers, once in ten thousand times.
+    """The share of `spare` random numbers that one load explains once in ten thousand times.
 
     The share of one direction among n random ones follows a beta distribution (1/2, (n - 1)/2), and
     no more than n of the places searched are independent.

@@ -1,4 +1,4 @@
-"""From the readings of a contact to what kind of object presses on the skin, and how it curves."""
+"""Object recognition: which kind of object presses on the skin, and how curved it is."""
 
 import math
 from dataclasses import dataclass
@@ -8,16 +8,15 @@ import numpy as np
 import scipy
 
 from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.evidence import log_evidence
-from kappaskin.contact.hypotheses import Hypotheses, hypotheses
+from kappaskin.contact.hypotheses import Hypotheses, fit_hypotheses, log_likelihoods
 from kappaskin.contact.interior import Hypothesis, Width
 from kappaskin.frames import Array, Touch
-from kappaskin.mechanics import Plate
+from kappaskin.mechanics import Block, Cylinder, PlacedObject, Plate, RigidObject, Sphere, Wedge
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 
 KINDS = ("plane", "cylinder", "sphere", "edge")
-"""What an object may be; each as likely beforehand as the others."""
+"""Kinds of object, equally likely a priori."""
 
 _COARSE = 15  # functions along each side, at first; of a disk or a polygon to the end
 _FINE, _FINE_MIXED = 40, 30  # and then: of waves that do not mix, and of those that do
@@ -31,15 +30,15 @@ _SURE = 0.4  # probability below which no kind is named
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactObject:
-    """What touches the skin, as far as the readings of one frame tell.
+    """The object that touches the skin, recognised from the readings of one frame.
 
-    `kind` is one of `KINDS`, or empty when they do not tell; `probability` has all of them, and is
-    empty without a contact. `position` (2,) in m and `force` in N have 95 % half widths. `radius`
-    in m with its 95 % interval `radius_95`: from 0 when only an upper bound is known, up to
-    infinity when it may be flat. `axis` is the angle in rad from x of a cylinder's axis or of an
-    edge, `length` its length in m, both with 95 % half widths. What does not apply is NaN. A flat
-    face on a flat skin touches at its rim alone and looks like the sphere or cylinder that touches
-    there; two points look like the edge that joins them.
+    `kind` is one of `KINDS`, or empty when undecided; `probability` has all of them, and is empty
+    without a contact. `position` (2,) in m and `force` in N have 95 % half widths. `radius` in m
+    has the 95 % interval `radius_95`: from 0 when only an upper bound is known, up to infinity when
+    it may be flat. `axis` is the angle in rad from x of a cylinder's axis or of an edge, `length`
+    its length in m, both with 95 % half widths. What does not apply is NaN. A flat face on a flat
+    skin touches at its rim alone and looks like the sphere or cylinder that touches there; two
+    points look like the edge that joins them.
     """
 
     kind: str
@@ -57,13 +56,13 @@ class ContactObject:
 
     @property
     def ranked(self) -> list[tuple[str, float]]:
-        """Kinds and their probabilities, the likeliest first."""
+        """Kinds and their probabilities, the most likely first."""
         return sorted(self.probability.items(), key=lambda item: -item[1])
 
     def describe(self) -> str:
-        """One line in millimetres and degrees, with the runner-up."""
+        """One line in millimetres and degrees, with the second guess."""
         if not self.probability:
-            return "nothing touches"
+            return "no contact"
         (likeliest, first), (second, chance) = self.ranked[:2]
         if not self.kind and first >= _SURE:
             return f"cannot tell: fits none of these objects, {likeliest} the least badly"
@@ -75,7 +74,7 @@ class ContactObject:
             parts.append(self._radius())
         if self.kind in ("cylinder", "edge"):
             parts.append(f"{1e3 * self.length:.0f} mm long, axis {math.degrees(self.axis):.0f} deg")
-        return f"{', '.join(parts)}; runner-up {second} {100 * chance:.0f} %"
+        return f"{', '.join(parts)}; second guess {second} {100 * chance:.0f} %"
 
     def _radius(self) -> str:
         low, high = (1e3 * radius for radius in self.radius_95)
@@ -110,14 +109,14 @@ NO_OBJECT = ContactObject(
 
 
 class ObjectFinder:
-    """What touches a skin: a plane, a cylinder, a sphere or an edge, by marginal likelihood.
+    """Recognises the object on a skin: a plane, a cylinder, a sphere or an edge.
 
-    To each kind belongs a small family of forces on the skin (`rigid_contacts`), fitted to the
-    readings by maximum likelihood. The kinds are weighed by Laplace's approximation of
-    their marginal likelihoods, the noise's size unknown. The object's curvature is that of the
-    skin between the forces. A few tens of milliseconds: for display, not for every frame. On a
-    skin bent to a radius of a few elements its probabilities promise too much: a dent there is
-    not much wider than what the functions resolve.
+    Each kind has a small family of forces on the skin (`elastic_skin`), fitted to the readings by
+    maximum likelihood. The kinds are compared by Laplace's approximation of their marginal
+    likelihoods, with unknown noise. The object's curvature is that of the skin between the forces.
+    It takes a few tens of milliseconds: for display, not for every frame. On a skin bent to a
+    radius of a few elements its probabilities are too confident: a dent there is not much wider
+    than what the functions resolve. Raises a `Refusal` for a strip and a drum head.
     """
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
@@ -133,9 +132,9 @@ class ObjectFinder:
         self._live = layout.live.ravel()
 
     def __call__(self, curvature: Array, noise: float, touch: Touch) -> ContactObject:
-        """The object for `curvature` (3, P) in 1/m, NaN where missing, and the `touch` in it.
+        """The object for `curvature` (3, P) in 1/m, NaN where missing, and the contact `touch`.
 
-        `noise` in 1/m is the standard deviation of a reading, as the fitted shape leaves it.
+        `noise` in 1/m is the standard deviation of a reading, as the fit estimates it.
         """
         used = self._live & np.isfinite(curvature).ravel()
         if not touch.present or used.sum() < _ENOUGH:
@@ -143,12 +142,12 @@ class ObjectFinder:
         K = np.where(used, curvature.ravel(), 0.0)
         noise = max(noise, _QUIET * float(np.abs(K).max()))
         return _judged(
-            self._skin, hypotheses(self._coarse, self._skin, K, used, noise, touch), noise
+            self._skin, fit_hypotheses(self._coarse, self._skin, K, used, noise, touch), noise
         )
 
 
 def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObject:
-    weights = log_evidence(skin, all_of)
+    weights = log_likelihoods(skin, all_of)
     most = max(weights.values())
     total = sum(math.exp(weight - most) for weight in weights.values())
     probability = {kind: math.exp(weights[kind] - most) / total for kind in KINDS}
@@ -173,7 +172,7 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
 
 
 def _axis(found: Hypothesis, radius_95: tuple[float, float], reach: float) -> tuple[float, float]:
-    """Angle in rad and half width, as far as the noise and the radius leave it open."""
+    """Angle in rad and its half width, from the noise and from the interval of the radius."""
     if len(found.best.parameters) < 6:
         return math.nan, math.nan
     off = reach * math.sqrt(found.best.covariance[3, 3])
@@ -185,7 +184,7 @@ def _axis(found: Hypothesis, radius_95: tuple[float, float], reach: float) -> tu
 
 
 def _length(found: Hypothesis, reach: float) -> tuple[float, float]:
-    """Length in m and half width."""
+    """Length in m and its half width."""
     if len(found.best.parameters) < 6:
         return math.nan, math.nan
     length = math.sqrt(found.best.parameters[4])
@@ -206,3 +205,31 @@ def _radius(width: Width, reach: float) -> tuple[float, tuple[float, float]]:
 
 def _inverse(curvature: float) -> float:
     return 1 / curvature if curvature > 0 else math.inf
+
+
+_FLAT = 100.0  # times the size: a rounder object is not told from a flat one
+_SHORTEST = 0.02  # of the size: an object as short as that is drawn at least so long
+_SHARP = math.radians(70)  # between the flanks of an edge, which the readings do not tell
+
+
+def placed_object(found: ContactObject, place: Array, size: float) -> PlacedObject | None:
+    """The object `found`, as a rigid object at `place` (2,) in m; None where its kind is unknown.
+
+    Dimensions that the readings do not determine, such as the size of a plane, are `size` in m; a
+    radius with an upper bound only is that bound.
+    """
+    rigid = _rigid(found, size)
+    turn = found.axis if math.isfinite(found.axis) else 0.0
+    return None if rigid is None else PlacedObject(rigid, place, turn)
+
+
+def _rigid(found: ContactObject, size: float) -> RigidObject | None:
+    radius = found.radius if math.isfinite(found.radius) else found.radius_95[1]
+    length = max(found.length, _SHORTEST * size) if math.isfinite(found.length) else size
+    if found.kind == "edge":
+        return Wedge(_SHARP, length, size)
+    if found.kind == "plane" or (found.kind and not radius < _FLAT * size):
+        return Block(size, size)
+    if found.kind == "cylinder":
+        return Cylinder(radius, length)
+    return Sphere(radius) if found.kind == "sphere" else None

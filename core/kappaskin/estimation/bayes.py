@@ -1,16 +1,54 @@
-"""The shape of a skin that bends as a plate does: a prior where the readings do not decide."""
+"""Bayesian estimator, with the prior of a plate under random loads."""
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from scipy import linalg
 
-from kappaskin.estimation.estimator import Estimator
+from kappaskin.bases import Basis, SineBasis
+from kappaskin.estimation.estimator import Estimator, PatternCache
 from kappaskin.estimation.fit import Fit
-from kappaskin.estimation.prior import prior_root
-from kappaskin.estimation.remembered import Remembered
 from kappaskin.frames import Array, Mask
+from kappaskin.mechanics import Plate
+
+
+def prior_root(basis: Basis) -> Array:
+    """L (N, F) in m: L L' is the covariance of the coefficients of a plate under a white load.
+
+    White means that loads at two points are independent: with G the Gram matrix of the functions,
+    the modal forces have the covariance G, and the coefficients of a plate of compliance C have
+    C G C. L spans the F combinations that are `basis.free`; unobservable shapes are left out.
+    Scaled so that the displacement's RMS over the skin is 1 m.
+
+    For sines on a flat skin it is the diagonal of 1 / (k_i^2 + k_j^2)^2, so scaled.
+    """
+    if isinstance(basis, SineBasis) and not basis.patch.base_curvature:
+        # The squares of sines average 1/2, along x and along y.
+        sd: Array = 1 / basis.laplacian.ravel() ** 2
+        squares = sd @ sd / (2 if basis.patch.strip else 4)
+        return np.diag(sd / np.sqrt(squares))
+    points, weights = basis.quadrature()
+    f = np.sqrt(weights / weights.sum())[:, None] * basis.at(points)
+    # With f = Q R, G = R'R and C R' is a root of C G C; R C R' is one of the displacement's.
+    R = _triangle(f)
+    root = _on_free(basis, Plate(basis.patch).compliance(basis).after(R).T)
+    return root / np.linalg.norm(R @ root)
+
+
+def _on_free(basis: Basis, root: Array) -> Array:
+    """The part of a covariance's `root` (N, N) in the free combinations, as a root (N, F)."""
+    W = np.eye(basis.size) if basis.free is None else basis.free
+    V = W if basis.unobservable is None else np.hstack([W, basis.unobservable])
+    share = cast("Array", np.linalg.lstsq(V, root)[0])[: W.shape[1]]
+    return W @ _triangle(share.T).T
+
+
+def _triangle(A: Array) -> Array:
+    """The triangular R of A = Q R: a root, R'R = A'A."""
+    return cast("Array", np.linalg.qr(A, mode="r"))
+
 
 _LEAST, _MOST = -12.0, 60.0  # ln of signal over noise in power, of the best seen direction
 _GRID = np.linspace(_LEAST, _MOST, 145)
@@ -19,7 +57,7 @@ _NEWTON = 3  # steps from the best of them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PosteriorSpread:
+class PosteriorUncertainty:
     """Covariance B diag(v) B^T for unit noise: B (N, F), v (F,)."""
 
     B: Array
@@ -29,7 +67,7 @@ class PosteriorSpread:
     def sd(self) -> Array:
         return np.sqrt(self.B**2 @ self.v)
 
-    def of(self, rows: Array) -> Array:
+    def covariance_of(self, rows: Array) -> Array:
         left = rows @ self.B
         return (left * self.v) @ left.swapaxes(-1, -2)
 
@@ -47,8 +85,8 @@ class PosteriorSpread:
 # readings at sigma = 0, with error bars of nothing. A density that grows as a power of both keeps
 # it from there (doi:10.1007/s11336-013-9328-2): -2 p ln (tau sigma) = -p ln gamma - 2 p ln sigma^2
 # more. With p = 1, one function that is seen among others unseen would let tau run away.
-class Evidence:
-    """The prior's scale and the noise that make readings K = A z most likely, A (R, F)."""
+class MarginalLikelihood:
+    """The scale of the prior and the noise that make readings K = A z most likely, A (R, F)."""
 
     def __init__(self, A: Array, told: bool, floor: float) -> None:
         U, s, Vt = linalg.svd(A, full_matrices=len(A) < A.shape[1])
@@ -112,48 +150,48 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Solver:
-    """What depends on which readings are used: the evidence, and B = L V (N, F)."""
+class _BayesSolver:
+    """What depends on which readings are used: the likelihood, and B = L V (N, F)."""
 
-    evidence: Evidence
+    likelihood: MarginalLikelihood
     B: Array
 
 
 class Bayes(Estimator):
-    """The most likely shape of a plate under a white load, given the readings.
+    """The posterior mean of the shape of a plate under a white load, given the readings.
 
     The coefficients are Gaussian with the standard deviation of a plate's under a load that is
     white in space, for sines proportional to 1/(i^2/a^2 + j^2/b^2)^2. Its scale, and the noise
     unless `sigma` is given, are those that make the readings most likely (type II maximum
-    likelihood, doi:10.1162/neco.1992.4.3.415), of each frame by itself. What the readings do not
-    decide is left to the prior, with error bars that say so: no basis is too large.
+    likelihood, doi:10.1162/neco.1992.4.3.415), of each frame by itself. The prior decides what the
+    readings do not, with error bars that show it: no basis is too large.
     """
 
     has_prior = True
 
     def _set_up(self) -> None:
         self._root = prior_root(self.basis)
-        self._solvers = Remembered[_Solver]()
+        self._solvers = PatternCache[_BayesSolver]()
         if self.readable.any():
             self._solvers(self.readable, self._made)
 
-    def _made(self, used: Mask) -> _Solver:
+    def _made(self, used: Mask) -> _BayesSolver:
         A = self.weight[used, None] * (self.M[used] @ self._root)
         told, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
-        evidence = Evidence(A, told, rounding**2)
-        return _Solver(evidence, self._root @ evidence.V)
+        likelihood = MarginalLikelihood(A, told, rounding**2)
+        return _BayesSolver(likelihood, self._root @ likelihood.V)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         if not used.any():
             raise self.refusal(0, 0)
         solver, frames = self._solvers(used, self._made), flat.shape[:-1]
-        evidence, B = solver.evidence, solver.B
-        y, gamma, sigma = evidence(np.atleast_2d(flat[..., used] * self.weight[used]))
-        d = 1 + gamma[:, None] * evidence.s2
+        likelihood, B = solver.likelihood, solver.B
+        y, gamma, sigma = likelihood(np.atleast_2d(flat[..., used] * self.weight[used]))
+        d = 1 + gamma[:, None] * likelihood.s2
         k = y.shape[1]
-        z = y * (gamma[:, None] * np.sqrt(evidence.s2[:k]) / d[:, :k])
+        z = y * (gamma[:, None] * np.sqrt(likelihood.s2[:k]) / d[:, :k])
         c = (z @ B[:, :k].T).astype(self.dtype)
-        spreads = [PosteriorSpread(B, v) for v in gamma[:, None] / d]
+        spreads = [PosteriorUncertainty(B, v) for v in gamma[:, None] / d]
         spent = (1 - 1 / d).sum(axis=1)
         return Fit(
             self,

@@ -1,28 +1,52 @@
-"""What every estimator takes and how it is asked: curvature to coefficients with error bars."""
+"""The interface of all estimators: curvature to coefficients with error bars."""
 
 from abc import ABC, abstractmethod
+from collections import OrderedDict
+from collections.abc import Callable
 from functools import cached_property
-from typing import ClassVar, cast
+from typing import ClassVar, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
 from kappaskin.bases import Basis, curvature_at
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation.fit import Fit, Spread, gathered
+from kappaskin.estimation.fit import Fit, Uncertainty, merged_fits
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
 
+_SETS = 8  # that are cached: those used last
+_Made = TypeVar("_Made")
+
+
+class PatternCache(Generic[_Made]):
+    """A cache of results that depend on which readings there are, for the last few such sets."""
+
+    def __init__(self) -> None:
+        self._made: OrderedDict[bytes, _Made] = OrderedDict()
+
+    def __call__(self, used: Mask, make: Callable[[Mask], _Made]) -> _Made:
+        """`make(used)` for the mask `used` of readings, from the cache where it is there."""
+        key = used.tobytes()
+        if key in self._made:
+            self._made.move_to_end(key)
+            return self._made[key]
+        made = self._made[key] = make(used)
+        if len(self._made) > _SETS:
+            self._made.popitem(last=False)
+        return made
+
+
 RIM_SD = 0.2e-3
-"""How far in m a rim that gives is expected to move, unless said otherwise."""
+"""Default standard deviation in m of the movement of an elastic rim."""
 
 # Powers of the largest number: the squares of readings over sigmas, added up, stay below it.
 _SAFE, _SAFE_SIGMA = 0.25, 0.2
 _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 
 
-def numbers(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Array:
-    """A copy of `values` in this `dtype`; raises a `Refusal` where they are no real numbers."""
+def real_array(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Array:
+    """A copy of `values` in this `dtype`; raises a `Refusal` for anything but real numbers."""
     if type(values) is np.ndarray and values.dtype == dtype:  # as in most frames: the fastest
         return values.copy()
     try:
@@ -40,7 +64,7 @@ def numbers(values: ArrayLike, what: str, dtype: DTypeLike = np.float64) -> Arra
 
 
 def column_lengths(A: Array) -> Array:
-    """Lengths (F,) of the columns of A (R, F); infinite where nothing but rounding is left."""
+    """Lengths (F,) of the columns of A (R, F); infinite where only rounding is left."""
     length = np.linalg.norm(A, axis=0)
     length[length <= _UNSEEN * length.max(initial=0.0)] = np.inf
     return length
@@ -50,18 +74,18 @@ class Estimator(ABC):
     """`fit = LeastSquares(basis, layout)`, factored once; `fit(curvature)` is a `Fit`.
 
     `sigma`, a scalar or (3, P) in 1/m, is the standard deviation of each reading; without it all
-    readings weigh the same and their noise is estimated. An infinite sigma leaves a reading out.
-    `rim_sd` in m is how far a rim that gives is expected to move: the standard deviation of each
-    shape that no reading sees, by RMS along the rim. A frame is computed in `dtype`, which is
-    float64 or float32; the factorisation always in float64.
+    readings weigh the same and their noise is estimated. An infinite sigma excludes a reading.
+    `rim_sd` in m is the standard deviation of each unobservable movement of an elastic rim, by RMS
+    along it. Frames are computed in `dtype`, float64 or float32; the factorisation is always in
+    float64.
     """
 
     has_matrix: ClassVar = True
-    """Whether M is made, 3 P x Ni Nj numbers."""
+    """Whether it makes the curvature operator M, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
-    """Whether what the readings do not decide is left to a prior, so that no basis is too large."""
+    """Whether a prior decides what the readings do not, so that no basis is too large."""
     remembers: ClassVar = False
-    """Whether frames depend on earlier ones: each is to be followed once, in order."""
+    """Whether a fit depends on earlier frames: `follow` each frame once, in order."""
 
     def __init__(
         self,
@@ -78,24 +102,26 @@ class Estimator(ABC):
         self.basis, self.layout, self.rim_sd = basis, layout, rim_sd
         # Typed as float64: what holds for one holds for the other.
         self.dtype = cast("np.dtype[np.float64]", np.dtype(dtype))
-        unseen = np.empty((basis.size, 0)) if basis.unseen is None else basis.unseen
-        self.undecided = rim_sd * unseen
-        """Shapes (N, q) in m that no reading sees, each as far as it is expected to go."""
+        unobservable = (
+            np.empty((basis.size, 0)) if basis.unobservable is None else basis.unobservable
+        )
+        self.undecided = rim_sd * unobservable
+        """Unobservable shapes (N, q) in m, each one standard deviation large."""
         self._largest = float(np.finfo(self.dtype).max) ** _SAFE
-        self.sigma = None if sigma is None else numbers(sigma, "sigma")
-        """The standard deviations in 1/m that were told, one or (3, P); None if none were."""
+        self.sigma = None if sigma is None else real_array(sigma, "sigma")
+        """The given standard deviations in 1/m, one or (3, P); None if none were given."""
         self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
-        """What each reading (3 P,) is worth, 1 / sigma in m; 1 for all without a sigma."""
+        """Weight 1 / sigma (3 P,) of each reading in m; 1 without a sigma."""
         self.readable: Mask = layout.live.ravel() & (self.weight > 0)
-        """Which readings (3 P,) are used when they are there."""
+        """Which readings (3 P,) are used when they are present."""
         self._all_readable = bool(self.readable.all())
         self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
-        """How many numbers there are to tell: the coefficients less what the edges decide."""
+        """Number of unknowns: the coefficients less what the boundary conditions decide."""
         self._set_up()
 
     @abstractmethod
     def _set_up(self) -> None:
-        """Make once what no frame changes; raises a `Refusal` when no shape can be told."""
+        """Compute once what no frame changes; raises a `Refusal` when no shape is determined."""
 
     def _weights(self, sigma: float | Array) -> Array:
         sigma = np.asarray(sigma)
@@ -123,7 +149,7 @@ class Estimator(ABC):
         return self.M.T.astype(self.dtype)
 
     def predicted(self, coefficients: Array) -> Array:
-        """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
+        """Readings (..., 3, P) in 1/m that `coefficients` (..., Ni, Nj) in m would cause."""
         frames = coefficients.shape[:-2]
         flat = coefficients.reshape(*frames, self.basis.size)
         return np.dot(flat, self._M_T).reshape(*frames, 3, len(self.layout))
@@ -138,9 +164,10 @@ class Estimator(ABC):
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading.
 
-        So do readings that are too large to compute with, of 4e9 in float32 and 1e77 in float64.
+        So do readings too large to compute with: 4e9 in float32, 1e77 in float64. Raises
+        `RankDeficient` when the readings do not determine the shape.
         """
-        K = numbers(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
+        K = real_array(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
         self._check_shape(K)
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
         if self._all_readable and _squared(K.reshape(-1)) <= self._largest**2:
@@ -163,18 +190,18 @@ class Estimator(ABC):
                 inner = error.__cause__
                 why = inner if isinstance(inner, RankDeficient) else error
                 raise RankDeficient(f"frame {first}: {why}") from why
-        return gathered(fits, np.argsort(np.argsort(which, kind="stable")))
+        return merged_fits(fits, np.argsort(np.argsort(which, kind="stable")))
 
     def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
         """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.
 
-        Both are NaN where nothing was read; `held` (3, P) has what is known of earlier frames too.
-        What remembers nothing itself fits that.
+        Both are NaN where nothing was read; `held` (3, P) also has the readings held from earlier
+        frames. An estimator without memory fits `held`.
         """
         return self(held)
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
-        """The fit to a skin at rest, of which only the readings `missing` (3, P) are not there."""
+        """The fit to a skin at rest, without the readings `missing` (3, P)."""
         return self(self._rest(missing))
 
     def _rest(self, missing: Mask | None) -> Array:
@@ -183,10 +210,10 @@ class Estimator(ABC):
 
     @abstractmethod
     def _fit(self, flat: Array, used: Mask) -> Fit:
-        """Fit readings (3 P,) or (T, 3 P) of which those `used` (3 P,) are there, the rest NaN."""
+        """Fit readings (3 P,) or (T, 3 P), of which those `used` (3 P,) are there, the rest NaN."""
 
     def _answer(
-        self, flat: Array, c: Array, spread: Spread, spare: int, steps: ArrayLike = 0
+        self, flat: Array, c: Array, spread: Uncertainty, spare: int, steps: ArrayLike = 0
     ) -> Fit:
         """The fit of `c` (..., N) or (..., Ni, Nj) to `flat` (..., 3 P), all of one `spread`."""
         frames = flat.shape[:-1]
@@ -201,7 +228,7 @@ class Estimator(ABC):
         )
 
     def _moves_as_a_whole(self) -> bool:
-        """Whether the basis has a function that changes no curvature anywhere; only arcs may."""
+        """Whether a function of the basis changes no curvature anywhere; only arcs may have one."""
         patch, W = self.basis.patch, self.basis.free
         if not (patch.strip and patch.base_curvature):
             return False
@@ -210,7 +237,7 @@ class Estimator(ABC):
         return bool(np.isinf(column_lengths(bends if W is None else bends @ W)).any())
 
     def refusal(self, readings: int, rank: int) -> RankDeficient:
-        """Why `readings` of them, which determine `rank` coefficients, do not decide a shape."""
+        """The error for `readings` readings that determine only `rank` coefficients."""
         (Ni, Nj), N, layout = self.basis.shape, self.unknowns, self.layout
         bound = "at most " if readings < N else ""
         what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
@@ -246,6 +273,6 @@ class Estimator(ABC):
 
 
 def _squared(a: Array) -> float:
-    """The sum of squares of `a`: of all that tells whether it is finite and small, the fastest."""
+    """Sum of squares of `a`: the fastest test of whether it is finite and small."""
     with np.errstate(over="ignore"):
         return float(a.dot(a))

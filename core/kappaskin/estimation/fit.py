@@ -1,4 +1,4 @@
-"""What every estimator answers: the shape of a frame or of several, and how well it is known."""
+"""Fits: the coefficients of one frame or several, with residual, noise and error bars."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 _MOST = 10_000  # coefficients: their covariance takes 800 MB
 
 
-class Spread(Protocol):
-    """How far the N coefficients of a frame may be off, for unit noise."""
+class Uncertainty(Protocol):
+    """Uncertainty of the N coefficients of a frame, for unit noise."""
 
     @property
     def sd(self) -> Array:
-        """Standard deviations (N,) of the coefficients in m for noise of 1 1/m."""
+        """Standard deviations (N,) of the coefficients in m, for a noise of 1 1/m."""
         ...
 
-    def of(self, rows: Array) -> Array:
+    def covariance_of(self, rows: Array) -> Array:
         """Covariance (..., R, R) of `rows` (..., R, N) times the coefficients."""
         ...
 
@@ -34,8 +34,8 @@ class Spread(Protocol):
         ...
 
 
-class DenseSpread:
-    """The spread that a covariance (N, N) tells; it is made when first asked for."""
+class DenseUncertainty:
+    """Uncertainty with a full covariance (N, N), computed when first needed."""
 
     def __init__(self, make: Callable[[], Array]) -> None:
         self._make = make
@@ -48,15 +48,15 @@ class DenseSpread:
     def sd(self) -> Array:
         return _root(np.diag(self.covariance))
 
-    def of(self, rows: Array) -> Array:
-        return seen_through(rows, self.covariance)
+    def covariance_of(self, rows: Array) -> Array:
+        return propagated_covariance(rows, self.covariance)
 
     def sd_of(self, rows: Array) -> Array:
         return _root(np.vecdot(rows @ self.covariance, rows))
 
 
-def seen_through(rows: Array, covariance: Array) -> Array:
-    """The covariance (..., R, R) of `rows` (..., R, N) times what has this `covariance`."""
+def propagated_covariance(rows: Array, covariance: Array) -> Array:
+    """Covariance (..., R, R) of `rows` (..., R, N) times what has this `covariance` (..., N, N)."""
     if rows.ndim == 2:
         return rows.dot(covariance).dot(rows.T)  # of small ones in half the time
     return rows @ covariance @ rows.mT
@@ -69,63 +69,61 @@ def _root(variance: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The shape that answers the readings best, of one frame or of T (leading axis).
+    """The shape that explains the readings best, of one frame or of T (leading axis).
 
-    `curvature` (..., 3, P) in 1/m is what it rests on, NaN where a reading is missing or was not
-    trusted; `coefficients` (..., Ni, Nj) in m; `spreads` says how far they may be off for unit
-    noise, of each frame when there are several; `spare` (...) how many readings there are beyond
-    those that the shape took. `told_noise` (...) is the noise in 1/m where the estimator knows it.
-    An iteration took `steps` (...); where it has not `converged` (...), the answer is that of
-    least squares. `suspect` (..., P) says which elements were left out and why, by their number in
-    `WHY`; None where none is ever suspected.
+    `curvature` (..., 3, P) in 1/m are the readings used, NaN where one is missing or excluded;
+    `coefficients` (..., Ni, Nj) in m; `uncertainty` theirs for unit noise, of each frame when there
+    are several; `spare` (...) the degrees of freedom left, readings less unknowns. `known_noise`
+    (...) in 1/m is the noise where the estimator knows it. An iteration took `steps` (...); where
+    it has not `converged` (...), the result is that of least squares. `suspect` (..., P) says which
+    elements were excluded and why, as numbers in `FAULTS`; None where the estimator excludes none.
     """
 
     estimator: "Estimator"
     curvature: Array
     coefficients: Array
-    spreads: "Spread | Sequence[Spread]"
+    uncertainty: "Uncertainty | Sequence[Uncertainty]"
     spare: ArrayLike
-    told_noise: Array | None = None
+    known_noise: Array | None = None
     steps: ArrayLike = 0
     converged: ArrayLike = True
     suspect: "NDArray[np.uint8] | None" = None
 
     @cached_property
     def residual(self) -> Array:
-        """What the shape leaves of the readings, (..., 3, P) in 1/m; NaN where it rests on none."""
+        """Residual (..., 3, P) in 1/m, readings less those of the shape; NaN where none is used."""
         return self.curvature - self.estimator.predicted(self.coefficients)
 
     @cached_property
     def noise(self) -> Array:
-        """Standard deviation (...) of a reading in 1/m; 1 where the fit was told each one's sigma.
+        """Standard deviation (...) of a reading in 1/m; 1 where each one's sigma was given.
 
-        It is as the residual tells it, NaN when every reading was spent on a coefficient, or as
-        the estimator knows it.
+        Estimated from the residual, NaN without a degree of freedom, or as the estimator knows it.
         """
-        if self.told_noise is not None:
-            return self.told_noise
+        if self.known_noise is not None:
+            return self.known_noise
         left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
         squares = np.vecdot(left, left)
-        if np.count_nonzero(squares != squares):  # NaN, told in a tenth of the time of any()
+        if np.count_nonzero(squares != squares):  # NaN, found in a tenth of the time of any()
             left = np.where(np.isnan(left), 0.0, left)
             squares = np.vecdot(left, left)
         if isinstance(self.spare, int) and self.spare > 0:  # as in most frames: the fastest
             return np.sqrt(squares / self.spare)
         return np.sqrt(squares / np.where(np.greater(self.spare, 0), self.spare, np.nan))
 
-    def _each(self, told: Callable[[Spread], Array], shape: tuple[int, ...]) -> Array:
-        """What is `told` of the spread, of this `shape`, for each frame when there are several."""
-        if not isinstance(self.spreads, Sequence):
-            return told(self.spreads).reshape(shape)
-        once = {id(spread): spread for spread in self.spreads}
-        known = {number: told(spread) for number, spread in once.items()}
-        frames = [known[id(spread)] for spread in self.spreads]
+    def _each(self, told: Callable[[Uncertainty], Array], shape: tuple[int, ...]) -> Array:
+        """`told(uncertainty)` in this `shape`, for each frame when there are several."""
+        if not isinstance(self.uncertainty, Sequence):
+            return told(self.uncertainty).reshape(shape)
+        once = {id(one): one for one in self.uncertainty}
+        known = {number: told(one) for number, one in once.items()}
+        frames = [known[id(one)] for one in self.uncertainty]
         return np.reshape(frames, (len(frames), *shape))
 
     @cached_property
     def unit_sd(self) -> Array:
         """Standard deviations (..., Ni, Nj) of the coefficients for unit noise."""
-        return self._each(lambda spread: spread.sd, self.estimator.basis.shape)
+        return self._each(lambda one: one.sd, self.estimator.basis.shape)
 
     @property
     def sd(self) -> Array:
@@ -136,7 +134,7 @@ class Fit:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients in m^2; made on demand."""
+        """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients in m^2."""
         if (N := self.estimator.basis.size) > _MOST:
             raise Refusal(
                 f"expected at most {_MOST} coefficients whose covariance is made, got {N} x {N} "
@@ -147,14 +145,16 @@ class Fit:
     def covariance_of(self, rows: Array) -> Array:
         """Covariance (..., R, R) of `rows` (..., R, N) times the flattened coefficients.
 
-        With several frames `rows` are those of all of them, (R, N).
+        With several frames, `rows` (R, N) are the same for all of them.
         """
-        noise, spreads = self.noise, self.spreads
-        if isinstance(spreads, Sequence):
-            unit = self._each(lambda spread: spread.of(rows), (*rows.shape[:-1], rows.shape[-2]))
+        noise, uncertainty = self.noise, self.uncertainty
+        if isinstance(uncertainty, Sequence):
+            unit = self._each(
+                lambda one: one.covariance_of(rows), (*rows.shape[:-1], rows.shape[-2])
+            )
             noise = noise.reshape(noise.shape + (1,) * (unit.ndim - noise.ndim))
         else:
-            unit = spreads.of(rows)
+            unit = uncertainty.covariance_of(rows)
         seen = noise**2 * unit
         if not self.estimator.undecided.size:
             return seen
@@ -166,9 +166,9 @@ class Fit:
         return {}
 
     def jet(self, x: float, y: float) -> tuple[Array, Array]:
-        """The shape of one frame at (x, y) in m: its derivatives (6,) in the order of `ORDERS`.
+        """Derivatives (6,) of the shape of one frame at (x, y) in m, in the order of `ORDERS`.
 
-        With their covariance (6, 6); the last place's are remembered.
+        And their covariance (6, 6). Those of the last point are cached.
         """
         if (x, y) not in self._jets:
             rows = self.estimator.basis.jet(x, y)
@@ -178,7 +178,7 @@ class Fit:
 
     def sd_of(self, rows: Array) -> Array:
         """Standard deviations (..., R) of `rows` (R, N) times the flattened coefficients."""
-        seen = self.noise[..., None] * self._each(lambda spread: spread.sd_of(rows), (len(rows),))
+        seen = self.noise[..., None] * self._each(lambda one: one.sd_of(rows), (len(rows),))
         return np.hypot(seen, np.linalg.norm(rows @ self.estimator.undecided, axis=-1))
 
     def surface_sd(self, positions: Array) -> Array:
@@ -186,8 +186,8 @@ class Fit:
         return self.sd_of(self.estimator.basis.at(positions))
 
 
-def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
-    """One fit of T frames from the fits of groups of them."""
+def merged_fits(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
+    """One fit of T frames from fits of groups of them: frame t is number `order[t]` of all."""
 
     def joined(parts: list[Array]) -> Array:
         return np.concatenate(parts)[order]
@@ -195,17 +195,17 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
     def of_each(name: str) -> Array:
         return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
 
-    spreads: list[Spread] = []
+    uncertainties: list[Uncertainty] = []
     for fit in fits:
-        own = fit.spreads
-        spreads.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
-    told = [fit.told_noise for fit in fits if fit.told_noise is not None]
+        own = fit.uncertainty
+        uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
+    told = [fit.known_noise for fit in fits if fit.known_noise is not None]
     suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
     return Fit(
         fits[0].estimator,
         joined([fit.curvature for fit in fits]),
         joined([fit.coefficients for fit in fits]),
-        [spreads[int(place)] for place in order],
+        [uncertainties[int(place)] for place in order],
         of_each("spare"),
         joined(told) if told else None,
         of_each("steps"),
@@ -214,20 +214,20 @@ def gathered(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
     )
 
 
-def in_time(fits: Sequence[Fit]) -> Fit:
-    """One fit of T frames from the fits of each of them."""
+def stacked_fits(fits: Sequence[Fit]) -> Fit:
+    """One fit of T frames from T fits of one frame each."""
 
     def alone(fit: Fit) -> Fit:
         return replace(
             fit,
             curvature=fit.curvature[None],
             coefficients=fit.coefficients[None],
-            spreads=[cast("Spread", fit.spreads)],
+            uncertainty=[cast("Uncertainty", fit.uncertainty)],
             spare=np.reshape(fit.spare, (1,)),
-            told_noise=None if fit.told_noise is None else np.reshape(fit.told_noise, (1,)),
+            known_noise=None if fit.known_noise is None else np.reshape(fit.known_noise, (1,)),
             steps=np.reshape(fit.steps, (1,)),
             converged=np.reshape(fit.converged, (1,)),
             suspect=None if fit.suspect is None else fit.suspect[None],
         )
 
-    return gathered([alone(fit) for fit in fits], np.arange(len(fits)))
+    return merged_fits([alone(fit) for fit in fits], np.arange(len(fits)))

@@ -1,4 +1,4 @@
-"""How many elements, and functions to tell, to where the elements are told most with.
+"""Element placement: observability of modes, predicted accuracy, D- and A-optimal placement.
 
 Readings with noise of variance s^2 leave the coefficients the covariance s^2 (M'M)^-1. A D-optimal
 placement makes the volume of that as small as can be, det M'M as large; an A-optimal one the mean
@@ -12,13 +12,38 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
-from kappaskin.estimation.estimator import Estimator
-from kappaskin.estimation.fit import Spread
+from kappaskin.estimation.estimator import Estimator, column_lengths
+from kappaskin.estimation.fit import Uncertainty
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
+
+
+def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
+    """Singular values (F,) of the live readings, the best observed first, and shapes (F, Ni, Nj).
+
+    They are those of M W with columns scaled to unit length: the first over the last is
+    `LeastSquares.condition`. Where the readings do not determine all coefficients the last values
+    are zero, or rounding, and no mixture of the last shapes changes the readings; the rigid motions
+    of an elastic rim are among them. The squared coefficients of each shape, in m, sum to 1 m^2.
+    """
+    W = np.eye(basis.size) if basis.free is None else basis.free
+    M_W = layout.curvature_operator(basis)[layout.live.ravel()] @ W
+    length = column_lengths(M_W)
+    A, back = M_W / length, W / np.where(np.isfinite(length), length, 1.0)
+    R = cast("tuple[Array]", linalg.qr(A, mode="r"))[0][: A.shape[1]] if len(A) else A
+    _, s, Vt = linalg.svd(R) if len(A) else (None, np.empty(0), np.eye(A.shape[1]))
+    values = np.concatenate([s, np.zeros(A.shape[1] - len(s))])
+    shapes = (back @ Vt.T).T
+    if basis.unobservable is not None:
+        values = np.concatenate([values, np.zeros(basis.unobservable.shape[1])])
+        shapes = np.vstack([shapes, basis.unobservable.T])
+    shapes /= np.linalg.norm(shapes, axis=1, keepdims=True)
+    return values, shapes.reshape(len(shapes), *basis.shape)
+
 
 _SWEEPS = 20  # over all elements at most; most placements are done after three to eight
 _GAIN = 1e-6  # of a criterion: a smaller one is not worth an exchange
@@ -27,17 +52,17 @@ _MOST_CANDIDATES = 10_000
 _RIDGE = 1e-9  # of what a reading tells on average, so that too few elements are no error
 
 Placement = Callable[[SensorLayout, Basis, float], SensorLayout]
-"""Elements, functions to tell and how far elements are apart in m at least, to as many elements."""
+"""A function of layout, basis to determine, and least distance in m; a layout as large."""
 
 
 def predicted_sd(estimator: Estimator, noise: float, positions: Array) -> Array:
-    """Standard deviation (P,) of the displacement in m at `positions` (P, 2) by `noise` in 1/m.
+    """Standard deviation (P,) in m of the displacement at `positions` (P, 2), for `noise` in 1/m.
 
-    From the covariance alone: nothing is simulated. What the functions cannot make is not in it.
+    From the covariance alone, without simulation. What the basis cannot represent is not in it.
     """
     rows = estimator.basis.at(positions)
     undecided = np.linalg.norm(rows @ estimator.undecided, axis=1)
-    spread = cast("Spread", estimator.at_rest().spreads)
+    spread = cast("Uncertainty", estimator.at_rest().uncertainty)
     return np.hypot(noise * spread.sd_of(rows), undecided)
 
 
@@ -57,34 +82,37 @@ def _clustered(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout
     return _at(half * (1 + np.sign(u) * np.abs(u) ** _CROWD), layout)
 
 
-def _telling_most(det: bool) -> Placement:
+def _optimal(det: bool) -> Placement:
     return lambda layout, basis, apart: _exchanged(layout, basis, apart, det)
 
 
 PLACEMENTS: dict[str, Placement] = {
     "scene": _as_they_are,
     "clustered": _clustered,
-    "D": _telling_most(det=True),
-    "A": _telling_most(det=False),
+    "D": _optimal(det=True),
+    "A": _optimal(det=False),
 }
-"""Ways to place as many elements as a scene has: where the scene has them, and others."""
+"""Placements by name: as in the scene, clustered in the middle, D-optimal, A-optimal."""
 
 
 def check_placement(layout: SensorLayout, by: str) -> None:
-    """Refuse what no elements can be placed `by` on."""
+    """Raise a `Refusal` for a layout whose elements cannot be placed `by` this name."""
     if by != "scene" and layout.patch.strip:
         raise Refusal("expected a skin with two sides to place elements on, got a strip")
     if by != "scene" and not layout.live.all():
         raise Refusal("expected live elements where they are placed anew, got dead ones among them")
 
 
-def elements_placed(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
-    """As many elements as `layout` has, placed `by` one of `PLACEMENTS` to tell `basis`."""
+def place_elements(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
+    """As many elements as `layout` has, placed by the name `by` to determine `basis`.
+
+    At least `apart` in m from each other where the placement is optimal.
+    """
     return PLACEMENTS[by](layout, basis, apart)
 
 
 def _candidates(layout: SensorLayout, apart: float) -> Array:
-    """Places (C, 2) on the skin at least `apart` in m from each other."""
+    """Candidate places (C, 2) in m on the skin, at least `apart` in m from each other."""
     patch = layout.patch
     m, n = (math.floor(side / apart + 1e-9) for side in (patch.a, patch.b))
     places = np.empty((0, 2))
@@ -117,9 +145,9 @@ def _exchanged(layout: SensorLayout, basis: Basis, apart: float, det: bool) -> S
 
 
 def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, Array]:
-    """What elements at `places` read of F functions, (C, 3, F), each of unit size over the places.
+    """Readings (C, 3, F) of F functions by elements at `places`, each function scaled to unit size.
 
-    With their mean products over the skin (F, F), scaled alike.
+    And the mean products (F, F) of the functions over the skin, scaled alike.
     """
     W = np.eye(basis.size) if basis.free is None else basis.free
     M = _at(places, layout).curvature_operator(basis) @ W
@@ -131,7 +159,7 @@ def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, A
 
 
 def _nearest(positions: Array, places: Array) -> NDArray[np.intp]:
-    """The numbers (P,) of different `places` (C, 2), each the nearest one left to a position."""
+    """The numbers (P,) of different `places` (C, 2), the nearest free one for each position."""
     left, chosen = np.ones(len(places), bool), list[int]()
     for position in positions:
         away = np.where(left, np.hypot(*(places - position).T), np.inf)
@@ -143,7 +171,7 @@ def _nearest(positions: Array, places: Array) -> NDArray[np.intp]:
 def _exchange(
     rows: Array, products: Array, chosen: NDArray[np.intp], free: Mask, n: int, det: bool
 ) -> bool:
-    """Whether element `n` of those `chosen` is better off elsewhere; then it is moved there.
+    """Move element `n` of those `chosen` to a better free place; whether there was one.
 
     With M'M = A of the others and a place's rows r (3, F), det(A + r'r) = det(A) det(1 + r V r'),
     V = A^-1, and trace((A + r'r)^-1 G) = trace(V G) - trace((1 + r V r')^-1 r V G V r').

@@ -1,9 +1,10 @@
-"""A region of interest to the scans that read it, and to what they buy and cost."""
+"""Scanned regions: which channels the next frame reads, and what accuracy that gives."""
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
 from operator import index
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,6 @@ from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import PointLoad
 from kappaskin.sensing import Scan, Sensor
 
-OFF, ELEMENTS, SKIN, INTRINSIC = "off", "elements", "skin", "intrinsic"
-TURNS, ADAPTIVE = "turns", "adaptive"
-_AROUND = (ELEMENTS, SKIN, INTRINSIC, TURNS, ADAPTIVE)
 _FUNCTIONS = 15  # along each side, of the shape a point load makes: Table 1's definition
 _SINGULAR = 1e-6  # share of the best seen direction below which one is not seen at all
 
@@ -26,18 +24,25 @@ class Region:
     """Which elements every frame scans while the others take turns, or which channels it scans.
 
     `around` is "off" (every frame scans everything), "elements" (those in `elements`), or "skin" or
-    "intrinsic": the elements within `radius` m of the contact that the skin itself, or a
-    force/torque sensor at the base of the fingertip, reports, and everything while there is none.
-    `share` of the other elements are scanned besides in each frame, so that each of them comes up
-    every 1 / share frames. With a share of 0 none do, until what is held of them has expired and
-    the readings left decide no shape; then everything is scanned once.
+    "intrinsic": the elements within `radius` m of the contact as reported by the skin itself or by
+    a force/torque sensor at the base of the fingertip, and everything while there is none. A
+    `share` of the other elements is scanned besides in each frame, so that each is scanned every
+    1 / share frames. With a share of 0 none are, until the readings held of them have expired and
+    those left determine no shape; then everything is scanned once.
 
-    Or `around` is "turns": every frame scans a `share` of all channels, in turn; or "adaptive":
-    as many, those that tell most of the contact and the surface, as an estimator that knows it
-    chooses (`Tracking`); with any other they take turns.
+    Or `around` is "turns": every frame scans a `share` of all channels, in turn; or "adaptive": as
+    many, the most informative about the contact and the surface as chosen by the estimator
+    (`Tracking`); with any other estimator they take turns.
 
-    `rate` is asked for, in frames/s; the scan may allow fewer.
+    `rate` is the requested frame rate in 1/s; the scan may allow less.
     """
+
+    OFF: ClassVar = "off"
+    ELEMENTS: ClassVar = "elements"
+    SKIN: ClassVar = "skin"
+    INTRINSIC: ClassVar = "intrinsic"
+    TURNS: ClassVar = "turns"
+    ADAPTIVE: ClassVar = "adaptive"
 
     around: str = OFF
     elements: tuple[int, ...] = ()
@@ -46,10 +51,10 @@ class Region:
     rate: float = 500.0
 
     def __post_init__(self) -> None:
-        if self.around not in (OFF, *_AROUND):
+        if self.around not in (self.OFF, *_AROUND):
             raise Refusal(
-                f"expected a region around {', '.join(_AROUND[:-1])} or {_AROUND[-1]}, or {OFF}, "
-                f"got {self.around!r}"
+                f"expected a region around {', '.join(_AROUND[:-1])} or {_AROUND[-1]}, or "
+                f"{self.OFF}, got {self.around!r}"
             )
         for name in ("radius", "rate"):
             value = getattr(self, name)
@@ -59,16 +64,16 @@ class Region:
             raise Refusal(f"expected Region.share between 0 and 1, got {self.share}")
         if self.by_channel and not self.share:
             raise Refusal(f"expected Region.share above zero for {self.around}, got 0")
-        if self.around == ELEMENTS and not self.elements:
+        if self.around == self.ELEMENTS and not self.elements:
             raise Refusal("expected at least one element in the region, got none; choose some")
 
     @property
     def by_channel(self) -> bool:
         """Whether frames scan a share of all channels."""
-        return self.around in (TURNS, ADAPTIVE)
+        return self.around in (self.TURNS, self.ADAPTIVE)
 
     def chosen(self, count: int) -> Mask:
-        """Which of `count` elements are in `elements`."""
+        """Mask (count,) of the `elements`; raises a `Refusal` for one that does not exist."""
         try:
             elements = [index(p) for p in self.elements]
         except TypeError as error:
@@ -80,13 +85,18 @@ class Region:
         return np.isin(np.arange(count), elements)
 
 
+_AROUND = (Region.ELEMENTS, Region.SKIN, Region.INTRINSIC, Region.TURNS, Region.ADAPTIVE)
+
+
 class Scanner:
-    """The scan of each next frame: the region, and the other elements in turn."""
+    """Makes the scan of each next frame: the region, and the other elements in turn."""
 
     def __init__(self, sensor: Sensor, region: Region) -> None:
         self._sensor, self._region = sensor, region
         self._all = sensor.scan()
-        self._inside = region.chosen(len(sensor.layout)) if region.around == ELEMENTS else None
+        self._inside = (
+            region.chosen(len(sensor.layout)) if region.around == Region.ELEMENTS else None
+        )
         self._turn = 0
         self._live = np.flatnonzero(sensor.layout.live.ravel())
         self._chosen: NDArray[np.intp] | None = None
@@ -97,12 +107,12 @@ class Scanner:
 
     @property
     def rate(self) -> float:
-        """Frames/s asked for."""
+        """Requested frame rate in 1/s."""
         return self._region.rate
 
     @property
     def inside(self) -> Mask | None:
-        """The elements (P,) that every frame scans; None while that is all of them."""
+        """The elements (P,) that every frame scans; None while it scans all."""
         return self._inside
 
     def follow(self, centre: Array) -> None:
@@ -117,15 +127,15 @@ class Scanner:
 
     @property
     def count(self) -> int:
-        """How many channels each frame scans where it scans a share of all of them."""
-        return _turn_of(self._region.share, len(self._live))
+        """Number of channels in a frame that scans a share of all."""
+        return _elements_per_turn(self._region.share, len(self._live))
 
     def choose(self, channels: NDArray[np.intp]) -> None:
-        """Scan these `channels` in the next frame."""
+        """Scan these `channels` (C,) in the next frame."""
         self._chosen = channels
 
     def __call__(self) -> Scan:
-        """The next frame's scan; its channels run upwards."""
+        """The scan of the next frame, its channels in increasing order."""
         if self._region.by_channel:
             chosen, self._chosen = self._chosen, None
             return self._sensor.scan(self._next_channels() if chosen is None else chosen)
@@ -141,9 +151,9 @@ class Scanner:
         return np.sort(self._live[next_ones])
 
     def _in_turn(self) -> NDArray[np.intp]:
-        """The next of the elements outside, from where the last frame stopped, round and round."""
+        """The next of the elements outside the region, from where the last frame stopped."""
         outside = np.flatnonzero(~np.asarray(self._inside))
-        count = _turn_of(self._region.share, len(outside))
+        count = _elements_per_turn(self._region.share, len(outside))
         if not count:
             return outside[:0]
         first = np.searchsorted(outside, self._turn)
@@ -152,8 +162,8 @@ class Scanner:
         return next_ones
 
 
-def _turn_of(share: float, outside: int) -> int:
-    """How many of `outside` elements take their turn in one frame."""
+def _elements_per_turn(share: float, outside: int) -> int:
+    """How many of `outside` elements are scanned in one frame."""
     return math.ceil(share * outside - 1e-9)
 
 
@@ -163,9 +173,9 @@ def contact_bound(
     """The Cramer-Rao bound (3,): standard deviations of x and y in m and of the force in N.
 
     No unbiased estimate of a point load from one frame with Gaussian `noise` in 1/m is better: the
-    bound is the inverse of J'WJ / noise^2, with J the slopes of the readings in the three unknowns
-    and W the `weight` (P,) of each element, how often a frame reads it; 1 when left out. Infinite
-    where the readings do not decide.
+    bound is the inverse of J'WJ / noise^2, with J the derivatives of the readings in the three
+    unknowns and W the `weight` (P,) of each element, how often a frame reads it; None means 1.
+    Infinite where the readings do not determine them.
     """
     layout = sensor.layout
     across = 1 if layout.patch.strip else _FUNCTIONS
@@ -189,12 +199,12 @@ def contact_bound(
 
 
 @dataclass(frozen=True, eq=False)
-class Bargain:
-    """What scanning a region buys, and what it costs.
+class ScanTradeoff:
+    """The gain in rate and the loss in accuracy of scanning a region.
 
-    `channels` in a frame, `scan_time` in s, `rate` in frames/s and `gain`, how many times that of
-    full scans it is. `bound` (3,) is what one frame tells of the contact at best, standard
-    deviations of x and y in m and of the force in N; `full_bound` (3,) with everything scanned.
+    `channels` in a frame, `scan_time` in s, frame rate `rate` in 1/s and `gain`, its ratio to that
+    of full scans. `bound` (3,) are the least standard deviations of x and y in m and of the force
+    in N from one frame; `full_bound` (3,) with everything scanned.
     """
 
     channels: int
@@ -209,21 +219,21 @@ class Bargain:
         return self.rate / self.full_rate
 
 
-def bargain(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> Bargain:
-    """What `region` buys and costs while `contact` is where it looks, at `noise` in 1/m.
+def scan_tradeoff(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> ScanTradeoff:
+    """The tradeoff of `region` for a `contact` inside it, at `noise` in 1/m.
 
-    Rates are those that the scans allow. An element outside counts by how often it takes its turn.
+    Rates are those that the scans allow. An element outside counts by how often it is scanned.
     """
     scanner = Scanner(sensor, region)
-    if region.around in (SKIN, INTRINSIC):
+    if region.around in (Region.SKIN, Region.INTRINSIC):
         scanner.follow(contact.centre())
     scan, full = scanner(), sensor.scan()
     inside = scanner.inside
     weight = np.full(len(sensor.layout), region.share if region.by_channel else 1.0)
     if inside is not None and not inside.all():
         outside = int((~inside).sum())
-        weight[~inside] = _turn_of(region.share, outside) / outside
-    return Bargain(
+        weight[~inside] = _elements_per_turn(region.share, outside) / outside
+    return ScanTradeoff(
         len(scan.channels),
         scan.duration,
         scan.rate,

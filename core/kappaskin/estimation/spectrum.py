@@ -1,4 +1,4 @@
-"""Readings at any times to how much of each frequency is in them."""
+"""Amplitude spectrum of readings at any times."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from kappaskin.frames import Array
 _ROUNDING = 1e-9  # of a wave's mean square: a sine of half the rate is zero at even steps
 
 
-def amplitudes(times: Array, values: Array, frequencies: Array) -> Array:
-    """The amplitude (..., F) of a sine of each of `frequencies` (F,) in Hz that fits best.
+def amplitude_spectrum(times: Array, values: Array, frequencies: Array) -> Array:
+    """Amplitudes (..., F) of sines of `frequencies` (F,) in Hz in `values` (..., T), in their unit.
 
-    To `values` (..., T) at `times` (T,) in s, less their mean, by least squares: Lomb's and
-    Scargle's spectrum (doi:10.1007/BF00648343), which needs no even steps.
+    By least squares at the `times` (T,) in s, after subtraction of the mean: the Lomb-Scargle
+    spectrum (doi:10.1007/BF00648343), which needs no even steps.
     """
     centred = values - values.mean(axis=-1, keepdims=True)
     turn = 2 * np.pi * np.multiply.outer(frequencies, times)

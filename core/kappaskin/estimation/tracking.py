@@ -1,4 +1,4 @@
-"""Frames and parts of frames, each reading at its own time, to the shape of a moving skin."""
+"""Tracking estimator: a moving skin from readings that each have their own time."""
 
 import math
 from collections.abc import Mapping
@@ -12,13 +12,55 @@ from numpy.typing import ArrayLike, NDArray
 from kappaskin._state import Remembering
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
-from kappaskin.estimation.choosing import telling_most
-from kappaskin.estimation.estimator import Estimator, numbers
-from kappaskin.estimation.fit import Fit, in_time
-from kappaskin.estimation.kalman import MovingModes
-from kappaskin.estimation.level import START, Level
-from kappaskin.estimation.prior import prior_root
+from kappaskin.estimation.bayes import prior_root
+from kappaskin.estimation.estimator import Estimator, real_array
+from kappaskin.estimation.fit import Fit, stacked_fits
+from kappaskin.estimation.kalman import START_SPEED, ModalKalmanFilter, SignalLevel
 from kappaskin.frames import Array, Mask
+
+_CANDIDATES = 80  # readings of which the next ones are chosen
+_AT_ONCE = 8  # of them, as good in the end as one by one
+
+
+def most_informative(
+    A: Array, P: Array, wanted: Array, worth: Array, count: int
+) -> NDArray[np.intp]:
+    """The `count` most informative of R readings about the quantities `wanted` (q, F), greedily.
+
+    The readings are A (R, F) times modes of the covariance P (F, F) in units of the noise. Each
+    reduces the summed variances of the quantities by (wanted P A')^2 over its own variance, times
+    its `worth` (R,).
+    """
+    AP = A @ P
+    E = AP @ wanted.T
+    first = worth * np.vecdot(E, E) / (1 + np.vecdot(AP, A))
+    most = min(max(_CANDIDATES, count), len(first))
+    left = np.argpartition(-first, most - 1)[:most]
+    return left[_greedy(AP[left] @ A[left].T, E[left], worth[left], count)]
+
+
+def _greedy(shared: Array, wanted: Array, worth: Array, count: int) -> NDArray[np.intp]:
+    """The same for all R readings, whose signals have the covariance `shared` (R, R).
+
+    A Cholesky factor of the covariance of those chosen, (count, R), grows some rows at a time.
+    """
+    R, variance = len(worth), 1 + shared.diagonal()
+    both = np.hstack([shared, wanted])
+    factor, chosen = np.empty((count, both.shape[1])), np.empty(count, np.intp)
+    for first in range(0, count, _AT_ONCE):
+        told = worth * np.vecdot(wanted, wanted) / variance
+        told[chosen[:first]] = -1.0
+        k = np.argsort(-told, kind="stable")[: min(_AT_ONCE, count - first)]
+        chosen[first : first + len(k)] = k
+        before = factor[:first]
+        left = both[k] - before[:, k].T @ before
+        L = np.linalg.cholesky(left[:, k] + np.eye(len(k)))
+        factor[first : first + len(k)] = rows = np.linalg.solve(L, left)
+        # Given those readings, the others are less uncertain by what they share with them.
+        wanted = wanted - rows[:, :R].T @ rows[:, R:]
+        variance = np.maximum(variance - np.sum(rows[:, :R] ** 2, axis=0), 1.0)
+    return chosen
+
 
 _MOST = 100  # readings that share one step of the filter
 _PHASE = 0.5  # rad that the fastest mode turns meanwhile at most, or
@@ -31,8 +73,8 @@ _COARSE = 8  # modes that make nearly all of the displacement
 _PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin, as displacement
 
 
-class TrackedSpread:
-    """The spread that a root S tells of amplitudes of `modes` (N, F): modes S' S modes'."""
+class TrackedUncertainty:
+    """Uncertainty by a root S (R, F) of the covariance of `modes` (N, F): modes S' S modes'."""
 
     def __init__(self, modes: Array, root: Array) -> None:
         self._modes, self._root = modes, root
@@ -45,7 +87,7 @@ class TrackedSpread:
     def sd(self) -> Array:
         return np.linalg.norm(self._half, axis=0)
 
-    def of(self, rows: Array) -> Array:
+    def covariance_of(self, rows: Array) -> Array:
         half = rows @ self._half.T
         return half @ half.swapaxes(-1, -2)
 
@@ -54,16 +96,16 @@ class TrackedSpread:
 
 
 class Tracking(Estimator, Remembering):
-    """`fit = Tracking(basis, layout)`; `fit(curvature)` follows frame after frame.
+    """`fit = Tracking(basis, layout)`; `fit(curvature)` tracks the skin frame by frame.
 
-    A Kalman filter of what the skin does: a plate under loads that nobody knows (`prior_root`),
-    each of its shapes moving the faster the finer it is (`MovingModes`). It remembers: every frame,
-    whole or not, is taken in at the times of its readings, and the answer is the shape at the last
-    of them. A frame that comes without times is read 6 ms after the one before.
+    A Kalman filter of a plate under unknown loads (`prior_root`), whose modes move the faster the
+    finer they are (`ModalKalmanFilter`). It has a memory: each frame, complete or not, is used at
+    the times of its readings, and the fit is the shape at the last of them. A frame without times
+    counts as read 6 ms after the one before.
 
-    How large shapes are, how fast they move and, without a `sigma`, the noise are found on the way:
-    from the first frame by its evidence, then by what is left unexplained. Readings that are beyond
-    what was expected are a touch or its end; the filter then expects anything once more.
+    The amplitude of the modes, their speed and, without a `sigma`, the noise are estimated: from
+    the likelihood of the first frame, then from the innovations. Readings far beyond expectation
+    mean a contact or its end; the uncertainty of the modes then grows to that of the start.
     """
 
     remembers: ClassVar = True
@@ -82,48 +124,48 @@ class Tracking(Estimator, Remembering):
 
     def restart(self) -> None:
         """Forget every frame."""
-        self._filter = MovingModes(self._wavenumbers, self.dtype)
-        self._level: Level | None = None
+        self._filter = ModalKalmanFilter(self._wavenumbers, self.dtype)
+        self._level: SignalLevel | None = None
         self._now = -math.inf
         self._left = np.full(self._A.shape[0], np.nan)
         self._read = np.full(self._A.shape[0], -math.inf)
 
     def recall(self, memory: Mapping[str, Array], before: str = "") -> None:
         if f"{before}_level.variance" in memory and self._level is None:
-            self._level = Level(0.0, 0.0, 0.0)
+            self._level = SignalLevel(0.0, 0.0, 0.0)
         super().recall(memory, before)
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
-        """The fit to a skin at rest by which nothing is remembered."""
+        """The fit to a skin at rest, without memory and without a trace in it."""
         fresh = copy(self)
         fresh.restart()
         return fresh(self._rest(missing))
 
     def __call__(self, curvature: ArrayLike) -> Fit:
-        """Take in the next frame (3, P) or T of them (T, 3, P), read 6 ms after each other."""
-        K = numbers(curvature, "curvature")
+        """Fit the next frame (3, P) in 1/m, or T of them (T, 3, P), read 6 ms after each other."""
+        K = real_array(curvature, "curvature")
         self._check_shape(K)
         if K.ndim == 2:
             return self.follow(K, np.full(K.shape, self._next))
         if not len(K):
             none = np.empty((0, *self.basis.shape), self.dtype)
             return Fit(self, K.astype(self.dtype), none, [], np.zeros(0), np.zeros(0))
-        return in_time([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
+        return stacked_fits([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
 
     @property
     def _next(self) -> float:
-        """When a frame is read of which nobody says when."""
+        """Time in s of a frame that comes without one."""
         return self._now + _PERIOD if math.isfinite(self._now) else 0.0
 
     def follow(self, curvature: ArrayLike, times: ArrayLike, held: Array | None = None) -> Fit:
-        """Take in `curvature` (3, P) in 1/m read at `times` (3, P) in s on the device's clock.
+        """Fit `curvature` (3, P) in 1/m read at `times` (3, P) in s on the device's clock.
 
-        Which readings are missing is told as in any call of an estimator; the time of a channel
-        that was not read at all is NaN. Readings of one channel are to come in the order of their
-        times. A clock that goes back is that of a device that started anew. What is `held` of
-        earlier frames is known already.
+        Missing readings are NaN as in any estimator; the time of a channel that was not read at
+        all is NaN too. Readings of one channel must come in the order of their times. A clock that
+        goes back means that the device has restarted. `held`, readings of earlier frames, is not
+        used: the filter knows them. Raises a `Refusal` for a reading without a time.
         """
-        frame, when = numbers(curvature, "curvature"), numbers(times, "times")
+        frame, when = real_array(curvature, "curvature"), real_array(times, "times")
         self._check_shape(frame)
         if frame.ndim != 2 or when.shape != frame.shape:
             raise Refusal(
@@ -148,21 +190,21 @@ class Tracking(Estimator, Remembering):
         return self._fitted()
 
     def choose(self, count: int, position: Array, ahead: float) -> NDArray[np.intp]:
-        """The `count` channels to read next, `ahead` s from now, upwards.
+        """The `count` channels to read next, `ahead` s from now, in increasing order.
 
-        Always the few that take most of what is uncertain of the surface, and of where
-        the contact is that was found at `position` (2,) in m, NaN when there is none. Choosing
-        looks at the covariance alone. A channel says again what it said until the finest shape has
-        moved on: what the modes leave of a reading is no noise that averages out.
+        Those that reduce most the uncertainty of the surface, and of the place of the contact at
+        `position` (2,) in m, NaN without one. They follow from the covariance alone. A channel that
+        was just read is worth little until the finest mode has moved on: what the modes leave of a
+        reading is not noise that averages out.
         """
         x, rate = self._filter.halves
         S, count = x + ahead * rate, min(count, int(self.readable.sum()))
         readable = np.flatnonzero(self.readable)
         A, worth = self._A[readable], self._aged(ahead)[readable]
-        return np.sort(readable[telling_most(A, S.T @ S, self._wanted(position), worth, count)])
+        return np.sort(readable[most_informative(A, S.T @ S, self._wanted(position), worth, count)])
 
     def _wanted(self, position: Array) -> Array:
-        """What is wanted of the modes (q, F): displacements in m, and the contact's place."""
+        """Quantities (q, F) of interest of the modes: displacements in m, the contact's place."""
         coarse = np.diag(self._displacements)[: min(_COARSE, self.unknowns)]
         if not np.isfinite(position).all():
             return coarse
@@ -173,7 +215,7 @@ class Tracking(Estimator, Remembering):
         return np.vstack([coarse, share * jet[1:3]])
 
     def _aged(self, ahead: float) -> Array:
-        """How much of a reading (3 P,) would be new."""
+        """Share (3 P,) of the next reading of each channel that would be new."""
         level = self._level
         if level is None:  # nothing was read yet
             return np.ones(len(self._read))
@@ -181,16 +223,16 @@ class Tracking(Estimator, Remembering):
         return -np.expm1(-finest * (self._now + ahead - self._read))
 
     def _begin(self, times: Array) -> None:
-        """Start anew where the clock went back."""
+        """Restart where the clock went back."""
         if times.size and times.min() < self._now - _BACK:
             self.restart()
 
     def _groups(self, used: NDArray[np.intp], t: Array) -> list[NDArray[np.intp]]:
-        """The channels `used` in the order of their times, as many at once as move together."""
+        """The channels `used` in the order of their times, in groups that share one filter step."""
         order = used[np.argsort(t[used], kind="stable")]
         if not order.size:
             return []
-        level = cast("Level", self._level)
+        level = cast("SignalLevel", self._level)
         fastest = math.sqrt(3) * level.speed * float(self._wavenumbers.max())
         span = max(_PHASE / fastest, _SHORTEST)
         later = np.flatnonzero(np.diff((t[order] - t[order[0]]) // span)) + 1
@@ -201,21 +243,21 @@ class Tracking(Estimator, Remembering):
         ]
 
     def _start(self, readings: Array, A: Array) -> None:
-        """Expect what the evidence of the first readings says."""
+        """Start with the most likely amplitude for the first readings."""
         told = (0.0, 0.0) if self.sigma is None else (1.0, math.inf)
-        self._level = Level(*told, float(np.finfo(self.dtype).eps))
-        self._filter.expect(self._level.renew(A, readings, self._signal), START)
+        self._level = SignalLevel(*told, float(np.finfo(self.dtype).eps))
+        self._filter.expect(self._level.renew(A, readings, self._signal), START_SPEED)
 
     def _advance(self, time: float) -> None:
-        level = cast("Level", self._level)
+        level = cast("SignalLevel", self._level)
         if time > self._now and math.isfinite(self._now):
             passed = min(time - self._now, _FORGOTTEN)
             self._filter.advance(passed, level.amplitude, level.speed)
         self._now = max(time, self._now)
 
     def _take(self, channels: NDArray[np.intp], K: Array, t: Array) -> None:
-        """Take in readings of `channels`, in the order of their times `t`."""
-        level, filter_ = cast("Level", self._level), self._filter
+        """Update the filter with readings of `channels`, in the order of their times `t` in s."""
+        level, filter_ = cast("SignalLevel", self._level), self._filter
         self._advance(float(t[-1]))
         A, lag = self._A[channels], (t - self._now).astype(self.dtype)
         readings = (self.weight[channels] * K).astype(self.dtype)
@@ -237,7 +279,7 @@ class Tracking(Estimator, Remembering):
         level.size(filter_.mean[0], float(np.vdot(S1, S1)), self._signal)
 
     def _fitted(self) -> Fit:
-        level = cast("Level", self._level)
+        level = cast("SignalLevel", self._level)
         c = (self._modes @ self._filter.mean[0]).reshape(self.basis.shape).astype(self.dtype)
         there = self._read > self._now - _HELD
         K = np.where(there, self._left, np.nan) + self.predicted(c).ravel()
@@ -249,7 +291,7 @@ class Tracking(Estimator, Remembering):
             self,
             K.reshape(3, -1).astype(self.dtype),
             c,
-            TrackedSpread(self._modes, self._filter.halves[0]),
+            TrackedUncertainty(self._modes, self._filter.halves[0]),
             spare,
             np.array(noise),
         )
@@ -259,7 +301,7 @@ class Tracking(Estimator, Remembering):
 
 
 def _principal(basis: Basis) -> tuple[Array, Array, Array]:
-    """Shapes (N, F) that are expected independently, their wave numbers (F,) in rad/m, and RMS.
+    """Principal modes (N, F) of the prior, their wave numbers (F,) in rad/m, and RMS (F,) in m.
 
     The largest first; their displacements are orthogonal over the skin.
     """

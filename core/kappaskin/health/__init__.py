@@ -1,8 +1,8 @@
-"""Health of the channels: dead, stuck, noisy, saturated, swapped or drifting ones."""
+"""Health: which channels are dead, stuck, noisy, saturated, swapped or drifting."""
 
+from kappaskin.health.findings import Exclusion as Exclusion
+from kappaskin.health.findings import FaultCodes as FaultCodes
 from kappaskin.health.findings import Finding as Finding
 from kappaskin.health.findings import Health as Health
-from kappaskin.health.leaving_out import Kinds as Kinds
-from kappaskin.health.leaving_out import LeftOut as LeftOut
-from kappaskin.health.leaving_out import leave_out as leave_out
-from kappaskin.health.monitor import Monitor as Monitor
+from kappaskin.health.findings import exclude as exclude
+from kappaskin.health.monitor import HealthMonitor as HealthMonitor

@@ -1,23 +1,28 @@
-"""What is found of the channels of a skin, and what leaving them out costs."""
+"""Findings: the fault of each channel, and what its exclusion costs in accuracy."""
 
 import math
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.estimation import WHY
-from kappaskin.frames import COMPONENTS, Array
+from kappaskin.errors import RankDeficient
+from kappaskin.estimation import FAULTS, Estimator, Fit, Uncertainty
+from kappaskin.frames import COMPONENTS, Array, Mask
+from kappaskin.health.inconsistency import InconsistencyTest, Indices, centred
+from kappaskin.sensing import Sensor
 
-_MOST = 256  # findings that are told one by one
+_MOST_LISTED = 256  # findings that are listed one by one
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong with one channel: `kind` is a word of `WHY`, `figure` says by how much.
+    """The fault of one channel: `kind` is a word of `FAULTS`, `figure` says by how much.
 
-    `since` when, in s on the clock of `Frame.host_time`. `kept` says that it is in the fit all the
-    same, as no shape could be told without it.
+    `since` when, in s on the clock of `Frame.host_time`. `kept` means that it is in the fit all the
+    same, as the shape is not determined without it.
     """
 
     channel: int
@@ -29,17 +34,17 @@ class Finding:
     kept: bool = False
 
     def __str__(self) -> str:
-        kept = "; kept, as no shape can be told without it" if self.kept else ""
+        kept = "; kept, as the shape is not determined without it" if self.kept else ""
         return f"{self.component} of element {self.element} {self.kind}: {self.figure}{kept}"
 
 
 @dataclass(frozen=True)
 class Health:
-    """All that is wrong with the channels of a skin now.
+    """The faults of all channels of a skin now.
 
-    `findings` are told one by one, upwards, at most 256 of the `count` there are. Leaving them out
-    makes the error bars of the shape `cost` times as wide, and that of the displacement at the
-    contact `contact_cost` times, NaN where there is no contact. `kept` of them are in the fit all
+    `findings` are the first of them by channel, at most 256 of the `count` there are. Their
+    exclusion makes the error bars of the shape `cost` times as wide, and that of the displacement
+    at the contact `contact_cost` times, NaN without a contact. `kept` of them are in the fit all
     the same.
     """
 
@@ -51,50 +56,257 @@ class Health:
 
     def __str__(self) -> str:
         if not self.count:
-            return "no channel is found wanting"
+            return "all channels OK"
         out = self.count - self.kept
-        words = [f"{out} channel{'' if out == 1 else 's'} left out"]
+        words = [f"{out} channel{'' if out == 1 else 's'} excluded"]
         words.append(f"error bars {100 * (self.cost - 1):+.0f} %")
         if math.isfinite(self.contact_cost):
             words.append(f"at the contact {100 * (self.contact_cost - 1):+.0f} %")
         if self.kept:
-            words.append(f"{self.kept} found wanting, but no shape can be told without")
+            words.append(f"{self.kept} faulty but kept: without, the shape is not determined")
         return ", ".join(words)
 
 
 def findings(
     kinds: NDArray[np.uint8], since: Array, figures: Array, kept: NDArray[np.bool_]
 ) -> tuple[Finding, ...]:
-    """What is found of C channels: `kinds`, `since` and `kept` (C,), `figures` (C, 2)."""
+    """The findings for C channels with `kinds`, `since` and `kept` (C,), `figures` (C, 2)."""
     P = len(kinds) // 3
     return tuple(
         Finding(
             int(channel),
             int(channel % P),
             COMPONENTS[int(channel) // P],
-            WHY[int(kinds[channel])],
+            FAULTS[int(kinds[channel])],
             float(since[channel]),
             _figure(
-                WHY[int(kinds[channel])], float(figures[channel, 0]), float(figures[channel, 1]), P
+                FAULTS[int(kinds[channel])],
+                float(figures[channel, 0]),
+                float(figures[channel, 1]),
+                P,
             ),
             bool(kept[channel]),
         )
-        for channel in np.flatnonzero(kinds)[:_MOST]
+        for channel in np.flatnonzero(kinds)[:_MOST_LISTED]
     )
 
 
 def _figure(kind: str, first: float, second: float, elements: int) -> str:
-    """The figures that `explain` gives, with their units in words."""
+    """The figures of `classify_faults` in words and units."""
     if math.isnan(first):
         return "the device says so"
     if kind in ("dead", "stuck"):
-        return f"reads {first:+.2f} 1/m while those around it tell of {second:.2f} 1/m of motion"
+        return f"reads {first:+.2f} 1/m while its neighbours predict {second:.2f} 1/m of motion"
     if kind == "noisy":
-        return f"{first:.2g} 1/m of noise, others have {second:.2g} 1/m"
+        return f"noise {first:.2g} 1/m, other channels {second:.2g} 1/m"
     if kind == "saturated":
         return f"on a rail for {100 * first:.0f} % of the last second"
     if kind == "swapped":
         other = int(first)
         return f"reads what {COMPONENTS[other // elements]} of element {other % elements} should"
-    trend = f", going by {second:+.2g} 1/m a minute" if kind == "drifting" else ""
-    return f"{first:+.2f} 1/m off what those around it say{trend}"
+    trend = f", drifting by {second:+.2g} 1/m a minute" if kind == "drifting" else ""
+    return f"{first:+.2f} 1/m off the prediction of its neighbours{trend}"
+
+
+DEAD, STUCK, NOISY, SWAPPED, OFFSET, SATURATED, DRIFTING = (
+    FAULTS.index(kind)
+    for kind in ("dead", "stuck", "noisy", "swapped", "offset", "saturated", "drifting")
+)
+
+_STILL = 0.25  # of the predicted motion: a channel that moves less does not respond
+_MOVED = 4.0  # times the error of the prediction: motion that is large enough to judge by
+_AT_REST = 0.1  # of the same: one that stays nearer to zero is dead
+_COUNTS = 5.0  # resolutions, within which zero is zero
+_CROSSED = 0.2  # of the squares left where two channels are swapped back
+_STEADY = 2.0  # times its scatter is what a channel is off by, or it is noise
+_LINE = 0.8  # of the scatter that a line explains; of a step it explains 0.75 at most
+_MOST_PAIRED = 512  # channels whose pairs are compared
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelFaults:
+    """The faults of n channels: `kinds` (n,) by number in `FAULTS` and `figures` (n, 2)."""
+
+    kinds: NDArray[np.uint8]
+    figures: Array
+
+
+def classify_faults(
+    test: InconsistencyTest, channels: Indices, resolution: float, step: float
+) -> ChannelFaults:
+    """The faults of `channels` (n,), which have one mean every `step` s.
+
+    Figures are in 1/m: for dead and stuck channels their reading and the predicted motion; for
+    noisy ones their noise and the median noise; for swapped ones the channel that reads what they
+    should, and NaN; for drifting ones and offsets how far they are off, and the drift per minute.
+    `resolution` in 1/m is that of one count.
+    """
+    changed, predicted = test.changed[:, channels], test.predicted[:, channels]
+    left = changed - predicted
+    changed, predicted = (
+        np.where(np.isnan(left), np.nan, values) for values in (changed, predicted)
+    )
+    lately = _amounts(predicted[test.recent]) > _MOVED * test.left_open[channels]
+    moves, should = (
+        np.where(lately, _amounts(values[test.recent]), _amounts(values))
+        for values in (changed, predicted)
+    )
+    still = (moves < _STILL * should) & (should > _MOVED * test.left_open[channels])
+    reads = test.reads[channels]
+    rest = np.maximum(_AT_REST * should, _COUNTS * resolution)
+    off, scatter = _means(left[test.recent]), _amounts(left[test.recent])
+    line, slope = _trend(left)
+    kinds = np.select(
+        [still & (np.abs(reads) < rest), still, np.abs(off) < _STEADY * scatter, line > _LINE],
+        [DEAD, STUCK, NOISY, DRIFTING],
+        OFFSET,
+    ).astype(np.uint8)
+    figures = np.stack([off, slope * 60 / step], axis=1)
+    figures[still] = np.stack([reads, should], axis=1)[still]
+    loud = kinds == NOISY
+    figures[loud] = np.stack([scatter, np.full(len(scatter), test.usual)], axis=1)[loud]
+    crossed, partner = _partners(centred(changed), centred(predicted))
+    kinds[crossed], figures[crossed] = SWAPPED, np.nan
+    figures[crossed, 0] = channels[partner[crossed]]
+    return ChannelFaults(kinds, figures)
+
+
+def _means(values: Array) -> Array:
+    """Means (n,) of `values` (T, n) without NaN."""
+    known = ~np.isnan(values)
+    return np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+
+
+def _amounts(values: Array) -> Array:
+    """Standard deviations (n,) of `values` (T, n) without NaN."""
+    apart, known = centred(values), np.count_nonzero(~np.isnan(values), axis=0)
+    return np.sqrt(np.sum(apart**2, axis=0) / np.maximum(known, 1))
+
+
+def _trend(left: Array) -> tuple[Array, Array]:
+    """The share of the scatter of `left` (T, n) that a line explains, and its slope, (n,) each."""
+    time = np.where(np.isnan(left), np.nan, np.arange(len(left))[:, None])
+    t, r = centred(time), centred(left)
+    tt, tr, rr = (np.sum(a * b, axis=0) for a, b in ((t, t), (t, r), (r, r)))
+    slope = np.divide(tr, tt, where=tt > 0, out=np.zeros_like(tr))
+    return np.divide(slope * tr, rr, where=rr > 0, out=np.zeros_like(tr)), slope
+
+
+def _partners(d: Array, p: Array) -> tuple[Mask, Indices]:
+    """Which of n channels are swapped in pairs, and with which one.
+
+    From their changes `d` (T, n) and the predicted ones `p` (T, n).
+    """
+    n = int(d.shape[1])
+    crossed = cast("Mask", np.zeros(n, bool))
+    partner = cast("Indices", np.zeros(n, np.intp))
+    if not 2 <= n <= _MOST_PAIRED:
+        return crossed, partner
+    D, Q, between = np.sum(d**2, axis=0), np.sum(p**2, axis=0), d.T @ p
+    own = D + Q - 2 * np.diag(between)
+    other = D[:, None] + Q - 2 * between  # of reading i as if it were j
+    left = (other + other.T) / np.maximum(own[:, None] + own, np.finfo(float).tiny)
+    np.fill_diagonal(left, np.inf)
+    partner = cast("Indices", left.argmin(axis=1))
+    # Of two stuck ones each moves as little as the other.
+    crossed = cast("Mask", left.min(axis=1) < _CROSSED)
+    each_other = cast("Mask", partner[partner] == np.arange(n))
+    return crossed & each_other, partner
+
+
+FaultCodes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exclusion:
+    """The channels excluded from a fit: those with a fault in `kinds` (3, P) that are not `kept`.
+
+    `ideal` is the fit at rest with every channel of such a skin, `fit` the one without these.
+    """
+
+    kinds: FaultCodes
+    kept: Mask
+    ideal: Fit
+    fit: Fit
+    _out: Mask | None
+    _worst: FaultCodes
+
+    @classmethod
+    def none(cls, sensor: Sensor, fit: Fit, ideal: Fit) -> "Exclusion":
+        """No exclusion but of the channels that `sensor` itself reports as dead."""
+        shape = sensor.layout.live.shape
+        kinds = np.zeros(shape, np.uint8)
+        return cls(kinds, np.zeros(shape, bool), ideal, fit, None, kinds[0])
+
+    def __call__(self, curvature: Array) -> Array:
+        """The `curvature` (3, P) to fit: NaN where it is excluded."""
+        return curvature if self._out is None else np.where(self._out, np.nan, curvature)
+
+    def words(self, suspect: FaultCodes | None) -> FaultCodes:
+        """The fault of each element (P,), of which the fit itself may `suspect` some."""
+        found = self._worst
+        return found if suspect is None else np.where(found > 0, found, suspect)
+
+    @property
+    def cost(self) -> float:
+        """Factor by which the error bars of the shape are wider, by root mean square."""
+        return float(np.linalg.norm(self.fit.unit_sd) / np.linalg.norm(self.ideal.unit_sd))
+
+    def cost_at(self, place: Array) -> float:
+        """Factor by which the error bar of the displacement at `place` (2,) in m is wider.
+
+        NaN for a place of NaN, and where the edge holds the skin; 1 without an exclusion.
+        """
+        if not np.isfinite(place).all():
+            return math.nan
+        if self.fit is self.ideal:
+            return 1.0
+        row = self.fit.estimator.basis.at(place[None])
+        without, with_all = (
+            float(cast("Uncertainty", fit.uncertainty).sd_of(row)[0])
+            for fit in (self.fit, self.ideal)
+        )
+        return without / with_all if with_all > 0 else math.nan
+
+
+def exclude(
+    was: Exclusion, estimator: Estimator, kinds: FaultCodes, badness: Array, loosest: float
+) -> Exclusion:
+    """Exclude as many channels with a fault in `kinds` (C,) as the shape is determined without.
+
+    By `badness` (C,), the worst first. A shape is determined while its error bars for unit noise
+    have a norm of at most `loosest`. `was` is the exclusion before.
+    """
+    shape = was.kinds.shape
+    if np.array_equal(kinds.reshape(shape), was.kinds):
+        return was
+    found = np.flatnonzero((kinds > 0) & estimator.readable)
+    worst = found[np.argsort(-badness[found], kind="stable")]
+    fit, count = _most(estimator, worst, loosest)
+    out = np.isin(np.arange(kinds.size), worst[:count]).reshape(shape)
+    kept = np.isin(np.arange(kinds.size), worst[count:]).reshape(shape)
+    own = kinds.reshape(shape).copy()
+    worst_of: FaultCodes = own.max(axis=0)
+    return replace(was, kinds=own, kept=kept, fit=fit, _out=out if count else None, _worst=worst_of)
+
+
+def _most(estimator: Estimator, worst: NDArray[np.intp], loosest: float) -> tuple[Fit, int]:
+    """The fit at rest without as many of the `worst` channels as possible, and their number."""
+    fit, least, most = estimator.at_rest(), 0, len(worst)
+    count = most
+    while least < most:
+        found = _without(estimator, worst[:count])
+        if found is not None and np.linalg.norm(found.unit_sd) <= loosest:
+            fit, least = found, count
+        else:
+            most = count - 1
+        count = (least + most + 1) // 2
+    return fit, least
+
+
+def _without(estimator: Estimator, channels: NDArray[np.intp]) -> Fit | None:
+    missing = np.zeros(3 * len(estimator.layout), bool)
+    missing[channels] = True
+    with suppress(RankDeficient):
+        return estimator.at_rest(missing.reshape(3, -1))
+    return None

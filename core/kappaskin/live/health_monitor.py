@@ -3,7 +3,7 @@
 import numpy as np
 
 from kappaskin.frames import Array, Frame
-from kappaskin.health import Health, Monitor
+from kappaskin.health import Health, HealthMonitor
 from kappaskin.live.pipelines import Side
 from kappaskin.pipeline import Pipeline
 from kappaskin.scenes import Scene
@@ -14,17 +14,17 @@ class Watching:
     """Looks after the channels of the sensor it met last; without one there is nothing to see."""
 
     def __init__(self) -> None:
-        self._monitor: Monitor | None = None
+        self._monitor: HealthMonitor | None = None
         self._spoilt: object = None  # by what, in a simulated scene
 
     def meet(self, sensor: Sensor | None) -> None:
-        self._monitor = None if sensor is None else Monitor(sensor)
+        self._monitor = None if sensor is None else HealthMonitor(sensor)
 
     def spoil(self, scene: Scene) -> None:
         """Begin anew where other effects are simulated: they may shift every channel."""
         spoilt = (scene.effects, scene.choice, scene.seed)
         if spoilt != self._spoilt and self._monitor is not None:
-            self._monitor.begin_anew()
+            self._monitor.reset()
         self._spoilt = spoilt
 
     def __call__(self, frame: Frame) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.health import Kinds, Monitor
+from kappaskin.health import FaultCodes, HealthMonitor
 from kappaskin.live.ring import Ring, slot_type
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.sensing import Sensor
@@ -43,7 +43,7 @@ class Side:
         self._sensor: Sensor | None = None
         self._asked = told.setup
         self._building: Future[_Built] | None = None
-        self.left: tuple[Kinds, Array] | None = None
+        self.left: tuple[FaultCodes, Array] | None = None
 
     def ask(self, setup: Setup) -> None:
         """Begin to build a pipeline for another setup, beside the running one."""
@@ -98,7 +98,7 @@ class Side:
             self.told, setup=pipeline.setup, generation=pipeline.generation, slot=slot
         )
 
-    def leave_out(self, monitor: Monitor) -> bool:
+    def leave_out(self, monitor: HealthMonitor) -> bool:
         """Fit without the channels that are not well; whether those are others than before."""
         if self.pipeline is None:
             return False

@@ -3,11 +3,6 @@
 from kappaskin.contact import IntrinsicContact
 from kappaskin.errors import Refusal
 from kappaskin.estimation import (
-    ADAPTIVE,
-    INTRINSIC,
-    OFF,
-    SKIN,
-    TURNS,
     Estimator,
     Region,
     Scanner,
@@ -18,9 +13,9 @@ from kappaskin.sensing import Sensor
 from kappaskin.sources import SerialSource, SimulatedSource, Source
 
 _NOT_ON_A_LINE = {
-    INTRINSIC: "a device on a line tells of no force/torque sensor at its base",
-    TURNS: "turns change the list with every frame, a device on a line is told 20 a second",
-    ADAPTIVE: "the list changes with every frame, a device on a line is told 20 a second",
+    Region.INTRINSIC: "a device on a line tells of no force/torque sensor at its base",
+    Region.TURNS: "turns change the list with every frame, a device on a line is told 20 a second",
+    Region.ADAPTIVE: "the list changes with every frame, a device on a line is told 20 a second",
 }
 
 
@@ -40,11 +35,11 @@ class Steering:
         source.scan(self._scanner)
 
     def __call__(self, touch: Touch, estimator: Estimator) -> None:
-        if self._around == SKIN:
+        if self._around == Region.SKIN:
             self._scanner.follow(touch.position)
-        elif self._around == INTRINSIC:
+        elif self._around == Region.INTRINSIC:
             self._scanner.follow(self._intrinsic(self._source.wrench()).position)
-        elif self._around == ADAPTIVE and isinstance(estimator, Tracking):
+        elif self._around == Region.ADAPTIVE and isinstance(estimator, Tracking):
             count = self._scanner.count
             self._scanner.choose(estimator.choose(count, touch.position, self._ahead / 2))
 
@@ -56,7 +51,7 @@ class Following:
     """
 
     def __init__(self, source: SerialSource, sensor: Sensor, region: Region) -> None:
-        self._source, self._follows = source, region.around == SKIN
+        self._source, self._follows = source, region.around == Region.SKIN
         self._scanner = Scanner(sensor, region)
         source.scan(self._scanner)
 
@@ -77,11 +72,11 @@ def steered(source: Source, region: Region) -> Steering | Following | None:
     """
     if isinstance(source, SimulatedSource):
         source.scan(None)
-        return None if region.around == OFF else Steering(source, region)
+        return None if region.around == Region.OFF else Steering(source, region)
     if not isinstance(source, SerialSource) or source.sensor is None:
         return None
     source.scan(None)
-    if region.around == OFF:
+    if region.around == Region.OFF:
         return None
     if region.around in _NOT_ON_A_LINE:
         raise Refusal(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from kappaskin.calibration import Tare, Taring
-from kappaskin.contact import LoadSeeker
+from kappaskin.contact import LoadDetector
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import Pipeline
@@ -76,7 +76,7 @@ class TareTaking:
         edge, temperature = pipeline.setup.edge, source.temperature
         rest, now = pipeline.rest(), datetime.now().astimezone()
         self._found = self._worker.submit(
-            lambda: taring.tare(LoadSeeker(taring.sensor, edge), rest, now, temperature)
+            lambda: taring.tare(LoadDetector(taring.sensor, edge), rest, now, temperature)
         )
 
     def give_up(self, why: str) -> None:

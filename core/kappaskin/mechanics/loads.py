@@ -1,10 +1,12 @@
-"""Loads on a patch, as what each basis function feels of them: a point, a line."""
+"""Loads: forces at a point, along a line, or distributed over an area."""
 
 import math
-from dataclasses import dataclass, fields, replace
-from typing import Protocol
+from abc import ABC, abstractmethod
+from dataclasses import Field, dataclass, fields, replace
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from kappaskin.bases import Basis, SineBasis
@@ -14,17 +16,17 @@ from kappaskin.skin import Patch, Polygon
 
 
 class Load(Protocol):
-    """A force in N somewhere on a patch; positive pushes along the normal."""
+    """A force in N on a patch; positive presses inward."""
 
     @property
     def force(self) -> float: ...
 
     def centre(self) -> Array:
-        """Its point of application (2,) in m."""
+        """Point of application (2,) in m."""
         ...
 
     def check(self, patch: Patch) -> None:
-        """Refuse a load that does not lie on `patch`."""
+        """Raise a `Refusal` for a load that does not lie on `patch`."""
         ...
 
     def shifted(self, dx: float, dy: float) -> "Load":
@@ -36,12 +38,12 @@ class Load(Protocol):
         ...
 
     def modal(self, basis: Basis) -> Array:
-        """The force times each function's mean under the load, (Ni, Nj) in N."""
+        """Modal forces (Ni, Nj) in N: the force times each function's mean under the load."""
         ...
 
 
 def check_on(load: Load, patch: Patch, points: ArrayLike) -> None:
-    """Refuse a `load` of no finite force, or whose `points` (P, 2) are not all on `patch`."""
+    """Raise a `Refusal` for an infinite force, or `points` (P, 2) in m that are off `patch`."""
     if not math.isfinite(load.force):
         raise Refusal(f"expected a finite force in N, got {load.force}")
     if not patch.contains(np.asarray(points)).all():
@@ -81,7 +83,7 @@ class PointLoad:
 
 @dataclass(frozen=True)
 class LineLoad:
-    """A force in N spread evenly along the line from (x0, y0) to (x1, y1) in m."""
+    """A force in N, uniform along the line from (x0, y0) to (x1, y1) in m."""
 
     x0: float
     y0: float
@@ -98,7 +100,7 @@ class LineLoad:
             check_on(self, patch, self._along())
 
     def _along(self) -> Array:
-        """The points (G, 2) that stand for the line."""
+        """Quadrature points (G, 2) of the line in m."""
         s = _LINE[0][:, None]
         return (1 - s) * (self.x0, self.y0) + s * (self.x1, self.y1)
 
@@ -125,7 +127,170 @@ class LineLoad:
 
 
 def is_point(load: Load) -> bool:
-    """Whether all of the force acts at one point."""
+    """Whether the whole force acts at one point."""
     if isinstance(load, LineLoad):
         return (load.x0, load.y0) == (load.x1, load.y1)
     return isinstance(load, PointLoad)
+
+
+_INSIDE = 1 - 1e-9  # of a load's size: one that touches an edge is on the patch, as computed
+
+
+class DistributedLoad(ABC):
+    """A force in N distributed about (x, y) in m, symmetric about the two axes through it.
+
+    By the symmetry, the mean of sin(k x) sin(l y) under the load is the product at its centre times
+    the mean of cos(k x) cos(l y) about it: a multiplier per function (Eq. 9, extended).
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every kind is a dataclass
+    x: float
+    y: float
+    force: float
+
+    @abstractmethod
+    def _wave(self, k: Array, l: Array) -> Array:
+        """Mean of cos(k x) cos(l y) under the load when it is centred on x = y = 0."""
+
+    @abstractmethod
+    def _rim(self) -> Array:
+        """Points (P, 2) in m on its rim, relative to its centre."""
+
+    @abstractmethod
+    def _quadrature(self, count: int) -> tuple[Array, Array]:
+        """Points (Q, 2) in m, relative to its centre, and weights (Q,) whose sum is one.
+
+        Exact to rounding for functions with up to `count` half waves across the load.
+        """
+
+    def centre(self) -> Array:
+        return np.array([self.x, self.y])
+
+    def check(self, patch: Patch) -> None:
+        check_on(self, patch, self.centre() + _INSIDE * self._rim())
+
+    def shifted(self, dx: float, dy: float) -> Self:
+        return replace(self, x=self.x + dx, y=self.y + dy)
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, force=self.force * factor)
+
+    def modal(self, basis: Basis) -> Array:
+        if isinstance(basis, SineBasis):
+            k, l = np.meshgrid(*basis.wavenumbers, indexing="ij")
+            return PointLoad(self.x, self.y, self.force).modal(basis) * self._wave(k, l)
+        points, weights = self._quadrature(max(basis.shape))
+        felt = weights @ basis.at(self.centre() + points)
+        if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
+            raise Refusal(
+                f"expected a load that lies wholly on the skin, got {self}; make it smaller"
+            )
+        return self.force * felt.reshape(basis.shape)
+
+
+def _check_size(load: DistributedLoad, *sizes: float) -> None:
+    if not all(0 < size < math.inf for size in sizes):
+        raise Refusal(
+            f"expected a load of a size above zero in metres, got {load}; for one of no size take "
+            "a point or a line"
+        )
+
+
+def _gauss(count: int) -> tuple[Array, Array]:
+    """Points on [-1, 1] and weights whose sum is one."""
+    t, w = np.polynomial.legendre.leggauss(16 + count)
+    return t, w / 2
+
+
+def _circle(count: int) -> Array:
+    angle = 2 * np.pi * np.arange(count) / count
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _rings(radius: Array, share: Array) -> tuple[Array, Array]:
+    """Points (Q, 2) on circles of `radius` (C,), and weights (Q,) that sum to `share` (C,)."""
+    round_it = _circle(4 * len(radius))
+    points = np.multiply.outer(radius, round_it).reshape(-1, 2)
+    return points, np.repeat(share, len(round_it)) / len(round_it)
+
+
+@dataclass(frozen=True)
+class DiscLoad(DistributedLoad):
+    """A force in N, uniform over the disc of `radius` about (x, y), all in m."""
+
+    x: float
+    y: float
+    radius: float
+    force: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_size(self, self.radius)
+
+    def _wave(self, k: Array, l: Array) -> Array:
+        turn = np.hypot(k, l) * self.radius
+        return 2 * scipy.special.j1(turn) / turn
+
+    def _rim(self) -> Array:
+        return self.radius * _circle(64)
+
+    def _quadrature(self, count: int) -> tuple[Array, Array]:
+        t, w = _gauss(count)
+        radius = (1 + t) / 2
+        return _rings(self.radius * radius, 2 * radius * w)
+
+
+@dataclass(frozen=True)
+class GaussianLoad(DistributedLoad):
+    """A force in N, distributed as a Gaussian of standard deviation `sd` about (x, y), all in m.
+
+    It must lie on the patch up to four standard deviations from its centre: exp(-8), less than
+    0.04 %, of its force lies beyond, and whether that is on the patch makes no difference.
+    """
+
+    x: float
+    y: float
+    sd: float
+    force: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_size(self, self.sd)
+
+    def _wave(self, k: Array, l: Array) -> Array:
+        return np.exp(-(k**2 + l**2) * self.sd**2 / 2)
+
+    def _rim(self) -> Array:
+        return 4 * self.sd * _circle(64)
+
+    def _quadrature(self, count: int) -> tuple[Array, Array]:
+        t, w = _gauss(count)
+        radius = 2 * (1 + t)  # in standard deviations
+        share = w * radius * np.exp(-(radius**2) / 2)
+        return _rings(self.sd * radius, share / share.sum())
+
+
+@dataclass(frozen=True)
+class RectangleLoad(DistributedLoad):
+    """A force in N, uniform over `width` along x by `height` along y about (x, y), all in m."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    force: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_size(self, self.width, self.height)
+
+    def _wave(self, k: Array, l: Array) -> Array:
+        return np.sinc(k * self.width / (2 * np.pi)) * np.sinc(l * self.height / (2 * np.pi))
+
+    def _rim(self) -> Array:
+        t = np.linspace(-1, 1, 17)
+        along, one = np.concatenate([t, t]), np.repeat([-1.0, 1.0], 17)
+        round_it = np.vstack([np.column_stack([along, one]), np.column_stack([one, along])])
+        return round_it * (self.width / 2, self.height / 2)
+
+    def _quadrature(self, count: int) -> tuple[Array, Array]:
+        t, w = _gauss(count)
+        x, y = np.meshgrid(self.width / 2 * t, self.height / 2 * t)
+        return np.column_stack([x.ravel(), y.ravel()]), np.multiply.outer(w, w).ravel()

@@ -1,4 +1,4 @@
-"""An elastic skin: from loads to the coefficients of its deflection."""
+"""Plates: the deflection of an elastic skin under loads."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from functools import reduce
 
 import numpy as np
 
-from kappaskin.bases import Basis, ElasticBasis, SineBasis, overlaps, terms
+from kappaskin.bases import Basis, ElasticBasis, SineBasis, curvature_terms, overlaps
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
@@ -15,16 +15,16 @@ from kappaskin.skin import Patch
 
 @dataclass(frozen=True, eq=False)
 class Compliance:
-    """Coefficients per modal force, in m/N: `values` (N,) where functions do not mix, else (N, N).
+    """Coefficients per modal force in m/N: `values` (N,) where functions do not mix, else (N, N).
 
-    With a `volume` (N,) in m^2, the integral of each function, a fluid below keeps the volume.
+    With `volume` (N,) in m^2, the integral of each function, a fluid below keeps its volume.
     """
 
     values: Array
     volume: Array | None = None
 
     def __call__(self, modal: Array) -> Array:
-        """Coefficients (Ni, Nj) in m under the modal forces (Ni, Nj) in N."""
+        """Coefficients (Ni, Nj) in m under modal forces (Ni, Nj) in N."""
         return self.after(modal.reshape(1, -1)).reshape(modal.shape)
 
     def after(self, M: Array) -> Array:
@@ -56,15 +56,15 @@ _THICKNESS = 0.25e-3  # m of a skin whose axial stiffness nobody gave: substrate
 
 @dataclass(frozen=True)
 class Plate:
-    """A thin skin on a patch: a plate with flexural `rigidity` D in N m, and what else holds it.
+    """A thin skin on a patch: a plate of flexural `rigidity` D in N m, and what supports it.
 
-    A drum head has `tension` T in N/m and may have no rigidity, a foam below it has the
-    `foundation` modulus k_f in N/m^3, a fluid below it keeps its volume. `poisson` matters where
-    an edge gives or the skin is bent. A cylinder skin that stretches along its axis as it bends
-    costs the `axial_stiffness` C in N/m, E h of an even sheet; left out, it is that of one 0.25 mm
-    thick, as the paper's is, and at zero it stretches freely, far too soft for a skin. A rim that
-    gives rests on springs, `rim_stiffness` in N/m per m of it; the default lets it give by 0.2 mm
-    under a load that presses the default skin of 0.1 x 0.1 m in by 5 mm.
+    `tension` T in N/m: a drum head has it, and may have no rigidity. `foundation` modulus k_f in
+    N/m^3 of a foam below. `fluid`: below is a fluid that keeps its volume. `poisson`: Poisson's
+    ratio, which matters where an edge is elastic or the skin is bent. `axial_stiffness` C in N/m
+    of a cylinder skin, which stretches along its axis as it bends: E h of a uniform sheet; None
+    means a sheet 0.25 mm thick, as the paper's skin, and zero one that stretches freely, which is
+    far too soft. `rim_stiffness` in N/m per m of an elastic rim: the default lets it give by
+    0.2 mm under a load that presses the default skin of 0.1 x 0.1 m in by 5 mm.
     """
 
     patch: Patch
@@ -108,13 +108,13 @@ class Plate:
 
     @property
     def stretching(self) -> float:
-        """C in N/m; of an even sheet it is 12 (1 - nu^2) D / h^2."""
+        """Axial stiffness C in N/m; of a uniform sheet it is 12 (1 - nu^2) D / h^2."""
         if self.axial_stiffness is None:
             return 12 * (1 - self.poisson**2) * self.rigidity / _THICKNESS**2
         return self.axial_stiffness
 
     def check(self, load: Load) -> None:
-        """Refuse a load that is not on the patch, or that moves the skin without limit."""
+        """Raise a `Refusal` for a load off the patch, or one that moves the skin without limit."""
         load.check(self.patch)
         if self.rigidity == 0 and is_point(load) and not self.patch.strip:
             raise Refusal(
@@ -123,7 +123,7 @@ class Plate:
             )
 
     def compliance(self, basis: Basis) -> Compliance:
-        """What each coefficient answers to modal forces, by Ritz; closed form for flat sines.
+        """The compliance by Ritz's method; in closed form for sines on a flat skin.
 
         There it is 4 / (a b (D k^4 + T k^2 + k_f)) with k^2 = k_i^2 + k_j^2 (Eq. 9, extended).
         """
@@ -147,11 +147,11 @@ class Plate:
         return Compliance(values, None if kept else volume)
 
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
-        """The energy's second derivative (N, N) in N/m, and what it is without cancellation."""
+        """Stiffness matrix (N, N) in N/m, and the same without its negative terms, for scaling."""
         nu, H, overlap = self.poisson, self.patch.base_curvature, overlaps(basis)
 
         def product(left: str, right: str) -> Array:
-            first, second = terms(self.patch, left), terms(self.patch, right)
+            first, second = curvature_terms(self.patch, left), curvature_terms(self.patch, right)
             pairs = [(g * h, one, other) for g, one in first for h, other in second]
             return reduce(np.add, (gh * overlap(one, other) for gh, one, other in pairs))
 
@@ -174,10 +174,10 @@ class Plate:
         return whole, whole + (self.rigidity * H**4 + self.tension * H**2) * squares
 
     def _by_ritz(self, basis: Basis) -> Array:
-        """The inverse (N, N) of the stiffness, on what the edges leave free."""
+        """Inverse (N, N) of the stiffness on the combinations that the edges leave free."""
         K, bare = self._stiffness(basis)
         free = np.eye(basis.size) if basis.free is None else basis.free
-        W = free if basis.unseen is None else np.hstack([free, basis.unseen])
+        W = free if basis.unobservable is None else np.hstack([free, basis.unobservable])
         scale = np.sqrt(np.diag(W.T @ bare @ W))
         scale[scale == 0] = np.inf
         values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from kappaskin._state import Memory, Remembering
 from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftWatch, Rest, Tare
-from kappaskin.contact import NO_TOUCH, LoadSeeker, PointContact, contact_geometry
+from kappaskin.contact import NO_TOUCH, LoadDetector, PointContact, contact_geometry
 from kappaskin.errors import RankDeficient
 from kappaskin.estimation import METHODS, RIM_SD, Fit, estimator_for
 from kappaskin.frames import Array, Estimate, Frame, Truth
-from kappaskin.health import LeftOut, leave_out
+from kappaskin.health import Exclusion, exclude
 from kappaskin.pipeline.frame_assembly import Hold
 from kappaskin.sensing import Sensor
 
@@ -76,7 +76,7 @@ class Pipeline:
         self.past = _Past(self._corrector(setup.calibration), Hold(sensor.channels, setup.hold))
         self._zero = self._shift(setup.tare)
         edge = setup.edge or sensor.edge
-        self.drift = None if setup.tare is None else DriftWatch(LoadSeeker(sensor, edge))
+        self.drift = None if setup.tare is None else DriftWatch(LoadDetector(sensor, edge))
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
@@ -85,14 +85,14 @@ class Pipeline:
         self._whole = self.fit.at_rest()
         loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
         self._loosest = math.inf if self.fit.has_prior else loosest
-        self._judged, self._decided = self._whole.spreads, True
+        self._judged, self._decided = self._whole.uncertainty, True
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         points = np.stack(np.meshgrid(self._x, self._y), axis=-1).reshape(-1, 2)
         on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
         self._touch = PointContact(sensor.plate, sensor.layout, edge)
-        self.left_out = LeftOut.none(sensor, self._whole, self._ideal())
+        self.left_out = Exclusion.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
         self.fitted: Fit | None = None
@@ -155,9 +155,9 @@ class Pipeline:
     def leave_out(self, kinds: NDArray[np.uint8], badness: Array) -> None:
         """Fit from now on without the channels of any of these `kinds` (C,), as many as it can.
 
-        Numbers in `WHY`, 0 for a good channel; with the worst by `badness` (C,) goes the first.
+        Numbers in `FAULTS`, 0 for a good channel; with the worst by `badness` (C,) goes the first.
         """
-        self.left_out = leave_out(self.left_out, self.fit, kinds, badness, self._loosest)
+        self.left_out = exclude(self.left_out, self.fit, kinds, badness, self._loosest)
 
     def _followed(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         if not self.fit.remembers:
@@ -174,12 +174,14 @@ class Pipeline:
         except RankDeficient:
             pass
         unknown = np.full_like(held, np.nan)
-        return Fit(self.fit, unknown, self._no_shape, self._whole.spreads, 0, np.array(math.nan))
+        return Fit(
+            self.fit, unknown, self._no_shape, self._whole.uncertainty, 0, np.array(math.nan)
+        )
 
     def _is_decided(self, fit: Fit) -> bool:
         """Whether a shape's error bars are told; fits to the same channels mostly share them."""
-        if fit.spreads is not self._judged:
-            self._judged, norm = fit.spreads, np.linalg.norm(fit.unit_sd)
+        if fit.uncertainty is not self._judged:
+            self._judged, norm = fit.uncertainty, np.linalg.norm(fit.unit_sd)
             self._decided = bool(norm <= self._loosest)
         return self._decided
 

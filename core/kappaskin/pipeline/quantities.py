@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, CurvatureMap
-from kappaskin.contact import FormMap
+from kappaskin.contact import CurvatureFormMap
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Estimator, Spread
+from kappaskin.estimation import Estimator, Uncertainty
 from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.sensing import SensorLayout
 
@@ -52,7 +52,7 @@ class ErrorBars:
 
     def __init__(self, estimator: Estimator, curvature: Array, x: Array, y: Array) -> None:
         self.basis, self._estimator = estimator.basis, estimator
-        self._spread = cast("Spread", estimator(curvature).spreads)
+        self._spread = cast("Uncertainty", estimator(curvature).uncertainty)
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         on = np.flatnonzero(self.basis.patch.contains(points))
         self._unit, self._undecided = np.full((2, len(points)), np.nan)
@@ -89,8 +89,8 @@ class Quantities:
         self._changes: dict[str, CurvatureMap] = {}
 
     @cached_property
-    def _form(self) -> FormMap:
-        return FormMap(self.basis, *self.grid)
+    def _form(self) -> CurvatureFormMap:
+        return CurvatureFormMap(self.basis, *self.grid)
 
     @cached_property
     def _at_elements(self) -> tuple[NDArray[np.intp], Array]:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kappaskin.frames import Array
-from kappaskin.mechanics import Indentation, Load, Plate, PointLoad, Press
+from kappaskin.mechanics import Indentation, IndentationSolver, Load, Plate, PointLoad
 from kappaskin.scenes.scene import Scene
 from kappaskin.scenes.stimulus import Indenter, contact_of
 
@@ -30,7 +30,7 @@ class Pressing:
 
     def __init__(self, scene: Scene, plate: Plate) -> None:
         self._plate, self._basis = plate, scene.basis
-        self._press: Press | None = None
+        self._press: IndentationSolver | None = None
         self._last: Indentation | None = None
         self.take(scene)
 
@@ -38,7 +38,7 @@ class Pressing:
         """Go on with what touches the same skin in another `scene`."""
         self._scene, self._indenter = scene, scene.indenter
         if self._indenter and self._press is None:
-            self._press = Press(self._plate, self._basis)
+            self._press = IndentationSolver(self._plate, self._basis)
 
     def __call__(self, time: float) -> Pressed:
         """What presses at `time` in s."""

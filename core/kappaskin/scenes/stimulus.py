@@ -7,7 +7,14 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.mechanics import Indentation, Load, Placed, Plate, Press, RigidObject
+from kappaskin.mechanics import (
+    Indentation,
+    IndentationSolver,
+    Load,
+    PlacedObject,
+    Plate,
+    RigidObject,
+)
 from kappaskin.scenes.motion import Motion, Pose
 from kappaskin.skin import Patch
 
@@ -60,7 +67,7 @@ class Indenter:
         self.check(patch, pose)
         place = np.array([self.x + pose.dx, self.y + pose.dy])
         over = patch.moves(place[None])[0]  # the usual, and quickly told
-        if not over and not Placed(self.rigid, place, self.turn + pose.turn).meets(patch):
+        if not over and not PlacedObject(self.rigid, place, self.turn + pose.turn).meets(patch):
             raise self._missing(patch, pose)
 
     def _missing(self, patch: Patch, pose: Pose) -> Refusal:
@@ -70,7 +77,7 @@ class Indenter:
             "metres from the corner x = y = 0"
         )
 
-    def into(self, press: Press, pose: Pose, after: Indentation | None) -> Indentation:
+    def into(self, press: IndentationSolver, pose: Pose, after: Indentation | None) -> Indentation:
         """What it does to the skin when it stands as `pose` says; `after` starts the search."""
         return press(
             self.rigid,

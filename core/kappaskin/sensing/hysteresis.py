@@ -1,4 +1,4 @@
-"""Operators with memory: hysteresis as weighted plays, creep as a standard linear solid."""
+"""Hysteresis and creep: Prandtl-Ishlinskii operators and standard linear solids."""
 
 import math
 from dataclasses import dataclass
@@ -45,12 +45,12 @@ class PrandtlIshlinskii:
 
     @property
     def _slopes(self) -> Array:
-        """What a reading rises by per curvature once the first j plays move along, (J + 1, C)."""
+        """Slope (J + 1, C) of the reading over the curvature while the first j plays move along."""
         return np.cumsum(np.vstack([self.linear[None], self.weights]), axis=0)
 
     @property
     def inverse(self) -> "PrandtlIshlinskii":
-        """The operator that gives the curvature back; its plays have weights below zero.
+        """The inverse operator, from reading to curvature; its plays have negative weights.
 
         Coming from rest the operator is a broken line through the points (r_j, y_j). The inverse
         comes from rest along the mirrored line: y_j are its thresholds, the changes of 1 / slope
@@ -61,13 +61,13 @@ class PrandtlIshlinskii:
         rise = 1 / slopes
         return PrandtlIshlinskii(y, np.diff(rise, axis=0), rise[0], self.stretch)
 
-    def start(self) -> "Plays":
-        """The operator at work on C channels, with every play at zero."""
-        return Plays(self)
+    def start(self) -> "PlayFilter":
+        """The operator with its state, for C channels, with every play at zero."""
+        return PlayFilter(self)
 
 
-class Plays(Remembering):
-    """The positions of all plays; called with each frame, it moves them."""
+class PlayFilter(Remembering):
+    """The positions of all plays; each call with a frame moves them."""
 
     REMEMBERED = ("_w",)
 
@@ -81,7 +81,7 @@ class Plays(Remembering):
         self._room = np.empty_like(self._r)
 
     def __call__(self, x: Array) -> Array:
-        """What is read (C,) when the curvature `x` (C,) comes next; all of it finite."""
+        """Reading (C,) for the next curvature `x` (C,), both in 1/m; all of it finite."""
         w, room = self._w, self._room
         u = np.maximum(x, self._zero)
         u *= self._shrink
@@ -97,7 +97,7 @@ class Plays(Remembering):
 
 
 def _step(elapsed: float, time_constant: float) -> tuple[float, float, float]:
-    """What the slow part keeps of itself, takes of the last curvature and of the present one.
+    """Weights of the slow part, of the last curvature and of the present one.
 
     s' = (x - s) / tau, solved exactly for an x that went straight from the last to the present
     value in the time `elapsed`.
@@ -112,9 +112,9 @@ def _step(elapsed: float, time_constant: float) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class StandardLinearSolid:
-    """y = x - phi s, tau s' = x - s: what is read at once relaxes to its share 1 - phi.
+    """Creep, y = x - phi s with tau s' = x - s: a reading relaxes to its share 1 - phi.
 
-    `share` phi is (C,), the part of the reading that goes; `time_constant` tau in s.
+    `share` phi (C,) is the part that relaxes; `time_constant` tau in s.
     """
 
     share: Array
@@ -126,16 +126,16 @@ class StandardLinearSolid:
         if not 0 < self.time_constant < math.inf:
             raise Refusal(f"expected a time constant above zero in s, got {self.time_constant}")
 
-    def start(self) -> "Relaxing":
-        """Curvature to reading, from rest."""
-        return Relaxing(self)
+    def start(self) -> "CreepFilter":
+        """The filter from curvature to reading, from rest."""
+        return CreepFilter(self)
 
-    def start_inverse(self) -> "Restoring":
-        """Reading to curvature, from rest."""
-        return Restoring(self)
+    def start_inverse(self) -> "InverseCreepFilter":
+        """The filter from reading to curvature, from rest."""
+        return InverseCreepFilter(self)
 
 
-class _Slow(Remembering):
+class _CreepState(Remembering):
     """The slow part s and the curvature before, both (C,)."""
 
     REMEMBERED = ("_s", "_x", "_time")
@@ -147,7 +147,7 @@ class _Slow(Remembering):
         self._time = math.nan
 
     def _begin(self, time: float) -> float:
-        """Let the time pass as far as the past decides it; the weight of the present curvature."""
+        """Advance the slow part to `time` in s; the weight of the present curvature in it."""
         # A first frame finds the skin at rest; a clock that went back tells of no time.
         keep, last, new = _step(time - self._time, self._tau)
         self._time = time
@@ -159,20 +159,20 @@ class _Slow(Remembering):
         self._x = x
 
 
-class Relaxing(_Slow):
-    """The solid at work, from curvature to reading."""
+class CreepFilter(_CreepState):
+    """Creep with its state: from curvature to reading."""
 
     def __call__(self, x: Array, time: float) -> Array:
-        """What is read (C,) when the curvature is `x` (C,) at `time` in s."""
+        """Reading (C,) in 1/m for the curvature `x` (C,) in 1/m at `time` in s."""
         self._end(x.copy(), self._begin(time))
         return x - self._share * self._s
 
 
-class Restoring(_Slow):
-    """The solid at work backwards: the curvature that `Relaxing` reads as `y`."""
+class InverseCreepFilter(_CreepState):
+    """Creep compensated, with its state: the curvature that `CreepFilter` reads as `y`."""
 
     def __call__(self, y: Array, time: float) -> Array:
-        """The curvature (C,) when `y` (C,) is read at `time` in s."""
+        """Curvature (C,) in 1/m for the reading `y` (C,) in 1/m at `time` in s."""
         new = self._begin(time)
         x = (y + self._share * self._s) / (1 - new * self._share)
         self._end(x, new)

@@ -1,23 +1,87 @@
-"""Where the elements are and what they sense."""
+"""Sensor layout: where the elements are, and the curvature that their gages read."""
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
-from kappaskin.bases import Basis, mean_curvature_at
+from kappaskin.bases import Basis, SineBasis, curvature_at, gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.skin import Patch
 
-_SHORTEST = 1e-6  # m: shorter gages than that tell no mean, only rounding
+_POINTS = 12  # exact to rounding for waves as short as the gage
+
+# A gage along the unit vector e reads the mean of the normal curvature e'Ke over its length L. One
+# lies along x and one along y. The twist is half of what two along the diagonals differ by, which
+# in the limit of short ones is f_xy. Each alone mixes the modes: it sees sin(k x) sin(l y) as
+# waves of k + l and of k - l. What they differ by does not: with h = L / sqrt(8) it is the twist
+#     k l cos(k x) cos(l y)   times   (cos(k h) sinc(l h) + sinc(k h) cos(l h)) / 2.
+_DIAGONAL = 1 / math.sqrt(2)
+
+
+def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
+    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on a flat skin.
+
+    xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above.
+    """
+    ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
+    L, h = gage_length, gage_length * _DIAGONAL / 2
+    twist = np.cos(ki * h) * _sinc(kj * h) + _sinc(ki * h) * np.cos(kj * h)
+    return np.stack([_sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2])
+
+
+def _sinc(t: Array) -> Array:
+    return np.sinc(t / np.pi)
+
+
+def mean_curvature_at(basis: Basis, positions: Array, gage_length: float) -> Array:
+    """Mean curvature xx, yy, xy (3, P, N) in 1/m per m of each function along the gages.
+
+    The middles of the gages, `gage_length` in m, are at `positions` (P, 2) in m. Without a length
+    it is `curvature_at`.
+    """
+    if not gage_length:
+        return curvature_at(basis, positions)
+    mean = _over_points if basis.patch.base_curvature else _between_ends
+
+    def along(x: float, y: float) -> Array:
+        return mean(basis, positions, gage_length, x, y)
+
+    rising, falling = along(_DIAGONAL, _DIAGONAL), along(_DIAGONAL, -_DIAGONAL)
+    return np.stack([along(1.0, 0.0), along(0.0, 1.0), (rising - falling) / 2])
+
+
+def _between_ends(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
+    """Mean curvature along (x, y), from the difference of slope between the ends of the gages.
+
+    Exact also for functions whose curvature jumps between triangles.
+    """
+    half = L / 2 * np.array([x, y])
+
+    def slope(places: Array) -> Array:
+        return x * basis.at(places, 1, 0) + y * basis.at(places, 0, 1)
+
+    return (slope(positions + half) - slope(positions - half)) / L
+
+
+def _over_points(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
+    """Mean curvature along (x, y) by quadrature: on a bent skin it is not only a derivative."""
+    along, weights = gauss(L, _POINTS)
+    steps = np.multiply.outer(along - L / 2, (x, y))
+    xx, yy, xy = curvature_at(basis, (positions + steps[:, None]).reshape(-1, 2))
+    normal = (x * x * xx + y * y * yy + 2 * x * y * xy).reshape(_POINTS, len(positions), -1)
+    return np.einsum("q,qpn->pn", weights / L, normal)
+
+
+_SHORTEST = 1e-6  # m: the mean over a shorter gage is lost in rounding
 _ROUNDING = 1e-9  # of a depth: gages as long as elements are apart end on the rim
 
 
 def _channels(patch: Patch, elements: int) -> Mask:
-    """All channels (3, P); on a strip, which bends along x only, those of xx."""
+    """The channels (3, P) that the patch has: all; on a strip, which bends along x only, xx."""
     live = np.ones((3, elements), bool)
     live[1:] = not patch.strip
     return live
@@ -25,11 +89,11 @@ def _channels(patch: Patch, elements: int) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class SensorLayout:
-    """P elements at `positions` (P, 2) in m; each senses curvature xx, yy and xy.
+    """P elements at `positions` (P, 2) in m; each senses the curvature xx, yy and xy.
 
-    `live` (3, P) is False for the channels that are dead. `shape` is (m, n) for a regular grid,
-    with element `p + m q` in column p (along x) and row q (along y), and None otherwise. Each reads
-    the mean over gages of `gage_length` in m along x, along y and along both diagonals.
+    `live` (3, P) is False for dead channels. `shape` is (m, n) for a regular grid, with element
+    p + m q in column p (along x) and row q (along y), and None otherwise. Each element reads the
+    mean over gages of `gage_length` in m along x, along y and along both diagonals.
     """
 
     patch: Patch
@@ -75,9 +139,9 @@ class SensorLayout:
 
     @classmethod
     def regular(cls, patch: Patch, m: int, n: int) -> "SensorLayout":
-        """Elements at the centres of an m x n tiling; those off a disk or a polygon are left out.
+        """Elements at the centres of an m x n tiling, without those off a disk or a polygon.
 
-        A layout that lacks some has no shape.
+        A layout that lacks some has no `shape`.
         """
         x, y = patch.cell_centres(m, n)
         positions = np.column_stack([np.tile(x, n), np.repeat(y, m)])
@@ -107,7 +171,7 @@ class SensorLayout:
 
     @property
     def lacking(self) -> Mask:
-        """The channels (3, P) that are dead, of those that there are on this patch."""
+        """The dead channels (3, P), of those that this patch has."""
         return _channels(self.patch, len(self)) & ~self.live
 
     def __len__(self) -> int:
@@ -122,3 +186,43 @@ class SensorLayout:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         K = mean_curvature_at(basis, self.positions, self.gage_length)
         return K.reshape(3 * len(self), basis.size)
+
+
+def slope_correction(slope_x: Array, slope_y: Array) -> Array:
+    """The factor (..., 3, P) by which Eqs. 3-5 are too large on slopes (..., P) along x and y.
+
+    With W^2 = 1 + f_x^2 + f_y^2 it is xx: W (1 + f_x^2), yy: W (1 + f_y^2),
+    xy: W sqrt((1 + f_x^2) (1 + f_y^2)).
+    """
+    along_x, along_y = 1 + slope_x**2, 1 + slope_y**2
+    W = np.sqrt(along_x + along_y - 1)
+    times = np.empty((*W.shape[:-1], 3, W.shape[-1]), W.dtype)
+    times[..., 0, :] = W * along_x
+    times[..., 1, :] = W * along_y
+    times[..., 2, :] = W * np.sqrt(along_x * along_y)
+    return times
+
+
+class NormalCurvature:
+    """The map from coefficients to the true normal curvature of the surface along the gages.
+
+    It is the first-order curvature (Eqs. 3-5) over the `slope_correction`. A gage of some length
+    reads the mean of Eqs. 3-5 along it, at the slope in its middle.
+    """
+
+    def __init__(self, basis: Basis, layout: SensorLayout, dtype: DTypeLike = np.float64) -> None:
+        if basis.patch.base_curvature:
+            raise Refusal(
+                f"expected a flat skin for finite slopes, got a {basis.patch.name}: on a bent one "
+                "the tangential displacement matters as much as the slope; use least-squares"
+            )
+        places = layout.positions
+        self._size = basis.size
+        self._second = layout.curvature_operator(basis).T.astype(dtype)
+        self._first = [basis.at(places, *order).T.astype(dtype) for order in ((1, 0), (0, 1))]
+
+    def __call__(self, coefficients: Array) -> Array:
+        """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
+        flat = coefficients.reshape(*coefficients.shape[:-2], self._size)
+        times = slope_correction(*(np.dot(flat, slope) for slope in self._first))
+        return np.dot(flat, self._second).reshape(times.shape) / times

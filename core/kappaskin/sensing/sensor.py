@@ -1,4 +1,4 @@
-"""What a device says it is: its skin, its elements and its electronics."""
+"""Sensor description: skin, elements, electronics, and the scan of its channels."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,16 +10,62 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Frame, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing.layout import SensorLayout
-from kappaskin.sensing.scan import Scan
 from kappaskin.sensing.transduction import Transduction
 
 
 @dataclass(frozen=True, eq=False)
-class Sensor:
-    """A sensor, real or simulated: a skin held as `edge` says, its elements, its electronics.
+class Scan:
+    """The scan of one frame: `channels` (C,) one after the other, times in s.
 
-    `rate` in frames/s. What channel c of its wire reads is number `channel_map[c]` of the (3, P)
-    array, a permutation (3 P,); without one each is its own.
+    Each channel takes `settling_time` after the multiplexer has switched, then `conversion_time`;
+    the converter holds its input when the conversion begins: that is when the channel is read.
+    """
+
+    channels: NDArray[np.intp]
+    settling_time: float
+    conversion_time: float
+
+    def __post_init__(self) -> None:
+        channels = self.channels
+        if channels.ndim != 1 or not channels.size:
+            raise Refusal(
+                f"expected at least one channel in a row, got an array of shape {channels.shape}; "
+                "choose what to scan"
+            )
+        in_order = np.sort(channels)
+        if in_order[0] < 0 or (np.diff(in_order) == 0).any():
+            raise Refusal(
+                "expected every channel once, counted from 0; got a channel twice or below 0"
+            )
+
+    @property
+    def interval(self) -> float:
+        """Seconds from one channel to the next."""
+        return self.settling_time + self.conversion_time
+
+    @cached_property
+    def times(self) -> Array:
+        """Seconds (C,) from the start of the frame to each channel's reading: the skew."""
+        places = np.arange(len(self.channels), dtype=np.float64)
+        return self.settling_time + places * self.interval
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the start of the frame to the end of its last conversion."""
+        return len(self.channels) * self.interval
+
+    @property
+    def rate(self) -> float:
+        """Frame rate in 1/s when one scan follows the other."""
+        return 1 / self.duration
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A sensor, real or simulated: skin, boundary condition `edge`, elements and electronics.
+
+    `rate` in frames/s. Channel c of the device is number `channel_map[c]` of the flattened (3, P)
+    array, a permutation (3 P,); None means the same order.
     """
 
     layout: SensorLayout
@@ -57,7 +103,7 @@ class Sensor:
         return 3 * len(self.layout)
 
     def scan(self, channels: ArrayLike | None = None) -> Scan:
-        """The scan of `channels` (C,) in their order; of all of them when left out."""
+        """The scan of `channels` (C,) in this order; None means all of them."""
         every = np.arange(self.channels)
         chosen = every if channels is None else np.asarray(channels)
         if chosen.size and not (chosen.dtype.kind in "iu" and chosen.max() < self.channels):
@@ -77,7 +123,7 @@ class Sensor:
         return None if self.layout.live.all() else ~self.layout.live.ravel()
 
     def nominal(self, frame: Frame) -> Array:
-        """Curvature (3 P,) in 1/m as Eq. 8 reads it; NaN where dead, unscanned or on a rail."""
+        """Curvature (3 P,) in 1/m by Eq. 8; NaN where dead, not scanned or on a rail."""
         flat = np.empty(self.channels)
         flat.fill(np.nan)
         flat[frame.channels] = self.transduction.curvature(frame.counts)

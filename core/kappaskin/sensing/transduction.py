@@ -1,7 +1,7 @@
-"""Curvature to volts to ADC counts, and back: the chain of Figs. 4 and 5."""
+"""Signal chain: curvature to bridge voltage to ADC counts, and back (Figs. 4 and 5)."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import cast
 
@@ -10,7 +10,155 @@ from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Counts, Mask
-from kappaskin.sensing.electronics import Amplifier, Converter, HalfBridge, Multiplexer
+
+
+def _require_positive(owner: object, *names: str) -> None:
+    for name in names:
+        value = getattr(owner, name)
+        if not (math.isfinite(value) and value > 0):
+            raise Refusal(f"expected {type(owner).__name__}.{name} above zero, got {value}")
+
+
+def _require_not_negative(owner: object, name: str) -> None:
+    value = getattr(owner, name)
+    if not (math.isfinite(value) and value >= 0):
+        raise Refusal(f"expected {type(owner).__name__}.{name} of at least zero, got {value}")
+
+
+@dataclass(frozen=True)
+class HalfBridge:
+    """Back-to-back strain gages in a half-bridge, and the dummy half-bridge beside it (Fig. 4).
+
+    Thicknesses in m, `excitation` V_in in V; the gage factor has no unit. `gage_resistance` R_g in
+    ohm is that of an unstrained gage, `gage_mismatch` the share of it by which the lower gage of a
+    pair exceeds the upper one. `dummy_resistance` R_d in ohm is the lower arm of the dummy, whose
+    middle is at `balance_voltage` V_bal in V; None means half of the excitation, two equal arms.
+
+    One gage of a pair stretches by what the other shrinks, so their sum stays 2 R_g and the middle
+    moves in proportion to the strain, however large it is: nothing of a quarter bridge's
+    nonlinearity is left to model. Nor is what a mismatch m does beyond its offset: it bends that
+    line by the share m GF strain / 2, 1e-4 at 1 % of each, and with a multiplexer of the supply
+    tilts it by less than m / 2.
+    """
+
+    gage_factor: float = 2.1
+    substrate_thickness: float = 225e-6
+    gage_thickness: float = 25e-6
+    excitation: float = 5.0
+    gage_resistance: float = 350.0
+    gage_mismatch: float = 0.0
+    dummy_resistance: float = 350.0
+    balance_voltage: float | None = None
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "gage_factor", "substrate_thickness", "gage_thickness")
+        _require_positive(self, "excitation", "gage_resistance", "dummy_resistance")
+        if not abs(self.gage_mismatch) < 1:
+            raise Refusal(
+                "expected HalfBridge.gage_mismatch between -1 and 1, a share of the gage's "
+                f"resistance, got {self.gage_mismatch}"
+            )
+        if not 0 < self.v_bal < self.excitation:
+            raise Refusal(
+                f"expected HalfBridge.balance_voltage between 0 and the excitation of "
+                f"{self.excitation:g} V, got {self.balance_voltage}"
+            )
+
+    @property
+    def thickness(self) -> float:
+        """t_s + t_g in m: the distance between the two gages of a pair."""
+        return self.substrate_thickness + self.gage_thickness
+
+    @property
+    def v_bal(self) -> float:
+        """V_bal in V, the voltage at the middle of the dummy half-bridge."""
+        return self.excitation / 2 if self.balance_voltage is None else self.balance_voltage
+
+    @property
+    def dummy_arms(self) -> tuple[float, float]:
+        """The dummy's upper and lower resistance in ohm: a divider from V_in to V_bal."""
+        R_d = self.dummy_resistance
+        return R_d * (self.excitation / self.v_bal - 1), R_d
+
+    def strain(self, curvature: ArrayLike) -> Array:
+        """Gage strain: curvature in 1/m times half the distance between the gages."""
+        return np.asarray(curvature, float) * self.thickness / 2
+
+    def fed(self, supply_resistance: float = 0.0) -> float:
+        """Voltage in V across a pair that is supplied through `supply_resistance` in ohm."""
+        R_g = self.gage_resistance
+        return self.excitation * 2 * R_g / (2 * R_g + supply_resistance)
+
+    def null_voltage(self, supply_resistance: float = 0.0) -> float:
+        """The balance voltage in V at which an unbent pair reads zero."""
+        return self.fed(supply_resistance) * (1 + self.gage_mismatch / 2) / 2
+
+    def balanced(self, supply_resistance: float = 0.0) -> "HalfBridge":
+        """The same bridge with its dummy at `null_voltage`."""
+        return replace(self, balance_voltage=self.null_voltage(supply_resistance))
+
+
+@dataclass(frozen=True)
+class Multiplexer:
+    """Connects one half-bridge at a time; `settling_time` in s before each conversion.
+
+    `supply_resistance` in ohm is what it puts between the excitation and the pair it feeds. It is
+    0 for a multiplexer of signals as in Fig. 4: that one stands before an amplifier whose inputs
+    draw no current, so nothing drops across its on-resistance and there is nothing to model.
+    """
+
+    settling_time: float = 0.0
+    supply_resistance: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_not_negative(self, "settling_time")
+        _require_not_negative(self, "supply_resistance")
+
+
+@dataclass(frozen=True)
+class Amplifier:
+    """An instrumentation amplifier; its output stays between minus and plus `rail` in V."""
+
+    gain: float = 100.0
+    rail: float = 2.5
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "gain", "rail")
+
+
+@dataclass(frozen=True)
+class Converter:
+    """A bipolar analog-to-digital converter, scanned over all channels.
+
+    It reads voltages between minus and plus `full_scale` in V as signed counts of `bits`; `offset`
+    in V is its reading at zero volts; `conversion_time` in s per channel limits the frame rate.
+    """
+
+    bits: int = 16
+    full_scale: float = 2.5
+    offset: float = 0.0
+    conversion_time: float = 5e-6
+
+    def __post_init__(self) -> None:
+        _require_positive(self, "full_scale", "conversion_time")
+        if not (8 <= self.bits <= 24 and self.bits == int(self.bits)):
+            raise Refusal(f"expected a converter of 8 to 24 bits, got {self.bits}")
+        if not abs(self.offset) < self.full_scale:
+            raise Refusal(
+                f"expected an offset inside +-{self.full_scale} V, got {self.offset} V; "
+                "balance the bridge"
+            )
+
+    @cached_property
+    def limits(self) -> tuple[int, int]:
+        """The lowest and highest count."""
+        return -(2 ** (self.bits - 1)), 2 ** (self.bits - 1) - 1
+
+    @property
+    def step(self) -> float:
+        """Volts per count."""
+        return self.full_scale / 2 ** (self.bits - 1)
+
 
 ELASTIC_LIMIT = 0.01
 """Strain up to which metal-foil gages are elastic (paper, section 2.3)."""
@@ -18,9 +166,9 @@ ELASTIC_LIMIT = 0.01
 
 @dataclass(frozen=True)
 class Transduction:
-    """What turns curvature in 1/m into counts, the same for every channel (Figs. 4, 5; Eqs. 7, 8).
+    """The chain from curvature in 1/m to counts, the same for all channels (Eqs. 7 and 8).
 
-    Refused when the unbent skin already drives the amplifier or the converter to a rail.
+    Raises a `Refusal` when the unbent skin already drives the amplifier or converter to a rail.
     """
 
     bridge: HalfBridge = field(default_factory=HalfBridge)
@@ -46,13 +194,13 @@ class Transduction:
 
     @property
     def _resting(self) -> float:
-        """Volts out of the amplifier when the skin is not bent."""
+        """Output of the amplifier in V when the skin is not bent."""
         null = self.bridge.null_voltage(self.multiplexer.supply_resistance)
         return self.amplifier.gain * (null - self.bridge.v_bal)
 
     @cached_property
     def offset(self) -> float:
-        """Volts that the converter reads when the skin is not bent."""
+        """What the converter reads in V when the skin is not bent."""
         return self._resting + self.converter.offset
 
     @cached_property
@@ -76,12 +224,12 @@ class Transduction:
 
     @cached_property
     def _offset(self) -> float:
-        """Curvature that the offset looks like, in 1/m."""
+        """The offset as a curvature in 1/m."""
         return self.offset / self.sensitivity
 
     @cached_property
     def limits(self) -> tuple[int, int]:
-        """The lowest and highest count that can come: the converter's, or the amplifier's rails."""
+        """Lowest and highest possible count: the converter's limits or the amplifier's rails."""
         low, high = self.converter.limits
         rail, offset = self.amplifier.rail, self.converter.offset
         return (
@@ -91,15 +239,15 @@ class Transduction:
 
     @property
     def strain_limit_curvature(self) -> float:
-        """Curvature in 1/m that strains a gage by 1 %: beyond it, metal foil is not elastic."""
+        """Curvature in 1/m that strains a gage by 1 %, the elastic limit of metal foil."""
         return ELASTIC_LIMIT / float(self.bridge.strain(1.0))
 
     def overstrained(self, curvature: ArrayLike) -> Mask:
         """Which elements (..., P) are bent beyond `strain_limit_curvature`.
 
-        `curvature` (..., 3, P) in 1/m. What counts is the larger principal curvature, the most
-        that a gage along any direction can see; where a reading is missing (NaN), the largest of
-        the others, which is never more.
+        `curvature` (..., 3, P) in 1/m. The larger principal curvature counts, the largest along
+        any direction; where a reading is missing (NaN), the largest of the others, which is never
+        more.
         """
         K = np.asarray(curvature, float)
         if K.ndim < 2 or K.shape[-2] != 3:
@@ -111,14 +259,14 @@ class Transduction:
         return largest > self.strain_limit_curvature
 
     def counts(self, curvature: Array) -> Counts:
-        """What the converter reads, clipped at the rails; NaN is refused."""
+        """Counts for `curvature` in 1/m, clipped at the rails; raises a `Refusal` for NaN."""
         volts = self.sensitivity * curvature + self.offset
         if np.isnan(volts).any():
             raise Refusal("expected numbers of curvature, got NaN; a converter always reads one")
         return np.clip(np.rint(volts / self._step), *self.limits).astype(np.int32)
 
     def curvature(self, counts: Counts) -> Array:
-        """Curvature in 1/m (Eq. 8); NaN on the rails, where the true value is unknown."""
+        """Curvature in 1/m for `counts` (Eq. 8); NaN on the rails, where it is unknown."""
         low, high = self.limits
         curvature = cast("Array", counts * self.resolution - self._offset)
         if counts.size and (counts.min() <= low or counts.max() >= high):
@@ -126,17 +274,17 @@ class Transduction:
         return curvature
 
     def saturated(self, counts: Counts) -> Mask:
-        """Which counts stand on a rail."""
+        """Which counts are on a rail."""
         low, high = self.limits
         return (counts <= low) | (counts >= high)
 
     @property
     def channel_time(self) -> float:
-        """Seconds that one channel takes: settling, then conversion."""
+        """Time in s for one channel: settling and conversion."""
         return self.multiplexer.settling_time + self.converter.conversion_time
 
     def scan_time(self, channels: int) -> float:
-        """Seconds for one scan: conversion, not arithmetic, bounds the frame rate."""
+        """Time in s for a scan of `channels`, which limits the frame rate."""
         return channels * self.channel_time
 
 

@@ -1,11 +1,11 @@
-"""The skin's own coordinates and outline."""
+"""The skin: its own coordinates, its outline, and surfaces on it."""
 
-from kappaskin.skin.distance import Distances as Distances
-from kappaskin.skin.distance import between as between
-from kappaskin.skin.distance import distances as distances
 from kappaskin.skin.outline import Outline as Outline
-from kappaskin.skin.outline import turn as turn
+from kappaskin.skin.outline import doubled_area as doubled_area
 from kappaskin.skin.patch import Disk as Disk
 from kappaskin.skin.patch import Patch as Patch
 from kappaskin.skin.patch import Polygon as Polygon
-from kappaskin.skin.rim import onto_rim as onto_rim
+from kappaskin.skin.surface import Distances as Distances
+from kappaskin.skin.surface import distances as distances
+from kappaskin.skin.surface import interpolated as interpolated
+from kappaskin.skin.surface import snapped_to_rim as snapped_to_rim

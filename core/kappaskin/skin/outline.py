@@ -1,4 +1,4 @@
-"""The corners of a polygon: checked, and where points lie from its edges."""
+"""Outlines: the corners and edges of a polygonal skin, and distances from them."""
 
 import math
 
@@ -19,7 +19,7 @@ class Outline:
     def __init__(self, corners: Array) -> None:
         self.corners, self.ends = corners, np.roll(corners, -1, axis=0)
         self.along: Array = self.ends - corners
-        """The edges (V, 2) as vectors, with their `lengths` (V,)."""
+        """The edges (V, 2) in m as vectors; their `lengths` (V,) in m."""
         self.lengths: Array = np.sqrt(np.sum(self.along**2, axis=1))
         level = np.where(self.along[:, 1] == 0, 1.0, self.along[:, 1])
         self._leaning = self.along[:, 0] / level
@@ -31,17 +31,20 @@ class Outline:
 
     @property
     def turns(self) -> Array:
-        """The angle (V,) in rad that it turns by at each corner, above zero where it is convex."""
+        """Turning angle (V,) in rad at each corner, positive where the outline is convex."""
         before = np.roll(self.along, 1, axis=0)
         onward = np.sum(before * self.along, axis=1)
-        return np.angle(onward + 1j * turn(self.corners - before, self.corners, self.ends))
+        return np.angle(onward + 1j * doubled_area(self.corners - before, self.corners, self.ends))
 
     @property
     def area(self) -> float:
-        return float(np.sum(turn(np.zeros(2), self.corners, self.ends))) / 2
+        return float(np.sum(doubled_area(np.zeros(2), self.corners, self.ends))) / 2
 
     def feet(self, positions: Array, short: float = 0.0) -> Array:
-        """The place (P, V, 2) on each edge, that share `short` off its ends, nearest to each."""
+        """The nearest point (P, V, 2) of each edge to each of `positions` (P, 2), all in m.
+
+        The share `short` of an edge at either end is left out.
+        """
         offset = positions[:, None] - self.corners
         share = (offset * self.along).sum(axis=-1) / self.lengths**2
         share = np.minimum(np.maximum(share, short), 1 - short)
@@ -55,20 +58,20 @@ class Outline:
         return np.count_nonzero(passed, axis=1) % 2 == 1
 
     def depth(self, positions: Array) -> Array:
-        """Distance (P,) of `positions` (P, 2) from the outline, below zero outside."""
+        """Distance (P,) in m of `positions` (P, 2) from the outline, negative outside."""
         away = positions[:, None] - self.feet(positions)
         distance: Array = np.sqrt((away**2).sum(axis=-1).min(axis=1))
         return np.where(self.inside(positions), distance, -distance)
 
 
-def turn(a: Array, b: Array, c: Array) -> Array:
-    """Twice the area of the triangles a, b, c (..., 2): above zero when counter-clockwise."""
+def doubled_area(a: Array, b: Array, c: Array) -> Array:
+    """Twice the signed area of the triangles a, b, c (..., 2): positive when counter-clockwise."""
     u, v = b - a, c - a
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
-def checked(vertices: ArrayLike) -> Array:
-    """The corners (V, 2) in m, counter-clockwise; refuses what is not the outline of a skin."""
+def checked_corners(vertices: ArrayLike) -> Array:
+    """The corners (V, 2) in m, counter-clockwise; raises a `Refusal` for no valid outline."""
     try:
         corners = np.array(vertices, float)
     except (ValueError, TypeError, OverflowError) as error:
@@ -97,7 +100,9 @@ def checked(vertices: ArrayLike) -> Array:
 
 def _check_crossings(line: Outline) -> None:
     a, b, c, d = line.corners[:, None], line.ends[:, None], line.corners[None], line.ends[None]
-    crossed = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
+    crossed = (doubled_area(a, b, c) * doubled_area(a, b, d) < 0) & (
+        doubled_area(c, d, a) * doubled_area(c, d, b) < 0
+    )
     if crossed.any():
         i, j = np.argwhere(crossed)[0]
         raise Refusal(f"edges {i} and {j} of the outline cross; give its corners in order")

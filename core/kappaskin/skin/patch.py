@@ -1,4 +1,4 @@
-"""The skin's own coordinates: x in [0, a], y in [0, b], and the outline that it fills of them."""
+"""Skins at rest: rectangles, arcs, cylinders, disks and polygons in their own coordinates."""
 
 import math
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
-from kappaskin.skin.outline import Outline, checked
+from kappaskin.skin.outline import Outline, checked_corners
 
 _MARGIN = 1e-3  # of a side: how near its rim a point may be and still move with the skin
 _CORNER = 0.02  # of an edge: how near to its ends no place is looked for along it
-_CELLS = 64  # along each side of a raster that tells quickly whether a point is far inside
+_CELLS = 64  # along each side of a raster that shows quickly whether a point is far inside
 _ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this far outside
 
 
@@ -21,9 +21,8 @@ _ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this fa
 class Patch:
     """A rectangular skin of `a` by `b` metres, held along its edges.
 
-    At rest it is bent along x to `radius` in m, infinite when flat: an arc of length a, or with
-    its width b a cylinder skin. A `strip` is held at its two ends in x only and is alike all along
-    y: a planar curve.
+    At rest it is flat, or bent along x to `radius` in m: a cylinder skin whose arc has the length
+    a. A `strip` is held at its two ends in x only and nothing varies along y: a planar curve.
 
     In space, x runs along the arc, whose highest point is at (a/2, y, 0); the outward normal there
     is (0, 0, 1). Displacement is positive inward, as a load presses; curvature is positive where
@@ -49,7 +48,7 @@ class Patch:
 
     @property
     def name(self) -> str:
-        """What it is, as messages call it."""
+        """A short description for messages."""
         what = f"{'strip' if self.strip else 'patch'} of {self.a:g} x {self.b:g} m"
         return f"{what} bent to {self.radius:g} m" if self.base_curvature else what
 
@@ -64,7 +63,7 @@ class Patch:
         return self.a / self.radius
 
     def grid(self, nx: int, ny: int) -> tuple[Array, Array]:
-        """Evenly spaced x (nx,) and y (ny,) in m that include the edges."""
+        """Evenly spaced x (nx,) and y (ny,) in m, edges included."""
         if nx < 2 or ny < 2:
             raise Refusal(f"expected a grid of at least 2 x 2 points, got {nx} x {ny}")
         return np.linspace(0.0, self.a, nx), np.linspace(0.0, self.b, ny)
@@ -80,19 +79,19 @@ class Patch:
         return np.all((positions >= 0) & (positions <= (self.a, self.b)), axis=-1)
 
     def depth(self, positions: Array) -> Array:
-        """How far inside the rim `positions` (P, 2) lie, (P,) in m; below zero off the skin."""
+        """Distance (P,) in m of `positions` (P, 2) from the rim; negative off the skin."""
         far = np.minimum(positions, (self.a, self.b) - positions)
         return far[:, 0] if self.strip else far.min(axis=-1)
 
     def inward(self, x: float, y: float) -> tuple[float, float]:
-        """(x, y) in m, or the nearest place to it a thousandth of a side inside the rim."""
+        """(x, y) in m, moved to at least a thousandth of a side inside the rim."""
         dx, dy = _MARGIN * self.a, _MARGIN * self.b
         return min(max(x, dx), self.a - dx), min(max(y, dy), self.b - dy)
 
     def near_rim(self, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
-        """Places just inside the held edges next to (x, y), and how far as share of a side.
+        """Points just inside the held edges near (x, y): x and y in m, distance in sides.
 
-        One for each edge that is no farther than `within` of a side.
+        One for each edge that is at most `within` sides away.
         """
         a, b, (dx, dy) = self.a, self.b, (_MARGIN * self.a, _MARGIN * self.b)
         places = [(dx, y, x / a), (a - dx, y, 1 - x / a)]
@@ -101,11 +100,11 @@ class Patch:
         return [place for place in places if place[2] <= within]
 
     def moves(self, positions: Array) -> Mask:
-        """Which of `positions` (P, 2) are so far inside the rim that the skin moves there."""
+        """Which of `positions` (P, 2) are far enough inside the rim for the skin to move there."""
         return self.depth(positions) >= 0.9 * _MARGIN * min(self.a, self.b)
 
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
-        """Points (..., 3) in m of the skin at rest and its outward normals (..., 3) there."""
+        """Points (..., 3) in m and outward unit normals (..., 3) of the skin at rest."""
         points, normals = np.zeros((2, *positions.shape[:-1], 3))
         points[..., :2] = positions
         if not self.base_curvature:
@@ -120,7 +119,7 @@ class Patch:
 
 @dataclass(frozen=True, init=False)
 class Disk(Patch):
-    """A flat round skin of `rim_radius` in m, held along its rim; it touches x = 0 and y = 0."""
+    """A flat round skin of `rim_radius` in m, held along its rim; its box begins at x = y = 0."""
 
     def __init__(self, rim_radius: float) -> None:
         if not 0 < rim_radius < math.inf:
@@ -129,7 +128,7 @@ class Disk(Patch):
 
     @property
     def rim_radius(self) -> float:
-        """Half of its sides, in m."""
+        """Radius of the rim in m."""
         return self.a / 2
 
     @property
@@ -160,7 +159,7 @@ class Disk(Patch):
 
 @dataclass(frozen=True, init=False)
 class Polygon(Patch):
-    """A flat skin with the corners `vertices` (V, 2) in m, given either way round.
+    """A flat skin with the corners `vertices` (V, 2) in m, in either sense of rotation.
 
     Its box begins at x = y = 0.
     """
@@ -168,7 +167,7 @@ class Polygon(Patch):
     vertices: tuple[tuple[float, float], ...]
 
     def __init__(self, vertices: ArrayLike) -> None:
-        corners = checked(vertices)
+        corners = checked_corners(vertices)
         super().__init__(*corners.max(axis=0).tolist())
         object.__setattr__(self, "vertices", tuple((x, y) for x, y in corners.tolist()))
 
@@ -191,13 +190,13 @@ class Polygon(Patch):
 
     @cached_property
     def _raster(self) -> list[list[float]]:
-        """At least how deep in m every point of a cell of the box lies, by row and column."""
+        """Lower bound in m of the depth of every point of a cell of the box, by row and column."""
         centres = np.stack(np.meshgrid(*self.cell_centres(_CELLS, _CELLS)), axis=-1)
         least = self.depth(centres.reshape(-1, 2)) - math.hypot(self.a, self.b) / 2 / _CELLS
         return least.reshape(_CELLS, _CELLS).tolist()
 
     def _is_deep(self, x: float, y: float, depth: float) -> bool:
-        """Whether (x, y) is known to lie deeper than `depth` in m without a look at every edge."""
+        """Whether the raster alone shows that (x, y) lies deeper than `depth` in m."""
         column, row = int(_CELLS * x / self.a), int(_CELLS * y / self.b)
         on = 0 <= row < _CELLS and 0 <= column < _CELLS
         return on and self._raster[row][column] > depth

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.estimation import ADAPTIVE, OFF, SKIN, TURNS, Region, bargain
+from kappaskin.estimation import Region, scan_tradeoff
 from kappaskin.frames import Array, Estimate
 from kappaskin.live import steered
 from kappaskin.mechanics import PointLoad
@@ -22,15 +22,15 @@ PERIODS = (4.0, 1.0, 0.25)
 
 _FASTEST = 1e6  # frames/s asked for: as many as the scan allows
 REGIONS = (
-    Region(OFF),
-    *(Region(SKIN, radius=radius, rate=_FASTEST) for radius in (0.015, 0.025, 0.035)),
-    *(Region(SKIN, radius=0.025, share=share, rate=_FASTEST) for share in (0.05, 0.2)),
+    Region(Region.OFF),
+    *(Region(Region.SKIN, radius=radius, rate=_FASTEST) for radius in (0.015, 0.025, 0.035)),
+    *(Region(Region.SKIN, radius=0.025, share=share, rate=_FASTEST) for share in (0.05, 0.2)),
 )
 TRACKED = (
-    Region(OFF),
-    Region(SKIN, radius=0.0195, rate=_FASTEST),  # a fifth of the channels
-    Region(TURNS, share=0.2, rate=_FASTEST),
-    Region(ADAPTIVE, share=0.2, rate=_FASTEST),
+    Region(Region.OFF),
+    Region(Region.SKIN, radius=0.0195, rate=_FASTEST),  # a fifth of the channels
+    Region(Region.TURNS, share=0.2, rate=_FASTEST),
+    Region(Region.ADAPTIVE, share=0.2, rate=_FASTEST),
 )
 ROWS = (
     *((region, "least-squares") for region in REGIONS),
@@ -128,13 +128,13 @@ def measured(
     newest = _rms([error(a.estimate, (a.ended + b.ended) / 2) for a, b in pairwise(answers)])
     (load,) = scene.loads_at(0.0)
     x, y = (float(along) for along in load.centre())
-    bounds = bargain(scene.sensor(), region, PointLoad(x, y, load.force), TABLE_1_NOISE)
+    bounds = scan_tradeoff(scene.sensor(), region, PointLoad(x, y, load.force), TABLE_1_NOISE)
     return {
         "speed_mm_s": 1e3 * 2 * math.pi * 0.022 / period,
         "method": method,
         "around": region.around,
-        "radius_mm": 1e3 * region.radius if region.around == SKIN else None,
-        "share": None if region.around == OFF else region.share,
+        "radius_mm": 1e3 * region.radius if region.around == Region.SKIN else None,
+        "share": None if region.around == Region.OFF else region.share,
         "channels": float(np.mean([a.channels for a in answers])),
         "rate": (len(answers) - 1) / (answers[-1].began - answers[0].began),
         "found": float(np.mean([a.estimate.touch.present for a in answers])),

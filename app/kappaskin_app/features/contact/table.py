@@ -5,7 +5,7 @@ import io
 import math
 from collections.abc import Sequence
 
-from kappaskin.estimation import WHY
+from kappaskin.estimation import FAULTS
 from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.sensing import Sensor
 
@@ -39,7 +39,7 @@ def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:
             str(number),
             *(_told(value, 1) for value in place),
             *(_told(value, 2) for value in estimate.curvature[:, number]),
-            WHY[estimate.suspect[number]],
+            FAULTS[estimate.suspect[number]],
         )
         for number, place in enumerate(places)
     ]

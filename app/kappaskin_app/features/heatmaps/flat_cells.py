@@ -63,7 +63,7 @@ class FlatCells(QWidget):
         self.update()
 
     def show_marks(self, crossed: Indices, dotted: Indices, kinds: dict[int, str]) -> None:
-        """Cross out and dot elements by number, and ring those of some kind in `WHY`."""
+        """Cross out and dot elements by number, and ring those of some kind in `FAULTS`."""
         marks = (crossed.tolist(), dotted.tolist())
         if (marks, kinds) != (self._marks, self._kinds):
             self._marks, self._kinds = marks, kinds

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from kappaskin.estimation import WHY
+from kappaskin.estimation import FAULTS
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.features.heatmaps.flat_cells import FlatCells
 from kappaskin_app.shell.shades import SHADES
@@ -100,9 +100,9 @@ class Heatmap(QWidget):
     def show_marks(self, crossed: Mask, dotted: Mask, kinds: NDArray[np.uint8]) -> None:
         """Cross out elements (P,) bent too far, dot those chosen to scan, ring those left out.
 
-        Of these `kinds` (P,) say why, by number in `WHY`.
+        Of these `kinds` (P,) say why, by number in `FAULTS`.
         """
-        self._kinds = {int(p): WHY[kinds[p]] for p in np.flatnonzero(kinds)}
+        self._kinds = {int(p): FAULTS[kinds[p]] for p in np.flatnonzero(kinds)}
         self.cells.show_marks(np.flatnonzero(crossed), np.flatnonzero(dotted), self._kinds)
 
     def show_wanted(self, element: int) -> None:

@@ -5,9 +5,9 @@ import time
 
 import numpy as np
 
-from kappaskin.contact import ContactObject, placed
+from kappaskin.contact import ContactObject, placed_object
 from kappaskin.frames import Estimate
-from kappaskin.mechanics import Placed
+from kappaskin.mechanics import PlacedObject
 from kappaskin.scenes import Indenter
 from kappaskin_app.features.membrane.band import Band
 from kappaskin_app.features.membrane.contact_frame import ContactFrame
@@ -86,15 +86,15 @@ class Overlaying:
         membrane = self._membrane
         self.frame.show(membrane.skin, touch.position, angle, slopes, membrane.lift)
 
-    def _of_found(self, estimate: Estimate) -> Placed | None:
+    def _of_found(self, estimate: Estimate) -> PlacedObject | None:
         """What was found of late, where the contact is now."""
         what, touch = self._what, estimate.touch
         if what is None or not touch.present or time.monotonic() - self._found_at > _OLD:
             return None
         patch = self._membrane.skin.patch
-        return placed(what, touch.position, max(patch.a, patch.b))
+        return placed_object(what, touch.position, max(patch.a, patch.b))
 
-    def _of_scene(self, estimate: Estimate) -> Placed | None:
+    def _of_scene(self, estimate: Estimate) -> PlacedObject | None:
         """The rigid object of the scene that is played, where it is now."""
         session = self._session
         if not session.inside:
@@ -104,5 +104,5 @@ class Overlaying:
             what, pose = stimulus.what, stimulus.pose_at(at)
             if isinstance(what, Indenter) and pose.amount:
                 place = np.array([what.x + pose.dx, what.y + pose.dy])
-                return Placed(what.rigid, place, what.turn + pose.turn)
+                return PlacedObject(what.rigid, place, what.turn + pose.turn)
         return None

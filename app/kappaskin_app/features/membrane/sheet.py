@@ -6,7 +6,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from kappaskin.mechanics import Placed
+from kappaskin.mechanics import PlacedObject
 from kappaskin_app.features.membrane.unlit import UNLIT
 from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 
@@ -31,7 +31,7 @@ class Sheet:
         )
         self.actor.visibility = False
 
-    def show(self, stands: Placed | None, skin: DrawnSkin, times: float) -> None:
+    def show(self, stands: PlacedObject | None, skin: DrawnSkin, times: float) -> None:
         """Draw the object that `stands` there resting on the `skin`; nothing of None."""
         points = None if stands is None else underside(stands, skin, times)
         self.actor.visibility = points is not None
@@ -39,7 +39,7 @@ class Sheet:
             self._mesh.points[:] = points
 
 
-def underside(stands: Placed, skin: DrawnSkin, times: float) -> Array | None:
+def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | None:
     """Points (k, 3) in mm of the underside, so low that it touches the drawn skin.
 
     None where it is nowhere above it.

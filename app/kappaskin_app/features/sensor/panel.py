@@ -4,7 +4,7 @@ import math
 
 from PySide6.QtWidgets import QLabel, QWidget
 
-from kappaskin.estimation import Bargain
+from kappaskin.estimation import ScanTradeoff
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
 from kappaskin_app.shell.form import Form, SimulationForm
@@ -72,7 +72,7 @@ class RegionPanel(Form):
         rows = {"region"} | ({"region_radius"} if round_a_contact else set())
         self.show_rows(rows | ({"region_share"} if settings.region != "off" else set()))
 
-    def show_bargain(self, bargain: Bargain | None) -> None:
+    def show_bargain(self, bargain: ScanTradeoff | None) -> None:
         """What the region in use buys and costs; None while that is not known."""
         self._told = "" if bargain is None else _words(bargain, *self._rates)
 
@@ -87,7 +87,7 @@ class RegionPanel(Form):
             self.show_message(self._told if self._region != "off" else "", hint=True)
 
 
-def _words(bargain: Bargain, asked: float, without: float) -> str:
+def _words(bargain: ScanTradeoff, asked: float, without: float) -> str:
     """What a region of which `asked` frames/s are wanted buys and costs; so many come `without`."""
     rate, full_rate = min(asked, bargain.rate), min(without, bargain.full_rate)
     buys = (

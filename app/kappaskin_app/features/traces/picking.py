@@ -5,7 +5,7 @@ import time
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.estimation import amplitudes
+from kappaskin.estimation import amplitude_spectrum
 from kappaskin.frames import Estimate
 from kappaskin_app.features.traces.element_card import ElementCard, Traces
 from kappaskin_app.features.traces.facts import facts, title
@@ -150,7 +150,7 @@ class Picking(QObject):
         highest = (len(times) - 1) / span / 2
         count = min(_LINES, max(round(highest * span), 2))
         frequencies = np.linspace(highest / count, highest, count)
-        self.card.show_spectrum(frequencies, amplitudes(times, read.T, frequencies))
+        self.card.show_spectrum(frequencies, amplitude_spectrum(times, read.T, frequencies))
 
     def _show_traces(self, elements: int) -> None:
         traced = [one for one in self._history.settings.traced if one < elements]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from kappaskin.bases import Basis
 from kappaskin.contact import surface_geometry
 from kappaskin.frames import Array
-from kappaskin.skin import onto_rim
+from kappaskin.skin import snapped_to_rim
 
 Triangles: TypeAlias = "NDArray[np.int64]"
 
@@ -39,7 +39,7 @@ class Skin:
         grid = np.stack(np.meshgrid(*patch.grid(nx, ny)), axis=-1)
         on = patch.contains(grid.reshape(-1, 2)).reshape(ny, nx)
         if not on.all():
-            grid, _ = onto_rim(patch, grid, on)
+            grid, _ = snapped_to_rim(patch, grid, on)
         corners = _triangles(on)
         self.triangles: Triangles
         used, self.triangles = np.unique(corners, return_inverse=True)

@@ -8,7 +8,7 @@ from kappaskin.bases import Basis
 from kappaskin.frames import Array
 from kappaskin.scenes.effects.effect import Effect, Size
 from kappaskin.scenes.effects.survey import Survey
-from kappaskin.sensing import SensorLayout, steepness
+from kappaskin.sensing import SensorLayout, slope_correction
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class FiniteSlope(Effect):
         number = float((fx**2 + fy**2).max(initial=0.0))
         if survey.plate.patch.base_curvature:
             return Size(number, 0.0)
-        return Size(number, survey.share(survey.curvature * (1 - 1 / steepness(fx, fy))))
+        return Size(number, survey.share(survey.curvature * (1 - 1 / slope_correction(fx, fy))))
 
     def sensed(self, basis: Basis, layout: SensorLayout) -> Callable[[Array], Array]:
         """Coefficients (Ni, Nj) in m to the curvature (3 P,) in 1/m that the elements read."""

@@ -14,7 +14,7 @@ import scipy
 from kappaskin.bases import Basis
 from kappaskin.contact import ContactObject, ObjectFinder, PointContact
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Estimator, Fit, in_time, predicted_sd
+from kappaskin.estimation import Estimator, Fit, predicted_sd, stacked_fits
 from kappaskin.frames import Array, Touch, Truth
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import Hysteresis, Indenter, Scene, Simulator, kept_of
@@ -70,7 +70,9 @@ class FrameBlock:
     @cached_property
     def fit(self) -> Fit:
         """The fit of all frames, each of which is taken in once by what remembers."""
-        return in_time(self.fits) if self.estimator.remembers else self.estimator(self.curvature)
+        return (
+            stacked_fits(self.fits) if self.estimator.remembers else self.estimator(self.curvature)
+        )
 
     @cached_property
     def coefficients(self) -> Array:

@@ -10,8 +10,8 @@ from kappaskin.bases import basis_for
 from kappaskin.estimation import (
     Estimator,
     check_placement,
-    elements_placed,
     estimator_for,
+    place_elements,
     predicted_sd,
 )
 from kappaskin.frames import Array, Mask
@@ -47,7 +47,7 @@ class Design:
         basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
         spacing = _SPACING * math.sqrt(patch.a * patch.b / len(scene.layout))
         return estimator_for(
-            "least-squares", basis, elements_placed(scene.layout, basis, self.by, spacing)
+            "least-squares", basis, place_elements(scene.layout, basis, self.by, spacing)
         )
 
 

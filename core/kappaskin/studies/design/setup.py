@@ -18,8 +18,8 @@ from kappaskin.estimation import (
     PLACEMENTS,
     Estimator,
     check_placement,
-    elements_placed,
     estimator_for,
+    place_elements,
 )
 from kappaskin.scenes import Lines, Scene, Table, scene_of
 
@@ -280,5 +280,5 @@ def _estimator(setup: PointSetup) -> Estimator:
     patch = scene.plate.patch
     Ni, Nj = fit.functions
     basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
-    layout = elements_placed(scene.layout, basis, setup.place.by, setup.place.apart)
+    layout = place_elements(scene.layout, basis, setup.place.by, setup.place.apart)
     return estimator_for(fit.method, basis, layout)

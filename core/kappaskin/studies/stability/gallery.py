@@ -12,7 +12,7 @@ from enum import Enum
 import numpy as np
 
 from kappaskin.bases import Basis, CurvatureMap, SineBasis
-from kappaskin.estimation import FiniteSlope
+from kappaskin.estimation import FiniteSlopeLeastSquares
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.scenes import TABLE_1_NOISE, scaled_to
@@ -340,7 +340,7 @@ def _slopes() -> Iterator[HardCase]:
     slope = np.abs(basis.on_grid(*_SQUARE.grid(101, 101), dx=1)(c)).max()
     for steepest in (0.5, 0.9):
         truth = c * steepest / slope
-        skin = FiniteSlope(basis, _TENS)
+        skin = FiniteSlopeLeastSquares(basis, _TENS)
         rng = np.random.default_rng(SEED)
         K = skin.predicted(truth) + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, 3, 100))
         hard = "gages sense the curvature of the bent surface, which is not that of Eqs. 3-5"

@@ -1,4 +1,4 @@
-"""Rigid objects as the skin meets them: how far the underside lies above its lowest point."""
+"""Rigid objects: spheres, cylinders, wedges, punches, blocks, by the height of their underside."""
 
 import math
 from dataclasses import dataclass
@@ -16,17 +16,17 @@ _ON = 1 + 1e-9  # of a size: a point of the keel on the rim, as computed, is on 
 
 
 class RigidObject(Protocol):
-    """What presses, seen along the normal of the skin; x and y in m count from its centre."""
+    """An object that presses on a skin, seen along the normal; x and y in m from its centre."""
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Half of its sides along x and y in m."""
+        """Half of its size along x and y in m."""
         ...
 
     def height(self, points: Array) -> Array:
-        """The underside above its lowest point, (P,) in m, at `points` (P, 2); infinite beside it.
+        """Height (P,) in m of the underside above its lowest point, at `points` (P, 2) in m.
 
-        Where it has none, the skin is free.
+        Infinite where there is no object above.
         """
         ...
 
@@ -36,7 +36,7 @@ class RigidObject(Protocol):
 
 
 def check_sizes(what: object, *sizes: float) -> None:
-    """Refuse a `what` with a size that is not a number above zero."""
+    """Raise a `Refusal` for an object `what` with a size that is not above zero, in m."""
     if not all(0 < size <= _LARGEST for size in sizes):
         raise Refusal(
             f"expected an object with sizes above zero in metres, {_LARGEST:g} at most, got {what}"
@@ -54,7 +54,7 @@ def _inside(points: Array, extent: tuple[float, float]) -> Mask:
 
 
 def _round(radius: float, away: Array) -> Array:
-    """How far a circle has risen at `away` in m from its lowest point, at most its radius."""
+    """Rise in m of a circle at the distance `away` in m from its lowest point."""
     away = np.minimum(np.abs(away), radius)
     # away^2 over the sum: the difference of the two would lose the digits of a slight rise.
     return away**2 / (radius + np.sqrt(radius**2 - away**2))
@@ -87,7 +87,7 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """A cylinder of `radius` and `length` in m that lies on its side, its axis along x."""
+    """A cylinder of `radius` and `length` in m, its axis along x."""
 
     radius: float
     length: float
@@ -108,9 +108,9 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Wedge:
-    """A wedge whose edge, `length` in m, lies along x, between flanks `width` in m apart in all.
+    """A wedge with an edge of `length` along x, `width` along y, both in m.
 
-    `angle` in rad is the one between the flanks; the edge is rounded to `tip_radius` in m.
+    `angle` in rad between the flanks; the edge is rounded to `tip_radius` in m.
     """
 
     angle: float

@@ -1,18 +1,11 @@
-"""Functions that a shape is made of, by how the skin is held."""
+"""Boundary conditions: how the edges of a skin are held, and the basis for each."""
 
 from collections.abc import Callable
 from functools import partial
 
-from kappaskin.bases.basis import ORDERS as ORDERS
-from kappaskin.bases.basis import Basis as Basis
-from kappaskin.bases.basis import CurvatureMap as CurvatureMap
-from kappaskin.bases.basis import ValueMap as ValueMap
-from kappaskin.bases.beam import ClampedBasis as ClampedBasis
-from kappaskin.bases.disk import DiskBasis as DiskBasis
-from kappaskin.bases.elastic import ElasticBasis as ElasticBasis
-from kappaskin.bases.overlap import overlaps as overlaps
-from kappaskin.bases.polygon import PolygonBasis as PolygonBasis
-from kappaskin.bases.sine import SineBasis as SineBasis
+from kappaskin.bases.basis import Basis
+from kappaskin.bases.modes import DiskBasis, PolygonBasis
+from kappaskin.bases.product import ClampedBasis, ElasticBasis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.skin import Disk, Patch, Polygon
 
@@ -29,25 +22,25 @@ _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
 }
 
 EDGES = tuple(_MAKERS[Patch])
-"""Ways to hold a skin, by name.
+"""Boundary conditions by name.
 
-Hinged, with the ends of an arc pinned, or free to slide; clamped, which holds the slope too; or
-elastic, a flat rectangle's rim that gives.
+`hinged`, with the ends of an arc pinned; `sliding`, with these free to slide; `clamped`, which
+holds the slope too; `elastic`, a flat rectangle whose rim gives.
 """
 
 
 def edges_of(patch: Patch) -> tuple[str, ...]:
-    """The ways to hold `patch`, the usual one first."""
+    """The boundary conditions that `patch` can have, the default first."""
     return tuple(e for e in _MAKERS[type(patch)] if not (patch.base_curvature and e == "elastic"))
 
 
 def check_edge(patch: Patch, edge: str) -> None:
-    """Refuse an edge that `patch` cannot have."""
+    """Raise a `Refusal` for a boundary condition that `patch` cannot have."""
     if edge not in (edges := edges_of(patch)):
         raise Refusal(f"expected an edge of a {patch.name} among {', '.join(edges)}; got {edge!r}")
 
 
 def basis_for(patch: Patch, edge: str, Ni: int, Nj: int) -> Basis:
-    """Ni x Nj functions for a skin that is held as `edge` says."""
+    """The basis of Ni x Nj functions for a patch with the boundary condition `edge`."""
     check_edge(patch, edge)
     return _MAKERS[type(patch)][edge](patch, Ni, Nj)

@@ -1,0 +1,80 @@
+"""Surfaces on the grid of a skin: interpolation, the rim, and distances along the skin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kappaskin.frames import Array, Mask
+from kappaskin.skin.patch import Patch
+
+Indices = NDArray[np.intp]
+
+_HALVINGS = 24  # of a cell, until the rim is found
+
+
+def snapped_to_rim(patch: Patch, grid: Array, on: Mask) -> tuple[Array, Indices]:
+    """The `grid` (ny, nx, 2) in m with the points just outside the skin moved on to its rim.
+
+    `on` (ny, nx) says which points lie on the skin. Also the number (ny nx,) of the point whose
+    value each one shows: its own, or for a moved point that of its neighbour on the skin.
+    """
+    ny, nx = on.shape
+    moved, shown = grid.copy(), np.arange(on.size).reshape(ny, nx)
+    least = np.full(on.shape, np.inf)
+    for dy, dx in ((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j):
+        q, p = np.nonzero(~on)
+        beside = (q + dy >= 0) & (q + dy < ny) & (p + dx >= 0) & (p + dx < nx)
+        q, p = q[beside], p[beside]
+        beside = on[q + dy, p + dx]
+        q, p = q[beside], p[beside]
+        inside, outside = grid[q + dy, p + dx], grid[q, p]
+        for _ in range(_HALVINGS):
+            middle = (inside + outside) / 2
+            there = patch.contains(middle)[:, None]
+            inside, outside = np.where(there, middle, inside), np.where(there, outside, middle)
+        far = np.linalg.norm(inside - grid[q, p], axis=-1)
+        near = far < least[q, p]
+        q, p = q[near], p[near]
+        least[q, p], moved[q, p] = far[near], inside[near]
+        shown[q, p] = shown[q + dy, p + dx]
+    return moved, shown.ravel()
+
+
+_STEPS = 256  # of the line along the skin
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Distances between two points of a bent skin, in m.
+
+    `straight` through the air, `along` the skin on the line that is straight in its own
+    coordinates, and how much `higher` the second point is than the first.
+    """
+
+    straight: float
+    along: float
+    higher: float
+
+
+def distances(patch: Patch, surface: Array, first: Array, second: Array) -> Distances:
+    """Distances between `first` and `second` (2,) in m, with displacement `surface` (ny, nx)."""
+    places = first + np.linspace(0.0, 1.0, _STEPS + 1)[:, None] * (second - first)
+    rest, out = patch.at_rest(places)
+    points = rest - out * interpolated(patch, surface, places)[:, None]
+    whole = points[-1] - points[0]
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return Distances(float(np.linalg.norm(whole)), float(steps.sum()), float(whole[2]))
+
+
+def interpolated(patch: Patch, values: Array, places: Array) -> Array:
+    """`values` (ny, nx) on the grid of a patch, interpolated at `places` (P, 2) in m: (P,).
+
+    Bilinear; NaN, as off the skin, counts as zero.
+    """
+    ny, nx = values.shape
+    known = np.nan_to_num(values)
+    p, q = np.clip(places / (patch.a, patch.b) * (nx - 1, ny - 1), 0, (nx - 1, ny - 1)).T
+    i, j = np.minimum(p.astype(int), nx - 2), np.minimum(q.astype(int), ny - 2)
+    low, high = (known[k, i] * (1 - p + i) + known[k, i + 1] * (p - i) for k in (j, j + 1))
+    return low * (1 - q + j) + high * (q - j)
