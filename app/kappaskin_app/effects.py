@@ -2,7 +2,7 @@
 
 import inspect
 
-from kappaskin.scenes import EFFECTS
+from kappaskin.scenes.effects import EFFECTS
 
 _CALLED = {"dead": "Dead elements", "stuck": "Stuck elements", "intermittent": "Loose elements"}
 

@@ -27,7 +27,7 @@ from kappaskin_app.simulation import (
     text_of,
     with_consequences,
 )
-from kappaskin_app.touching import Held, most_times
+from kappaskin_app.touching import GrabbedStimulus, most_times
 
 _TITLES = {name[:1].lower() + name[1:] for name in (d.title for d in DEMONSTRATIONS)}
 
@@ -38,7 +38,7 @@ class Wishes:
     def __init__(self, history: History, session: Session) -> None:
         self._history, self._session = history, session
         self._gesture, self._grabbed_end = -1, False
-        self._held: Held | None = None
+        self._held: GrabbedStimulus | None = None
         self._grabbed_load: Load | None = None
         self._place = (0.0, 0.0)
         self._grabbed_in: Written | None = None
@@ -170,7 +170,7 @@ class Wishes:
         self._gesture, self._grabbed_in = self._history.new_gesture(), settings.written
         # What is seen is in it: no other scene stays, nor does until this one is made.
         writes = settings.written is not None and not (session.refusal or session.making)
-        self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
+        self._held = GrabbedStimulus.at_place(session.scene, session.time, x, y) if writes else None
         self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
         self._place = x, y
 

@@ -16,15 +16,18 @@ from kappaskin import (
     Transduction,
     UniformNoise,
 )
-from kappaskin.scenes import DroppedFrames, Saturation
-from kappaskin.scenes.effects.converter import Quantisation
-from kappaskin.scenes.effects.cross_talk import CrossTalk
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
-from kappaskin.scenes.effects.finite_slope import FiniteSlope
-from kappaskin.scenes.effects.flicker import FlickerNoise
-from kappaskin.scenes.effects.hum import MainsHum
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes.effects import (
+    DroppedFrames,
+    FiniteSlope,
+    IntermittentElements,
+    Quantisation,
+    Saturation,
+    StrainLimit,
+    StuckElements,
+    Temperature,
+)
+from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
+from kappaskin.scenes.effects.noise import FlickerNoise
 
 CHANNELS = 300
 EFFECTS = [

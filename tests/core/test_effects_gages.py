@@ -24,9 +24,7 @@ from kappaskin import (
     basis_for,
 )
 from kappaskin.bases import curvature_at
-from kappaskin.scenes.effects.finite_slope import FiniteSlope
-from kappaskin.scenes.effects.gage_length import GageLength
-from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
+from kappaskin.scenes.effects import FiniteSlope, Fluid, Foam, GageLength, Tension
 from kappaskin.sources import from_json, to_json
 
 SQUARE = Patch(0.1, 0.1)

@@ -25,20 +25,29 @@ from kappaskin import (
     UniformNoise,
     basis_for,
 )
-from kappaskin.scenes import EFFECTS, CorruptedFrames, DeadElements, DroppedFrames, Saturation
-from kappaskin.scenes.effects.converter import Quantisation
-from kappaskin.scenes.effects.cross_talk import CrossTalk
-from kappaskin.scenes.effects.effect import LayoutEffect, SkinEffect
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
-from kappaskin.scenes.effects.finite_slope import FiniteSlope
-from kappaskin.scenes.effects.flicker import FlickerNoise
-from kappaskin.scenes.effects.gage_length import GageLength
-from kappaskin.scenes.effects.hum import MainsHum
-from kappaskin.scenes.effects.skew import Skew
-from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.effects.survey import Survey
-from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes.effects import (
+    EFFECTS,
+    CorruptedFrames,
+    DeadElements,
+    DroppedFrames,
+    FiniteSlope,
+    Fluid,
+    Foam,
+    GageLength,
+    IntermittentElements,
+    Quantisation,
+    Saturation,
+    Skew,
+    SkinEffect,
+    StrainLimit,
+    StuckElements,
+    Survey,
+    Temperature,
+    Tension,
+)
+from kappaskin.scenes.effects.effect import LayoutEffect
+from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
+from kappaskin.scenes.effects.noise import FlickerNoise
 
 DURATION, FRAMES = 2.0, 40
 LOUD = Transduction(amplifier=Amplifier(gain=1500.0))

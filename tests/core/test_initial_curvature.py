@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kappaskin import FIRST_GENERATION_LOOPS, Hysteresis
-from kappaskin.scenes import Creep
+from kappaskin.scenes.effects import Creep
 from kappaskin.studies.initial_curvature import SHARES, initial_curvature
 
 R0 = 12.9e-3

@@ -50,7 +50,7 @@ ROOMS = {
         "wire wire_vectors diagnosis interpreter",
     ),
     "fit": ("fit/*", "estimators least_squares fast bayes prior robust tracking finite_slope"),
-    "scene": ("scene/*", "motion scene scene_file scene_write plan simulate"),
+    "scene": ("scenes/*", "motion scene scene_file scene_write plan simulate"),
 }
 """Room -> its files, and the names of the tests in `tests/core` that are to notice a change."""
 

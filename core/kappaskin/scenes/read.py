@@ -1,4 +1,4 @@
-"""The text of a scene file to the scene: strict, and every refusal names its line."""
+"""Reading scene files: strict, and every refusal names its line."""
 
 import math
 import re
@@ -6,41 +6,196 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
-from pathlib import Path as FilePath
+from importlib.resources import files
+from pathlib import Path
 from typing import Any, cast, get_type_hints
+
+import numpy as np
 
 from kappaskin.bases import EDGES, basis_for
 from kappaskin.errors import Refusal
-from kappaskin.mechanics import Plate
-from kappaskin.scenes.choice import LINEAR, Choice
+from kappaskin.mechanics import (
+    Block,
+    Cylinder,
+    DiscLoad,
+    GaussianLoad,
+    HeightMap,
+    LineLoad,
+    Load,
+    Mesh,
+    Plate,
+    PointLoad,
+    Punch,
+    RectangleLoad,
+    RigidObject,
+    Sphere,
+    Wedge,
+)
 from kappaskin.scenes.cylinders import Presentation, schedule
-from kappaskin.scenes.effects import EFFECTS
-from kappaskin.scenes.effects.effect import Effect
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
-from kappaskin.scenes.effects.hysteresis import FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.limits import (
+from kappaskin.scenes.effects import (
+    EFFECTS,
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION_LOOPS,
+    Effect,
+    IntermittentElements,
+    StrainLimit,
+    StuckElements,
+    Within,
+)
+from kappaskin.scenes.plan import effects_of
+from kappaskin.scenes.scene import LINEAR, EffectSelection, Scene, scaled_to
+from kappaskin.scenes.schema import (
     DWELL,
     HOLD,
     RADII,
     RATE,
     SEED,
-    SKIN,
+    SKIN_LIMITS,
     check_elements,
     check_functions,
     check_sides,
 )
-from kappaskin.scenes.lines import Lines
-from kappaskin.scenes.plan import effects_of
-from kappaskin.scenes.read_stimulus import read_stimulus
-from kappaskin.scenes.scene import Scene, scaled_to
-from kappaskin.scenes.table import Table
+from kappaskin.scenes.stimulus import (
+    HoldStep,
+    Indenter,
+    Motion,
+    MotionPath,
+    MotionStep,
+    Orbit,
+    PressStep,
+    RecordedMotion,
+    ReleaseStep,
+    SlideStep,
+    Stimulus,
+    TapStep,
+    TurnStep,
+)
+from kappaskin.scenes.tables import LineNumbers, TomlTable
 from kappaskin.sensing import FIRST_GENERATION, SECOND_GENERATION, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 
+STEPS: dict[str, type[MotionStep]] = {
+    "press": PressStep,
+    "hold": HoldStep,
+    "release": ReleaseStep,
+    "slide": SlideStep,
+    "roll": SlideStep,
+    "turn": TurnStep,
+    "tap": TapStep,
+}
+LOADS: dict[str, type[Load]] = {
+    "point": PointLoad,
+    "line": LineLoad,
+    "disc": DiscLoad,
+    "rectangle": RectangleLoad,
+    "gaussian": GaussianLoad,
+}
+OBJECTS: dict[str, type[RigidObject]] = {
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "wedge": Wedge,
+    "punch": Punch,
+    "block": Block,
+    "heights": HeightMap,
+    "mesh": Mesh,
+}
+
+_LARGEST_RECORD = 2**22  # bytes of a recorded motion
+_FORCE = Within(-1e6, 1e6, "N")
+
+
+def read_stimulus(
+    table: TomlTable, plate: Plate, moved: Callable[[Load, float], Load], folder: Path
+) -> Stimulus:
+    """What a [[touch]] of `plate` says; `moved` makes a load move its place so far in m."""
+    what: Load | Indenter
+    if (name := table.choose("what", {name: name for name in (*LOADS, *OBJECTS)})) in OBJECTS:
+        what = table.make(Indenter, rigid=_object(table, OBJECTS[name], folder))
+    else:
+        what = table.make(LOADS[name])
+        if "displacement" in table:
+            if "force" in table:
+                raise table.refusal("expected a force or a displacement, got both", "displacement")
+            with table.blamed():
+                what.check(plate.patch)
+            with table.blamed("displacement"):
+                what = moved(what, table.get("displacement", float))
+    if what.force is not None and what.force not in _FORCE:
+        raise table.refusal(f"expected a force of {_FORCE}, got {what.force:g}", "force")
+    made = Stimulus(what, _motion(table, folder))
+    table.done()
+    with table.blamed():
+        made.check(plate)
+    return made
+
+
+def _object(table: TomlTable, kind: type[RigidObject], folder: Path) -> RigidObject:
+    """The rigid object that the table describes, read from a file in `folder` if it has one."""
+    with table.blamed():
+        if kind is Mesh:
+            return Mesh.read(_beside(table, "file", folder), table.get("unit", float, 1.0))
+        if kind is HeightMap:
+            sizes = (table.get(key, float) for key in ("length", "width", "relief"))
+            return HeightMap.read(_beside(table, "file", folder), *sizes)
+        return table.make(kind)
+
+
+def _beside(table: TomlTable, key: str, folder: Path) -> Path:
+    """The file that the table names, which lies beside that of the scene."""
+    file = folder / table.get(key, str)
+    if not file.is_file():
+        raise table.refusal(
+            f"expected the name of a file beside that of the scene, got {str(file)!r:.200}, where "
+            "there is none",
+            key,
+        )
+    return file
+
+
+def _motion(table: TomlTable, folder: Path) -> Motion | None:
+    given = [key for key in ("path", "orbit", "recorded") if key in table]
+    if len(given) > 1:
+        raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
+    if "orbit" in table:
+        orbit = table.table("orbit")
+        made = orbit.make(Orbit)
+        orbit.done()
+        return made
+    if "recorded" in table:
+        with table.blamed("recorded"):
+            return _recorded(_beside(table, "recorded", folder))
+    steps = [_step(step) for step in table.tables("path")]
+    with table.blamed("path"):
+        return MotionPath(tuple(steps)) if "path" in table else None
+
+
+def _step(table: TomlTable) -> MotionStep:
+    made = table.make(table.choose("step", STEPS))
+    table.done()
+    return made
+
+
+def _recorded(file: Path) -> RecordedMotion:
+    """A motion from a CSV file with the columns time, dx, dy and amount."""
+    try:
+        if file.stat().st_size > _LARGEST_RECORD:
+            raise OSError(f"it has more than {_LARGEST_RECORD} bytes; thin it out")
+        heading, *lines = file.read_text(encoding="utf-8-sig").splitlines() or [""]
+        rows = np.array([line.split(",") for line in lines if line.strip()], float)
+    except (OSError, ValueError) as error:
+        raise Refusal(
+            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
+        ) from error
+    if heading.replace(" ", "") != "time,dx,dy,amount":
+        raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r:.80}")
+    if rows.shape[1:] != (4,):
+        raise Refusal(f"{file}: expected lines of four numbers, got those of {rows.shape}")
+    return RecordedMotion(rows[:, 0], rows[:, 1:])
+
+
 FORMAT = 1
-_LARGEST = 2**24  # bytes
-_DEEP = re.compile(r"(?:\.[\w\"'-]+){64}")  # tables in tables, which take long to read
+_LARGEST_SCENE = 2**24  # bytes
+_DEEP_TABLES = re.compile(r"(?:\.[\w\"'-]+){64}")  # tables in tables, which take long to read
 
 ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
 ELSEWHERE = {
@@ -59,10 +214,10 @@ ELSEWHERE = {
 LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 
 
-def parsed(text: str, file: FilePath) -> dict[str, Any]:
+def parsed(text: str, file: Path) -> dict[str, Any]:
     """What the TOML `text`, of `file`, says."""
     try:
-        if _DEEP.search(text):
+        if _DEEP_TABLES.search(text):
             raise RecursionError
         return tomllib.loads(text)
     except ValueError as error:  # a whole number of thousands of digits is one of these, too
@@ -71,12 +226,12 @@ def parsed(text: str, file: FilePath) -> dict[str, Any]:
         raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
 
 
-def read_scene(text: str, file: FilePath) -> Scene:
+def read_scene(text: str, file: Path) -> Scene:
     """The scene that `text`, of `file`, describes; files that it names lie beside it."""
-    return scene_of(Table(parsed(text, file), Lines(text), str(file)), file)
+    return scene_of(TomlTable(parsed(text, file), LineNumbers(text), str(file)), file)
 
 
-def scene_of(top: Table, file: FilePath) -> Scene:
+def scene_of(top: TomlTable, file: Path) -> Scene:
     """The scene that a file says at its `top`, besides what somebody else has asked for there."""
     name, folder = file.stem.removesuffix(".scene"), file.parent
     if (version := top.get("format", int)) != FORMAT:
@@ -132,7 +287,7 @@ def scene_of(top: Table, file: FilePath) -> Scene:
     return scene
 
 
-def _skin(table: Table) -> tuple[Plate, str]:
+def _skin(table: TomlTable) -> tuple[Plate, str]:
     shapes: dict[str, Callable[[], Patch]] = {
         "rectangle": lambda: _rectangle(table, strip=False),
         "strip": lambda: _rectangle(table, strip=True),
@@ -143,7 +298,7 @@ def _skin(table: Table) -> tuple[Plate, str]:
     with table.blamed():
         patch = make()
         check_sides(patch)
-    for name, within in SKIN.items():
+    for name, within in SKIN_LIMITS.items():
         if table.get(name, float, 0.0):  # with no tension at all, say, it is none
             table.get(name, float, within=within)
     plate = table.make(Plate, patch=patch)
@@ -152,12 +307,12 @@ def _skin(table: Table) -> tuple[Plate, str]:
     return plate, edge
 
 
-def _rectangle(table: Table, strip: bool) -> Patch:
+def _rectangle(table: TomlTable, strip: bool) -> Patch:
     a, b = table.get("size", tuple[float, float])
     return Patch(a, b, table.get("radius", float, math.inf), strip)
 
 
-def _elements(table: Table, patch: Patch) -> SensorLayout:
+def _elements(table: TomlTable, patch: Patch) -> SensorLayout:
     with table.blamed():
         if "positions" in table:
             layout = SensorLayout.scattered(
@@ -174,7 +329,7 @@ def _elements(table: Table, patch: Patch) -> SensorLayout:
     return layout
 
 
-def _electronics(table: Table) -> Transduction:
+def _electronics(table: TomlTable) -> Transduction:
     chain = table.choose("like", ELECTRONICS, "modern")
     parts = {
         name: _changed(table.table(name), getattr(chain, name))
@@ -185,7 +340,7 @@ def _electronics(table: Table) -> Transduction:
         return replace(chain, **parts)
 
 
-def _changed(table: Table, part: Any) -> Any:
+def _changed(table: TomlTable, part: Any) -> Any:
     """The `part` of the electronics with what the table says of it."""
     hints = get_type_hints(cast("type[Any]", type(part)))
     said = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
@@ -194,7 +349,7 @@ def _changed(table: Table, part: Any) -> Any:
         return replace(part, **said)
 
 
-def _cylinders(table: Table, scene: Scene) -> Presentation:
+def _cylinders(table: TomlTable, scene: Scene) -> Presentation:
     hold = table.get("hold", float, 0.0, HOLD)
     radii = table.get("radii", tuple[float, ...], (), RADII)
     with table.blamed():
@@ -206,8 +361,8 @@ def _cylinders(table: Table, scene: Scene) -> Presentation:
 
 
 def _effects(
-    top: Table, electronics: Transduction, layout: SensorLayout
-) -> tuple[Choice, tuple[Effect, ...]]:
+    top: TomlTable, electronics: Transduction, layout: SensorLayout
+) -> tuple[EffectSelection, tuple[Effect, ...]]:
     """Which effects the file chooses, and those that it says the parameters of."""
     table = top.table("effects")
     found = list[Effect]()
@@ -228,43 +383,74 @@ def _effects(
                     effect.channels((3 * len(layout),))
     accuracy = top.get("accuracy", float, 0.01)
     with top.blamed("accuracy"):
-        Choice(accuracy=accuracy)
+        EffectSelection(accuracy=accuracy)
     with table.blamed("choose"):
         choice = _choice(table, accuracy)
     table.done(*EFFECTS)
     return choice, tuple(found)
 
 
-def _choice(table: Table, accuracy: float) -> Choice:
+def _choice(table: TomlTable, accuracy: float) -> EffectSelection:
     """`choose` is auto, all, linear or a list of names; `on` and `off` force some."""
     on, off = (frozenset(table.get(key, tuple[str, ...], ())) for key in ("on", "off"))
     if not isinstance(named := table.get("choose", str | tuple[str, ...], "auto"), str):
         if on or off:
             raise Refusal("expected either a list of effects, or some on and off, got both")
-        listed = Choice(False, accuracy, on=frozenset(named))
+        listed = EffectSelection(False, accuracy, on=frozenset(named))
         return replace(listed, off=frozenset(EFFECTS) - listed.on)
-    choices = {"auto": Choice(auto=True), "all": Choice(), "linear": LINEAR}
+    choices = {"auto": EffectSelection(auto=True), "all": EffectSelection(), "linear": LINEAR}
     if named not in choices:
         raise Refusal(f"expected auto, all, linear or a list of effects, got {named!r}")
     chosen = choices[named]
-    return Choice(chosen.auto, accuracy, on, (chosen.off - on) | off)
+    return EffectSelection(chosen.auto, accuracy, on, (chosen.off - on) | off)
 
 
-def _wanted(table: Table) -> set[str]:
+def _wanted(table: TomlTable) -> set[str]:
     """The effects that a file asks for by name."""
     named = table.get("choose", str | tuple[str, ...], "auto")
     return {*table.get("on", tuple[str, ...], ()), *(() if isinstance(named, str) else named)}
 
 
-def read_scene_text(file: FilePath) -> str:
+def read_scene_text(file: Path) -> str:
     """The text in `file`; raises `Refusal` for a file that cannot be read, or is no scene's."""
     try:
         if file.exists() and not file.is_file():
             raise Refusal(f"{file}: expected a file with a scene, got a folder or a device")
-        if file.stat().st_size > _LARGEST:
-            raise Refusal(f"{file}: expected a scene of at most {_LARGEST} bytes, got more")
+        if file.stat().st_size > _LARGEST_SCENE:
+            raise Refusal(f"{file}: expected a scene of at most {_LARGEST_SCENE} bytes, got more")
         return file.read_text(encoding="utf-8-sig")
     except Refusal:
         raise
     except (OSError, ValueError) as error:  # undecodable, or a name that no file has
         raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
+
+
+TABLE_1_NOISE = 0.40 / math.sqrt(3)
+"""RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
+
+DEFAULT_SCENE = "circle"
+
+_FOLDER = Path(str(files("kappaskin_resources"))) / "scenes"
+_ENDING = ".toml"
+
+SCENES = tuple(sorted(file.stem for file in _FOLDER.iterdir() if file.suffix == _ENDING))
+"""Names of the ready scenes."""
+
+
+def scene_file(name: str = "") -> Path:
+    """The file of the ready scene `name`, of the default one when empty; or the TOML file named."""
+    if name.endswith(_ENDING):
+        return Path(name)
+    name = name or DEFAULT_SCENE
+    if name not in SCENES:
+        raise Refusal(
+            f"expected a scene among {', '.join(SCENES)}, or a file that ends in {_ENDING}; got "
+            f"{name!r}"
+        )
+    return _FOLDER / f"{name}{_ENDING}"
+
+
+def load_scene(name: str = "") -> Scene:
+    """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
+    file = scene_file(name)
+    return read_scene(read_scene_text(file), file)

@@ -1,28 +1,117 @@
-"""A scene to the text of its file, which `read_scene` reads as the same scene."""
+"""Writing scene files: a scene to the text that `read_scene` reads as the same scene."""
 
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from kappaskin._toml import table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.mechanics import Load, RigidObject
 from kappaskin.scenes.cylinders import RADII, Presentation, schedule
-from kappaskin.scenes.effects import EFFECTS
-from kappaskin.scenes.effects.effect import Effect
-from kappaskin.scenes.effects.parameters import parameters
-from kappaskin.scenes.effects.strain_limit import StrainLimit
+from kappaskin.scenes.effects import EFFECTS, Effect, StrainLimit, parameters
 from kappaskin.scenes.plan import effects_of
-from kappaskin.scenes.read import ELECTRONICS, ELSEWHERE, FORMAT, LOOPS, read_scene
-from kappaskin.scenes.said import said_of
+from kappaskin.scenes.read import (
+    ELECTRONICS,
+    ELSEWHERE,
+    FORMAT,
+    LOADS,
+    LOOPS,
+    OBJECTS,
+    STEPS,
+    read_scene,
+)
 from kappaskin.scenes.scene import Scene
-from kappaskin.scenes.write_stimulus import TOUCH_UNITS, touch_of
+from kappaskin.scenes.stimulus import Indenter, Motion, MotionPath, MotionStep, Orbit, Stimulus
 from kappaskin.sensing import SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
+
+
+def said_of(owner: object, usual: object = None, without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The fields of a dataclass that are not as `usual`, their defaults when left out."""
+    hints = get_type_hints(type(owner))
+    said = dict[str, Any]()
+    for field in fields(cast("Any", owner)):
+        value = getattr(owner, field.name)
+        expected = field.default if usual is None else getattr(usual, field.name)
+        if field.init and field.name not in without and value != expected:
+            said[field.name] = plain(value, hints[field.name])
+    return said
+
+
+def plain(value: Any, kind: Any) -> Any:
+    """The `value` as TOML has it: a number where `kind` is float is one, however it came."""
+    if get_origin(kind) is tuple:
+        return [plain(each, get_args(kind)[0]) for each in value]
+    if isinstance(value, bool | str):
+        return value
+    return float(value) if kind is float or float in get_args(kind) else int(value)
+
+
+TOUCH_UNITS = {"angle": "rad", "force": "N", "depth": "m", "turn": "rad"}
+
+
+def touch_of(stimulus: Stimulus) -> dict[str, Any]:
+    """What a [[touch]] says of the stimulus; what came from another file is refused."""
+    what = stimulus.what
+    said = _pressed(what) if isinstance(what, Indenter) else _load(what)
+    return {**said, **_motion(stimulus.motion)}
+
+
+def _name(among: dict[str, type[Any]], one: object) -> str:
+    """What a file calls `one`; the first of two names for the same."""
+    for name, kind in among.items():
+        if type(one) is kind:
+            return name
+    raise Refusal(f"expected one of {', '.join(among)} to write in a scene file, got {one!r:.80}")
+
+
+def _load(load: Load) -> dict[str, Any]:
+    said = said_of(load, without=("force",))
+    return {"what": _name(LOADS, load), **said, "force": float(load.force)}
+
+
+def _pressed(what: Indenter) -> dict[str, Any]:
+    return {"what": _object(what.rigid), **said_of(what.rigid), **said_of(what, without=("rigid",))}
+
+
+def _object(rigid: RigidObject) -> str:
+    name = _name(OBJECTS, rigid)
+    if name in ("mesh", "heights"):
+        raise Refusal(
+            f"expected an object that a scene file describes, got a {type(rigid).__name__}, which "
+            f"does not tell its file any more; write [[touch]] with what = {name!r} and the file "
+            "by hand"
+        )
+    return name
+
+
+def _motion(motion: Motion | None) -> dict[str, Any]:
+    match motion:
+        case None:
+            return {}
+        case Orbit():
+            return {"orbit": said_of(motion)}
+        case MotionPath():
+            return {"path": [_step(step) for step in motion.steps]}
+        case _:
+            raise Refusal(
+                f"expected an orbit or a path to write in a scene file, got a "
+                f"{type(motion).__name__}, which does not tell its file any more; write "
+                "[[touch]] with recorded = the file by hand"
+            )
+
+
+def _step(step: MotionStep) -> dict[str, Any]:
+    time = ("seconds", "ease")
+    said = said_of(step)
+    last = {key: said.pop(key) for key in time if key in said}
+    return {"step": _name(STEPS, step), **said, **last}
+
 
 _METRES = ("size", "rim_radius", "outline", "radius", "positions", "gage_length", "radii")
 _UNITS = {

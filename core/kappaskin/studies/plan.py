@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from kappaskin.frames import Array
-from kappaskin.scenes import EFFECTS, Choice, Plan, ReadingEffect, Scene, Simulator, plan
+from kappaskin.scenes import EffectSelection, Plan, Scene, Simulator, plan
+from kappaskin.scenes.effects import EFFECTS, ReadingEffect
 
 _TURNS, _FRAMES, _LEAST = 7, 40, 4  # turns, and frames of each: usually, and at least
 _TURN = 0.02  # s that the frames of one turn may take
@@ -19,7 +20,7 @@ _TURN = 0.02  # s that the frames of one turn may take
 
 def _only(scene: Scene, *names: str) -> Scene:
     """The scene with these effects alone."""
-    return replace(scene, choice=Choice(off=frozenset(EFFECTS) - set(names)))
+    return replace(scene, choice=EffectSelection(off=frozenset(EFFECTS) - set(names)))
 
 
 def _frame(scene: Scene, *names: str) -> Callable[[float], object]:

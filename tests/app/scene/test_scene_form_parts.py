@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QComboBox, QToolButton
 from kappaskin import EFFECTS
 from kappaskin.scenes import read_scene
 from kappaskin_app.panels.scene_form.form import SceneForm
-from kappaskin_app.panels.scene_form.section import Offer, Section
+from kappaskin_app.panels.scene_form.section import Addition, Section
 from kappaskin_app.panels.scene_form.sections import sections_of
 from kappaskin_app.scene_text import changes, parts
 
@@ -28,7 +28,7 @@ size = [0.1, 0.1]
 """
 
 
-def _offers(section: Section) -> list[Offer]:
+def _offers(section: Section) -> list[Addition]:
     each = [*section.offers, *section.more]
     found = [inner for offer in each for inner in (offer.inside or (offer,))]
     return found + [offer for part in section.sections for offer in _offers(part)]

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.scene_form.editors import Editor, editor_for
-from kappaskin_app.panels.scene_form.section import Change, Offer, Row, Section
+from kappaskin_app.panels.scene_form.section import Addition, Change, Row, Section
 from kappaskin_app.scene_text import changes
 from kappaskin_app.scene_text.changes import Place
 
@@ -156,7 +156,7 @@ class SectionBox(QGroupBox):
         self.stops.append(button)
         return button
 
-    def _menu_button(self, text: str, tip: str, offers: tuple[Offer, ...]) -> QToolButton:
+    def _menu_button(self, text: str, tip: str, offers: tuple[Addition, ...]) -> QToolButton:
         button = _tool(text, tip, ("add",))
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setMenu(self._menu(offers, button))
@@ -164,7 +164,7 @@ class SectionBox(QGroupBox):
         self.stops.append(button)
         return button
 
-    def _menu(self, offers: tuple[Offer, ...], parent: QWidget) -> QMenu:
+    def _menu(self, offers: tuple[Addition, ...], parent: QWidget) -> QMenu:
         menu = QMenu(parent)
         menu.setToolTipsVisible(True)
         for offer in offers:

@@ -34,13 +34,13 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Offer:
+class Addition:
     """Something that may be put in, in words; or others `inside`."""
 
     words: str
     tip: str
     change: Change = str
-    inside: "tuple[Offer, ...]" = ()
+    inside: "tuple[Addition, ...]" = ()
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Section:
     place: Place
     rows: tuple[Row, ...] = ()
     sections: "tuple[Section, ...]" = ()
-    offers: tuple[Offer, ...] = ()
+    offers: tuple[Addition, ...] = ()
     adding: str = ""
-    more: tuple[Offer, ...] = ()
+    more: tuple[Addition, ...] = ()
     removable: bool = False
     step: bool = False
     tip: str = ""

@@ -5,7 +5,7 @@ from typing import Any
 
 from kappaskin_app.effects import called, explained
 from kappaskin_app.panels.scene_form.kinds import kind_of
-from kappaskin_app.panels.scene_form.section import Change, Offer, Row, Section
+from kappaskin_app.panels.scene_form.section import Addition, Change, Row, Section
 from kappaskin_app.panels.scene_form.words import how_of, named, words_of
 from kappaskin_app.scene_text import changes
 from kappaskin_app.scene_text.changes import Place
@@ -48,14 +48,14 @@ def _skin(said: Said) -> Section:
 
 
 def _electronics(said: Said) -> Section:
-    sections, offers = list[Section](), list[Offer]()
+    sections, offers = list[Section](), list[Addition]()
     for part in _ELECTRONICS:
         place = ("electronics", part)
         section = _section(named(part), part, "", _table(said, part), place)
         if part in said:
             sections.append(section)
         else:
-            offers.append(Offer(section.title, "", inside=section.offers))
+            offers.append(Addition(section.title, "", inside=section.offers))
     return _section(
         *("Electronics", "electronics", "", said, ("electronics",)),
         sections=tuple(sections),
@@ -111,7 +111,7 @@ def _more_touches(there: list[str]) -> Section:
         )
     else:
         said = {"dwell": optional("cylinders")["dwell"]}
-        laid = Offer(
+        laid = Addition(
             "Cylinders",
             "Lay the skin on one cylinder after the other, as a calibration does.",
             lambda text: changes.add_table(text, ("cylinders",), said),
@@ -132,7 +132,7 @@ def _effects(said: Said) -> Section:
         for name in there
     )
     more = tuple(
-        Offer(called(name), explained(name), _adding_effect(name))
+        Addition(called(name), explained(name), _adding_effect(name))
         for name in kinds("effects")
         if name not in there
     )
@@ -147,9 +147,9 @@ def _adding_step(place: Place, kind: str) -> Change:
     return lambda text: changes.add_step(text, place, kind)
 
 
-def _offers_of_kinds(part: str, adding: Callable[[str], Change]) -> tuple[Offer, ...]:
+def _offers_of_kinds(part: str, adding: Callable[[str], Change]) -> tuple[Addition, ...]:
     key = "step" if part == "step" else "what"
-    return tuple(Offer(words_of(part, key, kind), "", adding(kind)) for kind in kinds(part))
+    return tuple(Addition(words_of(part, key, kind), "", adding(kind)) for kind in kinds(part))
 
 
 def _table(said: Said, key: str) -> Said:
@@ -180,9 +180,9 @@ def _rows(part: str, kind: str, said: Said, place: Place) -> tuple[Row, ...]:
 _SAYS = (("skin", "shape"), ("touch", "what"), ("step", "step"))
 
 
-def _offers(part: str, kind: str, said: Said, place: Place) -> tuple[Offer, ...]:
+def _offers(part: str, kind: str, said: Said, place: Place) -> tuple[Addition, ...]:
     """What else a table may say."""
-    found = list[Offer]()
+    found = list[Addition]()
     for key, value in known(part, kind).items():
         if key in said:
             continue
@@ -191,7 +191,7 @@ def _offers(part: str, kind: str, said: Said, place: Place) -> tuple[Offer, ...]
         words = how.label + "".join(
             f" instead of {how_of(part, kind, other).label.lower()}" for other in instead
         )
-        found.append(Offer(words, how.explained, _putting_in(place, key, value)))
+        found.append(Addition(words, how.explained, _putting_in(place, key, value)))
     return () if part == "effects" and "like" in said else tuple(found)
 
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 from kappaskin.bases import EDGES
-from kappaskin.scenes import EFFECTS, parameters
+from kappaskin.scenes.effects import EFFECTS, parameters
 from kappaskin_app.effects import explained
 
 MM, UM, DEGREE = ("mm", 1e-3), ("\N{MICRO SIGN}m", 1e-6), ("\N{DEGREE SIGN}", math.pi / 180)

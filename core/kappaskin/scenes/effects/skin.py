@@ -7,9 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from kappaskin.mechanics import Plate
-from kappaskin.scenes.effects.effect import NOTHING, Size, SkinEffect
-from kappaskin.scenes.effects.parameters import Within
-from kappaskin.scenes.effects.survey import Survey
+from kappaskin.scenes.effects.effect import NOTHING, Size, SkinEffect, Survey, Within
 
 
 class _Backing(SkinEffect):

@@ -13,7 +13,8 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator, Fit, in_time
 from kappaskin.frames import Array, Touch, Truth
 from kappaskin.mechanics import Plate
-from kappaskin.scenes import Hysteresis, Scene, Simulator, kept_of
+from kappaskin.scenes import Scene, Simulator, kept_effects
+from kappaskin.scenes.effects import Hysteresis
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.setup import Setup
 
@@ -128,7 +129,7 @@ def block_of(setup: Setup, estimator: Estimator, seed: int) -> Block:
 
 def _compensated(scene: Scene, read: Array) -> Array:
     """Readings (T, 3 P) in 1/m, one after the other, with the scene's loops undone."""
-    loops = [effect for effect in kept_of(scene) if isinstance(effect, Hysteresis)]
+    loops = [effect for effect in kept_effects(scene) if isinstance(effect, Hysteresis)]
     if not loops:
         raise Refusal("expected a scene with hysteresis to compensate, got none of it")
     undo = loops[0].operator(read.shape[1]).inverse.start()

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes import Table
+from kappaskin.scenes import TomlTable
 
 
 class Distribution(Protocol):
@@ -116,7 +116,7 @@ KINDS = {
 """What values can be drawn from, by name."""
 
 
-def read_draw(table: Table) -> tuple[str, Distribution]:
+def read_draw(table: TomlTable) -> tuple[str, Distribution]:
     """The place in the file `what`, and what its values are drawn from."""
     place = table.get("what", str)
     made = table.make(table.choose("kind", KINDS))

@@ -13,7 +13,7 @@ import scipy
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator, predicted_sd
 from kappaskin.frames import Array
-from kappaskin.scenes import Indenter, Scene, kept_of
+from kappaskin.scenes import Indenter, Scene, kept_effects
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.block import Block
 
@@ -87,7 +87,7 @@ def _covered(block: Block) -> Array:
 
 def noise_of(scene: Scene) -> float:
     """The standard deviation in 1/m of all noise there is that differs from reading to reading."""
-    each = [getattr(effect, "rms", 0.0) for effect in kept_of(scene)]
+    each = [getattr(effect, "rms", 0.0) for effect in kept_effects(scene)]
     return math.hypot(*each)
 
 

@@ -17,7 +17,7 @@ from kappaskin.estimation import (
     elements_placed,
     estimator_for,
 )
-from kappaskin.scenes import Lines, Scene, Table, scene_of
+from kappaskin.scenes import LineNumbers, Scene, TomlTable, scene_of
 from kappaskin.studies.design.draws import Distribution, read_draw
 
 _NAME = "the study"
@@ -85,7 +85,7 @@ class Setup:
     draws: tuple[tuple[str, Distribution], ...]
 
 
-def read_setup(top: Table, file: Path, known: Iterable[str]) -> Setup:
+def read_setup(top: TomlTable, file: Path, known: Iterable[str]) -> Setup:
     """The setup that a file says at its `top`, which measures things that are `known`."""
     tables = fit, place, measure = [top.table(name) for name in ("fit", "place", "measure")]
     drawing = top.tables("draw")
@@ -107,7 +107,7 @@ def read_setup(top: Table, file: Path, known: Iterable[str]) -> Setup:
     return Setup(scene, *made, tuple(read_draw(table) for table in drawing))
 
 
-def _scene(top: Table, file: Path) -> Scene:
+def _scene(top: TomlTable, file: Path) -> Scene:
     """The scene, of which a worker that has no other files can make all."""
     for touch in top.tables("touch"):
         for key in _ELSEWHERE:
@@ -126,7 +126,7 @@ def _scene(top: Table, file: Path) -> Scene:
 def setup_of(said: dict[str, Any], known: Iterable[str]) -> Setup:
     """The setup of what a point says; its refusals name no file."""
     try:
-        return read_setup(Table(said, Lines(""), _NAME), Path("study.toml"), known)
+        return read_setup(TomlTable(said, LineNumbers(""), _NAME), Path("study.toml"), known)
     except Refusal as refusal:
         raise Refusal(str(refusal).removeprefix(f"{_NAME}, line 1: ")) from refusal
 

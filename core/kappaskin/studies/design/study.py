@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes import Lines, Table, parsed, read_scene_text
+from kappaskin.scenes import LineNumbers, TomlTable, parsed, read_scene_text
 from kappaskin.studies.design.draws import Distribution
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.places import parts_of, with_values
@@ -116,7 +116,7 @@ def load_study(name: str) -> Study:
 def read_study(text: str, file: Path) -> Study:
     """The study that `text`, of `file`, describes."""
     said = parsed(text, file)
-    top = Table(said, Lines(text), str(file))
+    top = TomlTable(said, LineNumbers(text), str(file))
     tables, stopping = top.tables("vary"), top.table("stop")
     base = read_setup(top, file, MEASURES)
     stop = _stop(stopping, base.measure.what)
@@ -134,7 +134,7 @@ def read_study(text: str, file: Path) -> Study:
     return Study(file.stem, title, description, text, base, axes, stop, own)
 
 
-def _stop(table: Table, measured: tuple[str, ...]) -> Stop:
+def _stop(table: TomlTable, measured: tuple[str, ...]) -> Stop:
     made = table.make(Stop)
     table.done()
     among = {name: name for name in measured}
@@ -144,7 +144,7 @@ def _stop(table: Table, measured: tuple[str, ...]) -> Stop:
 
 
 def _check_places(
-    top: Table, axes: tuple[Axis, ...], draws: tuple[tuple[str, Distribution], ...]
+    top: TomlTable, axes: tuple[Axis, ...], draws: tuple[tuple[str, Distribution], ...]
 ) -> None:
     """Refuse what would be said twice, and what changes nothing that is simulated."""
     seen = list[list[str | int]]()
@@ -157,7 +157,7 @@ def _check_places(
 
 
 def _check_place(
-    table: Table, key: str, place: str, barred: tuple[str, ...], seen: list[list[str | int]]
+    table: TomlTable, key: str, place: str, barred: tuple[str, ...], seen: list[list[str | int]]
 ) -> None:
     with table.blamed(key):
         parts = parts_of(place)
@@ -171,7 +171,7 @@ def _check_place(
     seen.append(parts)
 
 
-def _check(table: Table, key: str, said: dict[str, Any], values: dict[str, Any]) -> None:
+def _check(table: TomlTable, key: str, said: dict[str, Any], values: dict[str, Any]) -> None:
     """Refuse `values` by place, which are said at a `key`, that the scene cannot have."""
     try:
         setup_of(with_values(said, values), MEASURES)

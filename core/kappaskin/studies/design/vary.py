@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes import Table
+from kappaskin.scenes import TomlTable
 
 _SPACING = {"even": np.linspace, "log": np.geomspace}
 
@@ -53,7 +53,7 @@ class Axis:
             yield dict(zip(self.places, values, strict=True))
 
 
-def read_axis(table: Table, most: int) -> Axis:
+def read_axis(table: TomlTable, most: int) -> Axis:
     """What a table [[vary]] goes through, `most` values of each thing at most."""
     places = {place: _values(table, place, most) for place in table}
     counts = {place: len(values) for place, values in places.items()}
@@ -65,7 +65,7 @@ def read_axis(table: Table, most: int) -> Axis:
     return Axis(places)
 
 
-def _values(table: Table, place: str, most: int) -> list[Any]:
+def _values(table: TomlTable, place: str, most: int) -> list[Any]:
     if not table.is_table(place):
         return table.listed(place)
     said = table.table(place)

@@ -1,6 +1,7 @@
-"""A table of a TOML file to values of the kinds asked for; what nobody asks for is refused."""
+"""Strict reading of TOML: values of the kinds asked for; a refusal names its line."""
 
 import difflib
+import re
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields
@@ -8,8 +9,61 @@ from types import UnionType
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes.effects.parameters import Within
-from kappaskin.scenes.lines import Lines, Place
+from kappaskin.scenes.effects import Within
+
+# A name begins and ends with what is no space: else a line of spaces is tried in every way.
+_HEADER = re.compile(r"\s*(\[\[?)\s*([\w.\-\"']+(?: +[\w.\-\"']+)*)\s*\]\]?\s*(#.*)?$")
+_KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w\-"'.]+)\s*=""")
+
+Place = tuple[str | int, ...]
+"""The way to a value: keys, and numbers from 0 where tables come in arrays."""
+
+
+def _names(dotted: str) -> list[str]:
+    if dotted[0] == dotted[-1] and dotted.count(dotted[0]) == 2 and dotted[0] in "\"'":
+        return [dotted[1:-1]]
+    return [name.strip().strip("\"'") for name in dotted.split(".")]
+
+
+class LineNumbers:
+    """Where the keys of a file stand; of what is inside a value, where the value begins."""
+
+    def __init__(self, text: str) -> None:
+        self._lines: dict[Place, int] = {(): 1}
+        within, counts = list[str | int](), dict[str, int]()
+        in_text = False  # of several lines
+        for number, line in enumerate(text.split("\n"), 1):
+            was_in_text, quotes = in_text, line.count('"""') + line.count("'''")
+            in_text ^= quotes % 2 == 1
+            if was_in_text:
+                continue
+            if header := _HEADER.match(line):
+                if header[1] == "[[":
+                    counts[header[2]] = counts.get(header[2], -1) + 1
+                    for inner in [name for name in counts if name.startswith(f"{header[2]}.")]:
+                        del counts[inner]  # a new table has none yet
+                within = self._counted(_names(header[2]), counts)
+                self._lines[tuple(within)] = number
+            elif key := _KEY.match(line):
+                self._lines.setdefault((*within, *_names(key[1])), number)
+
+    @staticmethod
+    def _counted(names: list[str], counts: dict[str, int]) -> list[str | int]:
+        """The names with the number of the last table after those that are arrays of tables."""
+        place, dotted = list[str | int](), list[str]()
+        for name in names:
+            dotted.append(name)
+            place.append(name)
+            if ".".join(dotted) in counts:
+                place.append(counts[".".join(dotted)])
+        return place
+
+    def of(self, place: Place) -> int:
+        """The line of what is at `place`, or of the nearest thing around it."""
+        while place not in self._lines:
+            place = place[:-1]
+        return self._lines[place]
+
 
 _Made = TypeVar("_Made")
 _REQUIRED = object()
@@ -26,10 +80,12 @@ class _Placed(Refusal):
     """A refusal that says already where in the file it stands."""
 
 
-class Table:
+class TomlTable:
     """What a file says at one `place`; it is refused where it says what nobody asks for."""
 
-    def __init__(self, said: dict[str, Any], lines: Lines, name: str, place: Place = ()) -> None:
+    def __init__(
+        self, said: dict[str, Any], lines: LineNumbers, name: str, place: Place = ()
+    ) -> None:
         self._said, self._lines, self._name, self.place = said, lines, name, place
         self._asked: set[str] = set()
 
@@ -98,15 +154,15 @@ class Table:
             return value
         raise self.refusal(f"expected {_expected(kind)}, got {value!r:.60}", key)
 
-    def table(self, key: str) -> "Table":
+    def table(self, key: str) -> "TomlTable":
         """The table at `key`; an empty one when there is none."""
         self._asked.add(key)
         said = self._said.get(key, {})
         if not isinstance(said, dict):
             raise self.refusal(f"expected a table [{key}], got {said!r:.60}", key)
-        return Table(cast("dict[str, Any]", said), self._lines, self._name, (*self.place, key))
+        return TomlTable(cast("dict[str, Any]", said), self._lines, self._name, (*self.place, key))
 
-    def tables(self, key: str) -> "list[Table]":
+    def tables(self, key: str) -> "list[TomlTable]":
         """The tables of the array [[key]]."""
         self._asked.add(key)
         said = self._said.get(key, [])
@@ -114,7 +170,7 @@ class Table:
         if not all(isinstance(one, dict) for one in many):
             raise self.refusal(f"expected an array of tables [[{key}]], got {said!r:.60}", key)
         return [
-            Table(cast("dict[str, Any]", one), self._lines, self._name, (*self.place, key, n))
+            TomlTable(cast("dict[str, Any]", one), self._lines, self._name, (*self.place, key, n))
             for n, one in enumerate(many)
         ]
 

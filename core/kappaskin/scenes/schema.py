@@ -1,13 +1,13 @@
 """What a scene file may ask for at most: beyond, numbers mean nothing or take minutes."""
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes.effects.parameters import Within
+from kappaskin.scenes.effects import Within
 from kappaskin.skin import Disk, Patch, Polygon
 
 RATE = Within(1e-3, 1e6, "frames/s")
 SEED = Within(0, 2**64, whole=True)
 HOLD, DWELL, RADII = Within(0, 1e6, "s"), Within(1e-3, 1e6, "s"), Within(1e-4, 1e3, "m")
-SKIN = {
+SKIN_LIMITS = {
     "rigidity": Within(1e-12, 1e6, "N m"),
     "tension": Within(1e-9, 1e6, "N/m"),
     "foundation": Within(1e-9, 1e12, "N/m^3"),
