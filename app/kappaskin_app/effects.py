@@ -4,12 +4,11 @@ import inspect
 
 from kappaskin.scenes.effects import EFFECTS
 
-_CALLED = {"dead": "Dead elements", "stuck": "Stuck elements", "intermittent": "Loose elements"}
-
 
 def called(effect: str) -> str:
     """What people call an effect, also one that is not known."""
-    return _CALLED.get(effect, effect.replace("-", " ").capitalize())
+    kind = EFFECTS.get(effect)
+    return kind.called() if kind else effect.replace("-", " ").capitalize()
 
 
 def explained(effect: str) -> str:

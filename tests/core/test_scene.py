@@ -22,7 +22,7 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.scenes import TABLE_1_NOISE, LoadingHistory, scaled_to, survey_times
-from kappaskin.scenes.schema import check_elements
+from kappaskin.scenes.read import check_elements
 from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep, SlideStep, contact_of
 
 PATCH = Patch(0.1, 0.1)

@@ -11,8 +11,8 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AbstractTable, AoT, InlineTable, Table
 
+from kappaskin.scenes import PARTS, instead_of
 from kappaskin_app.scene_text.parsing import parsed
-from kappaskin_app.scene_text.parts import alike, instead_of, known, missing, needed
 from kappaskin_app.scene_text.places import placed
 
 Place = tuple[str | int, ...]
@@ -82,7 +82,7 @@ def add_table(text: str, place: Place, said: dict[str, Any]) -> str:
 
 def add_touch(text: str, kind: str) -> str:
     """The text with one more touch of this kind, at a like place of the skin that is there."""
-    said = placed(needed("touch", kind), parsed(text).get("skin"))
+    said = placed(PARTS["touch"].needed(kind), parsed(text).get("skin"))
     return _add(text, ("touch",), {"what": kind} | said)
 
 
@@ -94,7 +94,7 @@ def add_step(text: str, path: Place, kind: str) -> str:
     many = _at(parsed(text), path)
     before = isinstance(many, list) and many and _lifts(many[-1]) and not _lifts({"step": kind})
     return _add(
-        text, path, {"step": kind} | needed("step", kind), len(many) - 1 if before else None
+        text, path, {"step": kind} | PARTS["step"].needed(kind), len(many) - 1 if before else None
     )
 
 
@@ -110,17 +110,23 @@ def change_kind(text: str, place: Place, part: str, kind: str) -> str:
     document = parsed(text)
     at, key = place[:-1], str(place[-1])
     owner = _at(document, at)
-    may = known(part, kind)
+    may = PARTS[part].known(kind)
     said = {
         name: value
         for name, value in owner.items()
-        if name == key or (name in may and alike(_plain(value), may[name]))
+        if name == key or (name in may and _alike(_plain(value), may[name]))
     }
-    more = missing(part, kind, said)
+    more = PARTS[part].missing(kind, said)
     if part == "touch":
         more = placed(more, document.get("skin"))
     _set(document, at, said | {key: kind} | more)
     return _tidy(text, document)
+
+
+def _alike(value: Any, other: Any) -> bool:
+    """Whether two values are of a kind, as far as a form is concerned."""
+    numbers = [isinstance(one, int | float) and not isinstance(one, bool) for one in (value, other)]
+    return all(numbers) or (not any(numbers) and type(value) is type(other))
 
 
 def forced(text: str, effect: str, how: str) -> str:

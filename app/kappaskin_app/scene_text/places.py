@@ -9,7 +9,7 @@ from tomlkit.items import AbstractTable
 from kappaskin.errors import Refusal
 from kappaskin_app.scene_text.parsing import parsed
 
-_SIDE = 0.1  # m of the skin that parts.toml has its places on
+_SIDE = 0.1  # m of the skin that the schema's examples have their places on
 
 
 def placed(said: dict[str, Any], skin: Any) -> dict[str, Any]:

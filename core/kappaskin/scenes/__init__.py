@@ -12,12 +12,16 @@ from kappaskin.scenes.cylinders import check_strain as check_strain
 from kappaskin.scenes.cylinders import radii_for as radii_for
 from kappaskin.scenes.cylinders import schedule as schedule
 from kappaskin.scenes.cylinders import step_pairs as step_pairs
+from kappaskin.scenes.keys import Key as Key
+from kappaskin.scenes.keys import Unit as Unit
+from kappaskin.scenes.keys import instead_of as instead_of
 from kappaskin.scenes.plan import Plan as Plan
 from kappaskin.scenes.plan import kept_effects as kept_effects
 from kappaskin.scenes.plan import plan as plan
 from kappaskin.scenes.plan import planned as planned
 from kappaskin.scenes.read import SCENES as SCENES
 from kappaskin.scenes.read import TABLE_1_NOISE as TABLE_1_NOISE
+from kappaskin.scenes.read import check_sides as check_sides
 from kappaskin.scenes.read import load_scene as load_scene
 from kappaskin.scenes.read import parsed as parsed
 from kappaskin.scenes.read import read_scene as read_scene
@@ -33,8 +37,7 @@ from kappaskin.scenes.scene import Scene as Scene
 from kappaskin.scenes.scene import scaled_to as scaled_to
 from kappaskin.scenes.scene import survey_duration as survey_duration
 from kappaskin.scenes.scene import survey_times as survey_times
-from kappaskin.scenes.schema import SKIN_LIMITS as SKIN_LIMITS
-from kappaskin.scenes.schema import check_sides as check_sides
+from kappaskin.scenes.schema import PARTS as PARTS
 from kappaskin.scenes.simulator import Simulator as Simulator
 from kappaskin.scenes.stimulus import Indenter as Indenter
 from kappaskin.scenes.stimulus import Orbit as Orbit

@@ -12,25 +12,9 @@ from typing import Any, cast, get_type_hints
 
 import numpy as np
 
-from kappaskin.bases import EDGES, basis_for
+from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
-from kappaskin.mechanics import (
-    Block,
-    Cylinder,
-    DiscLoad,
-    GaussianLoad,
-    HeightMap,
-    LineLoad,
-    Load,
-    Mesh,
-    Plate,
-    PointLoad,
-    Punch,
-    RectangleLoad,
-    RigidObject,
-    Sphere,
-    Wedge,
-)
+from kappaskin.mechanics import HeightMap, Load, Mesh, Plate, RigidObject
 from kappaskin.scenes.cylinders import Presentation, schedule
 from kappaskin.scenes.effects import (
     EFFECTS,
@@ -45,63 +29,32 @@ from kappaskin.scenes.effects import (
 from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import LINEAR, EffectSelection, Scene, scaled_to
 from kappaskin.scenes.schema import (
-    DWELL,
-    HOLD,
-    RADII,
-    RATE,
-    SEED,
-    SKIN_LIMITS,
-    check_elements,
-    check_functions,
-    check_sides,
+    CYLINDERS,
+    EFFECT,
+    ELECTRONICS,
+    ELEMENTS,
+    FORMAT,
+    LOADS,
+    OBJECTS,
+    SCENE,
+    SKIN,
+    STEP,
+    TOUCH,
 )
 from kappaskin.scenes.stimulus import (
-    HoldStep,
     Indenter,
     Motion,
     MotionPath,
     MotionStep,
     Orbit,
-    PressStep,
     RecordedMotion,
-    ReleaseStep,
-    SlideStep,
     Stimulus,
-    TapStep,
-    TurnStep,
 )
 from kappaskin.scenes.tables import LineNumbers, TomlTable
 from kappaskin.sensing import FIRST_GENERATION, SECOND_GENERATION, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 
-STEPS: dict[str, type[MotionStep]] = {
-    "press": PressStep,
-    "hold": HoldStep,
-    "release": ReleaseStep,
-    "slide": SlideStep,
-    "roll": SlideStep,
-    "turn": TurnStep,
-    "tap": TapStep,
-}
-LOADS: dict[str, type[Load]] = {
-    "point": PointLoad,
-    "line": LineLoad,
-    "disc": DiscLoad,
-    "rectangle": RectangleLoad,
-    "gaussian": GaussianLoad,
-}
-OBJECTS: dict[str, type[RigidObject]] = {
-    "sphere": Sphere,
-    "cylinder": Cylinder,
-    "wedge": Wedge,
-    "punch": Punch,
-    "block": Block,
-    "heights": HeightMap,
-    "mesh": Mesh,
-}
-
 _LARGEST_RECORD = 2**22  # bytes of a recorded motion
-_FORCE = Within(-1e6, 1e6, "N")
 
 
 def read_stimulus(
@@ -109,19 +62,20 @@ def read_stimulus(
 ) -> Stimulus:
     """What a [[touch]] of `plate` says; `moved` makes a load move its place so far in m."""
     what: Load | Indenter
-    if (name := table.choose("what", {name: name for name in (*LOADS, *OBJECTS)})) in OBJECTS:
-        what = table.make(Indenter, rigid=_object(table, OBJECTS[name], folder))
+    if (name := TOUCH.choose(table, "what")) in OBJECTS:
+        what = table.make(Indenter, rigid=_object(table, OBJECTS[name].made, folder))
     else:
-        what = table.make(LOADS[name])
+        what = load = table.make(cast("type[Load]", LOADS[name].made))
         if "displacement" in table:
             if "force" in table:
                 raise table.refusal("expected a force or a displacement, got both", "displacement")
             with table.blamed():
-                what.check(plate.patch)
+                load.check(plate.patch)
             with table.blamed("displacement"):
-                what = moved(what, table.get("displacement", float))
-    if what.force is not None and what.force not in _FORCE:
-        raise table.refusal(f"expected a force of {_FORCE}, got {what.force:g}", "force")
+                what = moved(load, TOUCH.value(table, "displacement"))
+    force = TOUCH.limits["force"]
+    if what.force is not None and what.force not in force:
+        raise table.refusal(f"expected a force of {force}, got {what.force:g}", "force")
     made = Stimulus(what, _motion(table, folder))
     table.done()
     with table.blamed():
@@ -133,16 +87,16 @@ def _object(table: TomlTable, kind: type[RigidObject], folder: Path) -> RigidObj
     """The rigid object that the table describes, read from a file in `folder` if it has one."""
     with table.blamed():
         if kind is Mesh:
-            return Mesh.read(_beside(table, "file", folder), table.get("unit", float, 1.0))
+            return Mesh.read(_beside(table, "file", folder), TOUCH.value(table, "unit"))
         if kind is HeightMap:
-            sizes = (table.get(key, float) for key in ("length", "width", "relief"))
+            sizes = (TOUCH.value(table, key) for key in ("length", "width", "relief"))
             return HeightMap.read(_beside(table, "file", folder), *sizes)
         return table.make(kind)
 
 
 def _beside(table: TomlTable, key: str, folder: Path) -> Path:
     """The file that the table names, which lies beside that of the scene."""
-    file = folder / table.get(key, str)
+    file = folder / TOUCH.value(table, key)
     if not file.is_file():
         raise table.refusal(
             f"expected the name of a file beside that of the scene, got {str(file)!r:.200}, where "
@@ -170,7 +124,7 @@ def _motion(table: TomlTable, folder: Path) -> Motion | None:
 
 
 def _step(table: TomlTable) -> MotionStep:
-    made = table.make(table.choose("step", STEPS))
+    made = table.make(STEP.kinds[STEP.choose(table, "step")].made)
     table.done()
     return made
 
@@ -193,24 +147,10 @@ def _recorded(file: Path) -> RecordedMotion:
     return RecordedMotion(rows[:, 0], rows[:, 1:])
 
 
-FORMAT = 1
 _LARGEST_SCENE = 2**24  # bytes
 _DEEP_TABLES = re.compile(r"(?:\.[\w\"'-]+){64}")  # tables in tables, which take long to read
 
-ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
-ELSEWHERE = {
-    "tension": "[skin] has the tension",
-    "foam": "[skin] has the foundation",
-    "fluid": "[skin] has the fluid",
-    "dead": "[elements] has those that are dead",
-    "gage-length": "[elements] has the gage_length",
-    "finite-slope": "it has no numbers: name it in choose, on or off",
-    "skew": "the converter's times make it",
-    "saturation": "the amplifier and the converter make it",
-    "quantisation": "the converter makes it",
-}
-"""Effects that follow from what a scene says elsewhere."""
-
+CHAINS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
 LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 
 
@@ -234,7 +174,7 @@ def read_scene(text: str, file: Path) -> Scene:
 def scene_of(top: TomlTable, file: Path) -> Scene:
     """The scene that a file says at its `top`, besides what somebody else has asked for there."""
     name, folder = file.stem.removesuffix(".scene"), file.parent
-    if (version := top.get("format", int)) != FORMAT:
+    if (version := SCENE.value(top, "format")) != FORMAT:
         raise top.refusal(
             f"expected a scene of format {FORMAT}, got {version}; get a newer kappaskin"
             if version > FORMAT
@@ -243,7 +183,7 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
         )
     plate, edge = _skin(top.table("skin"))
     layout = _elements(top.table("elements"), plate.patch)
-    reference = top.get("reference", tuple[int, int], (15, 1 if plate.patch.strip else 15))
+    reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
         check_functions(plate.patch, edge, reference, len(layout))
@@ -254,7 +194,7 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
     )
     electronics = _electronics(top.table("electronics"))
     choice, effects = _effects(top, electronics, layout)
-    rate, seed = top.get("rate", float, 500.0, RATE), top.get("seed", int, 0, SEED)
+    rate, seed = SCENE.value(top, "rate"), SCENE.value(top, "seed")
     with top.blamed():
         scene = Scene(
             name,
@@ -268,8 +208,8 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
             reference,
             edge,
             choice=choice,
-            title=top.get("title", str, name),
-            text=top.get("text", str, ""),
+            title=SCENE.value(top, "title", default=name),
+            text=SCENE.value(top, "text"),
         )
         with top.blamed("rate"):
             scene.sensor()
@@ -288,49 +228,42 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
 
 
 def _skin(table: TomlTable) -> tuple[Plate, str]:
-    shapes: dict[str, Callable[[], Patch]] = {
-        "rectangle": lambda: _rectangle(table, strip=False),
-        "strip": lambda: _rectangle(table, strip=True),
-        "disk": lambda: Disk(table.get("rim_radius", float)),
-        "polygon": lambda: Polygon(table.get("outline", tuple[tuple[float, float], ...])),
-    }
-    make = table.choose("shape", shapes, "rectangle")
+    shape = SKIN.choose(table, "shape")
     with table.blamed():
-        patch = make()
+        patch = _patch(table, shape)
         check_sides(patch)
-    for name, within in SKIN_LIMITS.items():
-        if table.get(name, float, 0.0):  # with no tension at all, say, it is none
-            table.get(name, float, within=within)
-    plate = table.make(Plate, patch=patch)
-    edge = table.choose("edge", {edge: edge for edge in EDGES}, "hinged")
+    plate = SKIN.make(table, Plate, patch=patch)
+    edge = SKIN.choose(table, "edge")
     table.done()
     return plate, edge
 
 
-def _rectangle(table: TomlTable, strip: bool) -> Patch:
-    a, b = table.get("size", tuple[float, float])
-    return Patch(a, b, table.get("radius", float, math.inf), strip)
+def _patch(table: TomlTable, shape: str) -> Patch:
+    if shape == "disk":
+        return Disk(SKIN.value(table, "rim_radius"))
+    if shape == "polygon":
+        return Polygon(SKIN.value(table, "outline"))
+    a, b = SKIN.value(table, "size")
+    return Patch(a, b, SKIN.value(table, "radius"), shape == "strip")
 
 
 def _elements(table: TomlTable, patch: Patch) -> SensorLayout:
     with table.blamed():
         if "positions" in table:
-            layout = SensorLayout.scattered(
-                patch, table.get("positions", tuple[tuple[float, float], ...])
-            )
+            layout = SensorLayout.scattered(patch, ELEMENTS.value(table, "positions"))
         else:
-            grid = table.get("grid", tuple[int, int], (10, 10))
+            grid = ELEMENTS.value(table, "grid")
             check_elements(*grid)
             layout = SensorLayout.regular(patch, *grid)
         check_elements(len(layout))
-        layout = layout.without(table.get("dead", tuple[int, ...], ()))
-        layout = replace(layout, gage_length=table.get("gage_length", float, 0.0))
+        layout = layout.without(ELEMENTS.value(table, "dead"))
+        layout = replace(layout, gage_length=ELEMENTS.value(table, "gage_length"))
     table.done()
     return layout
 
 
 def _electronics(table: TomlTable) -> Transduction:
-    chain = table.choose("like", ELECTRONICS, "modern")
+    chain = CHAINS[ELECTRONICS.choose(table, "like")]
     parts = {
         name: _changed(table.table(name), getattr(chain, name))
         for name in ("bridge", "multiplexer", "amplifier", "converter")
@@ -350,12 +283,11 @@ def _changed(table: TomlTable, part: Any) -> Any:
 
 
 def _cylinders(table: TomlTable, scene: Scene) -> Presentation:
-    hold = table.get("hold", float, 0.0, HOLD)
-    radii = table.get("radii", tuple[float, ...], (), RADII)
+    hold, radii = CYLINDERS.value(table, "hold"), CYLINDERS.value(table, "radii")
     with table.blamed():
         strip = scene.plate.patch.strip
         steps = schedule(radii, hold, strip) if radii else schedule(hold=hold, strip=strip)
-        made = Presentation(steps, table.get("dwell", float, 1.0, DWELL))
+        made = Presentation(steps, CYLINDERS.value(table, "dwell"))
     table.done()
     return made
 
@@ -369,8 +301,8 @@ def _effects(
     for name, kind in EFFECTS.items():
         if name in table:
             said = table.table(name)
-            if name in ELSEWHERE:
-                raise said.refusal(f"expected no such table; {ELSEWHERE[name]}")
+            if kind.elsewhere:
+                raise said.refusal(f"expected no such table; {kind.elsewhere}")
             if name == "hysteresis" and "like" in said:
                 found.append(said.choose("like", LOOPS))
             elif kind is StrainLimit:
@@ -381,7 +313,7 @@ def _effects(
             if isinstance(effect := found[-1], StuckElements | IntermittentElements):
                 with said.blamed("elements"):
                     effect.channels((3 * len(layout),))
-    accuracy = top.get("accuracy", float, 0.01)
+    accuracy = SCENE.value(top, "accuracy")
     with top.blamed("accuracy"):
         EffectSelection(accuracy=accuracy)
     with table.blamed("choose"):
@@ -392,8 +324,8 @@ def _effects(
 
 def _choice(table: TomlTable, accuracy: float) -> EffectSelection:
     """`choose` is auto, all, linear or a list of names; `on` and `off` force some."""
-    on, off = (frozenset(table.get(key, tuple[str, ...], ())) for key in ("on", "off"))
-    if not isinstance(named := table.get("choose", str | tuple[str, ...], "auto"), str):
+    on, off = (frozenset(EFFECT.value(table, key)) for key in ("on", "off"))
+    if not isinstance(named := EFFECT.value(table, "choose"), str):
         if on or off:
             raise Refusal("expected either a list of effects, or some on and off, got both")
         listed = EffectSelection(False, accuracy, on=frozenset(named))
@@ -407,8 +339,46 @@ def _choice(table: TomlTable, accuracy: float) -> EffectSelection:
 
 def _wanted(table: TomlTable) -> set[str]:
     """The effects that a file asks for by name."""
-    named = table.get("choose", str | tuple[str, ...], "auto")
-    return {*table.get("on", tuple[str, ...], ()), *(() if isinstance(named, str) else named)}
+    named = EFFECT.value(table, "choose")
+    return {*EFFECT.value(table, "on"), *(() if isinstance(named, str) else named)}
+
+
+_SIDE = Within(1e-4, 10, "m")
+_MOST_ELEMENTS = 2**16 // 3  # as many as the wire's format can tell apart
+_MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
+_MOST_FUNCTIONS, _MOST_THAT_MIX = 64**2, 20**2  # some seconds to make the skin of
+
+
+def check_sides(patch: Patch) -> None:
+    """Refuse a skin that no sensor is as large or small as."""
+    if patch.a not in _SIDE or patch.b not in _SIDE:
+        raise Refusal(
+            f"expected sides of {_SIDE}, got {patch.a:g} x {patch.b:g} m; lengths are in metres"
+        )
+
+
+def check_elements(m: int, n: int = 1) -> None:
+    """Refuse more elements than a device could send the readings of."""
+    if m * n > _MOST_ELEMENTS:
+        raise Refusal(f"expected at most {_MOST_ELEMENTS} elements, got {m} x {n}; take fewer")
+
+
+def check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:
+    """Refuse more functions of the true shape than a few seconds and some memory are enough for."""
+    whole = isinstance(patch, Disk | Polygon)
+    mix = whole or patch.base_curvature or edge != "hinged"
+    most = _MOST_THAT_MIX if mix else _MOST_FUNCTIONS
+    most = min(most, _MOST_VALUES // (3 * elements))
+    if min(counts) > 0 and counts[0] * counts[1] > most:
+        raise Refusal(
+            f"expected at most {most} functions in all of the true shape of this skin with "
+            f"{elements} elements, got {counts[0]} x {counts[1]}; take fewer"
+        )
+
+
+def usual_reference(patch: Patch) -> tuple[int, int]:
+    """The number of functions of the true shape of a skin that says none."""
+    return (15, 1 if patch.strip else 15)
 
 
 def read_scene_text(file: Path) -> str:

@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields
 from types import UnionType
@@ -10,6 +10,18 @@ from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from kappaskin.errors import Refusal
 from kappaskin.scenes.effects import Within
+
+_Made = TypeVar("_Made")
+
+REQUIRED = object()
+"""The default of a key that has none."""
+
+_KINDS: dict[Any, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "a text",
+}
 
 # A name begins and ends with what is no space: else a line of spaces is tried in every way.
 _HEADER = re.compile(r"\s*(\[\[?)\s*([\w.\-\"']+(?: +[\w.\-\"']+)*)\s*\]\]?\s*(#.*)?$")
@@ -65,17 +77,6 @@ class LineNumbers:
         return self._lines[place]
 
 
-_Made = TypeVar("_Made")
-_REQUIRED = object()
-
-_KINDS: dict[Any, str] = {
-    float: "a number",
-    int: "a whole number",
-    bool: "true or false",
-    str: "a text",
-}
-
-
 class _Placed(Refusal):
     """A refusal that says already where in the file it stands."""
 
@@ -122,7 +123,7 @@ class TomlTable:
         return cast("list[Any]", said)
 
     def get(
-        self, key: str, kind: Any, default: Any = _REQUIRED, within: Within | None = None
+        self, key: str, kind: Any, default: Any = REQUIRED, within: Within | None = None
     ) -> Any:
         """The value at `key`, of `kind`: float, int, bool, str, or a tuple of them.
 
@@ -134,7 +135,7 @@ class TomlTable:
             if within is not None and not _all_within(value, within):
                 raise self.refusal(f"expected {within}, got {self._said[key]!r:.60}", key)
             return value
-        if default is _REQUIRED:
+        if default is REQUIRED:
             raise self.refusal(f"expected {key} = {_expected(kind)}, got none")
         return default
 
@@ -174,19 +175,26 @@ class TomlTable:
             for n, one in enumerate(many)
         ]
 
-    def make(self, kind: Callable[..., _Made], **given: Any) -> _Made:
-        """An instance of the dataclass `kind`, its fields as the table says, or as `given`."""
+    def make(
+        self, kind: Callable[..., _Made], limits: Mapping[str, Within] | None = None, **given: Any
+    ) -> _Made:
+        """An instance of the dataclass `kind`, its fields as the table says, or as `given`.
+
+        Numbers must be within their `limits`, by key.
+        """
         hints, values = get_type_hints(kind), dict(given)
         for field in fields(cast("Any", kind)):
             if field.init and field.name not in given:
                 required = field.default is MISSING and field.default_factory is MISSING
                 if required or field.name in self:
-                    values[field.name] = self.get(field.name, hints[field.name])
+                    values[field.name] = self.get(
+                        field.name, hints[field.name], within=(limits or {}).get(field.name)
+                    )
                 self._asked.add(field.name)
         with self.blamed():
             return kind(**values)
 
-    def choose(self, key: str, among: dict[str, _Made], default: Any = _REQUIRED) -> _Made:
+    def choose(self, key: str, among: dict[str, _Made], default: Any = REQUIRED) -> _Made:
         """What the name at `key` stands for."""
         return self.stands_for(self.get(key, str, default), key, among)
 

@@ -13,22 +13,35 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import Load, RigidObject
 from kappaskin.scenes.cylinders import RADII, Presentation, schedule
-from kappaskin.scenes.effects import EFFECTS, Effect, StrainLimit, parameters
+from kappaskin.scenes.effects import EFFECTS, Effect, StrainLimit
+from kappaskin.scenes.keys import Kind
 from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.read import (
-    ELECTRONICS,
-    ELSEWHERE,
-    FORMAT,
-    LOADS,
+    CHAINS,
     LOOPS,
-    OBJECTS,
-    STEPS,
     read_scene,
+    usual_reference,
 )
 from kappaskin.scenes.scene import Scene
+from kappaskin.scenes.schema import (
+    CYLINDERS,
+    EFFECT,
+    ELECTRONICS,
+    ELEMENTS,
+    FORMAT,
+    LOADS,
+    OBJECTS,
+    PARTS,
+    SCENE,
+    SKIN,
+    STEP,
+    TOUCH,
+)
 from kappaskin.scenes.stimulus import Indenter, Motion, MotionPath, MotionStep, Orbit, Stimulus
 from kappaskin.sensing import SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
+
+_MOST_CELLS = 2**20  # of a grid that is looked for
 
 
 def said_of(owner: object, usual: object = None, without: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -52,9 +65,6 @@ def plain(value: Any, kind: Any) -> Any:
     return float(value) if kind is float or float in get_args(kind) else int(value)
 
 
-TOUCH_UNITS = {"angle": "rad", "force": "N", "depth": "m", "turn": "rad"}
-
-
 def touch_of(stimulus: Stimulus) -> dict[str, Any]:
     """What a [[touch]] says of the stimulus; what came from another file is refused."""
     what = stimulus.what
@@ -62,10 +72,10 @@ def touch_of(stimulus: Stimulus) -> dict[str, Any]:
     return {**said, **_motion(stimulus.motion)}
 
 
-def _name(among: dict[str, type[Any]], one: object) -> str:
+def _name(among: Mapping[str, Kind], one: object) -> str:
     """What a file calls `one`; the first of two names for the same."""
     for name, kind in among.items():
-        if type(one) is kind:
+        if type(one) is kind.made:
             return name
     raise Refusal(f"expected one of {', '.join(among)} to write in a scene file, got {one!r:.80}")
 
@@ -110,21 +120,7 @@ def _step(step: MotionStep) -> dict[str, Any]:
     time = ("seconds", "ease")
     said = said_of(step)
     last = {key: said.pop(key) for key in time if key in said}
-    return {"step": _name(STEPS, step), **said, **last}
-
-
-_METRES = ("size", "rim_radius", "outline", "radius", "positions", "gage_length", "radii")
-_UNITS = {
-    **dict.fromkeys((*_METRES, "substrate_thickness", "gage_thickness"), "m"),
-    **{"rigidity": "N m", "tension": "N/m", "foundation": "N/m^3"},
-    **{"axial_stiffness": "N/m", "rim_stiffness": "N/m^2"},
-    **dict.fromkeys(("excitation", "balance_voltage", "rail", "full_scale", "offset"), "V"),
-    **dict.fromkeys(("gage_resistance", "dummy_resistance", "supply_resistance"), "ohm"),
-    **dict.fromkeys(("settling_time", "conversion_time", "hold"), "s"),
-    **{"dwell": "s on each", "rate": "frames/s"},
-}
-_EFFECT_UNITS = {"time_constant": "s", "thresholds": "1/m"}
-_MOST_CELLS = 2**20  # of a grid that is looked for
+    return {"step": _name(STEP.kinds, step), **said, **last}
 
 
 def write_scene(scene: Scene) -> str:
@@ -135,42 +131,40 @@ def write_scene(scene: Scene) -> str:
     """
     scene.sensor()  # as for a reader, a rate that cannot be kept is refused
     tables = [
-        table("", _top(scene), _UNITS),
-        table("[skin]", _skin(scene), _UNITS),
-        table("[elements]", _elements(scene.layout), _UNITS),
+        table("", _top(scene), SCENE.comments()),
+        table("[skin]", _skin(scene), SKIN.comments()),
+        table("[elements]", _elements(scene.layout), ELEMENTS.comments()),
         *_electronics(scene.transduction),
     ]
     if scene.laid is not None:
-        tables.append(table("[cylinders]", _cylinders(scene.laid, scene.plate.patch), _UNITS))
+        tables.append(
+            table("[cylinders]", _cylinders(scene.laid, scene.plate.patch), CYLINDERS.comments())
+        )
     tables += _effects(scene)
-    tables += [table("[[touch]]", touch_of(each), TOUCH_UNITS) for each in scene.stimuli]
+    tables += [table("[[touch]]", touch_of(each), TOUCH.comments()) for each in scene.stimuli]
     text = "\n".join(tables)
     read_scene(text, Path(f"{scene.name}.toml"))  # it refuses what is beyond the limits of a file
     return text
 
 
 def _top(scene: Scene) -> dict[str, Any]:
-    usual = {
-        "title": scene.name,
-        "text": "",
-        "rate": 500.0,
-        "seed": 0,
-        "reference": [15, 1 if scene.plate.patch.strip else 15],
-        "accuracy": 0.01,
-    }
+    usual = {key: SCENE.key(key).default for key in SCENE.keys}
+    usual |= {"title": scene.name, "reference": usual_reference(scene.plate.patch)}
     said = {
+        "format": FORMAT,
         "title": scene.title or scene.name,
         "text": scene.text,
         "rate": float(scene.rate),
         "seed": int(scene.seed),
-        "reference": [int(count) for count in scene.reference],
+        "reference": tuple(int(count) for count in scene.reference),
         "accuracy": float(scene.choice.accuracy),
     }
-    return {"format": FORMAT} | {key: said[key] for key in said if said[key] != usual[key]}
+    told = {key: value for key, value in said.items() if value != usual[key]}
+    return {key: [*value] if isinstance(value, tuple) else value for key, value in told.items()}
 
 
 def _skin(scene: Scene) -> dict[str, Any]:
-    held = {} if scene.edge == "hinged" else {"edge": scene.edge}
+    held = {} if scene.edge == SKIN.key("edge").default else {"edge": scene.edge}
     return {**_patch(scene.plate.patch), **said_of(scene.plate, without=("patch",)), **held}
 
 
@@ -220,11 +214,14 @@ def _cells(places: Array, side: float) -> int:
 
 def _electronics(electronics: Transduction) -> list[str]:
     """The tables of what differs from the chain that the electronics are most like."""
-    each = {name: _changes(electronics, chain) for name, chain in ELECTRONICS.items()}
+    each = {name: _changes(electronics, chain) for name, chain in CHAINS.items()}
     like = min(each, key=lambda name: sum(map(len, each[name].values())))
-    told = [] if like == "modern" else [table("[electronics]", {"like": like})]
+    usual = ELECTRONICS.key("like").default
+    told = [] if like == usual else [table("[electronics]", {"like": like})]
     parts = {name: said for name, said in each[like].items() if said}
-    return told + [table(f"[electronics.{name}]", parts[name], _UNITS) for name in parts]
+    return told + [
+        table(f"[electronics.{name}]", parts[name], PARTS[name].comments()) for name in parts
+    ]
 
 
 def _changes(electronics: Transduction, chain: Transduction) -> dict[str, dict[str, Any]]:
@@ -258,18 +255,14 @@ def _effects(scene: Scene) -> list[str]:
     choice = _choice(scene)
     told = [table("[effects]", choice)] if choice else []
     return told + [
-        table(f"[effects.{effect.name}]", _effect(effect, scene), _units(effect))
+        table(f"[effects.{effect.name}]", _effect(effect, scene), EFFECT.comments(effect.name))
         for effect in scene.effects
     ]
 
 
-def _units(effect: Effect) -> Mapping[str, str]:
-    return _EFFECT_UNITS | {key: within.unit for key, within in parameters(type(effect)).items()}
-
-
 def _effect(effect: Effect, scene: Scene) -> dict[str, Any]:
-    if type(effect) is not EFFECTS[effect.name] or effect.name in ELSEWHERE:
-        why = ELSEWHERE.get(effect.name, "it is none of those known")
+    if type(effect) is not EFFECTS[effect.name] or effect.elsewhere:
+        why = effect.elsewhere or "it is none of those known"
         raise Refusal(f"expected no {effect!r:.80} among the effects of a scene file: {why}")
     for name, loops in LOOPS.items():
         if effect == loops:

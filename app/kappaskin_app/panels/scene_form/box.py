@@ -86,8 +86,8 @@ class SectionBox(QGroupBox):
 
     def _add_row(self, row: Row) -> None:
         editor = self._editor(row)
-        label = QLabel(row.how.label)
-        label.setToolTip(row.how.explained)
+        label = QLabel(row.key.label)
+        label.setToolTip(row.key.explained)
         label.setBuddy(editor.stops[0])
         self.labels.append(label)
         at = self.grid.rowCount()
@@ -101,7 +101,7 @@ class SectionBox(QGroupBox):
         editor = editor_for(row, lambda value: self._wish(lambda t: row.changed(t, value)), small)
         for number, stop in enumerate(editor.stops, 1):
             which = f", {number} of {len(editor.stops)}" if len(editor.stops) > 1 else ""
-            stop.setAccessibleName(stop.accessibleName() or f"{row.how.label}{which}")
+            stop.setAccessibleName(stop.accessibleName() or f"{row.key.label}{which}")
         self.editors[row.place] = editor
         self.stops += editor.stops
         return editor

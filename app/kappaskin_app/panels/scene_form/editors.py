@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin.scenes import Key
 from kappaskin_app.guard import guarded
 from kappaskin_app.panels.form import ChoiceBox, well_behaved
 from kappaskin_app.panels.scene_form.numbers import (
@@ -27,7 +28,6 @@ from kappaskin_app.panels.scene_form.numbers import (
     shown,
 )
 from kappaskin_app.panels.scene_form.section import Row
-from kappaskin_app.panels.scene_form.words import DEGREE, How
 
 _WIDEST = 300  # px of an editor that is no line of text
 _TYPED = QRegularExpression(r"[-+0-9.eE,; ]*")
@@ -68,19 +68,19 @@ def editor_for(row: Row, said: Said, small: bool = False) -> Editor:
         editor = _MAKERS[kind](row, said)
     else:
         editor = _spin(row, kind, row.usual, said, small)
+    tip = row.key.explained + (" Pairs stand with ; in between." if kind == "pairs" else "")
     for widget in editor.stops:
         well_behaved(widget)
-        widget.setToolTip(row.how.explained)
+        widget.setToolTip(tip)
     editor.widget.setObjectName(".".join(map(str, row.place)))
     editor.show(row.value)
     return editor
 
 
 def _spin(row: Row, kind: str, usual: Any, said: Said, small: bool) -> Editor:
-    how = row.how
-    box = _whole_box(how, said) if kind == "whole" else _number_box(how, usual, said)
-    if how.unit:
-        box.setSuffix(f"{'' if how.unit == DEGREE[0] else ' '}{how.unit}")
+    key = row.key
+    box = _whole_box(key, said) if kind == "whole" else _number_box(key, usual, said)
+    box.setSuffix(key.unit.suffix)
     box.setKeyboardTracking(False)
     box.setAlignment(Qt.AlignmentFlag.AlignRight)
     if small:
@@ -96,14 +96,14 @@ def _spin(row: Row, kind: str, usual: Any, said: Said, small: bool) -> Editor:
     return Editor(box, fill)
 
 
-def _number_box(how: How, usual: Any, said: Said) -> NumberBox:
-    box = NumberBox(how, usual)
-    box.valueChanged.connect(guarded(lambda value: said(meant(value, how))))
+def _number_box(key: Key, usual: Any, said: Said) -> NumberBox:
+    box = NumberBox(key, usual)
+    box.valueChanged.connect(guarded(lambda value: said(meant(value, key.unit))))
     return box
 
 
-def _whole_box(how: How, said: Said) -> WholeNumberBox:
-    box = WholeNumberBox(how)
+def _whole_box(key: Key, said: Said) -> WholeNumberBox:
+    box = WholeNumberBox(key)
     box.valueChanged.connect(guarded(said))
     return box
 
@@ -148,7 +148,7 @@ def _switch(row: Row, said: Said) -> Editor:
 
 def _choice(row: Row, said: Said) -> Editor:
     box = ChoiceBox()
-    for value, words in row.how.choices:
+    for value, words in row.key.choices:
         box.addItem(words, value)
     _as_wide_as_there_is_room(box)
     box.activated.connect(guarded(lambda index: said(box.itemData(index))))
@@ -224,23 +224,24 @@ def _numbers_line() -> QLineEdit:
 
 def _numbers(row: Row, said: Said) -> Editor:
     def words(values: list[Any]) -> str:
-        return ", ".join(shown(value, row.how) for value in values)
+        return ", ".join(shown(value, row.key.unit) for value in values)
 
     def read(text: str, before: list[Any]) -> list[Any]:
-        return read_numbers(text, before, row.how, whole=row.kind == "wholes")
+        return read_numbers(text, before, row.key.unit, whole=row.kind == "wholes")
 
     return _line(_numbers_line(), words, read, said)
 
 
 def _pairs(row: Row, said: Said) -> Editor:
     def words(pairs: list[list[Any]]) -> str:
-        return "; ".join(", ".join(shown(one, row.how) for one in pair) for pair in pairs)
+        return "; ".join(", ".join(shown(one, row.key.unit) for one in pair) for pair in pairs)
 
     def read(text: str, before: list[list[Any]]) -> list[list[Any]]:
         each = [part for part in text.split(";") if part.strip(" ,")]
         befores = [*before, *([[]] * len(each))]
         return [
-            read_numbers(*both, row.how, whole=False) for both in zip(each, befores, strict=False)
+            read_numbers(*both, row.key.unit, whole=False)
+            for both in zip(each, befores, strict=False)
         ]
 
     return _line(_numbers_line(), words, read, said)

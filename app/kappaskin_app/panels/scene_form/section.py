@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from kappaskin_app.panels.scene_form.words import How
+from kappaskin.scenes import Key
 from kappaskin_app.scene_text import changes
 from kappaskin_app.scene_text.changes import Place
 
@@ -21,7 +21,7 @@ class Row:
 
     place: Place
     kind: str
-    how: How
+    key: Key
     value: Any
     usual: Any = None
     part: str = ""
@@ -67,7 +67,7 @@ class Section:
         """All but the values: what its editors are made from."""
         return (
             *(self.title, self.place, self.adding),
-            tuple((row.place, row.kind, row.how) for row in self.rows),
+            tuple((row.place, row.kind, row.key) for row in self.rows),
             tuple(section.structure for section in self.sections),
             tuple(offer.words for offer in (*self.offers, *self.more)),
         )

@@ -1,15 +1,15 @@
 """What the text of a scene says to what its forms show: parts with rows, and what may be added."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
+from kappaskin.scenes import PARTS, Key, instead_of
 from kappaskin_app.effects import called, explained
 from kappaskin_app.panels.scene_form.kinds import kind_of
 from kappaskin_app.panels.scene_form.section import Addition, Change, Row, Section
-from kappaskin_app.panels.scene_form.words import how_of, named, words_of
 from kappaskin_app.scene_text import changes
 from kappaskin_app.scene_text.changes import Place
-from kappaskin_app.scene_text.parts import instead_of, kinds, known, needed, optional
 
 _ELECTRONICS = ("bridge", "multiplexer", "amplifier", "converter")
 _ORDER = ("step", "seconds", "by", "to", "times", "ease")
@@ -51,7 +51,7 @@ def _electronics(said: Said) -> Section:
     sections, offers = list[Section](), list[Addition]()
     for part in _ELECTRONICS:
         place = ("electronics", part)
-        section = _section(named(part), part, "", _table(said, part), place)
+        section = _section(PARTS[part].label, part, "", _table(said, part), place)
         if part in said:
             sections.append(section)
         else:
@@ -75,12 +75,12 @@ def _motion(place: Place, said: Said) -> tuple[Section, ...]:
     found = list[Section]()
     if "orbit" in said:
         orbit, at = _table(said, "orbit"), (*place, "orbit")
-        found.append(_section(named("orbit"), "orbit", "", orbit, at, removable=True))
+        found.append(_section(PARTS["orbit"].label, "orbit", "", orbit, at, removable=True))
     if "path" in said:
         at = (*place, "path")
         found.append(
             Section(
-                *(named("path"), at),
+                *(PARTS["touch"].key("path").label, at),
                 sections=tuple(_step(*step) for step in _tables(said, "path", place)),
                 adding="Add step",
                 more=_offers_of_kinds("step", lambda kind: _adding_step(at, kind)),
@@ -101,16 +101,15 @@ def _turn(key: str) -> int:
 
 def _more_touches(there: list[str]) -> Section:
     """A rigid object presses alone, and so do cylinders; loads may be many."""
-    rigid = {kind for kind in kinds("touch") if "depth" in known("touch", kind)}
+    touch = PARTS["touch"]
+    rigid = {kind for kind in touch.kinds if "depth" in touch.known(kind)}
     offers = _offers_of_kinds("touch", lambda kind: lambda text: changes.add_touch(text, kind))
     if rigid & set(there):
         offers = ()
     elif there:
-        offers = tuple(
-            o for o, kind in zip(offers, kinds("touch"), strict=True) if kind not in rigid
-        )
+        offers = tuple(o for o, kind in zip(offers, touch.kinds, strict=True) if kind not in rigid)
     else:
-        said = {"dwell": optional("cylinders")["dwell"]}
+        said = {"dwell": PARTS["cylinders"].key("dwell").beginning}
         laid = Addition(
             "Cylinders",
             "Lay the skin on one cylinder after the other, as a calibration does.",
@@ -133,14 +132,14 @@ def _effects(said: Said) -> Section:
     )
     more = tuple(
         Addition(called(name), explained(name), _adding_effect(name))
-        for name in kinds("effects")
+        for name in PARTS["effects"].kinds
         if name not in there
     )
     return Section("Effects", ("effects",), sections=blocks, adding="Add effect", more=more)
 
 
 def _adding_effect(name: str) -> Change:
-    return lambda text: changes.add_table(text, ("effects", name), needed("effects", name))
+    return lambda text: changes.add_table(text, ("effects", name), PARTS["effects"].needed(name))
 
 
 def _adding_step(place: Place, kind: str) -> Change:
@@ -148,8 +147,8 @@ def _adding_step(place: Place, kind: str) -> Change:
 
 
 def _offers_of_kinds(part: str, adding: Callable[[str], Change]) -> tuple[Addition, ...]:
-    key = "step" if part == "step" else "what"
-    return tuple(Addition(words_of(part, key, kind), "", adding(kind)) for kind in kinds(part))
+    kinds = PARTS[part].kinds
+    return tuple(Addition(one.words, "", adding(name)) for name, one in kinds.items())
 
 
 def _table(said: Said, key: str) -> Said:
@@ -167,31 +166,34 @@ def _tables(said: Said, key: str, place: Place) -> list[tuple[Place, Said]]:
 
 
 def _rows(part: str, kind: str, said: Said, place: Place) -> tuple[Row, ...]:
-    may, found = known(part, kind), list[Row]()
-    for key, value in said.items():
-        if isinstance(value, Mapping) or key == "path" or (part == "scene" and key not in may):
+    may, found = PARTS[part].known(kind), list[Row]()
+    for name, value in said.items():
+        if isinstance(value, Mapping) or name == "path" or (part == "scene" and name not in may):
             continue
-        how, usual = how_of(part, kind, key), may.get(key)
-        says = part if (part, key) in _SAYS else ""
-        found.append(Row((*place, key), kind_of(value, how, usual), how, value, usual, says))
+        key = _key(part, kind, name)
+        says = part if name == PARTS[part].chosen_by else ""
+        found.append(Row((*place, name), kind_of(value, key), key, value, may.get(name), says))
     return tuple(found)
 
 
-_SAYS = (("skin", "shape"), ("touch", "what"), ("step", "step"))
+def _key(part: str, kind: str, name: str) -> Key:
+    """What is declared of a key; that of an effect tells what the effect does, too."""
+    key = PARTS[part].key(name, kind)
+    return replace(key, tip=f"{key.tip} {explained(kind)}".strip()) if part == "effects" else key
 
 
 def _offers(part: str, kind: str, said: Said, place: Place) -> tuple[Addition, ...]:
     """What else a table may say."""
     found = list[Addition]()
-    for key, value in known(part, kind).items():
-        if key in said:
+    for name, value in PARTS[part].known(kind).items():
+        if name in said:
             continue
-        how = how_of(part, kind, key)
-        instead = sorted(instead_of(key) & set(said))
-        words = how.label + "".join(
-            f" instead of {how_of(part, kind, other).label.lower()}" for other in instead
+        key = _key(part, kind, name)
+        instead = sorted(instead_of(name) & set(said))
+        words = key.label + "".join(
+            f" instead of {_key(part, kind, other).label.lower()}" for other in instead
         )
-        found.append(Addition(words, how.explained, _putting_in(place, key, value)))
+        found.append(Addition(words, key.explained, _putting_in(place, name, value)))
     return () if part == "effects" and "like" in said else tuple(found)
 
 

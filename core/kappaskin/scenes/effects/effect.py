@@ -6,7 +6,7 @@ be left out.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 from numbers import Integral, Real
@@ -23,7 +23,7 @@ from kappaskin.sensing import SensorLayout, Transduction
 
 @dataclass(frozen=True)
 class Within:
-    """Finite numbers from `least` to `most` in `unit`; only `whole` ones if it says so.
+    """Finite numbers from `least` to `most` in `unit`; only `whole` ones, `or_zero`, if it says so.
 
     It annotates a field: `rise: Annotated[float, Within(-200, 200, "K")]`.
     """
@@ -32,6 +32,7 @@ class Within:
     most: float = math.inf
     unit: str = ""
     whole: bool = False
+    or_zero: bool = False
 
     def __contains__(self, value: object) -> bool:
         if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
@@ -40,7 +41,8 @@ class Within:
             number = float(value)
         except OverflowError:
             return False
-        return math.isfinite(number) and self.least <= number <= self.most
+        inside = self.least <= number <= self.most or (self.or_zero and not number)
+        return math.isfinite(number) and inside
 
     def __str__(self) -> str:
         upward = math.isinf(self.most)
@@ -160,11 +162,22 @@ class Effect(ABC):
     """What scenes and plans call it."""
     formula: ClassVar[str]
     """The number of its `Size`, in words."""
+    label: ClassVar[str] = ""
+    """What people call it, where that is not its name."""
+    example: ClassVar[Mapping[str, Any]] = {}
+    """What a scene file says of one; nothing of an effect that follows from the rest of it."""
+    elsewhere: ClassVar[str] = ""
+    """Where the rest of a scene file says it."""
     authored: ClassVar[bool] = False
     """Whether only a scene's author decides on it: a failure, whose `Size` tells of no error."""
 
     def __post_init__(self) -> None:
         _check_ranges(self.name, self)
+
+    @classmethod
+    def called(cls) -> str:
+        """What people call it."""
+        return cls.label or cls.name.replace("-", " ").capitalize()
 
     @abstractmethod
     def size(self, survey: Survey) -> Size:

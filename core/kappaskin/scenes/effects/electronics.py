@@ -25,6 +25,7 @@ class MainsHum(ReadingEffect):
     """
 
     name: ClassVar = "mains-hum"
+    example: ClassVar = {"amplitude": 0.5}
     formula: ClassVar = "amplitude over peak curvature"
 
     amplitude: Annotated[float, Within(0, 1e4, "1/m")]
@@ -45,6 +46,7 @@ class Skew(Effect):
     """Channels are read one after the other while the skin moves; `Scan.times` says when."""
 
     name: ClassVar = "skew"
+    elsewhere: ClassVar = "the converter's times make it"
     formula: ClassVar = "scan time times rate of curvature over peak curvature"
 
     def size(self, survey: Survey) -> Size:
@@ -64,6 +66,7 @@ class CrossTalk(ReadingEffect):
     """
 
     name: ClassVar = "cross-talk"
+    example: ClassVar = {"share": 0.02}
     formula: ClassVar = "share kept of the channel scanned before"
 
     share: Annotated[float, Within(0, 0.5)]
@@ -87,6 +90,7 @@ class Quantisation(ReadingEffect):
     """Curvature is that of the count next to it, as `transduction` counts: no rails, only steps."""
 
     name: ClassVar = "quantisation"
+    elsewhere: ClassVar = "the converter makes it"
     at_once: ClassVar = True
     formula: ClassVar = "half a count over peak curvature"
 
@@ -107,6 +111,7 @@ class Saturation(ReadingEffect):
     """Curvature stays between the lowest and the highest count of `transduction`."""
 
     name: ClassVar = "saturation"
+    elsewhere: ClassVar = "the amplifier and the converter make it"
     at_once: ClassVar = True
     formula: ClassVar = "largest curvature over that at the rail on its side"
 

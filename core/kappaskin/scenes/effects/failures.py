@@ -55,6 +55,8 @@ class DeadElements(_Failing, LayoutEffect):
     """The `elements` never read anything: the layout says so, and the device with it."""
 
     name: ClassVar = "dead"
+    label: ClassVar = "Dead elements"
+    elsewhere: ClassVar = "[elements] has those that are dead"
 
     def of(self, layout: SensorLayout) -> SensorLayout:
         return layout.without(self.elements)
@@ -65,6 +67,8 @@ class StuckElements(_Failing, ReadingEffect):
     """The `elements` read what they read at the first frame from `since` in s on, ever after."""
 
     name: ClassVar = "stuck"
+    label: ClassVar = "Stuck elements"
+    example: ClassVar = {"elements": [5]}
 
     since: Annotated[float, Within(0, 1e9, "s")] = 0.0
 
@@ -83,6 +87,8 @@ class IntermittentElements(_Failing, ReadingEffect):
     """
 
     name: ClassVar = "intermittent"
+    label: ClassVar = "Loose elements"
+    example: ClassVar = {"elements": [3]}
 
     on: Annotated[float, Within(1e-6, 1e9, "s")] = 1.0
     off: Annotated[float, Within(1e-6, 1e9, "s")] = 0.1
@@ -117,6 +123,7 @@ class DroppedFrames(_LinkFailure):
     """The `share` of all frames never arrives."""
 
     name: ClassVar = "dropped-frames"
+    example: ClassVar = {"share": 0.01}
 
 
 @dataclass(frozen=True)
@@ -124,3 +131,4 @@ class CorruptedFrames(_LinkFailure):
     """The `share` of all frames arrives with wrong bytes, which its checksum tells."""
 
     name: ClassVar = "corrupted-frames"
+    example: ClassVar = {"share": 0.01}

@@ -37,6 +37,7 @@ class FiniteSlope(Effect):
     """
 
     name: ClassVar = "finite-slope"
+    elsewhere: ClassVar = "it has no numbers: name it in choose, on or off"
     formula: ClassVar = "largest slope squared"
 
     def size(self, survey: Survey) -> Size:
@@ -58,6 +59,7 @@ class GageLength(LayoutEffect):
     """Gages are `length` L in m long, along x, along y and along both diagonals."""
 
     name: ClassVar = "gage-length"
+    elsewhere: ClassVar = "[elements] has the gage_length"
     formula: ClassVar = "k L / 2, where k^2 is peak curvature over peak deflection"
 
     length: Annotated[float, Within(0, 10, "m")]
@@ -82,6 +84,7 @@ class StrainLimit(ReadingEffect):
     """
 
     name: ClassVar = "strain-limit"
+    example: ClassVar = {"share": 0.1}
     formula: ClassVar = "peak curvature over that of 1 % strain"
 
     transduction: Transduction
@@ -114,6 +117,7 @@ class Hysteresis(ReadingEffect):
     """
 
     name: ClassVar = "hysteresis"
+    example: ClassVar = {"like": "second"}
     formula: ClassVar = "how far the plays lag behind, over peak curvature"
 
     thresholds: tuple[float, ...]
@@ -174,6 +178,7 @@ class Creep(ReadingEffect):
     """Of every reading the `share` relaxes away, with the `time_constant` in s."""
 
     name: ClassVar = "creep"
+    example: ClassVar = {"share": 0.1, "time_constant": 8.0}
     formula: ClassVar = "share that relaxes away while the scene lasts"
 
     share: float
@@ -207,6 +212,7 @@ class Temperature(ReadingEffect):
     """
 
     name: ClassVar = "temperature"
+    example: ClassVar = {"rise": 5.0, "time_constant": 60.0, "offset": 0.05}
     formula: ClassVar = "apparent curvature over peak curvature, plus change of the gain"
 
     rise: Annotated[float, Within(-200, 200, "K")]
@@ -247,6 +253,7 @@ class Tolerance(ReadingEffect):
     """
 
     name: ClassVar = "tolerance"
+    example: ClassVar = {"gain_sd": 0.05, "offset_sd": 1.0}
     at_once: ClassVar = True
     formula: ClassVar = "spread of the gains, plus that of the offsets over peak curvature"
 

@@ -20,6 +20,7 @@ class UniformNoise(ReadingEffect):
     """Noise even between -sqrt(3) rms and sqrt(3) rms, in 1/m (the paper's, section 4)."""
 
     name: ClassVar = "uniform-noise"
+    example: ClassVar = {"rms": 0.1}
     at_once: ClassVar = True
     formula: ClassVar = "RMS of the noise over peak curvature"
 
@@ -40,6 +41,7 @@ class GaussianNoise(ReadingEffect):
     """Normal noise of standard deviation `rms`, in 1/m."""
 
     name: ClassVar = "gaussian-noise"
+    example: ClassVar = {"rms": 0.1}
     at_once: ClassVar = True
     formula: ClassVar = "RMS of the noise over peak curvature"
 
@@ -68,6 +70,7 @@ class FlickerNoise(ReadingEffect):
     """
 
     name: ClassVar = "flicker-noise"
+    example: ClassVar = {"rms": 0.1}
     formula: ClassVar = "RMS of the noise over peak curvature"
 
     rms: Annotated[float, Within(0, 1e4, "1/m")]
