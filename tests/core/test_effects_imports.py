@@ -27,7 +27,7 @@ survey = Survey(
     K.reshape(1, 3, -1), np.zeros(48), 1.0, np.zeros(48),
 )
 every = [
-    Tension(5.0), Foam(1e5), Fluid(), FiniteSlope(), GageLength(3e-3), DeadElements((1,)),
+    Tension(5.0), Foam(1e5), Fluid(), FiniteSlopeEffect(), GageLength(3e-3), DeadElements((1,)),
     StrainLimit(Transduction(), 0.1), SECOND_GENERATION_LOOPS, Creep(0.1, 1.0),
     Temperature(5.0, 1.0, 0.1), Tolerance(0.1, 0.1), IntermittentElements((1,)), MainsHum(0.1),
     Skew(), CrossTalk(0.1), FlickerNoise(0.1), GaussianNoise(0.1), UniformNoise(0.1),
@@ -56,7 +56,7 @@ def note(frame, event, _):
 
 sys.setprofile(note)
 effect = {effect.name: effect for effect in every}[sys.argv[1]]
-if isinstance(effect, FiniteSlope):
+if isinstance(effect, FiniteSlopeEffect):
     effect.sensed(basis, layout)(c)
 elif isinstance(effect, ReadingEffect):
     effect.start((48,), np.random.default_rng(0))(K, 0.0)

@@ -30,7 +30,7 @@ from kappaskin.scenes.effects import (
     CorruptedFrames,
     DeadElements,
     DroppedFrames,
-    FiniteSlope,
+    FiniteSlopeEffect,
     Fluid,
     Foam,
     GageLength,
@@ -56,7 +56,7 @@ EVERY = [
     Tension(60.0),
     Foam(3e5),
     Fluid(),
-    FiniteSlope(),
+    FiniteSlopeEffect(),
     GageLength(3e-3),
     DeadElements((1, 5)),
     StrainLimit(THICK, 0.2),
@@ -172,7 +172,7 @@ def left_out(effect, seed):
         return np.abs(share @ (scene.readings(plate=off) - scene.readings(plate=of))).max()
     if isinstance(effect, LayoutEffect):
         return np.abs(share @ scene.readings(effect.of(scene.layout)) - K).max()
-    if isinstance(effect, FiniteSlope):
+    if isinstance(effect, FiniteSlopeEffect):
         sensed = effect.sensed(scene.basis, scene.layout)
         shapes = s.coefficients.reshape(FRAMES, *scene.basis.shape)
         return max(np.abs(sensed(c) - k).max() for c, k in zip(shapes, K, strict=True))
@@ -220,7 +220,7 @@ def at_rest(s):
 
 
 @pytest.mark.parametrize(
-    "effect", [Tension(60.0), Foam(3e5), Fluid(), FiniteSlope(), GageLength(3e-3), Skew()]
+    "effect", [Tension(60.0), Foam(3e5), Fluid(), FiniteSlopeEffect(), GageLength(3e-3), Skew()]
 )
 def test_what_only_a_load_brings_about_is_nothing_at_rest(effect):
     assert effect.size(replace(survey(0), **at_rest(survey(0)))).error == 0
@@ -270,8 +270,8 @@ def test_on_a_bent_skin_slopes_are_left_to_first_order():
     bent = Patch(0.04, 0.03, 0.0129)
     basis, layout = basis_for(bent, "hinged", 8, 7), SensorLayout.regular(bent, 8, 6)
     s = replace(survey(0), plate=Plate(bent), basis=basis, layout=layout)
-    assert FiniteSlope().size(s).number > 0
-    assert FiniteSlope().size(s).error == 0
+    assert FiniteSlopeEffect().size(s).number > 0
+    assert FiniteSlopeEffect().size(s).error == 0
 
 
 def test_what_was_listed_here_is_every_known_effect_in_order():

@@ -23,7 +23,6 @@ from kappaskin.scenes.read import SCENES as SCENES
 from kappaskin.scenes.read import TABLE_1_NOISE as TABLE_1_NOISE
 from kappaskin.scenes.read import check_sides as check_sides
 from kappaskin.scenes.read import load_scene as load_scene
-from kappaskin.scenes.read import parsed as parsed
 from kappaskin.scenes.read import read_scene as read_scene
 from kappaskin.scenes.read import read_scene_text as read_scene_text
 from kappaskin.scenes.read import scene_file as scene_file
@@ -42,6 +41,6 @@ from kappaskin.scenes.simulator import Simulator as Simulator
 from kappaskin.scenes.stimulus import Indenter as Indenter
 from kappaskin.scenes.stimulus import Orbit as Orbit
 from kappaskin.scenes.stimulus import Stimulus as Stimulus
-from kappaskin.scenes.tables import LineNumbers as LineNumbers
 from kappaskin.scenes.tables import TomlTable as TomlTable
+from kappaskin.scenes.tables import parsed as parsed
 from kappaskin.scenes.write import write_scene as write_scene

@@ -1,4 +1,4 @@
-"""Radii of cylinders to the steps of a calibration: what to lay the skin on, in which order."""
+"""Cylinders that a skin is laid on to be calibrated: radii, and the schedule of steps."""
 
 import math
 from bisect import bisect_right

@@ -124,7 +124,7 @@ def fields_of(made: type[Any]) -> dict[str, tuple[Any, Any, Within | None]]:
 
 
 @dataclass(frozen=True)
-class Kind:
+class PartKind:
     """One kind of a part, of this name on the screen, that becomes one of a class `made`.
 
     It `needs` keys, here with examples, and may have those named in `may` besides those that every
@@ -148,7 +148,7 @@ class Part:
     label: str
     keys: Mapping[str, Key]
     made: tuple[type[Any], ...] = ()
-    kinds: Mapping[str, Kind] = field(default_factory=dict[str, Kind])
+    kinds: Mapping[str, PartKind] = field(default_factory=dict[str, PartKind])
     chosen_by: str = ""
 
     def key(self, name: str, kind: str = "") -> Key:

@@ -1,4 +1,4 @@
-"""A scene to the effects that it calls for at the accuracy asked for, and why."""
+"""Plan of a simulation: which effects a scene calls for at the accuracy asked for, and why."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from kappaskin.scenes.effects import (
     NOTHING,
     DeadElements,
     Effect,
-    FiniteSlope,
+    FiniteSlopeEffect,
     Fluid,
     Foam,
     GageLength,
@@ -79,7 +79,7 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
     if dead := tuple(np.flatnonzero(~layout.live.any(axis=0)).tolist()):
         there.append(DeadElements(dead))
     if not plate.patch.base_curvature and scene.laid is None:
-        there.append(FiniteSlope())
+        there.append(FiniteSlopeEffect())
     if scene.moves:
         there.append(Skew())
     there += [*scene.effects, Saturation(scene.transduction), Quantisation(scene.transduction)]

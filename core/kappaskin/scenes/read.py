@@ -1,8 +1,6 @@
 """Reading scene files: strict, and every refusal names its line."""
 
 import math
-import re
-import tomllib
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
@@ -50,7 +48,7 @@ from kappaskin.scenes.stimulus import (
     RecordedMotion,
     Stimulus,
 )
-from kappaskin.scenes.tables import LineNumbers, TomlTable
+from kappaskin.scenes.tables import TomlTable, parsed
 from kappaskin.sensing import FIRST_GENERATION, SECOND_GENERATION, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 
@@ -148,27 +146,14 @@ def _recorded(file: Path) -> RecordedMotion:
 
 
 _LARGEST_SCENE = 2**24  # bytes
-_DEEP_TABLES = re.compile(r"(?:\.[\w\"'-]+){64}")  # tables in tables, which take long to read
 
 CHAINS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
 LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 
 
-def parsed(text: str, file: Path) -> dict[str, Any]:
-    """What the TOML `text`, of `file`, says."""
-    try:
-        if _DEEP_TABLES.search(text):
-            raise RecursionError
-        return tomllib.loads(text)
-    except ValueError as error:  # a whole number of thousands of digits is one of these, too
-        raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
-    except RecursionError as error:
-        raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
-
-
 def read_scene(text: str, file: Path) -> Scene:
     """The scene that `text`, of `file`, describes; files that it names lie beside it."""
-    return scene_of(TomlTable(parsed(text, file), LineNumbers(text), str(file)), file)
+    return scene_of(TomlTable(parsed(text, file), text, str(file)), file)
 
 
 def scene_of(top: TomlTable, file: Path) -> Scene:

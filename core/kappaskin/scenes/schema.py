@@ -25,7 +25,7 @@ from kappaskin.mechanics import (
 )
 from kappaskin.scenes.cylinders import RADII
 from kappaskin.scenes.effects import EFFECTS, Effect, Within
-from kappaskin.scenes.keys import Key, Kind, Part, Unit, fields_of
+from kappaskin.scenes.keys import Key, Part, PartKind, Unit, fields_of
 from kappaskin.scenes.scene import EffectSelection, Scene
 from kappaskin.scenes.stimulus import (
     EASES,
@@ -160,10 +160,10 @@ SKIN = Part(
     },
     (Plate, Scene, Patch),
     {
-        "rectangle": Kind("Rectangle", Patch, {"size": [0.1, 0.1]}, ("radius",)),
-        "strip": Kind("Strip", Patch, {"size": [0.1, 0.02]}, ("radius",)),
-        "disk": Kind("Disk", Disk, {"rim_radius": 0.05}),
-        "polygon": Kind(
+        "rectangle": PartKind("Rectangle", Patch, {"size": [0.1, 0.1]}, ("radius",)),
+        "strip": PartKind("Strip", Patch, {"size": [0.1, 0.02]}, ("radius",)),
+        "disk": PartKind("Disk", Disk, {"rim_radius": 0.05}),
+        "polygon": PartKind(
             "Polygon",
             Polygon,
             {"outline": [[0.0, 0.0], [0.1, 0.0], [0.1, 0.06], [0.05, 0.1], [0.0, 0.06]]},
@@ -282,49 +282,51 @@ _HARDER = {"force": 0.2}
 _ALONG_X = {"width": _length("Width", "Along x.")}
 
 LOADS = {
-    "point": Kind("Point load", PointLoad, _IN_THE_MIDDLE | _FORCE, ("displacement",)),
-    "line": Kind(
+    "point": PartKind("Point load", PointLoad, _IN_THE_MIDDLE | _FORCE, ("displacement",)),
+    "line": PartKind(
         "Line load",
         LineLoad,
         {"x0": 0.03, "y0": 0.05, "x1": 0.07, "y1": 0.05} | _FORCE,
         ("displacement",),
     ),
-    "disc": Kind(
+    "disc": PartKind(
         "Disc load", DiscLoad, _IN_THE_MIDDLE | {"radius": 0.005} | _FORCE, ("displacement",)
     ),
-    "rectangle": Kind(
+    "rectangle": PartKind(
         "Rectangle load",
         RectangleLoad,
         _IN_THE_MIDDLE | {"width": 0.01, "height": 0.006} | _FORCE,
         ("displacement",),
         _ALONG_X,
     ),
-    "gaussian": Kind(
+    "gaussian": PartKind(
         "Soft round load", GaussianLoad, _IN_THE_MIDDLE | {"sd": 0.003} | _FORCE, ("displacement",)
     ),
 }
 OBJECTS = {
-    "sphere": Kind("Ball", Sphere, _IN_THE_MIDDLE | {"radius": 0.02} | _HARDER, ("depth",)),
-    "cylinder": Kind(
+    "sphere": PartKind("Ball", Sphere, _IN_THE_MIDDLE | {"radius": 0.02} | _HARDER, ("depth",)),
+    "cylinder": PartKind(
         "Cylinder",
         Cylinder,
         _IN_THE_MIDDLE | {"radius": 0.01, "length": 0.05} | _HARDER,
         ("depth", "turn"),
     ),
-    "wedge": Kind(
+    "wedge": PartKind(
         "Edge",
         Wedge,
         _IN_THE_MIDDLE | {"angle": 1.5707963, "length": 0.04, "width": 0.02} | _HARDER,
         ("depth", "turn", "tip_radius"),
     ),
-    "punch": Kind("Flat punch", Punch, _IN_THE_MIDDLE | {"radius": 0.005} | _HARDER, ("depth",)),
-    "block": Kind(
+    "punch": PartKind(
+        "Flat punch", Punch, _IN_THE_MIDDLE | {"radius": 0.005} | _HARDER, ("depth",)
+    ),
+    "block": PartKind(
         "Block",
         Block,
         _IN_THE_MIDDLE | {"length": 0.03, "width": 0.02} | _HARDER,
         ("depth", "turn"),
     ),
-    "heights": Kind(
+    "heights": PartKind(
         "Relief from a file",
         HeightMap,
         {"file": "heights.npy"}
@@ -333,7 +335,7 @@ OBJECTS = {
         | _HARDER,
         ("depth", "turn"),
     ),
-    "mesh": Kind(
+    "mesh": PartKind(
         "Mesh from a file",
         Mesh,
         {"file": "mesh.stl"} | _IN_THE_MIDDLE | _HARDER,
@@ -460,18 +462,18 @@ STEP = Part(
         ),
     },
     kinds={
-        "press": Kind("Press", PressStep, {"seconds": 0.5}, ("to",)),
-        "hold": Kind("Hold", HoldStep, {"seconds": 1.0}),
-        "release": Kind("Release", ReleaseStep, {"seconds": 0.5}),
-        "slide": Kind("Slide", SlideStep, {"by": [0.01, 0.0], "seconds": 1.0}),
-        "roll": Kind("Roll", SlideStep, {"by": [0.01, 0.0], "seconds": 1.0}),
-        "turn": Kind(
+        "press": PartKind("Press", PressStep, {"seconds": 0.5}, ("to",)),
+        "hold": PartKind("Hold", HoldStep, {"seconds": 1.0}),
+        "release": PartKind("Release", ReleaseStep, {"seconds": 0.5}),
+        "slide": PartKind("Slide", SlideStep, {"by": [0.01, 0.0], "seconds": 1.0}),
+        "roll": PartKind("Roll", SlideStep, {"by": [0.01, 0.0], "seconds": 1.0}),
+        "turn": PartKind(
             "Turn",
             TurnStep,
             {"by": 1.5707963, "seconds": 1.0},
             keys={"by": Key("By", "About the skin's normal, from x to y.", _DEGREE)},
         ),
-        "tap": Kind("Tap", TapStep, {"times": 3, "seconds": 1.0}),
+        "tap": PartKind("Tap", TapStep, {"times": 3, "seconds": 1.0}),
     },
     chosen_by="step",
 )
@@ -532,11 +534,11 @@ _EFFECT_KEYS: dict[str, dict[str, Key]] = {
 """Keys that mean something else in one effect than in others."""
 
 
-def _kind_of(effect: type[Effect]) -> Kind:
+def _kind_of(effect: type[Effect]) -> PartKind:
     """The kind of table that tells an effect; it may leave out what has a default."""
     may = (name for name, (_, default, _) in fields_of(effect).items() if default is not REQUIRED)
     keys = _EFFECT_KEYS.get(effect.name, {})
-    return Kind(effect.called(), effect, effect.example, tuple(may), keys)
+    return PartKind(effect.called(), effect, effect.example, tuple(may), keys)
 
 
 def _named(label: str, tip: str) -> Key:

@@ -1,4 +1,4 @@
-"""A scene to frames: the counts a real device would send, with the truth beside them."""
+"""Simulator: the counts that a real device would send of a scene, with the truth beside them."""
 
 import math
 import zlib
@@ -13,7 +13,7 @@ from kappaskin.scenes.effects import (
     CorruptedFrames,
     DroppedFrames,
     Effect,
-    FiniteSlope,
+    FiniteSlopeEffect,
     GageLength,
     ReadingEffect,
     Skew,
@@ -104,7 +104,7 @@ class Simulator:
         self._take_stimuli()
         self._skewed = Skew in kinds
         self._scan = scene.sensor().scan()
-        sloped = [effect for effect in self._kept if isinstance(effect, FiniteSlope)]
+        sloped = [effect for effect in self._kept if isinstance(effect, FiniteSlopeEffect)]
         if sloped:
             self._sensed = sloped[0].sensed(self._basis, layout)
         else:

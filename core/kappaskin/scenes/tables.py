@@ -2,9 +2,11 @@
 
 import difflib
 import re
+import tomllib
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields
+from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
@@ -26,6 +28,7 @@ _KINDS: dict[Any, str] = {
 # A name begins and ends with what is no space: else a line of spaces is tried in every way.
 _HEADER = re.compile(r"\s*(\[\[?)\s*([\w.\-\"']+(?: +[\w.\-\"']+)*)\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w\-"'.]+)\s*=""")
+_DEEP_TABLES = re.compile(r"(?:\.[\w\"'-]+){64}")  # tables in tables, which take long to read
 
 Place = tuple[str | int, ...]
 """The way to a value: keys, and numbers from 0 where tables come in arrays."""
@@ -37,7 +40,19 @@ def _names(dotted: str) -> list[str]:
     return [name.strip().strip("\"'") for name in dotted.split(".")]
 
 
-class LineNumbers:
+def parsed(text: str, file: Path) -> dict[str, Any]:
+    """What the TOML `text`, of `file`, says."""
+    try:
+        if _DEEP_TABLES.search(text):
+            raise RecursionError
+        return tomllib.loads(text)
+    except ValueError as error:  # a whole number of thousands of digits is one of these, too
+        raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
+    except RecursionError as error:
+        raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
+
+
+class _LineNumbers:
     """Where the keys of a file stand; of what is inside a value, where the value begins."""
 
     def __init__(self, text: str) -> None:
@@ -85,9 +100,11 @@ class TomlTable:
     """What a file says at one `place`; it is refused where it says what nobody asks for."""
 
     def __init__(
-        self, said: dict[str, Any], lines: LineNumbers, name: str, place: Place = ()
+        self, values: dict[str, Any], text: "str | _LineNumbers", name: str, place: Place = ()
     ) -> None:
-        self._said, self._lines, self._name, self.place = said, lines, name, place
+        """The `values` that the `text` of a file of this `name` has at `place`."""
+        self._lines = _LineNumbers(text) if isinstance(text, str) else text
+        self._values, self._name, self.place = values, name, place
         self._asked: set[str] = set()
 
     def refusal(self, why: str, key: str = "") -> Refusal:
@@ -106,19 +123,19 @@ class TomlTable:
             raise self.refusal(str(refusal), key) from refusal
 
     def __contains__(self, key: str) -> bool:
-        return key in self._said
+        return key in self._values
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._said)
+        return iter(self._values)
 
     def is_table(self, key: str) -> bool:
         """Whether there is a table at `key`."""
-        return isinstance(self._said[key], dict)
+        return isinstance(self._values[key], dict)
 
     def listed(self, key: str) -> list[Any]:
         """The list at `key`, of values of any kind."""
         self._asked.add(key)
-        if not isinstance(said := self._said[key], list):
+        if not isinstance(said := self._values[key], list):
             raise self.refusal(f"expected a list, got {said!r:.60}", key)
         return cast("list[Any]", said)
 
@@ -130,10 +147,10 @@ class TomlTable:
         Its numbers must be `within` a range, if one is given.
         """
         self._asked.add(key)
-        if key in self._said:
-            value: Any = self._as(self._said[key], kind, key)
+        if key in self._values:
+            value: Any = self._as(self._values[key], kind, key)
             if within is not None and not _all_within(value, within):
-                raise self.refusal(f"expected {within}, got {self._said[key]!r:.60}", key)
+                raise self.refusal(f"expected {within}, got {self._values[key]!r:.60}", key)
             return value
         if default is REQUIRED:
             raise self.refusal(f"expected {key} = {_expected(kind)}, got none")
@@ -158,22 +175,23 @@ class TomlTable:
     def table(self, key: str) -> "TomlTable":
         """The table at `key`; an empty one when there is none."""
         self._asked.add(key)
-        said = self._said.get(key, {})
+        said = self._values.get(key, {})
         if not isinstance(said, dict):
             raise self.refusal(f"expected a table [{key}], got {said!r:.60}", key)
-        return TomlTable(cast("dict[str, Any]", said), self._lines, self._name, (*self.place, key))
+        return self._inside(said, key)
 
     def tables(self, key: str) -> "list[TomlTable]":
         """The tables of the array [[key]]."""
         self._asked.add(key)
-        said = self._said.get(key, [])
+        said = self._values.get(key, [])
         many = cast("list[Any]", said) if isinstance(said, list) else [said]
         if not all(isinstance(one, dict) for one in many):
             raise self.refusal(f"expected an array of tables [[{key}]], got {said!r:.60}", key)
-        return [
-            TomlTable(cast("dict[str, Any]", one), self._lines, self._name, (*self.place, key, n))
-            for n, one in enumerate(many)
-        ]
+        return [self._inside(one, key, n) for n, one in enumerate(many)]
+
+    def _inside(self, values: Any, *place: str | int) -> "TomlTable":
+        """A table in this one, of these `values`."""
+        return TomlTable(values, self._lines, self._name, (*self.place, *place))
 
     def make(
         self, kind: Callable[..., _Made], limits: Mapping[str, Within] | None = None, **given: Any
@@ -207,7 +225,7 @@ class TomlTable:
 
     def done(self, *others: str) -> None:
         """Refuse a key that nobody asked for; it may be meant as one of those or of `others`."""
-        for key in self._said:
+        for key in self._values:
             if key not in self._asked:
                 near = "".join(
                     f"; did you mean {one}?" for one in _nearest(key, [*self._asked, *others])

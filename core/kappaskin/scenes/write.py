@@ -14,14 +14,9 @@ from kappaskin.frames import Array
 from kappaskin.mechanics import Load, RigidObject
 from kappaskin.scenes.cylinders import RADII, Presentation, schedule
 from kappaskin.scenes.effects import EFFECTS, Effect, StrainLimit
-from kappaskin.scenes.keys import Kind
+from kappaskin.scenes.keys import PartKind
 from kappaskin.scenes.plan import effects_of
-from kappaskin.scenes.read import (
-    CHAINS,
-    LOOPS,
-    read_scene,
-    usual_reference,
-)
+from kappaskin.scenes.read import CHAINS, LOOPS, read_scene, usual_reference
 from kappaskin.scenes.scene import Scene
 from kappaskin.scenes.schema import (
     CYLINDERS,
@@ -44,7 +39,9 @@ from kappaskin.skin import Disk, Patch, Polygon
 _MOST_CELLS = 2**20  # of a grid that is looked for
 
 
-def said_of(owner: object, usual: object = None, without: tuple[str, ...] = ()) -> dict[str, Any]:
+def written_fields(
+    owner: object, usual: object = None, without: tuple[str, ...] = ()
+) -> dict[str, Any]:
     """The fields of a dataclass that are not as `usual`, their defaults when left out."""
     hints = get_type_hints(type(owner))
     said = dict[str, Any]()
@@ -52,27 +49,27 @@ def said_of(owner: object, usual: object = None, without: tuple[str, ...] = ()) 
         value = getattr(owner, field.name)
         expected = field.default if usual is None else getattr(usual, field.name)
         if field.init and field.name not in without and value != expected:
-            said[field.name] = plain(value, hints[field.name])
+            said[field.name] = toml_value(value, hints[field.name])
     return said
 
 
-def plain(value: Any, kind: Any) -> Any:
+def toml_value(value: Any, kind: Any) -> Any:
     """The `value` as TOML has it: a number where `kind` is float is one, however it came."""
     if get_origin(kind) is tuple:
-        return [plain(each, get_args(kind)[0]) for each in value]
+        return [toml_value(each, get_args(kind)[0]) for each in value]
     if isinstance(value, bool | str):
         return value
     return float(value) if kind is float or float in get_args(kind) else int(value)
 
 
-def touch_of(stimulus: Stimulus) -> dict[str, Any]:
+def written_touch(stimulus: Stimulus) -> dict[str, Any]:
     """What a [[touch]] says of the stimulus; what came from another file is refused."""
     what = stimulus.what
     said = _pressed(what) if isinstance(what, Indenter) else _load(what)
     return {**said, **_motion(stimulus.motion)}
 
 
-def _name(among: Mapping[str, Kind], one: object) -> str:
+def _name(among: Mapping[str, PartKind], one: object) -> str:
     """What a file calls `one`; the first of two names for the same."""
     for name, kind in among.items():
         if type(one) is kind.made:
@@ -81,12 +78,16 @@ def _name(among: Mapping[str, Kind], one: object) -> str:
 
 
 def _load(load: Load) -> dict[str, Any]:
-    said = said_of(load, without=("force",))
+    said = written_fields(load, without=("force",))
     return {"what": _name(LOADS, load), **said, "force": float(load.force)}
 
 
 def _pressed(what: Indenter) -> dict[str, Any]:
-    return {"what": _object(what.rigid), **said_of(what.rigid), **said_of(what, without=("rigid",))}
+    return {
+        "what": _object(what.rigid),
+        **written_fields(what.rigid),
+        **written_fields(what, without=("rigid",)),
+    }
 
 
 def _object(rigid: RigidObject) -> str:
@@ -105,7 +106,7 @@ def _motion(motion: Motion | None) -> dict[str, Any]:
         case None:
             return {}
         case Orbit():
-            return {"orbit": said_of(motion)}
+            return {"orbit": written_fields(motion)}
         case MotionPath():
             return {"path": [_step(step) for step in motion.steps]}
         case _:
@@ -118,7 +119,7 @@ def _motion(motion: Motion | None) -> dict[str, Any]:
 
 def _step(step: MotionStep) -> dict[str, Any]:
     time = ("seconds", "ease")
-    said = said_of(step)
+    said = written_fields(step)
     last = {key: said.pop(key) for key in time if key in said}
     return {"step": _name(STEP.kinds, step), **said, **last}
 
@@ -141,7 +142,7 @@ def write_scene(scene: Scene) -> str:
             table("[cylinders]", _cylinders(scene.laid, scene.plate.patch), CYLINDERS.comments())
         )
     tables += _effects(scene)
-    tables += [table("[[touch]]", touch_of(each), TOUCH.comments()) for each in scene.stimuli]
+    tables += [table("[[touch]]", written_touch(each), TOUCH.comments()) for each in scene.stimuli]
     text = "\n".join(tables)
     read_scene(text, Path(f"{scene.name}.toml"))  # it refuses what is beyond the limits of a file
     return text
@@ -165,7 +166,7 @@ def _top(scene: Scene) -> dict[str, Any]:
 
 def _skin(scene: Scene) -> dict[str, Any]:
     held = {} if scene.edge == SKIN.key("edge").default else {"edge": scene.edge}
-    return {**_patch(scene.plate.patch), **said_of(scene.plate, without=("patch",)), **held}
+    return {**_patch(scene.plate.patch), **written_fields(scene.plate, without=("patch",)), **held}
 
 
 def _patch(patch: Patch) -> dict[str, Any]:
@@ -177,7 +178,7 @@ def _patch(patch: Patch) -> dict[str, Any]:
         case _:
             shape = {"shape": "strip"} if patch.strip else {}
             size = {"size": [float(patch.a), float(patch.b)]}
-            return {**shape, **size, **said_of(patch, without=("a", "b", "strip"))}
+            return {**shape, **size, **written_fields(patch, without=("a", "b", "strip"))}
 
 
 def _elements(layout: SensorLayout) -> dict[str, Any]:
@@ -190,7 +191,7 @@ def _elements(layout: SensorLayout) -> dict[str, Any]:
             "elements of which some channels are dead; those that are dead are so as a whole"
         )
     placed = {"positions": layout.positions.tolist()} if grid is None else {"grid": list(grid[0])}
-    gages = said_of(layout, without=("patch", "positions", "live", "shape"))
+    gages = written_fields(layout, without=("patch", "positions", "live", "shape"))
     return {**placed, **({"dead": dead} if dead else {}), **gages}
 
 
@@ -227,7 +228,9 @@ def _electronics(electronics: Transduction) -> list[str]:
 def _changes(electronics: Transduction, chain: Transduction) -> dict[str, dict[str, Any]]:
     """What each part says where it differs from that of `chain`."""
     names = [field.name for field in fields(chain)]
-    return {name: said_of(getattr(electronics, name), getattr(chain, name)) for name in names}
+    return {
+        name: written_fields(getattr(electronics, name), getattr(chain, name)) for name in names
+    }
 
 
 def _cylinders(laid: Presentation, patch: Patch) -> dict[str, Any]:
@@ -269,7 +272,7 @@ def _effect(effect: Effect, scene: Scene) -> dict[str, Any]:
             return {"like": name}
     if isinstance(effect, StrainLimit) and effect.transduction != scene.transduction:
         raise Refusal("expected a strain limit of the scene's own electronics, got another's")
-    return said_of(effect, without=("transduction",))
+    return written_fields(effect, without=("transduction",))
 
 
 def _choice(scene: Scene) -> dict[str, Any]:

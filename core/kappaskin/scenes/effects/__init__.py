@@ -1,4 +1,4 @@
-"""What spoils a reading; an empty list of effects spoils nothing."""
+"""Effects on readings: in the skin, its gages, the electronics and on the link."""
 
 from kappaskin.scenes.effects.effect import NOTHING as NOTHING
 from kappaskin.scenes.effects.effect import Effect as Effect
@@ -23,7 +23,7 @@ from kappaskin.scenes.effects.failures import StuckElements as StuckElements
 from kappaskin.scenes.effects.gages import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
 from kappaskin.scenes.effects.gages import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS
 from kappaskin.scenes.effects.gages import Creep as Creep
-from kappaskin.scenes.effects.gages import FiniteSlope as FiniteSlope
+from kappaskin.scenes.effects.gages import FiniteSlopeEffect as FiniteSlopeEffect
 from kappaskin.scenes.effects.gages import GageLength as GageLength
 from kappaskin.scenes.effects.gages import Hysteresis as Hysteresis
 from kappaskin.scenes.effects.gages import StrainLimit as StrainLimit
@@ -38,7 +38,7 @@ from kappaskin.scenes.effects.skin import Tension as Tension
 
 _SKIN = (Tension, Foam, Fluid)
 _GAGES = (
-    *(FiniteSlope, GageLength, DeadElements),
+    *(FiniteSlopeEffect, GageLength, DeadElements),
     *(StrainLimit, Hysteresis, Creep, Temperature, Tolerance, IntermittentElements),
 )
 _ELECTRONICS = (

@@ -29,7 +29,7 @@ from kappaskin.sensing import (
 
 
 @dataclass(frozen=True)
-class FiniteSlope(Effect):
+class FiniteSlopeEffect(Effect):
     """Gages read the true normal curvature, of which the second derivative is the first order.
 
     It replaces the operator from coefficients to curvature. For a bent skin there is no such

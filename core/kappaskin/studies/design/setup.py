@@ -17,7 +17,7 @@ from kappaskin.estimation import (
     elements_placed,
     estimator_for,
 )
-from kappaskin.scenes import LineNumbers, Scene, TomlTable, scene_of
+from kappaskin.scenes import Scene, TomlTable, scene_of
 from kappaskin.studies.design.draws import Distribution, read_draw
 
 _NAME = "the study"
@@ -126,7 +126,7 @@ def _scene(top: TomlTable, file: Path) -> Scene:
 def setup_of(said: dict[str, Any], known: Iterable[str]) -> Setup:
     """The setup of what a point says; its refusals name no file."""
     try:
-        return read_setup(TomlTable(said, LineNumbers(""), _NAME), Path("study.toml"), known)
+        return read_setup(TomlTable(said, "", _NAME), Path("study.toml"), known)
     except Refusal as refusal:
         raise Refusal(str(refusal).removeprefix(f"{_NAME}, line 1: ")) from refusal
 

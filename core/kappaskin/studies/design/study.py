@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes import LineNumbers, TomlTable, parsed, read_scene_text
+from kappaskin.scenes import TomlTable, parsed, read_scene_text
 from kappaskin.studies.design.draws import Distribution
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.places import parts_of, with_values
@@ -116,7 +116,7 @@ def load_study(name: str) -> Study:
 def read_study(text: str, file: Path) -> Study:
     """The study that `text`, of `file`, describes."""
     said = parsed(text, file)
-    top = TomlTable(said, LineNumbers(text), str(file))
+    top = TomlTable(said, text, str(file))
     tables, stopping = top.tables("vary"), top.table("stop")
     base = read_setup(top, file, MEASURES)
     stop = _stop(stopping, base.measure.what)
