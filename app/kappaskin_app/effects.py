@@ -1,4 +1,4 @@
-"""The name that a scene file has for an effect to words: what it is called, and what it does."""
+"""Names and descriptions of effects."""
 
 import inspect
 

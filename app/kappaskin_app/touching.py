@@ -1,4 +1,4 @@
-"""What touches the skin in a scene, as it is seen and taken hold of at one moment."""
+"""Stimuli of a scene as they are drawn, grabbed and dragged in the view."""
 
 import math
 from dataclasses import dataclass, replace

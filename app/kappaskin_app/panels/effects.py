@@ -1,4 +1,4 @@
-"""What the plan says of every effect, and which are forced on or off."""
+"""Effects panel: the plan for every effect, and which are forced on or off."""
 
 from typing import Any
 

@@ -131,7 +131,7 @@ class PartKind:
     kind may have. `keys` are those that mean something else than in other kinds.
     """
 
-    words: str
+    label: str
     made: type[Any]
     needs: Mapping[str, Any] = field(default_factory=dict[str, Any])
     may: tuple[str, ...] = ()
@@ -160,7 +160,7 @@ class Part:
         for made in self.made:
             found = found.of_field(made, name)
         if name == self.chosen_by:
-            found = replace(found, choices=tuple((n, one.words) for n, one in self.kinds.items()))
+            found = replace(found, choices=tuple((n, one.label) for n, one in self.kinds.items()))
         return found
 
     def needed(self, kind: str = "") -> dict[str, Any]:
@@ -201,10 +201,12 @@ class Part:
             for name, key in keys.items()
         }
 
-    def value(self, table: TomlTable, name: str, **default: Any) -> Any:
-        """The value of a key in `table`, or its default, unless another one is given."""
+    def value(self, table: TomlTable, name: str, default: Any = REQUIRED) -> Any:
+        """The value of a key in `table`, or its default, unless another `default` is given."""
         key = self.key(name)
-        return table.get(name, key.kind, default.get("default", key.default), key.limits)
+        return table.get(
+            name, key.kind, key.default if default is REQUIRED else default, key.limits
+        )
 
     def choose(self, table: TomlTable, name: str) -> str:
         """The one of its choices that `table` names at a key."""

@@ -52,103 +52,61 @@ from kappaskin.scenes.tables import TomlTable, parsed
 from kappaskin.sensing import FIRST_GENERATION, SECOND_GENERATION, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 
-_LARGEST_RECORD = 2**22  # bytes of a recorded motion
+TABLE_1_NOISE = 0.40 / math.sqrt(3)
+"""RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
 
+DEFAULT_SCENE = "circle"
 
-def read_stimulus(
-    table: TomlTable, plate: Plate, moved: Callable[[Load, float], Load], folder: Path
-) -> Stimulus:
-    """What a [[touch]] of `plate` says; `moved` makes a load move its place so far in m."""
-    what: Load | Indenter
-    if (name := TOUCH.choose(table, "what")) in OBJECTS:
-        what = table.make(Indenter, rigid=_object(table, OBJECTS[name].made, folder))
-    else:
-        what = load = table.make(cast("type[Load]", LOADS[name].made))
-        if "displacement" in table:
-            if "force" in table:
-                raise table.refusal("expected a force or a displacement, got both", "displacement")
-            with table.blamed():
-                load.check(plate.patch)
-            with table.blamed("displacement"):
-                what = moved(load, TOUCH.value(table, "displacement"))
-    force = TOUCH.limits["force"]
-    if what.force is not None and what.force not in force:
-        raise table.refusal(f"expected a force of {force}, got {what.force:g}", "force")
-    made = Stimulus(what, _motion(table, folder))
-    table.done()
-    with table.blamed():
-        made.check(plate)
-    return made
+_FOLDER = Path(str(files("kappaskin_resources"))) / "scenes"
+_ENDING = ".toml"
 
-
-def _object(table: TomlTable, kind: type[RigidObject], folder: Path) -> RigidObject:
-    """The rigid object that the table describes, read from a file in `folder` if it has one."""
-    with table.blamed():
-        if kind is Mesh:
-            return Mesh.read(_beside(table, "file", folder), TOUCH.value(table, "unit"))
-        if kind is HeightMap:
-            sizes = (TOUCH.value(table, key) for key in ("length", "width", "relief"))
-            return HeightMap.read(_beside(table, "file", folder), *sizes)
-        return table.make(kind)
-
-
-def _beside(table: TomlTable, key: str, folder: Path) -> Path:
-    """The file that the table names, which lies beside that of the scene."""
-    file = folder / TOUCH.value(table, key)
-    if not file.is_file():
-        raise table.refusal(
-            f"expected the name of a file beside that of the scene, got {str(file)!r:.200}, where "
-            "there is none",
-            key,
-        )
-    return file
-
-
-def _motion(table: TomlTable, folder: Path) -> Motion | None:
-    given = [key for key in ("path", "orbit", "recorded") if key in table]
-    if len(given) > 1:
-        raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
-    if "orbit" in table:
-        orbit = table.table("orbit")
-        made = orbit.make(Orbit)
-        orbit.done()
-        return made
-    if "recorded" in table:
-        with table.blamed("recorded"):
-            return _recorded(_beside(table, "recorded", folder))
-    steps = [_step(step) for step in table.tables("path")]
-    with table.blamed("path"):
-        return MotionPath(tuple(steps)) if "path" in table else None
-
-
-def _step(table: TomlTable) -> MotionStep:
-    made = table.make(STEP.kinds[STEP.choose(table, "step")].made)
-    table.done()
-    return made
-
-
-def _recorded(file: Path) -> RecordedMotion:
-    """A motion from a CSV file with the columns time, dx, dy and amount."""
-    try:
-        if file.stat().st_size > _LARGEST_RECORD:
-            raise OSError(f"it has more than {_LARGEST_RECORD} bytes; thin it out")
-        heading, *lines = file.read_text(encoding="utf-8-sig").splitlines() or [""]
-        rows = np.array([line.split(",") for line in lines if line.strip()], float)
-    except (OSError, ValueError) as error:
-        raise Refusal(
-            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
-        ) from error
-    if heading.replace(" ", "") != "time,dx,dy,amount":
-        raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r:.80}")
-    if rows.shape[1:] != (4,):
-        raise Refusal(f"{file}: expected lines of four numbers, got those of {rows.shape}")
-    return RecordedMotion(rows[:, 0], rows[:, 1:])
-
-
-_LARGEST_SCENE = 2**24  # bytes
+SCENES = tuple(sorted(file.stem for file in _FOLDER.iterdir() if file.suffix == _ENDING))
+"""Names of the ready scenes."""
 
 CHAINS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
 LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
+"""Electronics and loops that a scene may say are like those of a prototype."""
+
+_LARGEST_SCENE = 2**24  # bytes
+_LARGEST_RECORD = 2**22  # bytes of a recorded motion
+
+_SIDE = Within(1e-4, 10, "m")
+_MOST_ELEMENTS = 2**16 // 3  # as many as the wire's format can tell apart
+_MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
+_MOST_FUNCTIONS, _MOST_THAT_MIX = 64**2, 20**2  # some seconds to make the skin of
+
+
+def scene_file(name: str = "") -> Path:
+    """The file of the ready scene `name`, of the default one when empty; or the TOML file named."""
+    if name.endswith(_ENDING):
+        return Path(name)
+    name = name or DEFAULT_SCENE
+    if name not in SCENES:
+        raise Refusal(
+            f"expected a scene among {', '.join(SCENES)}, or a file that ends in {_ENDING}; got "
+            f"{name!r}"
+        )
+    return _FOLDER / f"{name}{_ENDING}"
+
+
+def load_scene(name: str = "") -> Scene:
+    """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
+    file = scene_file(name)
+    return read_scene(read_scene_text(file), file)
+
+
+def read_scene_text(file: Path) -> str:
+    """The text in `file`; raises `Refusal` for a file that cannot be read, or is no scene's."""
+    try:
+        if file.exists() and not file.is_file():
+            raise Refusal(f"{file}: expected a file with a scene, got a folder or a device")
+        if file.stat().st_size > _LARGEST_SCENE:
+            raise Refusal(f"{file}: expected a scene of at most {_LARGEST_SCENE} bytes, got more")
+        return file.read_text(encoding="utf-8-sig")
+    except Refusal:
+        raise
+    except (OSError, ValueError) as error:  # undecodable, or a name that no file has
+        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
 
 
 def read_scene(text: str, file: Path) -> Scene:
@@ -261,10 +219,10 @@ def _electronics(table: TomlTable) -> Transduction:
 def _changed(table: TomlTable, part: Any) -> Any:
     """The `part` of the electronics with what the table says of it."""
     hints = get_type_hints(cast("type[Any]", type(part)))
-    said = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
+    changes = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
     table.done()
     with table.blamed():
-        return replace(part, **said)
+        return replace(part, **changes)
 
 
 def _cylinders(table: TomlTable, scene: Scene) -> Presentation:
@@ -285,18 +243,18 @@ def _effects(
     found = list[Effect]()
     for name, kind in EFFECTS.items():
         if name in table:
-            said = table.table(name)
+            own = table.table(name)
             if kind.elsewhere:
-                raise said.refusal(f"expected no such table; {kind.elsewhere}")
-            if name == "hysteresis" and "like" in said:
-                found.append(said.choose("like", LOOPS))
+                raise own.refusal(f"expected no such table; {kind.elsewhere}")
+            if name == "hysteresis" and "like" in own:
+                found.append(own.choose("like", LOOPS))
             elif kind is StrainLimit:
-                found.append(said.make(kind, transduction=electronics))
+                found.append(own.make(kind, transduction=electronics))
             else:
-                found.append(said.make(kind))
-            said.done()
+                found.append(own.make(kind))
+            own.done()
             if isinstance(effect := found[-1], StuckElements | IntermittentElements):
-                with said.blamed("elements"):
+                with own.blamed("elements"):
                     effect.channels((3 * len(layout),))
     accuracy = SCENE.value(top, "accuracy")
     with top.blamed("accuracy"):
@@ -328,10 +286,94 @@ def _wanted(table: TomlTable) -> set[str]:
     return {*EFFECT.value(table, "on"), *(() if isinstance(named, str) else named)}
 
 
-_SIDE = Within(1e-4, 10, "m")
-_MOST_ELEMENTS = 2**16 // 3  # as many as the wire's format can tell apart
-_MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
-_MOST_FUNCTIONS, _MOST_THAT_MIX = 64**2, 20**2  # some seconds to make the skin of
+def read_stimulus(
+    table: TomlTable, plate: Plate, moved: Callable[[Load, float], Load], folder: Path
+) -> Stimulus:
+    """What a [[touch]] of `plate` says; `moved` makes a load move its place so far in m."""
+    what: Load | Indenter
+    if (name := TOUCH.choose(table, "what")) in OBJECTS:
+        what = table.make(Indenter, rigid=_object(table, OBJECTS[name].made, folder))
+    else:
+        what = load = table.make(cast("type[Load]", LOADS[name].made))
+        if "displacement" in table:
+            if "force" in table:
+                raise table.refusal("expected a force or a displacement, got both", "displacement")
+            with table.blamed():
+                load.check(plate.patch)
+            with table.blamed("displacement"):
+                what = moved(load, TOUCH.value(table, "displacement"))
+    force = TOUCH.limits["force"]
+    if what.force is not None and what.force not in force:
+        raise table.refusal(f"expected a force of {force}, got {what.force:g}", "force")
+    made = Stimulus(what, _motion(table, folder))
+    table.done()
+    with table.blamed():
+        made.check(plate)
+    return made
+
+
+def _object(table: TomlTable, kind: type[RigidObject], folder: Path) -> RigidObject:
+    """The rigid object that the table describes, read from a file in `folder` if it has one."""
+    with table.blamed():
+        if kind is Mesh:
+            return Mesh.read(_beside(table, "file", folder), TOUCH.value(table, "unit"))
+        if kind is HeightMap:
+            sizes = (TOUCH.value(table, key) for key in ("length", "width", "relief"))
+            return HeightMap.read(_beside(table, "file", folder), *sizes)
+        return table.make(kind)
+
+
+def _beside(table: TomlTable, key: str, folder: Path) -> Path:
+    """The file that the table names, which lies beside that of the scene."""
+    file = folder / TOUCH.value(table, key)
+    if not file.is_file():
+        raise table.refusal(
+            f"expected the name of a file beside that of the scene, got {str(file)!r:.200}, where "
+            "there is none",
+            key,
+        )
+    return file
+
+
+def _motion(table: TomlTable, folder: Path) -> Motion | None:
+    given = [key for key in ("path", "orbit", "recorded") if key in table]
+    if len(given) > 1:
+        raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
+    if "orbit" in table:
+        orbit = table.table("orbit")
+        made = orbit.make(Orbit)
+        orbit.done()
+        return made
+    if "recorded" in table:
+        with table.blamed("recorded"):
+            return _recorded(_beside(table, "recorded", folder))
+    steps = [_step(step) for step in table.tables("path")]
+    with table.blamed("path"):
+        return MotionPath(tuple(steps)) if "path" in table else None
+
+
+def _step(table: TomlTable) -> MotionStep:
+    made = table.make(STEP.kinds[STEP.choose(table, "step")].made)
+    table.done()
+    return made
+
+
+def _recorded(file: Path) -> RecordedMotion:
+    """A motion from a CSV file with the columns time, dx, dy and amount."""
+    try:
+        if file.stat().st_size > _LARGEST_RECORD:
+            raise OSError(f"it has more than {_LARGEST_RECORD} bytes; thin it out")
+        heading, *lines = file.read_text(encoding="utf-8-sig").splitlines() or [""]
+        rows = np.array([line.split(",") for line in lines if line.strip()], float)
+    except (OSError, ValueError) as error:
+        raise Refusal(
+            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
+        ) from error
+    if heading.replace(" ", "") != "time,dx,dy,amount":
+        raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r:.80}")
+    if rows.shape[1:] != (4,):
+        raise Refusal(f"{file}: expected lines of four numbers, got those of {rows.shape}")
+    return RecordedMotion(rows[:, 0], rows[:, 1:])
 
 
 def check_sides(patch: Patch) -> None:
@@ -364,48 +406,3 @@ def check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: 
 def usual_reference(patch: Patch) -> tuple[int, int]:
     """The number of functions of the true shape of a skin that says none."""
     return (15, 1 if patch.strip else 15)
-
-
-def read_scene_text(file: Path) -> str:
-    """The text in `file`; raises `Refusal` for a file that cannot be read, or is no scene's."""
-    try:
-        if file.exists() and not file.is_file():
-            raise Refusal(f"{file}: expected a file with a scene, got a folder or a device")
-        if file.stat().st_size > _LARGEST_SCENE:
-            raise Refusal(f"{file}: expected a scene of at most {_LARGEST_SCENE} bytes, got more")
-        return file.read_text(encoding="utf-8-sig")
-    except Refusal:
-        raise
-    except (OSError, ValueError) as error:  # undecodable, or a name that no file has
-        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
-
-
-TABLE_1_NOISE = 0.40 / math.sqrt(3)
-"""RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
-
-DEFAULT_SCENE = "circle"
-
-_FOLDER = Path(str(files("kappaskin_resources"))) / "scenes"
-_ENDING = ".toml"
-
-SCENES = tuple(sorted(file.stem for file in _FOLDER.iterdir() if file.suffix == _ENDING))
-"""Names of the ready scenes."""
-
-
-def scene_file(name: str = "") -> Path:
-    """The file of the ready scene `name`, of the default one when empty; or the TOML file named."""
-    if name.endswith(_ENDING):
-        return Path(name)
-    name = name or DEFAULT_SCENE
-    if name not in SCENES:
-        raise Refusal(
-            f"expected a scene among {', '.join(SCENES)}, or a file that ends in {_ENDING}; got "
-            f"{name!r}"
-        )
-    return _FOLDER / f"{name}{_ENDING}"
-
-
-def load_scene(name: str = "") -> Scene:
-    """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
-    file = scene_file(name)
-    return read_scene(read_scene_text(file), file)

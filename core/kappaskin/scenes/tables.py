@@ -135,9 +135,9 @@ class TomlTable:
     def listed(self, key: str) -> list[Any]:
         """The list at `key`, of values of any kind."""
         self._asked.add(key)
-        if not isinstance(said := self._values[key], list):
-            raise self.refusal(f"expected a list, got {said!r:.60}", key)
-        return cast("list[Any]", said)
+        if not isinstance(value := self._values[key], list):
+            raise self.refusal(f"expected a list, got {value!r:.60}", key)
+        return cast("list[Any]", value)
 
     def get(
         self, key: str, kind: Any, default: Any = REQUIRED, within: Within | None = None
@@ -175,18 +175,18 @@ class TomlTable:
     def table(self, key: str) -> "TomlTable":
         """The table at `key`; an empty one when there is none."""
         self._asked.add(key)
-        said = self._values.get(key, {})
-        if not isinstance(said, dict):
-            raise self.refusal(f"expected a table [{key}], got {said!r:.60}", key)
-        return self._inside(said, key)
+        value = self._values.get(key, {})
+        if not isinstance(value, dict):
+            raise self.refusal(f"expected a table [{key}], got {value!r:.60}", key)
+        return self._inside(value, key)
 
     def tables(self, key: str) -> "list[TomlTable]":
         """The tables of the array [[key]]."""
         self._asked.add(key)
-        said = self._values.get(key, [])
-        many = cast("list[Any]", said) if isinstance(said, list) else [said]
+        value = self._values.get(key, [])
+        many = cast("list[Any]", value) if isinstance(value, list) else [value]
         if not all(isinstance(one, dict) for one in many):
-            raise self.refusal(f"expected an array of tables [[{key}]], got {said!r:.60}", key)
+            raise self.refusal(f"expected an array of tables [[{key}]], got {value!r:.60}", key)
         return [self._inside(one, key, n) for n, one in enumerate(many)]
 
     def _inside(self, values: Any, *place: str | int) -> "TomlTable":
@@ -217,7 +217,7 @@ class TomlTable:
         return self.stands_for(self.get(key, str, default), key, among)
 
     def stands_for(self, name: str, key: str, among: dict[str, _Made]) -> _Made:
-        """What a `name` that was said at `key` stands for."""
+        """What a `name` that stands at `key` stands for."""
         if name not in among:
             near = "".join(f"; did you mean {one!r}?" for one in _nearest(name, list(among)))
             raise self.refusal(f"expected one of {', '.join(among)}, got {name!r}{near}", key)
@@ -245,10 +245,10 @@ def _nearest(name: str, known: list[str]) -> list[str]:
 
 def _dotted(place: Place) -> str:
     """The way to a value as a person writes it, tables counted from one."""
-    said = ""
+    text = ""
     for part in place:
-        said += f"[{part + 1}]" if isinstance(part, int) else f".{part}"
-    return f"{said[1:]}: " if said else ""
+        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}"
+    return f"{text[1:]}: " if text else ""
 
 
 def _expected(kind: Any) -> str:

@@ -44,13 +44,13 @@ def written_fields(
 ) -> dict[str, Any]:
     """The fields of a dataclass that are not as `usual`, their defaults when left out."""
     hints = get_type_hints(type(owner))
-    said = dict[str, Any]()
+    values = dict[str, Any]()
     for field in fields(cast("Any", owner)):
         value = getattr(owner, field.name)
         expected = field.default if usual is None else getattr(usual, field.name)
         if field.init and field.name not in without and value != expected:
-            said[field.name] = toml_value(value, hints[field.name])
-    return said
+            values[field.name] = toml_value(value, hints[field.name])
+    return values
 
 
 def toml_value(value: Any, kind: Any) -> Any:
@@ -65,8 +65,8 @@ def toml_value(value: Any, kind: Any) -> Any:
 def written_touch(stimulus: Stimulus) -> dict[str, Any]:
     """What a [[touch]] says of the stimulus; what came from another file is refused."""
     what = stimulus.what
-    said = _pressed(what) if isinstance(what, Indenter) else _load(what)
-    return {**said, **_motion(stimulus.motion)}
+    values = _pressed(what) if isinstance(what, Indenter) else _load(what)
+    return {**values, **_motion(stimulus.motion)}
 
 
 def _name(among: Mapping[str, PartKind], one: object) -> str:
@@ -78,8 +78,8 @@ def _name(among: Mapping[str, PartKind], one: object) -> str:
 
 
 def _load(load: Load) -> dict[str, Any]:
-    said = written_fields(load, without=("force",))
-    return {"what": _name(LOADS, load), **said, "force": float(load.force)}
+    values = written_fields(load, without=("force",))
+    return {"what": _name(LOADS, load), **values, "force": float(load.force)}
 
 
 def _pressed(what: Indenter) -> dict[str, Any]:
@@ -119,9 +119,9 @@ def _motion(motion: Motion | None) -> dict[str, Any]:
 
 def _step(step: MotionStep) -> dict[str, Any]:
     time = ("seconds", "ease")
-    said = written_fields(step)
-    last = {key: said.pop(key) for key in time if key in said}
-    return {"step": _name(STEP.kinds, step), **said, **last}
+    values = written_fields(step)
+    last = {key: values.pop(key) for key in time if key in values}
+    return {"step": _name(STEP.kinds, step), **values, **last}
 
 
 def write_scene(scene: Scene) -> str:
@@ -151,7 +151,7 @@ def write_scene(scene: Scene) -> str:
 def _top(scene: Scene) -> dict[str, Any]:
     usual = {key: SCENE.key(key).default for key in SCENE.keys}
     usual |= {"title": scene.name, "reference": usual_reference(scene.plate.patch)}
-    said = {
+    written = {
         "format": FORMAT,
         "title": scene.title or scene.name,
         "text": scene.text,
@@ -160,8 +160,8 @@ def _top(scene: Scene) -> dict[str, Any]:
         "reference": tuple(int(count) for count in scene.reference),
         "accuracy": float(scene.choice.accuracy),
     }
-    told = {key: value for key, value in said.items() if value != usual[key]}
-    return {key: [*value] if isinstance(value, tuple) else value for key, value in told.items()}
+    changes = {key: value for key, value in written.items() if value != usual[key]}
+    return {key: [*value] if isinstance(value, tuple) else value for key, value in changes.items()}
 
 
 def _skin(scene: Scene) -> dict[str, Any]:
@@ -218,9 +218,9 @@ def _electronics(electronics: Transduction) -> list[str]:
     each = {name: _changes(electronics, chain) for name, chain in CHAINS.items()}
     like = min(each, key=lambda name: sum(map(len, each[name].values())))
     usual = ELECTRONICS.key("like").default
-    told = [] if like == usual else [table("[electronics]", {"like": like})]
-    parts = {name: said for name, said in each[like].items() if said}
-    return told + [
+    tables = [] if like == usual else [table("[electronics]", {"like": like})]
+    parts = {name: values for name, values in each[like].items() if values}
+    return tables + [
         table(f"[electronics.{name}]", parts[name], PARTS[name].comments()) for name in parts
     ]
 
@@ -244,8 +244,8 @@ def _cylinders(laid: Presentation, patch: Patch) -> dict[str, Any]:
             "expected cylinders in the order of a schedule, which is what a scene file can tell, "
             f"got {len(laid.steps)} other steps; take those of kappaskin.schedule"
         )
-    said = {"radii": list(radii)} if radii != RADII else {}
-    return {**({"hold": float(hold)} if hold else {}), **said, "dwell": float(laid.dwell)}
+    values = {"radii": list(radii)} if radii != RADII else {}
+    return {**({"hold": float(hold)} if hold else {}), **values, "dwell": float(laid.dwell)}
 
 
 def _effects(scene: Scene) -> list[str]:
@@ -256,8 +256,8 @@ def _effects(scene: Scene) -> list[str]:
             f"scene file, {', '.join(ordered)}; got {', '.join(names)}"
         )
     choice = _choice(scene)
-    told = [table("[effects]", choice)] if choice else []
-    return told + [
+    tables = [table("[effects]", choice)] if choice else []
+    return tables + [
         table(f"[effects.{effect.name}]", _effect(effect, scene), EFFECT.comments(effect.name))
         for effect in scene.effects
     ]

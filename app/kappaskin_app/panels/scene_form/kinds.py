@@ -1,4 +1,4 @@
-"""A value in a scene's text to the kind of editor that it is edited by."""
+"""Which kind of editor edits a value."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""Numbers of a scene as they are shown and typed: in their own unit, with the digits they need."""
+"""Number boxes: values in the unit of the screen, with the digits that they need."""
 
 import math
 import re

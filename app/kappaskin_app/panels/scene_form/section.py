@@ -1,4 +1,4 @@
-"""One part of a scene as a form shows it: rows of values, parts of its own, what may be added."""
+"""Sections of a scene form: rows of values, parts of their own, and what may be added."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

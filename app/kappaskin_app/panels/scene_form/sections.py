@@ -1,4 +1,4 @@
-"""What the text of a scene says to what its forms show: parts with rows, and what may be added."""
+"""The sections that a scene's text calls for, from the schema of scene files."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -14,74 +14,76 @@ from kappaskin_app.scene_text.changes import Place
 _ELECTRONICS = ("bridge", "multiplexer", "amplifier", "converter")
 _ORDER = ("step", "seconds", "by", "to", "times", "ease")
 
-Said = Mapping[str, Any]
+Values = Mapping[str, Any]
 
 
-def sections_of(said: Said) -> tuple[Section, ...]:
+def sections_of(values: Values) -> tuple[Section, ...]:
     """What a scene's TOML says, part by part in the order of its forms."""
-    touches = _tables(said, "touch", ())
+    touches = _tables(values, "touch", ())
     found = [
-        _section("Scene", "scene", "", said, ()),
-        _skin(_table(said, "skin")),
-        _section("Elements", "elements", "", _table(said, "elements"), ("elements",)),
-        _electronics(_table(said, "electronics")),
+        _section("Scene", "scene", "", values, ()),
+        _skin(_table(values, "skin")),
+        _section("Elements", "elements", "", _table(values, "elements"), ("elements",)),
+        _electronics(_table(values, "electronics")),
         *(_touch(f"Touch {n}", *touch) for n, touch in enumerate(touches, 1)),
     ]
-    if "cylinders" not in said:
+    if "cylinders" not in values:
         found.append(_more_touches([str(touch.get("what")) for _, touch in touches]))
-    found.append(_effects(_table(said, "effects")))
-    if "cylinders" in said:
-        table, place = _table(said, "cylinders"), ("cylinders",)
+    found.append(_effects(_table(values, "effects")))
+    if "cylinders" in values:
+        table, place = _table(values, "cylinders"), ("cylinders",)
         found.append(_section("Cylinders", "cylinders", "", table, place, removable=True))
     return tuple(found)
 
 
-def _section(title: str, part: str, kind: str, said: Said, place: Place, **more: Any) -> Section:
+def _section(
+    title: str, part: str, kind: str, values: Values, place: Place, **more: Any
+) -> Section:
     """What a table says that has no parts, or whose parts are `more`."""
-    rows = _rows(part, kind, said, place)
-    offers = (*_offers(part, kind, said, place), *more.pop("offers", ()))
+    rows = _rows(part, kind, values, place)
+    offers = (*_offers(part, kind, values, place), *more.pop("offers", ()))
     return Section(title, place, rows, offers=offers, **more)
 
 
-def _skin(said: Said) -> Section:
-    return _section("Skin", "skin", str(said.get("shape", "rectangle")), said, ("skin",))
+def _skin(values: Values) -> Section:
+    return _section("Skin", "skin", str(values.get("shape", "rectangle")), values, ("skin",))
 
 
-def _electronics(said: Said) -> Section:
+def _electronics(values: Values) -> Section:
     sections, offers = list[Section](), list[Addition]()
     for part in _ELECTRONICS:
         place = ("electronics", part)
-        section = _section(PARTS[part].label, part, "", _table(said, part), place)
-        if part in said:
+        section = _section(PARTS[part].label, part, "", _table(values, part), place)
+        if part in values:
             sections.append(section)
         else:
             offers.append(Addition(section.title, "", inside=section.offers))
     return _section(
-        *("Electronics", "electronics", "", said, ("electronics",)),
+        *("Electronics", "electronics", "", values, ("electronics",)),
         sections=tuple(sections),
         offers=offers,
     )
 
 
-def _touch(title: str, place: Place, said: Said) -> Section:
+def _touch(title: str, place: Place, values: Values) -> Section:
     return _section(
-        *(title, "touch", str(said.get("what")), said, place),
-        sections=_motion(place, said),
+        *(title, "touch", str(values.get("what")), values, place),
+        sections=_motion(place, values),
         removable=True,
     )
 
 
-def _motion(place: Place, said: Said) -> tuple[Section, ...]:
+def _motion(place: Place, values: Values) -> tuple[Section, ...]:
     found = list[Section]()
-    if "orbit" in said:
-        orbit, at = _table(said, "orbit"), (*place, "orbit")
+    if "orbit" in values:
+        orbit, at = _table(values, "orbit"), (*place, "orbit")
         found.append(_section(PARTS["orbit"].label, "orbit", "", orbit, at, removable=True))
-    if "path" in said:
+    if "path" in values:
         at = (*place, "path")
         found.append(
             Section(
                 *(PARTS["touch"].key("path").label, at),
-                sections=tuple(_step(*step) for step in _tables(said, "path", place)),
+                sections=tuple(_step(*step) for step in _tables(values, "path", place)),
                 adding="Add step",
                 more=_offers_of_kinds("step", lambda kind: _adding_step(at, kind)),
                 removable=True,
@@ -90,9 +92,9 @@ def _motion(place: Place, said: Said) -> tuple[Section, ...]:
     return tuple(found)
 
 
-def _step(place: Place, said: Said) -> Section:
-    ordered = {key: said[key] for key in sorted(said, key=_turn)}
-    return _section("", "step", str(said.get("step")), ordered, place, step=True, removable=True)
+def _step(place: Place, values: Values) -> Section:
+    ordered = {key: values[key] for key in sorted(values, key=_turn)}
+    return _section("", "step", str(values.get("step")), ordered, place, step=True, removable=True)
 
 
 def _turn(key: str) -> int:
@@ -109,22 +111,22 @@ def _more_touches(there: list[str]) -> Section:
     elif there:
         offers = tuple(o for o, kind in zip(offers, touch.kinds, strict=True) if kind not in rigid)
     else:
-        said = {"dwell": PARTS["cylinders"].key("dwell").beginning}
+        values = {"dwell": PARTS["cylinders"].key("dwell").beginning}
         laid = Addition(
             "Cylinders",
             "Lay the skin on one cylinder after the other, as a calibration does.",
-            lambda text: changes.add_table(text, ("cylinders",), said),
+            lambda text: changes.add_table(text, ("cylinders",), values),
         )
         offers = (*offers, laid)
     tip = "" if offers else "A rigid object presses alone: remove it first, or change what it is."
     return Section("", ("touch", "more"), adding="Add touch", more=offers, tip=tip)
 
 
-def _effects(said: Said) -> Section:
-    there = [name for name, table in said.items() if isinstance(table, Mapping)]
+def _effects(values: Values) -> Section:
+    there = [name for name, table in values.items() if isinstance(table, Mapping)]
     blocks = tuple(
         _section(
-            *(called(name), "effects", name, said[name], ("effects", name)),
+            *(called(name), "effects", name, values[name], ("effects", name)),
             removable=True,
             tip=explained(name),
         )
@@ -148,26 +150,26 @@ def _adding_step(place: Place, kind: str) -> Change:
 
 def _offers_of_kinds(part: str, adding: Callable[[str], Change]) -> tuple[Addition, ...]:
     kinds = PARTS[part].kinds
-    return tuple(Addition(one.words, "", adding(name)) for name, one in kinds.items())
+    return tuple(Addition(one.label, "", adding(name)) for name, one in kinds.items())
 
 
-def _table(said: Said, key: str) -> Said:
-    found = said.get(key)
+def _table(values: Values, key: str) -> Values:
+    found = values.get(key)
     return found if isinstance(found, Mapping) else {}
 
 
-def _tables(said: Said, key: str, place: Place) -> list[tuple[Place, Said]]:
+def _tables(values: Values, key: str, place: Place) -> list[tuple[Place, Values]]:
     """The tables of an array with their places; a table by itself is an array of one."""
-    found = said.get(key)
+    found = values.get(key)
     if isinstance(found, Mapping):
         return [((*place, key), found)]
     many = enumerate(found) if isinstance(found, list) else ()
     return [((*place, key, n), one) for n, one in many if isinstance(one, Mapping)]
 
 
-def _rows(part: str, kind: str, said: Said, place: Place) -> tuple[Row, ...]:
+def _rows(part: str, kind: str, values: Values, place: Place) -> tuple[Row, ...]:
     may, found = PARTS[part].known(kind), list[Row]()
-    for name, value in said.items():
+    for name, value in values.items():
         if isinstance(value, Mapping) or name == "path" or (part == "scene" and name not in may):
             continue
         key = _key(part, kind, name)
@@ -182,19 +184,19 @@ def _key(part: str, kind: str, name: str) -> Key:
     return replace(key, tip=f"{key.tip} {explained(kind)}".strip()) if part == "effects" else key
 
 
-def _offers(part: str, kind: str, said: Said, place: Place) -> tuple[Addition, ...]:
+def _offers(part: str, kind: str, values: Values, place: Place) -> tuple[Addition, ...]:
     """What else a table may say."""
     found = list[Addition]()
     for name, value in PARTS[part].known(kind).items():
-        if name in said:
+        if name in values:
             continue
         key = _key(part, kind, name)
-        instead = sorted(instead_of(name) & set(said))
+        instead = sorted(instead_of(name) & set(values))
         words = key.label + "".join(
             f" instead of {_key(part, kind, other).label.lower()}" for other in instead
         )
         found.append(Addition(words, key.explained, _putting_in(place, name, value)))
-    return () if part == "effects" and "like" in said else tuple(found)
+    return () if part == "effects" and "like" in values else tuple(found)
 
 
 def _putting_in(place: Place, key: str, value: Any) -> Change:
