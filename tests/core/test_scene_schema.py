@@ -1,5 +1,6 @@
 """The schema of scene files: one declaration, from which all else about a key comes."""
 
+import re
 import runpy
 from dataclasses import fields
 from pathlib import Path
@@ -72,3 +73,9 @@ def test_numbers_beyond_the_limits_declared_are_refused_with_them(part, name):
 def test_the_guide_tells_every_key_as_it_is_declared():
     page = GUIDE["PAGE"].read_text(encoding="utf-8")
     assert page.endswith(GUIDE["told"]()), "run python tests/guide_keys.py"
+
+
+def test_the_guide_names_every_effect_where_it_comes_about():
+    page = GUIDE["PAGE"].read_text(encoding="utf-8")
+    rows = page.partition("| where | effects |")[2].partition("\n\n")[0]
+    assert re.findall(r"`([\w-]+)`", rows) == list(EFFECTS)

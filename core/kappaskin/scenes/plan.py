@@ -65,7 +65,7 @@ class Plan:
 
 
 def effects_of(scene: Scene) -> dict[str, Effect]:
-    """Everything that there is of `scene` to spoil its readings, by name, as it comes about."""
+    """All effects that there are in `scene`, by name, in the order in which they come about."""
     plate, layout = scene.plate, scene.layout
     there: list[Effect] = []
     if plate.tension and plate.rigidity:  # a drum head is no skin without its tension
@@ -135,7 +135,7 @@ def _percent(share: float) -> str:
 
 
 def kept_effects(scene: Scene) -> tuple[Effect, ...]:
-    """The effects that `plan` keeps; without a look at the scene where its choice needs none."""
+    """The effects that `plan` keeps; without a survey of the scene where its choice needs none."""
     if scene.choice.auto:
         return plan(scene).kept
     there, off = effects_of(scene), scene.choice.off

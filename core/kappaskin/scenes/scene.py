@@ -1,4 +1,4 @@
-"""A scene: a skin, what touches it, what spoils its readings; its loads over time."""
+"""A scene: a skin, what touches it and what disturbs its readings; its loads over time."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -166,7 +166,7 @@ def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Lo
 
 @dataclass(frozen=True, slots=True)
 class Playback:
-    """A scene that stood at `at` s when device time was `since` s, `speed` times as fast since.
+    """Playback of a scene: at `at` s when device time was `since` s, `speed` times as fast since.
 
     At a speed of zero it stands still, while the device goes on reading it.
     """
@@ -190,7 +190,7 @@ FROM_THE_BEGINNING = Playback()
 
 
 class AppliedLoads(NamedTuple):
-    """What presses at one moment: modal `force` (Ri, Rj) in N, and the `contact` (2,) in m.
+    """The loads on a skin at one moment: modal `force` (Ri, Rj) in N and `contact` (2,) in m.
 
     That is the centre of force, NaN where nothing touches. `loads` make the force: those of the
     scene, or a point load wherever a rigid object bears.
@@ -202,7 +202,7 @@ class AppliedLoads(NamedTuple):
 
 
 class LoadingHistory:
-    """What presses on the skin of `scene`, as if it were `plate`, at one time after the other.
+    """The loads on the skin of `scene` over time, as if the skin were `plate`.
 
     A rigid object is sought from where it was: asked in order, that is quick.
     """
@@ -240,11 +240,11 @@ class LoadingHistory:
 
 _MOMENTS = 48  # evenly over the scene, besides those of its motions and those halfway
 _LONGEST = 60.0  # s of a scene that nothing repeats in: what drifts has this long to do so
-_STEP = 1e-3  # s over which a rate is told; less of a motion that is as fast
+_STEP = 1e-3  # s over which a rate is taken; less of a motion that is as fast
 
 
 def survey_times(scene: Scene) -> list[float]:
-    """Times in s, upwards, at which to look at a scene to have seen all of it."""
+    """The times in s, ascending, at which a survey samples a scene."""
     if not (scene.moves or scene.laid):
         return [0.0]
     evenly = np.arange(_MOMENTS) * scene.duration / _MOMENTS
@@ -255,12 +255,12 @@ def survey_times(scene: Scene) -> list[float]:
 
 
 def survey_duration(scene: Scene) -> float:
-    """Seconds after which nothing new is to be seen of a scene, or all that counts has drifted."""
+    """Seconds after which a scene repeats; `_LONGEST` of one in which nothing moves."""
     return scene.duration if scene.moves or scene.laid else _LONGEST
 
 
 def survey(scene: Scene) -> Survey:
-    """Look at `scene` all over one repetition."""
+    """The survey of one repetition of `scene`, by which the sizes of effects are judged."""
     basis = scene.basis
     layout = replace(scene.layout, gage_length=0.0)
     times = np.array(survey_times(scene))

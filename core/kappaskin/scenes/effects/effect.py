@@ -153,9 +153,9 @@ NOTHING = Size(0.0, 0.0)
 
 
 class Effect(ABC):
-    """One thing that spoils readings; its values compare equal when they spoil alike.
+    """One thing that disturbs readings; two that disturb alike compare equal.
 
-    An effect is told and judged without what it takes to work: that is imported when it starts.
+    To describe and judge one takes nothing of what it does: that is imported when it starts.
     """
 
     name: ClassVar[str]
