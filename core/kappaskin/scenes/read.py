@@ -129,10 +129,10 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
     reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
-        check_functions(plate.patch, edge, reference, len(layout))
+        _check_functions(plate.patch, edge, reference, len(layout))
         basis()
     stimuli = tuple(
-        read_stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), folder)
+        _stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), folder)
         for table in top.tables("touch")
     )
     electronics = _electronics(top.table("electronics"))
@@ -286,7 +286,7 @@ def _wanted(table: TomlTable) -> set[str]:
     return {*EFFECT.value(table, "on"), *(() if isinstance(named, str) else named)}
 
 
-def read_stimulus(
+def _stimulus(
     table: TomlTable, plate: Plate, moved: Callable[[Load, float], Load], folder: Path
 ) -> Stimulus:
     """What a [[touch]] of `plate` says; `moved` makes a load move its place so far in m."""
@@ -390,7 +390,7 @@ def check_elements(m: int, n: int = 1) -> None:
         raise Refusal(f"expected at most {_MOST_ELEMENTS} elements, got {m} x {n}; take fewer")
 
 
-def check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:
+def _check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:
     """Refuse more functions of the true shape than a few seconds and some memory are enough for."""
     whole = isinstance(patch, Disk | Polygon)
     mix = whole or patch.base_curvature or edge != "hinged"

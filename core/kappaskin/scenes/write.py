@@ -39,91 +39,6 @@ from kappaskin.skin import Disk, Patch, Polygon
 _MOST_CELLS = 2**20  # of a grid that is looked for
 
 
-def written_fields(
-    owner: object, usual: object = None, without: tuple[str, ...] = ()
-) -> dict[str, Any]:
-    """The fields of a dataclass that are not as `usual`, their defaults when left out."""
-    hints = get_type_hints(type(owner))
-    values = dict[str, Any]()
-    for field in fields(cast("Any", owner)):
-        value = getattr(owner, field.name)
-        expected = field.default if usual is None else getattr(usual, field.name)
-        if field.init and field.name not in without and value != expected:
-            values[field.name] = toml_value(value, hints[field.name])
-    return values
-
-
-def toml_value(value: Any, kind: Any) -> Any:
-    """The `value` as TOML has it: a number where `kind` is float is one, however it came."""
-    if get_origin(kind) is tuple:
-        return [toml_value(each, get_args(kind)[0]) for each in value]
-    if isinstance(value, bool | str):
-        return value
-    return float(value) if kind is float or float in get_args(kind) else int(value)
-
-
-def written_touch(stimulus: Stimulus) -> dict[str, Any]:
-    """What a [[touch]] says of the stimulus; what came from another file is refused."""
-    what = stimulus.what
-    values = _pressed(what) if isinstance(what, Indenter) else _load(what)
-    return {**values, **_motion(stimulus.motion)}
-
-
-def _name(among: Mapping[str, PartKind], one: object) -> str:
-    """What a file calls `one`; the first of two names for the same."""
-    for name, kind in among.items():
-        if type(one) is kind.made:
-            return name
-    raise Refusal(f"expected one of {', '.join(among)} to write in a scene file, got {one!r:.80}")
-
-
-def _load(load: Load) -> dict[str, Any]:
-    values = written_fields(load, without=("force",))
-    return {"what": _name(LOADS, load), **values, "force": float(load.force)}
-
-
-def _pressed(what: Indenter) -> dict[str, Any]:
-    return {
-        "what": _object(what.rigid),
-        **written_fields(what.rigid),
-        **written_fields(what, without=("rigid",)),
-    }
-
-
-def _object(rigid: RigidObject) -> str:
-    name = _name(OBJECTS, rigid)
-    if name in ("mesh", "heights"):
-        raise Refusal(
-            f"expected an object that a scene file describes, got a {type(rigid).__name__}, which "
-            f"does not tell its file any more; write [[touch]] with what = {name!r} and the file "
-            "by hand"
-        )
-    return name
-
-
-def _motion(motion: Motion | None) -> dict[str, Any]:
-    match motion:
-        case None:
-            return {}
-        case Orbit():
-            return {"orbit": written_fields(motion)}
-        case MotionPath():
-            return {"path": [_step(step) for step in motion.steps]}
-        case _:
-            raise Refusal(
-                f"expected an orbit or a path to write in a scene file, got a "
-                f"{type(motion).__name__}, which does not tell its file any more; write "
-                "[[touch]] with recorded = the file by hand"
-            )
-
-
-def _step(step: MotionStep) -> dict[str, Any]:
-    time = ("seconds", "ease")
-    values = written_fields(step)
-    last = {key: values.pop(key) for key in time if key in values}
-    return {"step": _name(STEP.kinds, step), **values, **last}
-
-
 def write_scene(scene: Scene) -> str:
     """The text of a file of `scene`, whose name is the file's.
 
@@ -142,7 +57,7 @@ def write_scene(scene: Scene) -> str:
             table("[cylinders]", _cylinders(scene.laid, scene.plate.patch), CYLINDERS.comments())
         )
     tables += _effects(scene)
-    tables += [table("[[touch]]", written_touch(each), TOUCH.comments()) for each in scene.stimuli]
+    tables += [table("[[touch]]", _touch(each), TOUCH.comments()) for each in scene.stimuli]
     text = "\n".join(tables)
     read_scene(text, Path(f"{scene.name}.toml"))  # it refuses what is beyond the limits of a file
     return text
@@ -166,7 +81,7 @@ def _top(scene: Scene) -> dict[str, Any]:
 
 def _skin(scene: Scene) -> dict[str, Any]:
     held = {} if scene.edge == SKIN.key("edge").default else {"edge": scene.edge}
-    return {**_patch(scene.plate.patch), **written_fields(scene.plate, without=("patch",)), **held}
+    return {**_patch(scene.plate.patch), **_fields(scene.plate, without=("patch",)), **held}
 
 
 def _patch(patch: Patch) -> dict[str, Any]:
@@ -178,7 +93,7 @@ def _patch(patch: Patch) -> dict[str, Any]:
         case _:
             shape = {"shape": "strip"} if patch.strip else {}
             size = {"size": [float(patch.a), float(patch.b)]}
-            return {**shape, **size, **written_fields(patch, without=("a", "b", "strip"))}
+            return {**shape, **size, **_fields(patch, without=("a", "b", "strip"))}
 
 
 def _elements(layout: SensorLayout) -> dict[str, Any]:
@@ -191,7 +106,7 @@ def _elements(layout: SensorLayout) -> dict[str, Any]:
             "elements of which some channels are dead; those that are dead are so as a whole"
         )
     placed = {"positions": layout.positions.tolist()} if grid is None else {"grid": list(grid[0])}
-    gages = written_fields(layout, without=("patch", "positions", "live", "shape"))
+    gages = _fields(layout, without=("patch", "positions", "live", "shape"))
     return {**placed, **({"dead": dead} if dead else {}), **gages}
 
 
@@ -228,9 +143,7 @@ def _electronics(electronics: Transduction) -> list[str]:
 def _changes(electronics: Transduction, chain: Transduction) -> dict[str, dict[str, Any]]:
     """What each part says where it differs from that of `chain`."""
     names = [field.name for field in fields(chain)]
-    return {
-        name: written_fields(getattr(electronics, name), getattr(chain, name)) for name in names
-    }
+    return {name: _fields(getattr(electronics, name), getattr(chain, name)) for name in names}
 
 
 def _cylinders(laid: Presentation, patch: Patch) -> dict[str, Any]:
@@ -272,7 +185,7 @@ def _effect(effect: Effect, scene: Scene) -> dict[str, Any]:
             return {"like": name}
     if isinstance(effect, StrainLimit) and effect.transduction != scene.transduction:
         raise Refusal("expected a strain limit of the scene's own electronics, got another's")
-    return written_fields(effect, without=("transduction",))
+    return _fields(effect, without=("transduction",))
 
 
 def _choice(scene: Scene) -> dict[str, Any]:
@@ -289,3 +202,86 @@ def _choice(scene: Scene) -> dict[str, Any]:
     forced = {"on": on, "off": off}
     lists = {key: [name for name in EFFECTS if name in forced[key]] for key in forced}
     return named | {key: names for key, names in lists.items() if names}
+
+
+def _touch(stimulus: Stimulus) -> dict[str, Any]:
+    """What a [[touch]] says of the stimulus; what came from another file is refused."""
+    what = stimulus.what
+    values = _pressed(what) if isinstance(what, Indenter) else _load(what)
+    return {**values, **_motion(stimulus.motion)}
+
+
+def _name(among: Mapping[str, PartKind], one: object) -> str:
+    """What a file calls `one`; the first of two names for the same."""
+    for name, kind in among.items():
+        if type(one) is kind.made:
+            return name
+    raise Refusal(f"expected one of {', '.join(among)} to write in a scene file, got {one!r:.80}")
+
+
+def _load(load: Load) -> dict[str, Any]:
+    values = _fields(load, without=("force",))
+    return {"what": _name(LOADS, load), **values, "force": float(load.force)}
+
+
+def _pressed(what: Indenter) -> dict[str, Any]:
+    return {
+        "what": _object(what.rigid),
+        **_fields(what.rigid),
+        **_fields(what, without=("rigid",)),
+    }
+
+
+def _object(rigid: RigidObject) -> str:
+    name = _name(OBJECTS, rigid)
+    if name in ("mesh", "heights"):
+        raise Refusal(
+            f"expected an object that a scene file describes, got a {type(rigid).__name__}, which "
+            f"does not tell its file any more; write [[touch]] with what = {name!r} and the file "
+            "by hand"
+        )
+    return name
+
+
+def _motion(motion: Motion | None) -> dict[str, Any]:
+    match motion:
+        case None:
+            return {}
+        case Orbit():
+            return {"orbit": _fields(motion)}
+        case MotionPath():
+            return {"path": [_step(step) for step in motion.steps]}
+        case _:
+            raise Refusal(
+                f"expected an orbit or a path to write in a scene file, got a "
+                f"{type(motion).__name__}, which does not tell its file any more; write "
+                "[[touch]] with recorded = the file by hand"
+            )
+
+
+def _step(step: MotionStep) -> dict[str, Any]:
+    time = ("seconds", "ease")
+    values = _fields(step)
+    last = {key: values.pop(key) for key in time if key in values}
+    return {"step": _name(STEP.kinds, step), **values, **last}
+
+
+def _fields(owner: object, usual: object = None, without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The fields of a dataclass that are not as `usual`, their defaults when left out."""
+    hints = get_type_hints(type(owner))
+    values = dict[str, Any]()
+    for field in fields(cast("Any", owner)):
+        value = getattr(owner, field.name)
+        expected = field.default if usual is None else getattr(usual, field.name)
+        if field.init and field.name not in without and value != expected:
+            values[field.name] = _toml(value, hints[field.name])
+    return values
+
+
+def _toml(value: Any, kind: Any) -> Any:
+    """The `value` as TOML has it: a number where `kind` is float is one, however it came."""
+    if get_origin(kind) is tuple:
+        return [_toml(each, get_args(kind)[0]) for each in value]
+    if isinstance(value, bool | str):
+        return value
+    return float(value) if kind is float or float in get_args(kind) else int(value)
