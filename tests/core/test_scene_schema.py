@@ -4,10 +4,12 @@ import re
 import runpy
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from kappaskin import Refusal
+from kappaskin._toml import table
 from kappaskin.scenes import PARTS, Indenter, instead_of, load_scene, read_scene
 from kappaskin.scenes.effects import EFFECTS
 
@@ -42,6 +44,36 @@ def test_an_effect_is_told_by_a_table_of_its_own_or_by_the_rest_of_a_scene(name)
     effect = EFFECTS[name]
     assert bool(effect.example) != bool(effect.elsewhere)
     assert (name in PARTS["effects"].kinds) == bool(effect.example)
+
+
+HEAD = "format = 1\n\n[skin]\nsize = [0.1, 0.1]\n\n"
+FILES = {"heights", "mesh", "recorded"}
+"""What lies beside a scene in a file of its own."""
+
+
+def with_one(part: str, kind: str, values: dict[str, Any]) -> str:
+    """A scene file with one table of this kind."""
+    if part == "effects":
+        return HEAD + table(f"[effects.{kind}]", values)
+    if part == "skin":
+        return "format = 1\n" + table("[skin]", {"shape": kind} | values)
+    if part == "touch":
+        return HEAD + table("[[touch]]", {"what": kind} | values)
+    release = {"step": "release", "seconds": 0.5}
+    path = {"path": [{"step": kind} | values, release]}
+    return HEAD + table("[[touch]]", {"what": "disc"} | PARTS["touch"].needed("disc") | path)
+
+
+@pytest.mark.parametrize(("part", "kind"), [(p, k) for p, k in KINDS if k and k not in FILES])
+def test_the_examples_of_every_kind_are_what_a_reader_takes(part, kind):
+    needed = PARTS[part].needed(kind)
+    read_scene(with_one(part, kind, needed), Path("a.toml"))
+
+    for name, example in PARTS[part].optional(kind).items():
+        if name not in {"shape", *FILES}:
+            rest = {key: needed[key] for key in needed if key not in instead_of(name)}
+            if "like" not in rest:  # which tells all of the loops
+                read_scene(with_one(part, kind, rest | {name: example}), Path("a.toml"))
 
 
 def test_what_cannot_stand_beside_a_key_says_the_same_of_it():
