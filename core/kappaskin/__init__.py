@@ -122,29 +122,19 @@ if TYPE_CHECKING:
     from kappaskin.recording import setup_from as setup_from
     from kappaskin.recording import setups_of as setups_of
     from kappaskin.scenes import ADVICE as ADVICE
-    from kappaskin.scenes import EFFECTS as EFFECTS
-    from kappaskin.scenes import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
     from kappaskin.scenes import RADII as RADII
     from kappaskin.scenes import SCENES as SCENES
-    from kappaskin.scenes import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS
-    from kappaskin.scenes import Choice as Choice
-    from kappaskin.scenes import Creep as Creep
-    from kappaskin.scenes import GaussianNoise as GaussianNoise
-    from kappaskin.scenes import Hysteresis as Hysteresis
+    from kappaskin.scenes import AppliedLoads as AppliedLoads
+    from kappaskin.scenes import CylinderStep as CylinderStep
+    from kappaskin.scenes import EffectSelection as EffectSelection
     from kappaskin.scenes import Indenter as Indenter
+    from kappaskin.scenes import LoadingHistory as LoadingHistory
     from kappaskin.scenes import Orbit as Orbit
     from kappaskin.scenes import Presentation as Presentation
-    from kappaskin.scenes import Pressed as Pressed
-    from kappaskin.scenes import Pressing as Pressing
     from kappaskin.scenes import Scene as Scene
     from kappaskin.scenes import Simulator as Simulator
-    from kappaskin.scenes import Step as Step
     from kappaskin.scenes import Stimulus as Stimulus
-    from kappaskin.scenes import Tolerance as Tolerance
-    from kappaskin.scenes import UniformNoise as UniformNoise
     from kappaskin.scenes import load_scene as load_scene
-    from kappaskin.scenes import moments_of as moments_of
-    from kappaskin.scenes import parameters as parameters
     from kappaskin.scenes import plan as plan
     from kappaskin.scenes import planned as planned
     from kappaskin.scenes import radii_for as radii_for
@@ -152,7 +142,17 @@ if TYPE_CHECKING:
     from kappaskin.scenes import read_scene_text as read_scene_text
     from kappaskin.scenes import scene_file as scene_file
     from kappaskin.scenes import schedule as schedule
+    from kappaskin.scenes import survey_times as survey_times
     from kappaskin.scenes import write_scene as write_scene
+    from kappaskin.scenes.effects import EFFECTS as EFFECTS
+    from kappaskin.scenes.effects import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
+    from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS
+    from kappaskin.scenes.effects import Creep as Creep
+    from kappaskin.scenes.effects import GaussianNoise as GaussianNoise
+    from kappaskin.scenes.effects import Hysteresis as Hysteresis
+    from kappaskin.scenes.effects import Tolerance as Tolerance
+    from kappaskin.scenes.effects import UniformNoise as UniformNoise
+    from kappaskin.scenes.effects import parameters as parameters
     from kappaskin.sensing import FIRST_GENERATION as FIRST_GENERATION
     from kappaskin.sensing import SECOND_GENERATION as SECOND_GENERATION
     from kappaskin.sensing import Amplifier as Amplifier
@@ -230,11 +230,14 @@ else:
                 "is_written said_of_setup setup_from setups_of"
             ),
             "scenes": (
-                "ADVICE Choice Creep EFFECTS FIRST_GENERATION_LOOPS GaussianNoise Hysteresis "
-                "Indenter Orbit Presentation Pressed Pressing RADII SCENES "
-                "SECOND_GENERATION_LOOPS Scene Simulator Step Stimulus Tolerance UniformNoise "
-                "load_scene moments_of parameters plan planned radii_for read_scene "
-                "read_scene_text scene_file schedule write_scene"
+                "ADVICE AppliedLoads CylinderStep EffectSelection Indenter LoadingHistory Orbit "
+                "Presentation RADII SCENES Scene Simulator Stimulus load_scene plan planned "
+                "radii_for read_scene read_scene_text scene_file schedule survey_times "
+                "write_scene"
+            ),
+            "scenes.effects": (
+                "Creep EFFECTS FIRST_GENERATION_LOOPS GaussianNoise Hysteresis "
+                "SECOND_GENERATION_LOOPS Tolerance UniformNoise parameters"
             ),
             "sensing": (
                 "Amplifier Converter FIRST_GENERATION HalfBridge Multiplexer SECOND_GENERATION "

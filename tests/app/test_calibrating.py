@@ -18,12 +18,12 @@ from kappaskin import (
     Setup,
     Simulator,
     Status,
-    Step,
     Tare,
     Tolerance,
     load_scene,
 )
 from kappaskin.calibration.calibration import fingerprint
+from kappaskin.scenes import CylinderStep
 from kappaskin_app.features.calibration.calibrating import Calibrating, parsed_radii
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
@@ -40,7 +40,7 @@ class Bench:
     history: History
     now: float
     status: Status
-    laid: list[Step | None]
+    laid: list[CylinderStep | None]
     simulator: Simulator
     frame: int = 0
 
@@ -50,7 +50,7 @@ class Bench:
 
     def read(self, n: int = 60, blank: bool = False, ago: float = 0.0) -> None:
         """Let the next `n` estimates come, 50 a second."""
-        step = next((step for step in reversed(self.laid) if step), None) or Step(1)
+        step = next((step for step in reversed(self.laid) if step), None) or CylinderStep(1)
         self.simulator.change(replace(SCENE, laid=Presentation((step,), 1.0)))
         sensor = SCENE.sensor()
         for _ in range(n):

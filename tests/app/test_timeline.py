@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 
 from kappaskin import Presentation, load_scene
-from kappaskin.scenes.motion import Path, Press, Release
+from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.features.scene.track import profile
 from kappaskin_app.theme import DARK, LIGHT
@@ -53,7 +53,7 @@ def test_a_skin_that_waits_on_one_cylinder_has_no_timeline(row):
 
 def test_a_scene_of_years_is_shown_as_well(row):
     scene = load_scene("slipping")
-    still = replace(scene.stimuli[0], motion=Path((Press(1e9), Release(1e9))))
+    still = replace(scene.stimuli[0], motion=MotionPath((PressStep(1e9), ReleaseStep(1e9))))
     row.show_scene(replace(scene, stimuli=(still,)))
     row.show_time(1.5e9, True)
     assert row.track.time == 1.5e9

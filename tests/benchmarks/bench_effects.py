@@ -16,15 +16,18 @@ from kappaskin import (
     Transduction,
     UniformNoise,
 )
-from kappaskin.scenes import DroppedFrames, Saturation
-from kappaskin.scenes.effects.converter import Quantisation
-from kappaskin.scenes.effects.cross_talk import CrossTalk
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
-from kappaskin.scenes.effects.finite_slope import FiniteSlope
-from kappaskin.scenes.effects.flicker import FlickerNoise
-from kappaskin.scenes.effects.hum import MainsHum
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes.effects import (
+    DroppedFrames,
+    FiniteSlopeEffect,
+    IntermittentElements,
+    Quantisation,
+    Saturation,
+    StrainLimit,
+    StuckElements,
+    Temperature,
+)
+from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
+from kappaskin.scenes.effects.noise import FlickerNoise
 
 CHANNELS = 300
 EFFECTS = [
@@ -74,7 +77,7 @@ def test_finite_slopes_take_a_few_times_the_operator(medians, figure, ratio) -> 
     patch = Patch(0.1, 0.1)
     basis, layout = SineBasis(patch, 15, 15), SensorLayout.regular(patch, 10, 10)
     c = np.random.default_rng(0).normal(0, 1e-4, (15, 15))
-    M, sensed = layout.curvature_operator(basis), FiniteSlope().sensed(basis, layout)
+    M, sensed = layout.curvature_operator(basis), FiniteSlopeEffect().sensed(basis, layout)
 
     ours, baseline = medians(lambda: sensed(c), lambda: M @ c.ravel(), turns=60, calls=100)
 

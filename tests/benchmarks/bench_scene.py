@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from kappaskin import SCENES, PointLoad, Simulator, load_scene
-from kappaskin.scenes import EFFECTS, Choice, kept_of
+from kappaskin.scenes import EffectSelection, kept_effects
+from kappaskin.scenes.effects import EFFECTS
 from kappaskin.scenes.plan import effects_of
 
-NONE = Choice(off=frozenset(EFFECTS))
+NONE = EffectSelection(off=frozenset(EFFECTS))
 
 
 def reading(scene, frames):
@@ -51,8 +52,8 @@ def test_a_scene_without_effects_costs_little_more_than_the_bare_plate(
 @pytest.mark.parametrize("name", ["tapping", "hot-room", "failing-elements"])
 def test_a_plan_costs_no_more_than_what_it_keeps(name, medians, figure, ratio) -> None:
     scene = load_scene(name)
-    kept = frozenset(effect.name for effect in kept_of(scene))
-    alone = replace(scene, choice=Choice(off=frozenset(EFFECTS) - kept))
+    kept = frozenset(effect.name for effect in kept_effects(scene))
+    alone = replace(scene, choice=EffectSelection(off=frozenset(EFFECTS) - kept))
 
     planned, direct = medians(
         reading(scene, 1000), reading(alone, 1000), turns=7, calls=1, clock=time.thread_time
@@ -65,13 +66,13 @@ def test_a_plan_costs_no_more_than_what_it_keeps(name, medians, figure, ratio) -
 def test_on_the_ready_scenes_a_plan_saves_most_of_the_time(medians, figure, ratio) -> None:
     planned, everything = 0.0, 0.0
     for name in SCENES:
-        scene = replace(load_scene(name), choice=Choice(auto=True))
-        every = replace(scene, choice=Choice())
+        scene = replace(load_scene(name), choice=EffectSelection(auto=True))
+        every = replace(scene, choice=EffectSelection())
         auto, whole = medians(
             reading(scene, 60), reading(every, 60), turns=3, calls=1, clock=time.thread_time
         )
         planned, everything = planned + auto, everything + whole
-        assert len(effects_of(scene)) >= len(kept_of(scene))
+        assert len(effects_of(scene)) >= len(kept_effects(scene))
 
     figure(
         f"the {len(SCENES)} ready scenes: everything that is in them costs "

@@ -35,9 +35,7 @@ from kappaskin import (
 from kappaskin.calibration import summary, take_sweep
 from kappaskin.calibration.file import from_toml
 from kappaskin.errors import SourceError
-from kappaskin.scenes import ReadingEffect
-from kappaskin.scenes.effects.effect import Size
-from kappaskin.scenes.effects.survey import Survey
+from kappaskin.scenes.effects import ReadingEffect, Size, Survey
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources import PseudoDevice

@@ -39,8 +39,7 @@ from kappaskin.calibration.calibration import fingerprint
 from kappaskin.calibration.lines import lines
 from kappaskin.calibration.loops import identify, thresholds
 from kappaskin.live.ring import Ring
-from kappaskin.scenes import ReadingEffect
-from kappaskin.scenes.effects.effect import Size
+from kappaskin.scenes.effects import ReadingEffect, Size
 
 pytestmark = pytest.mark.slow
 

@@ -23,15 +23,21 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.cli.common import REFUSED
-from kappaskin.scenes import Choice, CorruptedFrames, Creep, DroppedFrames, GaussianNoise, plan
-from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes import EffectSelection, plan
+from kappaskin.scenes.effects import (
+    CorruptedFrames,
+    Creep,
+    DroppedFrames,
+    GaussianNoise,
+    Temperature,
+)
 from kappaskin.studies import CostMeasurement, effect_rows, effects_text, usual_setting
 
 pytestmark = pytest.mark.slow
 
 EIGHT = Setting("least-squares", (8, 8))
 CENTRE = load_scene("centre")
-EVERYTHING = Choice()
+EVERYTHING = EffectSelection()
 FIGURES = ("rms_with", "rms_without")
 
 
@@ -107,7 +113,7 @@ def test_a_scene_without_a_load_is_refused(scene, reason) -> None:
 def test_without_it_is_the_scene_that_never_had_it() -> None:
     scene = load_scene("failing-elements")
     left_out = frozenset(entry.name for entry in plan(scene) if not entry.kept)
-    scene = replace(scene, choice=Choice(off=left_out | {"finite-slope"}))
+    scene = replace(scene, choice=EffectSelection(off=left_out | {"finite-slope"}))
     found = told(scene)
     for effect in scene.effects:
         others = tuple(one for one in scene.effects if one is not effect)
@@ -133,8 +139,8 @@ def test_without_dead_elements_is_the_skin_where_all_live(name) -> None:
 
 def test_with_what_is_left_out_is_the_scene_that_keeps_it() -> None:
     scene = load_scene("tapping")
-    without = replace(scene, choice=Choice(off=frozenset({"skew", "finite-slope"})))
-    slope = replace(scene, choice=Choice(off=frozenset({"skew"})))
+    without = replace(scene, choice=EffectSelection(off=frozenset({"skew", "finite-slope"})))
+    slope = replace(scene, choice=EffectSelection(off=frozenset({"skew"})))
     found, other = told(without), told(slope)
     assert not found["finite-slope"].kept
     assert other["finite-slope"].kept
@@ -185,7 +191,7 @@ def test_foam_is_judged_from_the_shape_of_the_skin_that_lies_on_it() -> None:
     assert foam.kept
     assert foam.rms_without == pytest.approx(off, rel=2e-3)
     assert foam.rms_with < 1e-3 * foam.rms_without
-    left_out = told(replace(still, choice=Choice(off=scene.choice.off | {"foam"})))["foam"]
+    left_out = told(replace(still, choice=EffectSelection(off=scene.choice.off | {"foam"})))["foam"]
     assert not left_out.kept
     assert (left_out.rms_with, left_out.rms_without) == (foam.rms_with, foam.rms_without)
 
@@ -196,7 +202,9 @@ def test_readings_on_a_rail_are_missing_and_steps_count_where_they_are_simulated
     assert saturation.rms_with > 1.1 * saturation.rms_without
     coarse = replace(CENTRE.transduction, converter=replace(CENTRE.transduction.converter, bits=8))
     scene = replace(CENTRE, effects=(), transduction=coarse, choice=EVERYTHING)
-    steps = told(replace(scene, choice=Choice(off=frozenset({"finite-slope"}))))["quantisation"]
+    steps = told(replace(scene, choice=EffectSelection(off=frozenset({"finite-slope"}))))[
+        "quantisation"
+    ]
     assert steps.rms_with > 1.1 * steps.rms_without
 
 

@@ -19,15 +19,22 @@ from kappaskin import (
     Transduction,
     UniformNoise,
 )
-from kappaskin.scenes import EFFECTS, Hysteresis, ReadingEffect, Saturation, Within, parameters
-from kappaskin.scenes.effects.converter import Quantisation
-from kappaskin.scenes.effects.cross_talk import CrossTalk
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
-from kappaskin.scenes.effects.flicker import FlickerNoise
-from kappaskin.scenes.effects.gage_length import GageLength
-from kappaskin.scenes.effects.hum import MainsHum
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes.effects import (
+    EFFECTS,
+    GageLength,
+    Hysteresis,
+    IntermittentElements,
+    Quantisation,
+    ReadingEffect,
+    Saturation,
+    StrainLimit,
+    StuckElements,
+    Temperature,
+    Within,
+    parameters,
+)
+from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
+from kappaskin.scenes.effects.noise import FlickerNoise
 
 DRAWS = 200_000
 EFFECTS_AT_WORK = [

@@ -10,13 +10,9 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter, welch
 
 from kappaskin import Amplifier, Converter, HalfBridge, Refusal, Transduction
-from kappaskin.scenes import Saturation
-from kappaskin.scenes.effects.converter import Quantisation
-from kappaskin.scenes.effects.cross_talk import CrossTalk
-from kappaskin.scenes.effects.flicker import FlickerNoise
-from kappaskin.scenes.effects.hum import MainsHum
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes.effects import Quantisation, Saturation, StrainLimit, Temperature
+from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
+from kappaskin.scenes.effects.noise import FlickerNoise
 
 
 def started(effect, shape=(12,), seed=0):

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Refusal, SensorLayout
-from kappaskin.scenes import EFFECTS, CorruptedFrames, DeadElements, DroppedFrames
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
+from kappaskin.scenes.effects import (
+    EFFECTS,
+    CorruptedFrames,
+    DeadElements,
+    DroppedFrames,
+    IntermittentElements,
+    StuckElements,
+)
 
 P = 5
 FAILING = [DeadElements, StuckElements, IntermittentElements]

@@ -24,9 +24,7 @@ from kappaskin import (
     basis_for,
 )
 from kappaskin.bases import curvature_at
-from kappaskin.scenes.effects.finite_slope import FiniteSlope
-from kappaskin.scenes.effects.gage_length import GageLength
-from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
+from kappaskin.scenes.effects import FiniteSlopeEffect, Fluid, Foam, GageLength, Tension
 from kappaskin.sources import from_json, to_json
 
 SQUARE = Patch(0.1, 0.1)
@@ -235,7 +233,7 @@ def test_on_a_slope_the_true_normal_curvature_is_sensed():
     fx, fy = f[1, 0], f[0, 1]
     W = np.sqrt(1 + fx**2 + fy**2)
 
-    xx, yy, xy = FiniteSlope().sensed(EIGHT, TENS)(c).reshape(3, -1)
+    xx, yy, xy = FiniteSlopeEffect().sensed(EIGHT, TENS)(c).reshape(3, -1)
 
     np.testing.assert_allclose(xx, f[2, 0] / (W * (1 + fx**2)), rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(yy, f[0, 2] / (W * (1 + fy**2)), rtol=1e-12, atol=1e-12)
@@ -246,7 +244,7 @@ def test_on_a_slope_the_true_normal_curvature_is_sensed():
 def test_on_a_bent_skin_finite_slopes_are_refused():
     patch = Patch(0.04, 0.03, 12.9e-3)
     with pytest.raises(Refusal, match="flat skin for finite slopes"):
-        FiniteSlope().sensed(SineBasis(patch, 4, 4), SensorLayout.regular(patch, 8, 8))
+        FiniteSlopeEffect().sensed(SineBasis(patch, 4, 4), SensorLayout.regular(patch, 8, 8))
 
 
 # What holds the skin

@@ -25,20 +25,29 @@ from kappaskin import (
     UniformNoise,
     basis_for,
 )
-from kappaskin.scenes import EFFECTS, CorruptedFrames, DeadElements, DroppedFrames, Saturation
-from kappaskin.scenes.effects.converter import Quantisation
-from kappaskin.scenes.effects.cross_talk import CrossTalk
-from kappaskin.scenes.effects.effect import LayoutEffect, SkinEffect
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
-from kappaskin.scenes.effects.finite_slope import FiniteSlope
-from kappaskin.scenes.effects.flicker import FlickerNoise
-from kappaskin.scenes.effects.gage_length import GageLength
-from kappaskin.scenes.effects.hum import MainsHum
-from kappaskin.scenes.effects.skew import Skew
-from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.effects.survey import Survey
-from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes.effects import (
+    EFFECTS,
+    CorruptedFrames,
+    DeadElements,
+    DroppedFrames,
+    FiniteSlopeEffect,
+    Fluid,
+    Foam,
+    GageLength,
+    IntermittentElements,
+    Quantisation,
+    Saturation,
+    Skew,
+    SkinEffect,
+    StrainLimit,
+    StuckElements,
+    Survey,
+    Temperature,
+    Tension,
+)
+from kappaskin.scenes.effects.effect import LayoutEffect
+from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
+from kappaskin.scenes.effects.noise import FlickerNoise
 
 DURATION, FRAMES = 2.0, 40
 LOUD = Transduction(amplifier=Amplifier(gain=1500.0))
@@ -47,7 +56,7 @@ EVERY = [
     Tension(60.0),
     Foam(3e5),
     Fluid(),
-    FiniteSlope(),
+    FiniteSlopeEffect(),
     GageLength(3e-3),
     DeadElements((1, 5)),
     StrainLimit(THICK, 0.2),
@@ -163,7 +172,7 @@ def left_out(effect, seed):
         return np.abs(share @ (scene.readings(plate=off) - scene.readings(plate=of))).max()
     if isinstance(effect, LayoutEffect):
         return np.abs(share @ scene.readings(effect.of(scene.layout)) - K).max()
-    if isinstance(effect, FiniteSlope):
+    if isinstance(effect, FiniteSlopeEffect):
         sensed = effect.sensed(scene.basis, scene.layout)
         shapes = s.coefficients.reshape(FRAMES, *scene.basis.shape)
         return max(np.abs(sensed(c) - k).max() for c, k in zip(shapes, K, strict=True))
@@ -211,7 +220,7 @@ def at_rest(s):
 
 
 @pytest.mark.parametrize(
-    "effect", [Tension(60.0), Foam(3e5), Fluid(), FiniteSlope(), GageLength(3e-3), Skew()]
+    "effect", [Tension(60.0), Foam(3e5), Fluid(), FiniteSlopeEffect(), GageLength(3e-3), Skew()]
 )
 def test_what_only_a_load_brings_about_is_nothing_at_rest(effect):
     assert effect.size(replace(survey(0), **at_rest(survey(0)))).error == 0
@@ -261,8 +270,8 @@ def test_on_a_bent_skin_slopes_are_left_to_first_order():
     bent = Patch(0.04, 0.03, 0.0129)
     basis, layout = basis_for(bent, "hinged", 8, 7), SensorLayout.regular(bent, 8, 6)
     s = replace(survey(0), plate=Plate(bent), basis=basis, layout=layout)
-    assert FiniteSlope().size(s).number > 0
-    assert FiniteSlope().size(s).error == 0
+    assert FiniteSlopeEffect().size(s).number > 0
+    assert FiniteSlopeEffect().size(s).error == 0
 
 
 def test_what_was_listed_here_is_every_known_effect_in_order():

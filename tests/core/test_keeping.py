@@ -15,8 +15,7 @@ from kappaskin import METHODS, SCENES, Calibration, Pipeline, Setup, load_scene
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live.recorder import Keeping
 from kappaskin.recording import Recorder, Recording, verifying
-from kappaskin.scenes import SECOND_GENERATION_LOOPS
-from kappaskin.scenes.effects.failures import StuckElements
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, StuckElements
 from kappaskin.sources import SimulatedSource
 
 NO_SIDE = SimpleNamespace(pipeline=None, left=None)

@@ -6,28 +6,29 @@ import numpy as np
 import pytest
 
 from kappaskin import Refusal
-from kappaskin.scenes import Orbit, Step
-from kappaskin.scenes.motion import (
+from kappaskin.scenes import Orbit
+from kappaskin.scenes.stimulus import (
     EASES,
-    Hold,
-    Path,
+    HoldStep,
+    MotionPath,
+    MotionStep,
     Pose,
-    Press,
-    Recorded,
-    Release,
-    Slide,
-    Tap,
-    Turn,
+    PressStep,
+    RecordedMotion,
+    ReleaseStep,
+    SlideStep,
+    TapStep,
+    TurnStep,
 )
 
 SOMEWHERE = Pose(0.01, -0.02, 0.7, 0.3)
 STEPS = {
-    "press": (Press(0.4, to=0.5), Pose(0.01, -0.02, 0.5, 0.3)),
-    "hold": (Hold(0.4), SOMEWHERE),
-    "release": (Release(0.4), Pose(0.01, -0.02, 0.0, 0.3)),
-    "slide": (Slide(0.4, by=(0.03, 0.01)), Pose(0.04, -0.01, 0.7, 0.3)),
-    "turn": (Turn(0.4, by=-0.5), Pose(0.01, -0.02, 0.7, -0.2)),
-    "linear": (Slide(0.4, "linear", (0.03, 0.01)), Pose(0.04, -0.01, 0.7, 0.3)),
+    "press": (PressStep(0.4, to=0.5), Pose(0.01, -0.02, 0.5, 0.3)),
+    "hold": (HoldStep(0.4), SOMEWHERE),
+    "release": (ReleaseStep(0.4), Pose(0.01, -0.02, 0.0, 0.3)),
+    "slide": (SlideStep(0.4, by=(0.03, 0.01)), Pose(0.04, -0.01, 0.7, 0.3)),
+    "turn": (TurnStep(0.4, by=-0.5), Pose(0.01, -0.02, 0.7, -0.2)),
+    "linear": (SlideStep(0.4, "linear", (0.03, 0.01)), Pose(0.04, -0.01, 0.7, 0.3)),
 }
 every_step = pytest.mark.parametrize(("step", "end"), STEPS.values(), ids=STEPS)
 
@@ -37,7 +38,9 @@ def numbers(pose: Pose) -> np.ndarray:
 
 
 @every_step
-def test_a_step_leads_from_where_it_begins_to_its_end_and_stays_between(step: Step, end) -> None:
+def test_a_step_leads_from_where_it_begins_to_its_end_and_stays_between(
+    step: MotionStep, end
+) -> None:
     begin, last = numbers(SOMEWHERE), numbers(end)
 
     way = np.array([numbers(step.at(SOMEWHERE, t)) for t in np.linspace(0, step.seconds, 21)])
@@ -49,7 +52,7 @@ def test_a_step_leads_from_where_it_begins_to_its_end_and_stays_between(step: St
 
 
 @every_step
-def test_before_and_after_its_time_a_step_stands_still(step: Step, end) -> None:
+def test_before_and_after_its_time_a_step_stands_still(step: MotionStep, end) -> None:
     for early, late in ((-1.0, 0.0), (9.0, step.seconds)):
         assert step.at(SOMEWHERE, early) == step.at(SOMEWHERE, late)
 
@@ -67,13 +70,13 @@ def test_a_smooth_step_begins_and_ends_without_speed_and_without_a_jerk() -> Non
 def test_no_step_goes_beyond_its_end_by_rounding(ease: str) -> None:
     late = 1 - 2.0**-53 * np.arange(5000)
     assert max(EASES[ease](s) for s in late.tolist()) == 1
-    path = Path((Press(0.3, ease), Release(0.1, ease)))
+    path = MotionPath((PressStep(0.3, ease), ReleaseStep(0.1, ease)))
     assert min(path.at(n / 60).amount for n in range(600)) == 0
 
 
 @pytest.mark.parametrize("times", [1, 2, 5])
 def test_taps_press_so_many_times_and_rest_as_long_in_between(times: int) -> None:
-    tap = Tap(2.0, times=times)
+    tap = TapStep(2.0, times=times)
     at = (np.arange(9000) + 0.5) * tap.seconds / 9000
 
     amount = np.array([tap.at(SOMEWHERE, t).amount for t in at])
@@ -88,12 +91,20 @@ def test_taps_press_so_many_times_and_rest_as_long_in_between(times: int) -> Non
     for t in (-1.0, 0.0, 2.0, 3.0):
         assert tap.at(SOMEWHERE, t).amount == pytest.approx(0.0, abs=1e-15)
     assert tap.end(SOMEWHERE).amount == 0
-    path = Path((Hold(1.0), tap))
+    path = MotionPath((HoldStep(1.0), tap))
     assert path.moments == [0.0, 1.0, pytest.approx(1.0 + 1.0 / (2 * times - 1)), 3.0]
     assert path.at(path.moments[2]).amount == pytest.approx(1.0)
 
 
-PATH = Path((Press(0.5), Slide(1.0, by=(0.02, 0.0)), Turn(0.25, by=0.4), Hold(0.25), Release(1.0)))
+PATH = MotionPath(
+    (
+        PressStep(0.5),
+        SlideStep(1.0, by=(0.02, 0.0)),
+        TurnStep(0.25, by=0.4),
+        HoldStep(0.25),
+        ReleaseStep(1.0),
+    )
+)
 
 
 def test_a_path_goes_through_its_steps_and_begins_anew() -> None:
@@ -120,14 +131,14 @@ def test_nothing_jumps_along_a_path() -> None:
 
 
 def test_a_path_that_ends_where_it_began_need_not_be_lifted() -> None:
-    there_and_back = (Press(1.0), Press(1.0, to=0.0), Slide(1.0, by=(0.1, 0.0)))
-    assert Path(there_and_back).at(2.9).dx > 0.09
+    there_and_back = (PressStep(1.0), PressStep(1.0, to=0.0), SlideStep(1.0, by=(0.1, 0.0)))
+    assert MotionPath(there_and_back).at(2.9).dx > 0.09
     with pytest.raises(Refusal, match=r"0\.1 and 0 m away that presses 1 times"):
-        Path((Press(1.0), Slide(1.0, by=(0.1, 0.0))))
+        MotionPath((PressStep(1.0), SlideStep(1.0, by=(0.1, 0.0))))
 
 
 def test_a_record_is_straight_between_its_times_and_begins_anew() -> None:
-    record = Recorded(
+    record = RecordedMotion(
         np.array([0.0, 1.0, 3.0]), np.array([[0, 0, 0], [0.01, 0.02, 1.0], [0.03, 0.0, 0.5]])
     )
 
@@ -143,21 +154,24 @@ def test_a_record_is_straight_between_its_times_and_begins_anew() -> None:
     ("make", "why"),
     [
         (lambda: Orbit(-0.01, 2.0), "a radius >= 0 m"),
-        (lambda: Hold(0.0), "a step that takes"),
-        (lambda: Press(1.0, to=1000.5), "share of 0 to 1000 to press to, got 1000.5"),
-        (lambda: Press(1.0, to=-0.1), "share of 0 to 1000"),
-        (lambda: Hold(1.0, "sudden"), "ease among smooth, linear, got 'sudden'"),
-        (lambda: Slide(1.0, by=(0.0, math.inf)), "two finite numbers"),
-        (lambda: Turn(1.0, by=math.nan), "finite angle"),
-        (lambda: Tap(1.0, times=0), "1 to 1000 taps, got 0"),
-        (lambda: Tap(1.0, times=1001), "1 to 1000 taps, got 1001"),
-        (lambda: Recorded(np.zeros(1), np.zeros((1, 3))), "at least two times"),
-        (lambda: Recorded(np.arange(3.0), np.zeros((3, 2))), "poses \\(T, 3\\)"),
-        (lambda: Recorded(np.array([0.5, 1.0]), np.zeros((2, 3))), "begin with 0"),
-        (lambda: Recorded(np.array([0.0, 1.0, 1.0]), np.zeros((3, 3))), "and rise"),
-        (lambda: Recorded(np.array([0.0, 2e9]), np.zeros((2, 3))), "a record of"),
-        (lambda: Recorded(np.array([0.0, 1e-9]), np.zeros((2, 3))), "a record of 1e-06 to"),
-        (lambda: Recorded(np.arange(2.0), np.array([[0, 0, -0.1], [0, 0, 1]])), "got -0.1 to 1"),
+        (lambda: HoldStep(0.0), "a step that takes"),
+        (lambda: PressStep(1.0, to=1000.5), "share of 0 to 1000 to press to, got 1000.5"),
+        (lambda: PressStep(1.0, to=-0.1), "share of 0 to 1000"),
+        (lambda: HoldStep(1.0, "sudden"), "ease among smooth, linear, got 'sudden'"),
+        (lambda: SlideStep(1.0, by=(0.0, math.inf)), "two finite numbers"),
+        (lambda: TurnStep(1.0, by=math.nan), "finite angle"),
+        (lambda: TapStep(1.0, times=0), "1 to 1000 taps, got 0"),
+        (lambda: TapStep(1.0, times=1001), "1 to 1000 taps, got 1001"),
+        (lambda: RecordedMotion(np.zeros(1), np.zeros((1, 3))), "at least two times"),
+        (lambda: RecordedMotion(np.arange(3.0), np.zeros((3, 2))), "poses \\(T, 3\\)"),
+        (lambda: RecordedMotion(np.array([0.5, 1.0]), np.zeros((2, 3))), "begin with 0"),
+        (lambda: RecordedMotion(np.array([0.0, 1.0, 1.0]), np.zeros((3, 3))), "and rise"),
+        (lambda: RecordedMotion(np.array([0.0, 2e9]), np.zeros((2, 3))), "a record of"),
+        (lambda: RecordedMotion(np.array([0.0, 1e-9]), np.zeros((2, 3))), "a record of 1e-06 to"),
+        (
+            lambda: RecordedMotion(np.arange(2.0), np.array([[0, 0, -0.1], [0, 0, 1]])),
+            "got -0.1 to 1",
+        ),
     ],
 )
 def test_what_no_touch_can_do_is_refused(make, why: str) -> None:
@@ -166,8 +180,8 @@ def test_what_no_touch_can_do_is_refused(make, why: str) -> None:
 
 
 def test_the_extremes_that_a_touch_can_do_are_allowed() -> None:
-    assert Press(1e-6, to=1000.0).end(Pose()).amount == 1000
-    assert Tap(1.0, times=1000).times == 1000
+    assert PressStep(1e-6, to=1000.0).end(Pose()).amount == 1000
+    assert TapStep(1.0, times=1000).times == 1000
     assert Orbit(0.0, 1e9).at(2.5e8) == Pose(0.0, 0.0)
-    least = Recorded(np.array([0.0, 1e-6]), np.array([[0, 0, 0], [0, 0, 1000.0]]))
+    least = RecordedMotion(np.array([0.0, 1e-6]), np.array([[0, 0, 0], [0, 0, 1000.0]]))
     assert least.duration == 1e-6

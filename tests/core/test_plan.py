@@ -22,10 +22,18 @@ from kappaskin import (
     load_scene,
     schedule,
 )
-from kappaskin.scenes import EFFECTS, Choice, Orbit, kept_of, plan
-from kappaskin.scenes.motion import Hold, Path, Press, Recorded, Release, Tap
+from kappaskin.scenes import EffectSelection, Orbit, kept_effects, plan
+from kappaskin.scenes.effects import EFFECTS
 from kappaskin.scenes.plan import effects_of
-from kappaskin.scenes.survey import survey
+from kappaskin.scenes.scene import survey
+from kappaskin.scenes.stimulus import (
+    HoldStep,
+    MotionPath,
+    PressStep,
+    RecordedMotion,
+    ReleaseStep,
+    TapStep,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -58,8 +66,10 @@ def test_every_known_effect_is_in_the_plan_with_its_size_and_why(name):
 def test_what_is_left_out_changes_no_reading_by_more_than_the_accuracy(name, accuracy):
     scene = load_scene(name)
     # Random effects draw from streams of their own: those kept are the same in both.
-    auto = replace(scene, choice=Choice(auto=True, accuracy=accuracy, on=frozenset(RANDOM)))
-    every = replace(scene, choice=Choice())
+    auto = replace(
+        scene, choice=EffectSelection(auto=True, accuracy=accuracy, on=frozenset(RANDOM))
+    )
+    every = replace(scene, choice=EffectSelection())
     times = moments(scene)
 
     change = np.abs(readings(auto, times) - readings(every, times)).max() / survey(scene).peak
@@ -69,13 +79,17 @@ def test_what_is_left_out_changes_no_reading_by_more_than_the_accuracy(name, acc
 
 
 SQUARE = Patch(0.1, 0.1)
-BARE = Scene("bare", Plate(SQUARE), SensorLayout.regular(SQUARE, 10, 10), choice=Choice(auto=True))
+BARE = Scene(
+    "bare", Plate(SQUARE), SensorLayout.regular(SQUARE, 10, 10), choice=EffectSelection(auto=True)
+)
 LOAD = GaussianLoad(0.05, 0.05, 0.01, 2.0)
 RARE = {
-    "a press": Path((Hold(100.0), Press(0.05), Hold(1.0), Release(0.05))),
-    "a tap": Path((Hold(100.0), Tap(0.1))),
-    "taps": Path((Hold(100.0), Tap(0.5, times=3))),
-    "a record's end": Recorded(np.array([0.0, 100.0, 100.1]), np.eye(3)[[0, 0, 2]] * [0, 0, 1]),
+    "a press": MotionPath((HoldStep(100.0), PressStep(0.05), HoldStep(1.0), ReleaseStep(0.05))),
+    "a tap": MotionPath((HoldStep(100.0), TapStep(0.1))),
+    "taps": MotionPath((HoldStep(100.0), TapStep(0.5, times=3))),
+    "a record's end": RecordedMotion(
+        np.array([0.0, 100.0, 100.1]), np.eye(3)[[0, 0, 2]] * [0, 0, 1]
+    ),
 }
 
 
@@ -84,16 +98,16 @@ def test_what_happens_within_a_moment_of_a_long_scene_is_planned_for(motion):
     scene = BARE.touched_by(LOAD, motion=motion)
     times = np.linspace(100, np.nextafter(motion.duration, 0), 200)
 
-    planned, whole = (readings(s, times) for s in (scene, replace(scene, choice=Choice())))
+    planned, whole = (readings(s, times) for s in (scene, replace(scene, choice=EffectSelection())))
 
     assert np.abs(planned - whole).max() < 0.01 * np.abs(whole).max()
 
 
-@pytest.mark.parametrize("motion", [Orbit(0.01, 1e-3), Tap(1.0, times=1000)], ids=str)
+@pytest.mark.parametrize("motion", [Orbit(0.01, 1e-3), TapStep(1.0, times=1000)], ids=str)
 def test_the_skew_of_what_comes_again_a_thousand_times_a_second_is_kept(motion):
-    motion = motion if isinstance(motion, Orbit) else Path((motion,))
+    motion = motion if isinstance(motion, Orbit) else MotionPath((motion,))
 
-    assert "skew" in {effect.name for effect in kept_of(BARE.touched_by(LOAD, motion=motion))}
+    assert "skew" in {effect.name for effect in kept_effects(BARE.touched_by(LOAD, motion=motion))}
 
 
 def test_the_smallest_cylinder_is_planned_for_however_long_another_is_held():
@@ -101,16 +115,16 @@ def test_the_smallest_cylinder_is_planned_for_however_long_another_is_held():
     scene = BARE.laid_on(laid)
 
     assert survey(scene).peak == max(np.abs(step.curvature).max() for step in laid.steps)
-    assert "saturation" in {effect.name for effect in kept_of(scene)}
+    assert "saturation" in {effect.name for effect in kept_effects(scene)}
 
 
 @READY
 def test_noise_that_is_left_out_is_as_small_as_the_accuracy(name):
-    scene = replace(load_scene(name), choice=Choice(auto=True, accuracy=0.2))
+    scene = replace(load_scene(name), choice=EffectSelection(auto=True, accuracy=0.2))
     out = {entry.name: entry for entry in plan(scene) if not entry.kept and entry.effect}
     for effect in out.keys() & RANDOM:
-        alone = replace(scene, choice=Choice(off=frozenset(EFFECTS) - {effect}))
-        bare = replace(scene, choice=Choice(off=frozenset(EFFECTS)))
+        alone = replace(scene, choice=EffectSelection(off=frozenset(EFFECTS) - {effect}))
+        bare = replace(scene, choice=EffectSelection(off=frozenset(EFFECTS)))
         times = moments(scene)
         change = readings(alone, times) - readings(bare, times)
         assert np.abs(change).max() / survey(scene).peak <= out[effect].size.error
@@ -118,14 +132,18 @@ def test_noise_that_is_left_out_is_as_small_as_the_accuracy(name):
 
 def test_the_random_stream_of_an_effect_is_its_own():
     scene = load_scene("tapping")
-    both = replace(scene, choice=Choice())
-    without = replace(scene, choice=Choice(off=frozenset({"skew", "finite-slope", "quantisation"})))
-    silent = replace(scene, choice=Choice(off=frozenset({"gaussian-noise", "quantisation"})))
-    bare = replace(silent, choice=Choice(off=silent.choice.off | without.choice.off))
+    both = replace(scene, choice=EffectSelection())
+    without = replace(
+        scene, choice=EffectSelection(off=frozenset({"skew", "finite-slope", "quantisation"}))
+    )
+    silent = replace(
+        scene, choice=EffectSelection(off=frozenset({"gaussian-noise", "quantisation"}))
+    )
+    bare = replace(silent, choice=EffectSelection(off=silent.choice.off | without.choice.off))
     times = moments(scene)
 
     noise = readings(without, times) - readings(bare, times)
-    other = readings(replace(both, choice=Choice(off=frozenset({"quantisation"}))), times)
+    other = readings(replace(both, choice=EffectSelection(off=frozenset({"quantisation"}))), times)
 
     np.testing.assert_allclose(other - readings(silent, times), noise, atol=1e-9)
 
@@ -133,38 +151,51 @@ def test_the_random_stream_of_an_effect_is_its_own():
 def test_effects_can_be_forced_on_and_off():
     scene = load_scene("tapping")
     forced = replace(
-        scene, choice=Choice(True, 0.01, frozenset({"quantisation"}), frozenset({"gaussian-noise"}))
+        scene,
+        choice=EffectSelection(
+            True, 0.01, frozenset({"quantisation"}), frozenset({"gaussian-noise"})
+        ),
     )
-    kept = {effect.name for effect in kept_of(forced)}
+    kept = {effect.name for effect in kept_effects(forced)}
     assert "quantisation" in kept
     assert "gaussian-noise" not in kept
 
 
 def test_failures_are_kept_whatever_the_accuracy():
     scene = load_scene("failing-elements")
-    kept = kept_of(replace(scene, choice=Choice(auto=True, accuracy=0.9)))
+    kept = kept_effects(replace(scene, choice=EffectSelection(auto=True, accuracy=0.9)))
     assert {"dead", "stuck", "intermittent"} <= {effect.name for effect in kept}
 
 
 @READY
 def test_what_is_kept_without_a_look_is_what_the_plan_keeps(name):
-    scene = replace(load_scene(name), choice=Choice(off=frozenset({"finite-slope"})))
-    assert kept_of(scene) == plan(scene).kept
+    scene = replace(load_scene(name), choice=EffectSelection(off=frozenset({"finite-slope"})))
+    assert kept_effects(scene) == plan(scene).kept
     assert all(effects_of(scene)[effect.name] is not None for effect in plan(scene).kept)
 
 
-def test_what_is_left_out_is_not_imported():
+def test_what_is_left_out_is_neither_imported_nor_run():
     code = """
 import sys
 from kappaskin import Simulator, load_scene
 scene = load_scene("hot-room")
 scan = scene.sensor().scan()
+ran = set()
+
+def note(frame, event, _):
+    code = frame.f_code
+    if event == "call" and "at_work" in code.co_filename and code.co_name != "<module>":
+        ran.add(code.co_qualname.split(".")[0])
+
+sys.setprofile(note)
 Simulator(scene).reading(scan, 0.0)
+sys.setprofile(None)
 room = "kappaskin.scenes.effects.at_work."
 print(sorted(name.removeprefix(room) for name in sys.modules if name.startswith(room)))
+print(sorted(ran))
 """
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert told.stdout.strip() == "['noise', 'temperature']"
+    assert told.stdout.splitlines() == ["['gages', 'noise']", "['gaussian', 'temperature']"]
 
 
 def test_the_command_tells_the_plan(run):

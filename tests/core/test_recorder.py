@@ -28,7 +28,7 @@ from kappaskin.recording import Recording, Verdict, decode, verifying
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import Layout
 from kappaskin.recording.writing import part_of
-from kappaskin.scenes import SECOND_GENERATION_LOOPS, CorruptedFrames, Creep, DroppedFrames
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, CorruptedFrames, Creep, DroppedFrames
 from kappaskin.sources import open_source
 
 pytestmark = pytest.mark.slow

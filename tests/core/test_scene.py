@@ -21,10 +21,9 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.scenes import TABLE_1_NOISE, Pressing, moments_of, scaled_to
-from kappaskin.scenes.limits import check_elements
-from kappaskin.scenes.motion import Path, Press, Release, Slide
-from kappaskin.scenes.stimulus import contact_of
+from kappaskin.scenes import TABLE_1_NOISE, LoadingHistory, scaled_to, survey_times
+from kappaskin.scenes.read import check_elements
+from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep, SlideStep, contact_of
 
 PATCH = Patch(0.1, 0.1)
 
@@ -130,7 +129,13 @@ def test_without_motion_loads_stay():
 
 
 def test_a_load_presses_as_hard_as_its_motion_says_where_that_has_taken_it():
-    way = Path((Press(1.0, "linear"), Slide(1.0, "linear", (0.02, 0.0)), Release(1.0, "linear")))
+    way = MotionPath(
+        (
+            PressStep(1.0, "linear"),
+            SlideStep(1.0, "linear", (0.02, 0.0)),
+            ReleaseStep(1.0, "linear"),
+        )
+    )
     moved = scene(PointLoad(0.05, 0.05, 0.4), motion=way)
 
     told = [moved.loads_at(time) for time in (0.0, 0.25, 1.5, 2.75)]
@@ -159,7 +164,11 @@ L = Polygon([(0, 0), (0.1, 0), (0.1, 0.05), (0.05, 0.05), (0.05, 0.1), (0, 0.1)]
     ("patch", "load", "motion"),
     [
         (Disk(0.05), PointLoad(0.07, 0.07), Orbit(0.0225, 1.0)),
-        (L, PointLoad(0.08, 0.03), Path((Press(1), Slide(1, by=(-0.05, 0.05)), Release(1)))),
+        (
+            L,
+            PointLoad(0.08, 0.03),
+            MotionPath((PressStep(1), SlideStep(1, by=(-0.05, 0.05)), ReleaseStep(1))),
+        ),
     ],
     ids=["by the rim of a disk", "over the inner corner of an L"],
 )
@@ -187,7 +196,7 @@ def test_a_scene_that_is_too_fast_for_its_converter_is_no_sensor():
 def test_a_scene_is_looked_at_all_over_once(name):
     scene = load_scene(name)
 
-    moments = np.array(moments_of(scene))
+    moments = np.array(survey_times(scene))
 
     assert moments[0] == 0
     assert (np.diff(moments) > 0).all()
@@ -201,7 +210,7 @@ def test_a_rigid_object_presses_as_the_point_loads_that_it_makes():
     scene = load_scene("pencil")
     time = max(scene.moments, key=lambda time: scene.stimuli[0].pose_at(time).amount)
 
-    pressed = Pressing(scene, scene.plate)(time)
+    pressed = LoadingHistory(scene, scene.plate)(time)
 
     force = sum(load.modal(scene.basis) for load in pressed.loads)
     np.testing.assert_allclose(force, pressed.force, atol=1e-9 * np.abs(pressed.force).max())

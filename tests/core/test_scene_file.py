@@ -31,7 +31,8 @@ def test_every_ready_scene_says_what_there_is_to_see(name):
 
 @pytest.mark.parametrize("file", ["mine.toml", "mine.scene.toml"])
 def test_a_scene_is_called_as_its_file_is_whatever_it_ends_in(file):
-    assert read_scene(HEAD, Path(file)).name == "mine"
+    scene = read_scene(HEAD, Path(file))
+    assert (scene.name, scene.title) == ("mine", "mine")
 
 
 def test_what_a_file_says_is_what_the_scene_is():

@@ -42,18 +42,30 @@ from kappaskin import (
     write_scene,
 )
 from kappaskin.mechanics import Block, Cylinder, HeightMap, Mesh, Punch, Sphere, Wedge
-from kappaskin.scenes import EFFECTS, Choice, CorruptedFrames, Indenter, kept_of, plan
-from kappaskin.scenes.choice import LINEAR
-from kappaskin.scenes.effects.cross_talk import CrossTalk
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
-from kappaskin.scenes.effects.flicker import FlickerNoise
-from kappaskin.scenes.effects.hum import MainsHum
-from kappaskin.scenes.effects.skin import Foam
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.effects.temperature import Temperature
-from kappaskin.scenes.motion import Hold, Press, Recorded, Release, Slide, Tap, Turn
-from kappaskin.scenes.motion import Path as Way
+from kappaskin.scenes import EffectSelection, Indenter, kept_effects, plan
+from kappaskin.scenes.effects import (
+    EFFECTS,
+    CorruptedFrames,
+    Foam,
+    IntermittentElements,
+    StrainLimit,
+    StuckElements,
+    Temperature,
+)
+from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
+from kappaskin.scenes.effects.noise import FlickerNoise
 from kappaskin.scenes.plan import effects_of
+from kappaskin.scenes.scene import LINEAR
+from kappaskin.scenes.stimulus import (
+    HoldStep,
+    MotionPath,
+    PressStep,
+    RecordedMotion,
+    ReleaseStep,
+    SlideStep,
+    TapStep,
+    TurnStep,
+)
 from kappaskin.sources import information
 
 SQUARE = Patch(0.1, 0.1)
@@ -93,14 +105,15 @@ def test_a_scene_is_written_as_a_person_would_write_it():
         replace(SensorLayout.regular(disk, 6, 5).without([3, 7]), gage_length=2e-5),
         (
             Stimulus(
-                GaussianLoad(0.05, 0.05, 0.004, 0.15), Way((Press(1.0, to=2.0), Release(0.5)))
+                GaussianLoad(0.05, 0.05, 0.004, 0.15),
+                MotionPath((PressStep(1.0, to=2.0), ReleaseStep(0.5))),
             ),
             Stimulus(PointLoad(0.04, 0.05), Orbit(0.01, 4)),
         ),
         (Creep(0.1, 8), GaussianNoise(0.1)),
         replace(SECOND_GENERATION, amplifier=replace(SECOND_GENERATION.amplifier, gain=90.0)),
         edge="clamped",
-        choice=Choice(auto=True, off=frozenset({"skew"})),
+        choice=EffectSelection(auto=True, off=frozenset({"skew"})),
         title='The "drum"',
         text='One\n"two" \\ three.\n',
     )
@@ -196,13 +209,13 @@ def motions(draw, patch: Patch):
     by = st.floats(-0.01 * patch.b, 0.01 * patch.b)
     eases = st.sampled_from(["smooth", "linear"])
     step = st.one_of(
-        st.builds(Press, numbers, eases, shares),
-        st.builds(Hold, numbers, eases),
-        st.builds(Slide, numbers, eases, st.tuples(by, by)),
-        st.builds(Turn, numbers, eases, st.floats(-3, 3)),
-        st.builds(Tap, numbers, eases, st.integers(1, 9)),
+        st.builds(PressStep, numbers, eases, shares),
+        st.builds(HoldStep, numbers, eases),
+        st.builds(SlideStep, numbers, eases, st.tuples(by, by)),
+        st.builds(TurnStep, numbers, eases, st.floats(-3, 3)),
+        st.builds(TapStep, numbers, eases, st.integers(1, 9)),
     )
-    return Way((*draw(st.lists(step, max_size=4)), Release(draw(numbers))))
+    return MotionPath((*draw(st.lists(step, max_size=4)), ReleaseStep(draw(numbers))))
 
 
 @st.composite
@@ -273,13 +286,13 @@ def effects(draw, chain: Transduction):
 
 
 @st.composite
-def choices(draw, scene: Scene) -> Choice:
+def choices(draw, scene: Scene) -> EffectSelection:
     there = sorted(effects_of(scene))
     on = frozenset(draw(st.sets(st.sampled_from(there))))
     if draw(st.booleans()):
-        return Choice(on=on, off=frozenset(EFFECTS) - on)
+        return EffectSelection(on=on, off=frozenset(EFFECTS) - on)
     off = frozenset(draw(st.sets(st.sampled_from(sorted(EFFECTS))))) - on
-    return Choice(draw(st.booleans()), draw(st.floats(0.001, 0.5)), on, off)
+    return EffectSelection(draw(st.booleans()), draw(st.floats(0.001, 0.5)), on, off)
 
 
 words = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
@@ -330,7 +343,7 @@ def test_any_scene_is_the_same_once_written_and_read(scene):
     if scene.choice.auto:
         assert read.choice == scene.choice
     else:
-        assert kept_of(read) == kept_of(scene)
+        assert kept_effects(read) == kept_effects(scene)
     assert write_scene(read) == write_scene(scene)
 
 
@@ -355,7 +368,12 @@ def test_cylinders_are_the_same_once_written_and_read(laid):
 
 @pytest.mark.parametrize(
     "choice",
-    [LINEAR, Choice(), Choice(auto=True), Choice(off=frozenset(EFFECTS))],
+    [
+        LINEAR,
+        EffectSelection(),
+        EffectSelection(auto=True),
+        EffectSelection(off=frozenset(EFFECTS)),
+    ],
     ids=["linear", "all", "auto", "none"],
 )
 def test_a_choice_is_the_same_once_written_and_read(choice):
@@ -378,7 +396,9 @@ def test_an_element_beside_a_notch_is_written_by_its_place():
 
 
 def test_what_is_on_though_there_is_nothing_of_it_is_left_out():
-    scene = replace(BARE, choice=Choice(auto=True, on=frozenset({"creep", "quantisation"})))
+    scene = replace(
+        BARE, choice=EffectSelection(auto=True, on=frozenset({"creep", "quantisation"}))
+    )
 
     assert 'on = ["quantisation"]' in write_scene(scene)
     assert plan(again(scene)).entries == plan(scene).entries
@@ -401,7 +421,7 @@ def test_numbers_of_any_kind_are_written_as_what_they_are():
 HALF_DEAD = replace(BARE.layout, live=np.arange(48).reshape(3, 16) != 5)
 ODD_GRID = replace(BARE.layout, positions=BARE.layout.positions + 1e-3)
 LARGE = Patch(20.0, 20.0)
-RECORD = Recorded(np.array([0.0, 1.0]), np.zeros((2, 3)))
+RECORD = RecordedMotion(np.array([0.0, 1.0]), np.zeros((2, 3)))
 PYRAMID = Mesh(
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 0.01,
     np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]),
@@ -413,7 +433,7 @@ def pressed_by(rigid) -> Scene:
 
 
 UNSAID = {
-    "a record": (PRESSED.touched_by(*PRESSED.loads, motion=RECORD), "Recorded motion, .* its file"),
+    "a record": (PRESSED.touched_by(*PRESSED.loads, motion=RECORD), "RecordedMotion, .* its file"),
     "a mesh": (pressed_by(PYRAMID), "a Mesh, which does not tell its file"),
     "a map": (pressed_by(HeightMap(np.zeros((2, 2)), 0.01, 0.01)), "HeightMap.* its file"),
     "half an element": (replace(BARE, layout=HALF_DEAD), "some channels are dead"),

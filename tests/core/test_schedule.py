@@ -15,12 +15,12 @@ from kappaskin import (
     Presentation,
     Procedure,
     Refusal,
-    Step,
     Transduction,
     load_scene,
     radii_for,
     schedule,
 )
+from kappaskin.scenes import CylinderStep
 
 SENSOR = load_scene("calibration").sensor()
 SHORT = schedule((0.05, 0.025, 0.015))
@@ -44,7 +44,7 @@ def all_taken(steps=SHORT):
 @pytest.mark.parametrize("along", ["x", "y", "diagonal"])
 @pytest.mark.parametrize("face", [1, -1])
 def test_a_cylinder_has_one_principal_curvature_and_bends_as_it_lies(along, face):
-    xx, yy, xy = Step(1, 0.02, along, face).curvature
+    xx, yy, xy = CylinderStep(1, 0.02, along, face).curvature
     principal = np.linalg.eigvalsh([[xx, xy], [xy, yy]])
     assert sorted(principal, key=abs) == pytest.approx([0.0, face * 50.0])
     direction = {"x": (1, 0), "y": (0, 1), "diagonal": (math.sqrt(0.5), math.sqrt(0.5))}[along]
@@ -85,23 +85,23 @@ def test_the_ready_radii_stay_within_the_elastic_limit_and_reach_the_papers_fing
 @pytest.mark.parametrize(
     ("step", "words"),
     [
-        (Step(1), "Flat table, nothing pressing on the skin"),
+        (CylinderStep(1), "Flat table, nothing pressing on the skin"),
         (
-            Step(5, 0.025, "x", 1, "back"),
+            CylinderStep(5, 0.025, "x", 1, "back"),
             "Cylinder of radius 25 mm, bent along x, inner face on it, on the way back",
         ),
         (
-            Step(5, 0.0145, "diagonal", -1),
+            CylinderStep(5, 0.0145, "diagonal", -1),
             "Cylinder of radius 14.5 mm, bent along the diagonal from corner x = y = 0, "
             "outer face on it, on the way there",
         ),
         (
-            Step(2, 0.013, "y", -1, "first"),
+            CylinderStep(2, 0.013, "y", -1, "first"),
             "Cylinder of radius 13 mm, bent along y, outer face on it, first of all, to wipe out "
             "its past",
         ),
         (
-            Step(2, 0.02, "y", hold=60.0),
+            CylinderStep(2, 0.02, "y", hold=60.0),
             "Cylinder of radius 20 mm, bent along y, inner face on it, held for 60 s",
         ),
     ],

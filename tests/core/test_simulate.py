@@ -18,10 +18,10 @@ from kappaskin import (
     Scene,
     SensorLayout,
     Simulator,
-    Step,
     UniformNoise,
     load_scene,
 )
+from kappaskin.scenes import CylinderStep
 
 PATCH = Patch(0.1, 0.1)
 QUIET = Scene("quiet", Plate(PATCH), SensorLayout.regular(PATCH, 5, 4)).touched_by(
@@ -157,7 +157,7 @@ def test_changing_only_the_load_keeps_the_loops_and_the_creep():
 
 
 def test_a_skin_laid_on_cylinders_bends_alike_everywhere_and_has_no_coefficients():
-    steps = (Step(1), Step(2, 0.05, "x"), Step(3, 0.04, "diagonal", -1))
+    steps = (CylinderStep(1), CylinderStep(2, 0.05, "x"), CylinderStep(3, 0.04, "diagonal", -1))
     simulator = Simulator(QUIET.laid_on(Presentation(steps, 0.01)))
 
     frames = [simulator.frame(n, lambda: 0.0) for n in range(30)]
@@ -172,7 +172,7 @@ def test_a_skin_laid_on_cylinders_bends_alike_everywhere_and_has_no_coefficients
 
 def test_a_load_on_a_skin_laid_on_cylinders_is_refused():
     with pytest.raises(Refusal, match="no loads on a skin that lies on cylinders"):
-        replace(QUIET, laid=Presentation((Step(1),), 1.0))
+        replace(QUIET, laid=Presentation((CylinderStep(1),), 1.0))
 
 
 def test_a_change_to_more_elements_is_answered_with_their_channels():

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from kappaskin import (
     Amplifier,
-    Choice,
     DiscLoad,
     Frame,
     Indenter,
@@ -32,7 +31,8 @@ from kappaskin import (
 from kappaskin.mechanics import Sphere
 from kappaskin.recording import Recorder, Recording
 from kappaskin.recording.messages import LINES
-from kappaskin.scenes import CorruptedFrames, DroppedFrames
+from kappaskin.scenes import EffectSelection
+from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
 from kappaskin.sources import SimulatedSource, open_source
 from kappaskin.sources.wire import pack_runs, unpack_runs
 
@@ -233,7 +233,7 @@ def test_a_scene_that_is_refused_leaves_the_one_that_plays() -> None:
         source.play(replace(fingertip(), transduction=amplified))
     crushed = Stimulus(Indenter(Sphere(0.01), 0.05, 0.05, force=1e6))
     with pytest.raises(Refusal, match="press with less force"):
-        source.play(replace(source.scene, stimuli=(crushed,), choice=Choice(auto=True)))
+        source.play(replace(source.scene, stimuli=(crushed,), choice=EffectSelection(auto=True)))
 
     assert source.sensor is sensor
     assert not source.scene.indenter

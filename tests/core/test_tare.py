@@ -27,8 +27,8 @@ from kappaskin import (
 from kappaskin.calibration import DriftWatch, Rest, Taring
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.contact import LoadDetector
-from kappaskin.scenes.effects.flicker import FlickerNoise
-from kappaskin.scenes.effects.temperature import Temperature
+from kappaskin.scenes.effects import Temperature
+from kappaskin.scenes.effects.noise import FlickerNoise
 
 pytestmark = pytest.mark.slow
 

@@ -35,7 +35,8 @@ from kappaskin.publish.channels import CHANNELS
 from kappaskin.publish.client import Client
 from kappaskin.recording import Recorder, ReplayedSource, Verdict, repairing, verifying
 from kappaskin.recording.messages import TOPICS
-from kappaskin.scenes import SECOND_GENERATION_LOOPS, Creep, read_scene
+from kappaskin.scenes import read_scene
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
 from kappaskin.sources import (
     Command,
     Decoder,

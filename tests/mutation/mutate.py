@@ -60,7 +60,7 @@ ROOMS = {
         "estimators least_squares fast bayes prior robust tracking finite_slope placement "
         "stability",
     ),
-    "scene": ("scene/*", "motion scene scene_file scene_write plan simulate"),
+    "scene": ("scenes/*", "motion scene scene_file scene_write scene_schema plan simulate"),
 }
 """Room -> its files, and the names of the tests in `tests/core` that are to notice a change."""
 
@@ -137,6 +137,8 @@ class Reach:
         if not reached or "" in reached:  # or in none of the calls that were looked at
             all_of_it = [tests for (file, _), tests in self.lines.items() if file == str(made.file)]
             reached = set[str]().union(*all_of_it)
+        if not reached & self.seconds.keys():  # of a file that is only loaded: what uses it
+            reached = set(self.seconds)
         took: dict[str, float] = defaultdict(float)
         for test in reached & self.seconds.keys():
             took[test.split("::")[0]] += self.seconds[test]

@@ -1,15 +1,14 @@
-"""The name that a scene file has for an effect to words: what it is called, and what it does."""
+"""Names and descriptions of effects."""
 
 import inspect
 
-from kappaskin.scenes import EFFECTS
-
-_CALLED = {"dead": "Dead elements", "stuck": "Stuck elements", "intermittent": "Loose elements"}
+from kappaskin.scenes.effects import EFFECTS
 
 
 def called(effect: str) -> str:
     """What people call an effect, also one that is not known."""
-    return _CALLED.get(effect, effect.replace("-", " ").capitalize())
+    kind = EFFECTS.get(effect)
+    return kind.called() if kind else effect.replace("-", " ").capitalize()
 
 
 def explained(effect: str) -> str:

@@ -15,7 +15,7 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Engine, Left, Status
 from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Setup
-from kappaskin.scenes import Presentation, Scene, Step
+from kappaskin.scenes import CylinderStep, Presentation, Scene
 from kappaskin.sensing import Sensor
 from kappaskin.sources import LISTS
 from kappaskin_app.guard import guarded
@@ -108,7 +108,7 @@ class Session(QObject):
             engine.scan(region_of(history.settings))
         else:
             self.asked = engine.adopted.asked.setup
-        self._laid: Step | None = None
+        self._laid: CylinderStep | None = None
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0
         self.estimate: Estimate | None = None
@@ -235,7 +235,7 @@ class Session(QObject):
             self.engine.publish([])
         self.unsent.emit(why)
 
-    def lay(self, step: Step | None) -> None:
+    def lay(self, step: CylinderStep | None) -> None:
         """Lay the simulated skin on the cylinder of `step`.
 
         Until None, readings are nominal and every frame has all of them.

@@ -11,20 +11,22 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
 from kappaskin.mechanics import Load, Plate
 from kappaskin.scenes import (
-    FIRST_GENERATION_LOOPS,
-    SECOND_GENERATION_LOOPS,
-    Creep,
-    GaussianNoise,
-    Hysteresis,
     Scene,
     Stimulus,
-    Tolerance,
-    UniformNoise,
     planned,
     read_scene,
     read_scene_text,
     scene_file,
     write_scene,
+)
+from kappaskin.scenes.effects import (
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION_LOOPS,
+    Creep,
+    GaussianNoise,
+    Hysteresis,
+    Tolerance,
+    UniformNoise,
 )
 from kappaskin.sensing import (
     FIRST_GENERATION,

@@ -1,4 +1,4 @@
-"""What touches the skin in a scene, as it is seen and taken hold of at one moment."""
+"""Stimuli of a scene as they are drawn, grabbed and dragged in the view."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,28 +13,28 @@ _DEEPEST = 0.2  # of the skin's shorter side
 _LEAST = 0.01  # of the hardest press that a hand can do: lighter is no touch
 
 
-class Touch(NamedTuple):
+class DrawnStimulus(NamedTuple):
     """The `number` of a stimulus of the scene, and the `load` that it is drawn as."""
 
     number: int
     load: Load
 
 
-def touches_at(scene: Scene, time: float) -> list[Touch]:
+def touches_at(scene: Scene, time: float) -> list[DrawnStimulus]:
     """What presses at `time` in s; a rigid object as a point that has its force, or 1 N."""
-    found = list[Touch]()
+    found = list[DrawnStimulus]()
     for number, stimulus in enumerate(scene.stimuli):
         pose, what = stimulus.pose_at(time), stimulus.what
         load = stimulus.load_at(time)
         if isinstance(what, Indenter) and pose.amount:
             load = PointLoad(what.x + pose.dx, what.y + pose.dy, what.force or 1.0)
         if load is not None:
-            found.append(Touch(number, load))
+            found.append(DrawnStimulus(number, load))
     return found
 
 
 @dataclass
-class Held:
+class GrabbedStimulus:
     """A touch of a `scene` that was grabbed `at` (x, y) in m; so far it moved `by` so much.
 
     And presses so many `times` as hard, between limits that keep the skin in the picture.
@@ -47,7 +47,7 @@ class Held:
     times: float = 1.0
 
     @classmethod
-    def at_place(cls, scene: Scene, time: float, x: float, y: float) -> "Held | None":
+    def at_place(cls, scene: Scene, time: float, x: float, y: float) -> "GrabbedStimulus | None":
         """The touch nearest to (x, y) in m at `time` in s, if there is one."""
         there = touches_at(scene, time)
         if not there:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array
-from kappaskin.scenes import Step, applied, check_readable, check_strain
+from kappaskin.scenes import CylinderStep, applied_curvature, check_readable, check_strain
 from kappaskin.sensing import Sensor
 
 _FEWEST_FRAMES = 2  # whose spread tells the noise
@@ -24,7 +24,7 @@ class Taken:
     and what was read then, `course` (T, C) in 1/m, tell how it went.
     """
 
-    step: Step
+    step: CylinderStep
     mean: Array
     noise: Array
     frames: int
@@ -60,7 +60,7 @@ class Sweep:
     `course` (T, C) tell how the hold went, and are empty without one.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[CylinderStep, ...]
     readings: Array
     noise: Array
     times: Array
@@ -82,20 +82,20 @@ class Sweep:
     @property
     def curvature(self) -> Array:
         """The curvature (S, 3) in 1/m of every step."""
-        return applied(self.steps)
+        return applied_curvature(self.steps)
 
 
 class Procedure:
     """A calibration being taken: knows the next step, takes its frames, goes back if asked."""
 
-    def __init__(self, sensor: Sensor, steps: tuple[Step, ...]) -> None:
+    def __init__(self, sensor: Sensor, steps: tuple[CylinderStep, ...]) -> None:
         check_strain(steps, sensor)
         check_readable(steps, sensor)
         self.sensor, self.steps = sensor, steps
         self.taken: list[Taken] = []
 
     @property
-    def step(self) -> Step | None:
+    def step(self) -> CylinderStep | None:
         """What to lay the skin on now; None when all is done."""
         return None if self.done else self.steps[len(self.taken)]
 
@@ -126,7 +126,7 @@ class Procedure:
         self.taken.append(taken)
         return taken
 
-    def _check(self, step: Step, times: Array, readings: Array) -> None:
+    def _check(self, step: CylinderStep, times: Array, readings: Array) -> None:
         n, C = len(times), self.sensor.channels
         if times.ndim != 1 or readings.shape != (n, C):
             raise Refusal(f"expected readings ({n}, {C}), got {readings.shape}")

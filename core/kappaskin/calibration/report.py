@@ -15,7 +15,8 @@ from kappaskin.calibration.loops import identify, thresholds
 from kappaskin.calibration.procedure import Sweep
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Mask
-from kappaskin.scenes import FACES, FEWEST_RADII, Running, Step, check_strain, pairs
+from kappaskin.scenes import FACES, FEWEST_RADII, CylinderStep, check_strain, step_pairs
+from kappaskin.scenes.effects import RunningEffect
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, StandardLinearSolid
 
 _Part = TypeVar("_Part", Lines, PrandtlIshlinskii)
@@ -92,7 +93,7 @@ def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _check_way(steps: tuple[Step, ...], x: Array, face: int, what: str) -> None:
+def _check_way(steps: tuple[CylinderStep, ...], x: Array, face: int, what: str) -> None:
     k = np.unique((face * x[face * x > 0]).round(9))
     if not len(k):
         raise Refusal(
@@ -103,7 +104,7 @@ def _check_way(steps: tuple[Step, ...], x: Array, face: int, what: str) -> None:
         raise Refusal(
             f"expected at least {FEWEST_RADII} radii that bend {what}, got {len(k)}; add cylinders"
         )
-    if not pairs(steps, x, face):
+    if not step_pairs(steps, x, face):
         raise Refusal(
             f"no cylinder that bends {what} was taken again on the way back; without it the loops "
             "cannot be seen"
@@ -129,7 +130,7 @@ def _check(sweep: Sweep, sensor: Sensor) -> None:
         )
 
 
-def _in_time(sweep: Sweep, run: Running) -> Array:
+def _in_time(sweep: Sweep, run: RunningEffect) -> Array:
     """What `run` makes of the readings (S, C), given also the course of the hold."""
     times = np.concatenate([sweep.times, sweep.moments])
     readings = np.concatenate([sweep.readings, sweep.course])
@@ -189,7 +190,7 @@ def _gaps(sweep: Sweep, values: Array) -> Array:
     """Widest difference between the ways (2, C) of `values` (S, C), on the inner and outer face."""
     out: list[Array] = []
     for x, v in zip(sweep.curvature.T, np.split(values, 3, axis=1), strict=True):
-        ways = (np.array(pairs(sweep.steps, x, face), int).reshape(-1, 2).T for face in FACES)
+        ways = (np.array(step_pairs(sweep.steps, x, face), int).reshape(-1, 2).T for face in FACES)
         widest = [np.abs(v[back] - v[there]).max(axis=0, initial=0.0) for there, back in ways]
         out.append(np.stack(widest))
     return np.concatenate(out, axis=1)

@@ -11,7 +11,7 @@ import numpy as np
 from kappaskin.calibration.procedure import Procedure, Sweep
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import OVERTAKEN, Array, Frame
-from kappaskin.scenes import ADVICE, Presentation, Step, load_scene, radii_for, schedule
+from kappaskin.scenes import ADVICE, CylinderStep, Presentation, load_scene, radii_for, schedule
 from kappaskin.sensing import Sensor
 from kappaskin.sources import SIMULATION, SimulatedSource, Source, open_source
 
@@ -38,7 +38,9 @@ class Virtual:
         self.now += seconds
 
 
-def _steps(sensor: Sensor, radii: tuple[float, ...] | None, hold: float) -> tuple[Step, ...]:
+def _steps(
+    sensor: Sensor, radii: tuple[float, ...] | None, hold: float
+) -> tuple[CylinderStep, ...]:
     return schedule(radii or radii_for(sensor), hold, sensor.layout.patch.strip)
 
 
@@ -125,7 +127,7 @@ def _recorded(listener: Listener, seconds: float) -> list[Frame]:
     return kept
 
 
-def _prompt(step: Step, total: int, again: bool) -> str:
+def _prompt(step: CylinderStep, total: int, again: bool) -> str:
     then = "press Enter, then lay it on" if step.hold else "press Enter when it lies still"
     redo = ", or r and Enter to take the last one again" if again else ""
     return f"{step.number}/{total}  {step}: {then}{redo}: "

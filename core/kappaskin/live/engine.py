@@ -38,7 +38,7 @@ from kappaskin.live.status import LOST, Status
 from kappaskin.pipeline import Setup
 from kappaskin.publish import targets_of
 from kappaskin.recording import unused
-from kappaskin.scenes import Playing, Scene
+from kappaskin.scenes import Playback, Scene
 
 LONGEST_NOTE = 500
 """Characters of a note."""
@@ -206,7 +206,7 @@ class Engine:
         still, and a scene goes on being read. A recording that is `looped` begins anew at its end.
         Status tells where it is.
         """
-        Playing(at or 0.0, 0.0, speed)  # or refused here
+        Playback(at or 0.0, 0.0, speed)  # or refused here
         self._send(Seek(at, speed, looped))
 
     def step(self, frames: int) -> None:

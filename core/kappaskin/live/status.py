@@ -15,7 +15,7 @@ from kappaskin.live.tare_taking import TareNews
 from kappaskin.pipeline import Setup
 from kappaskin.publish import PublishNews, State
 from kappaskin.recording import Replay, Written
-from kappaskin.scenes import FROM_THE_BEGINNING, Playing
+from kappaskin.scenes import FROM_THE_BEGINNING, Playback
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting
 
@@ -60,7 +60,7 @@ class Status:
     reader_gap: float = math.nan
     last_frame: float = -math.inf
     reported: float = -math.inf
-    playing: Playing = FROM_THE_BEGINNING
+    playing: Playback = FROM_THE_BEGINNING
     events: tuple[Event, ...] = ()
     happened: int = 0
     temperature: float = math.nan

@@ -1,4 +1,4 @@
-"""Radii of cylinders to the steps of a calibration: what to lay the skin on, in which order."""
+"""Cylinders that a skin is laid on to be calibrated: radii, and the schedule of steps."""
 
 import math
 from bisect import bisect_right
@@ -44,7 +44,7 @@ _BENT = {
 
 
 @dataclass(frozen=True)
-class Step:
+class CylinderStep:
     """One thing to lay the skin on: a cylinder of `radius` in m, or a flat table (infinite).
 
     `along` is x, y or diagonal, the direction in which the skin bends. `face` is 1 when the inner
@@ -86,7 +86,7 @@ class Step:
 
 def schedule(
     radii: tuple[float, ...] = RADII, hold: float = 0.0, strip: bool = False
-) -> tuple[Step, ...]:
+) -> tuple[CylinderStep, ...]:
     """The steps with cylinders of `radii` in m, as the paper took them (section 5).
 
     For each direction of bending, on a `strip` x alone: from large to small radii and back with
@@ -105,9 +105,12 @@ def schedule(
         )
     if not 0 <= hold < math.inf:
         raise Refusal(f"expected a hold of at least 0 s, got {hold}")
-    steps = [Step(1)]
+    steps = [CylinderStep(1)]
     if hold:
-        steps += [Step(2, radii[-1], "x" if strip else "diagonal", hold=hold), Step(3)]
+        steps += [
+            CylinderStep(2, radii[-1], "x" if strip else "diagonal", hold=hold),
+            CylinderStep(3),
+        ]
     for along in ("x",) if strip else _BENT:
         stays = [[(radii[-1], -1, "first")]]
         for face in (1, -1):
@@ -115,17 +118,17 @@ def schedule(
             stays.append(there + [(radius, face, "back") for radius in reversed(radii[:-1])])
         for stay in stays:
             for radius, face, way in stay:
-                steps.append(Step(len(steps) + 1, radius, along, face, way))
-            steps.append(Step(len(steps) + 1))
+                steps.append(CylinderStep(len(steps) + 1, radius, along, face, way))
+            steps.append(CylinderStep(len(steps) + 1))
     return tuple(steps)
 
 
-def applied(steps: tuple[Step, ...]) -> Array:
+def applied_curvature(steps: tuple[CylinderStep, ...]) -> Array:
     """The curvature (S, 3) in 1/m of every step."""
     return np.array([step.curvature for step in steps]).reshape(-1, 3)
 
 
-def pairs(steps: tuple[Step, ...], x: Array, face: int) -> list[tuple[int, int]]:
+def step_pairs(steps: tuple[CylinderStep, ...], x: Array, face: int) -> list[tuple[int, int]]:
     """Steps (there, back) on the same cylinder with `face`, among those with curvature in `x`."""
     there: dict[tuple[str, float], int] = {}
     found: list[tuple[int, int]] = []
@@ -170,7 +173,7 @@ def radii_for(sensor: Sensor) -> tuple[float, ...]:
     return tuple(float(radius) for radius in np.ceil(1e3 / (most * steps)) / 1e3)
 
 
-def check_readable(steps: tuple[Step, ...], sensor: Sensor) -> None:
+def check_readable(steps: tuple[CylinderStep, ...], sensor: Sensor) -> None:
     """Refuse steps that no channel could read, before anybody takes the first."""
     smallest = min(steps, key=lambda step: step.radius)
     if not smallest.flat and not _reads(sensor, 1 / smallest.radius):
@@ -182,7 +185,7 @@ def check_readable(steps: tuple[Step, ...], sensor: Sensor) -> None:
         )
 
 
-def check_strain(steps: tuple[Step, ...], sensor: Sensor) -> None:
+def check_strain(steps: tuple[CylinderStep, ...], sensor: Sensor) -> None:
     """Refuse steps that would bend the sensor's gages beyond their elastic limit."""
     # The gage that reads twist lies along the diagonal, and so bends with the full 1/R.
     least = 1 / sensor.transduction.strain_limit_curvature
@@ -200,7 +203,7 @@ def check_strain(steps: tuple[Step, ...], sensor: Sensor) -> None:
 class Presentation:
     """Steps that follow one another by themselves, each for `dwell` s, or its hold if longer."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[CylinderStep, ...]
     dwell: float
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""A scene to the effects that it calls for at the accuracy asked for, and why."""
+"""Plan of a simulation: which effects a scene calls for at the accuracy asked for, and why."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -6,21 +6,26 @@ from typing import Any
 
 import numpy as np
 
-from kappaskin.scenes.choice import Choice
-from kappaskin.scenes.effects import EFFECTS
-from kappaskin.scenes.effects.converter import Quantisation, Saturation
-from kappaskin.scenes.effects.effect import NOTHING, Effect, Size
-from kappaskin.scenes.effects.failures import DeadElements
-from kappaskin.scenes.effects.finite_slope import FiniteSlope
-from kappaskin.scenes.effects.gage_length import GageLength
-from kappaskin.scenes.effects.skew import Skew
-from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
-from kappaskin.scenes.scene import Scene
-from kappaskin.scenes.survey import survey
+from kappaskin.scenes.effects import (
+    EFFECTS,
+    NOTHING,
+    DeadElements,
+    Effect,
+    FiniteSlopeEffect,
+    Fluid,
+    Foam,
+    GageLength,
+    Quantisation,
+    Saturation,
+    Size,
+    Skew,
+    Tension,
+)
+from kappaskin.scenes.scene import EffectSelection, Scene, survey
 
 
 @dataclass(frozen=True)
-class Entry:
+class PlanEntry:
     """One effect in a plan: how large it is, whether it is `kept`, and why."""
 
     name: str
@@ -47,7 +52,7 @@ class Plan:
     Those `kept` are in the order in which they come about.
     """
 
-    entries: tuple[Entry, ...]
+    entries: tuple[PlanEntry, ...]
     kept: tuple[Effect, ...]
 
     @property
@@ -55,12 +60,12 @@ class Plan:
         """By how much all that was left out changes a reading, as a share of the peak."""
         return sum(entry.size.error for entry in self.entries if not entry.kept)
 
-    def __iter__(self) -> Iterator[Entry]:
+    def __iter__(self) -> Iterator[PlanEntry]:
         return iter(self.entries)
 
 
 def effects_of(scene: Scene) -> dict[str, Effect]:
-    """Everything that there is of `scene` to spoil its readings, by name, as it comes about."""
+    """All effects that there are in `scene`, by name, in the order in which they come about."""
     plate, layout = scene.plate, scene.layout
     there: list[Effect] = []
     if plate.tension and plate.rigidity:  # a drum head is no skin without its tension
@@ -74,7 +79,7 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
     if dead := tuple(np.flatnonzero(~layout.live.any(axis=0)).tolist()):
         there.append(DeadElements(dead))
     if not plate.patch.base_curvature and scene.laid is None:
-        there.append(FiniteSlope())
+        there.append(FiniteSlopeEffect())
     if scene.moves:
         there.append(Skew())
     there += [*scene.effects, Saturation(scene.transduction), Quantisation(scene.transduction)]
@@ -88,9 +93,9 @@ def plan(scene: Scene) -> Plan:
     reasons = _reasons(scene.choice, there, sizes)
     return Plan(
         tuple(
-            Entry(name, sizes[name], *reasons[name], there[name])
+            PlanEntry(name, sizes[name], *reasons[name], there[name])
             if name in there
-            else Entry(name, NOTHING, False, "not in this scene")
+            else PlanEntry(name, NOTHING, False, "not in this scene")
             for name in dict.fromkeys((*EFFECTS, *there))
         ),
         tuple(effect for name, effect in there.items() if reasons[name][0]),
@@ -98,7 +103,7 @@ def plan(scene: Scene) -> Plan:
 
 
 def _reasons(
-    choice: Choice, there: dict[str, Effect], sizes: dict[str, Size]
+    choice: EffectSelection, there: dict[str, Effect], sizes: dict[str, Size]
 ) -> dict[str, tuple[bool, str]]:
     """Whether each effect that is `there` is kept, and why."""
     found, spent = dict[str, tuple[bool, str]](), 0.0
@@ -129,8 +134,8 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
-def kept_of(scene: Scene) -> tuple[Effect, ...]:
-    """The effects that `plan` keeps; without a look at the scene where its choice needs none."""
+def kept_effects(scene: Scene) -> tuple[Effect, ...]:
+    """The effects that `plan` keeps; without a survey of the scene where its choice needs none."""
     if scene.choice.auto:
         return plan(scene).kept
     there, off = effects_of(scene), scene.choice.off
@@ -139,6 +144,6 @@ def kept_of(scene: Scene) -> tuple[Effect, ...]:
 
 def planned(scene: Scene) -> Scene:
     """The scene with the effects that its plan keeps chosen by name: nothing is left to plan."""
-    kept = {effect.name for effect in kept_of(scene)}
+    kept = {effect.name for effect in kept_effects(scene)}
     accuracy = scene.choice.accuracy
-    return replace(scene, choice=Choice(accuracy=accuracy, off=frozenset(EFFECTS) - kept))
+    return replace(scene, choice=EffectSelection(accuracy=accuracy, off=frozenset(EFFECTS) - kept))

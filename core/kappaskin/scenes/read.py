@@ -1,85 +1,123 @@
-"""The text of a scene file to the scene: strict, and every refusal names its line."""
+"""Reading scene files: strict, and every refusal names its line."""
 
 import math
-import re
-import tomllib
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
-from pathlib import Path as FilePath
+from importlib.resources import files
+from pathlib import Path
 from typing import Any, cast, get_type_hints
 
-from kappaskin.bases import EDGES, basis_for
+import numpy as np
+
+from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
-from kappaskin.mechanics import Plate
-from kappaskin.scenes.choice import LINEAR, Choice
+from kappaskin.mechanics import HeightMap, Load, Mesh, Plate, RigidObject
 from kappaskin.scenes.cylinders import Presentation, schedule
-from kappaskin.scenes.effects import EFFECTS
-from kappaskin.scenes.effects.effect import Effect
-from kappaskin.scenes.effects.failures import IntermittentElements, StuckElements
-from kappaskin.scenes.effects.hysteresis import FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS
-from kappaskin.scenes.effects.strain_limit import StrainLimit
-from kappaskin.scenes.limits import (
-    DWELL,
-    HOLD,
-    RADII,
-    RATE,
-    SEED,
-    SKIN,
-    check_elements,
-    check_functions,
-    check_sides,
+from kappaskin.scenes.effects import (
+    EFFECTS,
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION_LOOPS,
+    Effect,
+    IntermittentElements,
+    StrainLimit,
+    StuckElements,
+    Within,
 )
-from kappaskin.scenes.lines import Lines
 from kappaskin.scenes.plan import effects_of
-from kappaskin.scenes.read_stimulus import read_stimulus
-from kappaskin.scenes.scene import Scene, scaled_to
-from kappaskin.scenes.table import Table
+from kappaskin.scenes.scene import LINEAR, EffectSelection, Scene, scaled_to
+from kappaskin.scenes.schema import (
+    CYLINDERS,
+    EFFECT,
+    ELECTRONICS,
+    ELEMENTS,
+    FORMAT,
+    LOADS,
+    OBJECTS,
+    SCENE,
+    SKIN,
+    STEP,
+    TOUCH,
+)
+from kappaskin.scenes.stimulus import (
+    Indenter,
+    Motion,
+    MotionPath,
+    MotionStep,
+    Orbit,
+    RecordedMotion,
+    Stimulus,
+)
+from kappaskin.scenes.tables import TomlTable, parsed
 from kappaskin.sensing import FIRST_GENERATION, SECOND_GENERATION, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 
-FORMAT = 1
-_LARGEST = 2**24  # bytes
-_DEEP = re.compile(r"(?:\.[\w\"'-]+){64}")  # tables in tables, which take long to read
+TABLE_1_NOISE = 0.40 / math.sqrt(3)
+"""RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
 
-ELECTRONICS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
-ELSEWHERE = {
-    "tension": "[skin] has the tension",
-    "foam": "[skin] has the foundation",
-    "fluid": "[skin] has the fluid",
-    "dead": "[elements] has those that are dead",
-    "gage-length": "[elements] has the gage_length",
-    "finite-slope": "it has no numbers: name it in choose, on or off",
-    "skew": "the converter's times make it",
-    "saturation": "the amplifier and the converter make it",
-    "quantisation": "the converter makes it",
-}
-"""Effects that follow from what a scene says elsewhere."""
+DEFAULT_SCENE = "circle"
 
+_FOLDER = Path(str(files("kappaskin_resources"))) / "scenes"
+_ENDING = ".toml"
+
+SCENES = tuple(sorted(file.stem for file in _FOLDER.iterdir() if file.suffix == _ENDING))
+"""Names of the ready scenes."""
+
+CHAINS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_GENERATION}
 LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
+"""Electronics and loops that a scene may say are like those of a prototype."""
+
+_LARGEST_SCENE = 2**24  # bytes
+_LARGEST_RECORD = 2**22  # bytes of a recorded motion
+
+_SIDE = Within(1e-4, 10, "m")
+_MOST_ELEMENTS = 2**16 // 3  # as many as the wire's format can tell apart
+_MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
+_MOST_FUNCTIONS, _MOST_THAT_MIX = 64**2, 20**2  # some seconds to make the skin of
 
 
-def parsed(text: str, file: FilePath) -> dict[str, Any]:
-    """What the TOML `text`, of `file`, says."""
+def scene_file(name: str = "") -> Path:
+    """The file of the ready scene `name`, of the default one when empty; or the TOML file named."""
+    if name.endswith(_ENDING):
+        return Path(name)
+    name = name or DEFAULT_SCENE
+    if name not in SCENES:
+        raise Refusal(
+            f"expected a scene among {', '.join(SCENES)}, or a file that ends in {_ENDING}; got "
+            f"{name!r}"
+        )
+    return _FOLDER / f"{name}{_ENDING}"
+
+
+def load_scene(name: str = "") -> Scene:
+    """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
+    file = scene_file(name)
+    return read_scene(read_scene_text(file), file)
+
+
+def read_scene_text(file: Path) -> str:
+    """The text in `file`; raises `Refusal` for a file that cannot be read, or is no scene's."""
     try:
-        if _DEEP.search(text):
-            raise RecursionError
-        return tomllib.loads(text)
-    except ValueError as error:  # a whole number of thousands of digits is one of these, too
-        raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
-    except RecursionError as error:
-        raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
+        if file.exists() and not file.is_file():
+            raise Refusal(f"{file}: expected a file with a scene, got a folder or a device")
+        if file.stat().st_size > _LARGEST_SCENE:
+            raise Refusal(f"{file}: expected a scene of at most {_LARGEST_SCENE} bytes, got more")
+        return file.read_text(encoding="utf-8-sig")
+    except Refusal:
+        raise
+    except (OSError, ValueError) as error:  # undecodable, or a name that no file has
+        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
 
 
-def read_scene(text: str, file: FilePath) -> Scene:
+def read_scene(text: str, file: Path) -> Scene:
     """The scene that `text`, of `file`, describes; files that it names lie beside it."""
-    return scene_of(Table(parsed(text, file), Lines(text), str(file)), file)
+    return scene_of(TomlTable(parsed(text, file), text, str(file)), file)
 
 
-def scene_of(top: Table, file: FilePath) -> Scene:
+def scene_of(top: TomlTable, file: Path) -> Scene:
     """The scene that a file says at its `top`, besides what somebody else has asked for there."""
     name, folder = file.stem.removesuffix(".scene"), file.parent
-    if (version := top.get("format", int)) != FORMAT:
+    if (version := SCENE.value(top, "format")) != FORMAT:
         raise top.refusal(
             f"expected a scene of format {FORMAT}, got {version}; get a newer kappaskin"
             if version > FORMAT
@@ -88,18 +126,18 @@ def scene_of(top: Table, file: FilePath) -> Scene:
         )
     plate, edge = _skin(top.table("skin"))
     layout = _elements(top.table("elements"), plate.patch)
-    reference = top.get("reference", tuple[int, int], (15, 1 if plate.patch.strip else 15))
+    reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
-        check_functions(plate.patch, edge, reference, len(layout))
+        _check_functions(plate.patch, edge, reference, len(layout))
         basis()
     stimuli = tuple(
-        read_stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), folder)
+        _stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), folder)
         for table in top.tables("touch")
     )
     electronics = _electronics(top.table("electronics"))
     choice, effects = _effects(top, electronics, layout)
-    rate, seed = top.get("rate", float, 500.0, RATE), top.get("seed", int, 0, SEED)
+    rate, seed = SCENE.value(top, "rate"), SCENE.value(top, "seed")
     with top.blamed():
         scene = Scene(
             name,
@@ -113,8 +151,8 @@ def scene_of(top: Table, file: FilePath) -> Scene:
             reference,
             edge,
             choice=choice,
-            title=top.get("title", str, name),
-            text=top.get("text", str, ""),
+            title=SCENE.value(top, "title", default=name),
+            text=SCENE.value(top, "text"),
         )
         with top.blamed("rate"):
             scene.sensor()
@@ -132,50 +170,43 @@ def scene_of(top: Table, file: FilePath) -> Scene:
     return scene
 
 
-def _skin(table: Table) -> tuple[Plate, str]:
-    shapes: dict[str, Callable[[], Patch]] = {
-        "rectangle": lambda: _rectangle(table, strip=False),
-        "strip": lambda: _rectangle(table, strip=True),
-        "disk": lambda: Disk(table.get("rim_radius", float)),
-        "polygon": lambda: Polygon(table.get("outline", tuple[tuple[float, float], ...])),
-    }
-    make = table.choose("shape", shapes, "rectangle")
+def _skin(table: TomlTable) -> tuple[Plate, str]:
+    shape = SKIN.choose(table, "shape")
     with table.blamed():
-        patch = make()
+        patch = _patch(table, shape)
         check_sides(patch)
-    for name, within in SKIN.items():
-        if table.get(name, float, 0.0):  # with no tension at all, say, it is none
-            table.get(name, float, within=within)
-    plate = table.make(Plate, patch=patch)
-    edge = table.choose("edge", {edge: edge for edge in EDGES}, "hinged")
+    plate = SKIN.make(table, Plate, patch=patch)
+    edge = SKIN.choose(table, "edge")
     table.done()
     return plate, edge
 
 
-def _rectangle(table: Table, strip: bool) -> Patch:
-    a, b = table.get("size", tuple[float, float])
-    return Patch(a, b, table.get("radius", float, math.inf), strip)
+def _patch(table: TomlTable, shape: str) -> Patch:
+    if shape == "disk":
+        return Disk(SKIN.value(table, "rim_radius"))
+    if shape == "polygon":
+        return Polygon(SKIN.value(table, "outline"))
+    a, b = SKIN.value(table, "size")
+    return Patch(a, b, SKIN.value(table, "radius"), shape == "strip")
 
 
-def _elements(table: Table, patch: Patch) -> SensorLayout:
+def _elements(table: TomlTable, patch: Patch) -> SensorLayout:
     with table.blamed():
         if "positions" in table:
-            layout = SensorLayout.scattered(
-                patch, table.get("positions", tuple[tuple[float, float], ...])
-            )
+            layout = SensorLayout.scattered(patch, ELEMENTS.value(table, "positions"))
         else:
-            grid = table.get("grid", tuple[int, int], (10, 10))
+            grid = ELEMENTS.value(table, "grid")
             check_elements(*grid)
             layout = SensorLayout.regular(patch, *grid)
         check_elements(len(layout))
-        layout = layout.without(table.get("dead", tuple[int, ...], ()))
-        layout = replace(layout, gage_length=table.get("gage_length", float, 0.0))
+        layout = layout.without(ELEMENTS.value(table, "dead"))
+        layout = replace(layout, gage_length=ELEMENTS.value(table, "gage_length"))
     table.done()
     return layout
 
 
-def _electronics(table: Table) -> Transduction:
-    chain = table.choose("like", ELECTRONICS, "modern")
+def _electronics(table: TomlTable) -> Transduction:
+    chain = CHAINS[ELECTRONICS.choose(table, "like")]
     parts = {
         name: _changed(table.table(name), getattr(chain, name))
         for name in ("bridge", "multiplexer", "amplifier", "converter")
@@ -185,86 +216,193 @@ def _electronics(table: Table) -> Transduction:
         return replace(chain, **parts)
 
 
-def _changed(table: Table, part: Any) -> Any:
+def _changed(table: TomlTable, part: Any) -> Any:
     """The `part` of the electronics with what the table says of it."""
     hints = get_type_hints(cast("type[Any]", type(part)))
-    said = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
+    changes = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
     table.done()
     with table.blamed():
-        return replace(part, **said)
+        return replace(part, **changes)
 
 
-def _cylinders(table: Table, scene: Scene) -> Presentation:
-    hold = table.get("hold", float, 0.0, HOLD)
-    radii = table.get("radii", tuple[float, ...], (), RADII)
+def _cylinders(table: TomlTable, scene: Scene) -> Presentation:
+    hold, radii = CYLINDERS.value(table, "hold"), CYLINDERS.value(table, "radii")
     with table.blamed():
         strip = scene.plate.patch.strip
         steps = schedule(radii, hold, strip) if radii else schedule(hold=hold, strip=strip)
-        made = Presentation(steps, table.get("dwell", float, 1.0, DWELL))
+        made = Presentation(steps, CYLINDERS.value(table, "dwell"))
     table.done()
     return made
 
 
 def _effects(
-    top: Table, electronics: Transduction, layout: SensorLayout
-) -> tuple[Choice, tuple[Effect, ...]]:
+    top: TomlTable, electronics: Transduction, layout: SensorLayout
+) -> tuple[EffectSelection, tuple[Effect, ...]]:
     """Which effects the file chooses, and those that it says the parameters of."""
     table = top.table("effects")
     found = list[Effect]()
     for name, kind in EFFECTS.items():
         if name in table:
-            said = table.table(name)
-            if name in ELSEWHERE:
-                raise said.refusal(f"expected no such table; {ELSEWHERE[name]}")
-            if name == "hysteresis" and "like" in said:
-                found.append(said.choose("like", LOOPS))
+            own = table.table(name)
+            if kind.elsewhere:
+                raise own.refusal(f"expected no such table; {kind.elsewhere}")
+            if name == "hysteresis" and "like" in own:
+                found.append(own.choose("like", LOOPS))
             elif kind is StrainLimit:
-                found.append(said.make(kind, transduction=electronics))
+                found.append(own.make(kind, transduction=electronics))
             else:
-                found.append(said.make(kind))
-            said.done()
+                found.append(own.make(kind))
+            own.done()
             if isinstance(effect := found[-1], StuckElements | IntermittentElements):
-                with said.blamed("elements"):
+                with own.blamed("elements"):
                     effect.channels((3 * len(layout),))
-    accuracy = top.get("accuracy", float, 0.01)
+    accuracy = SCENE.value(top, "accuracy")
     with top.blamed("accuracy"):
-        Choice(accuracy=accuracy)
+        EffectSelection(accuracy=accuracy)
     with table.blamed("choose"):
         choice = _choice(table, accuracy)
     table.done(*EFFECTS)
     return choice, tuple(found)
 
 
-def _choice(table: Table, accuracy: float) -> Choice:
+def _choice(table: TomlTable, accuracy: float) -> EffectSelection:
     """`choose` is auto, all, linear or a list of names; `on` and `off` force some."""
-    on, off = (frozenset(table.get(key, tuple[str, ...], ())) for key in ("on", "off"))
-    if not isinstance(named := table.get("choose", str | tuple[str, ...], "auto"), str):
+    on, off = (frozenset(EFFECT.value(table, key)) for key in ("on", "off"))
+    if not isinstance(named := EFFECT.value(table, "choose"), str):
         if on or off:
             raise Refusal("expected either a list of effects, or some on and off, got both")
-        listed = Choice(False, accuracy, on=frozenset(named))
+        listed = EffectSelection(False, accuracy, on=frozenset(named))
         return replace(listed, off=frozenset(EFFECTS) - listed.on)
-    choices = {"auto": Choice(auto=True), "all": Choice(), "linear": LINEAR}
+    choices = {"auto": EffectSelection(auto=True), "all": EffectSelection(), "linear": LINEAR}
     if named not in choices:
         raise Refusal(f"expected auto, all, linear or a list of effects, got {named!r}")
     chosen = choices[named]
-    return Choice(chosen.auto, accuracy, on, (chosen.off - on) | off)
+    return EffectSelection(chosen.auto, accuracy, on, (chosen.off - on) | off)
 
 
-def _wanted(table: Table) -> set[str]:
+def _wanted(table: TomlTable) -> set[str]:
     """The effects that a file asks for by name."""
-    named = table.get("choose", str | tuple[str, ...], "auto")
-    return {*table.get("on", tuple[str, ...], ()), *(() if isinstance(named, str) else named)}
+    named = EFFECT.value(table, "choose")
+    return {*EFFECT.value(table, "on"), *(() if isinstance(named, str) else named)}
 
 
-def read_scene_text(file: FilePath) -> str:
-    """The text in `file`; raises `Refusal` for a file that cannot be read, or is no scene's."""
+def _stimulus(
+    table: TomlTable, plate: Plate, moved: Callable[[Load, float], Load], folder: Path
+) -> Stimulus:
+    """What a [[touch]] of `plate` says; `moved` makes a load move its place so far in m."""
+    what: Load | Indenter
+    if (name := TOUCH.choose(table, "what")) in OBJECTS:
+        what = table.make(Indenter, rigid=_object(table, OBJECTS[name].made, folder))
+    else:
+        what = load = table.make(cast("type[Load]", LOADS[name].made))
+        if "displacement" in table:
+            if "force" in table:
+                raise table.refusal("expected a force or a displacement, got both", "displacement")
+            with table.blamed():
+                load.check(plate.patch)
+            with table.blamed("displacement"):
+                what = moved(load, TOUCH.value(table, "displacement"))
+    force = TOUCH.limits["force"]
+    if what.force is not None and what.force not in force:
+        raise table.refusal(f"expected a force of {force}, got {what.force:g}", "force")
+    made = Stimulus(what, _motion(table, folder))
+    table.done()
+    with table.blamed():
+        made.check(plate)
+    return made
+
+
+def _object(table: TomlTable, kind: type[RigidObject], folder: Path) -> RigidObject:
+    """The rigid object that the table describes, read from a file in `folder` if it has one."""
+    with table.blamed():
+        if kind is Mesh:
+            return Mesh.read(_beside(table, "file", folder), TOUCH.value(table, "unit"))
+        if kind is HeightMap:
+            sizes = (TOUCH.value(table, key) for key in ("length", "width", "relief"))
+            return HeightMap.read(_beside(table, "file", folder), *sizes)
+        return table.make(kind)
+
+
+def _beside(table: TomlTable, key: str, folder: Path) -> Path:
+    """The file that the table names, which lies beside that of the scene."""
+    file = folder / TOUCH.value(table, key)
+    if not file.is_file():
+        raise table.refusal(
+            f"expected the name of a file beside that of the scene, got {str(file)!r:.200}, where "
+            "there is none",
+            key,
+        )
+    return file
+
+
+def _motion(table: TomlTable, folder: Path) -> Motion | None:
+    given = [key for key in ("path", "orbit", "recorded") if key in table]
+    if len(given) > 1:
+        raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
+    if "orbit" in table:
+        orbit = table.table("orbit")
+        made = orbit.make(Orbit)
+        orbit.done()
+        return made
+    if "recorded" in table:
+        with table.blamed("recorded"):
+            return _recorded(_beside(table, "recorded", folder))
+    steps = [_step(step) for step in table.tables("path")]
+    with table.blamed("path"):
+        return MotionPath(tuple(steps)) if "path" in table else None
+
+
+def _step(table: TomlTable) -> MotionStep:
+    made = table.make(STEP.kinds[STEP.choose(table, "step")].made)
+    table.done()
+    return made
+
+
+def _recorded(file: Path) -> RecordedMotion:
+    """A motion from a CSV file with the columns time, dx, dy and amount."""
     try:
-        if file.exists() and not file.is_file():
-            raise Refusal(f"{file}: expected a file with a scene, got a folder or a device")
-        if file.stat().st_size > _LARGEST:
-            raise Refusal(f"{file}: expected a scene of at most {_LARGEST} bytes, got more")
-        return file.read_text(encoding="utf-8-sig")
-    except Refusal:
-        raise
-    except (OSError, ValueError) as error:  # undecodable, or a name that no file has
-        raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
+        if file.stat().st_size > _LARGEST_RECORD:
+            raise OSError(f"it has more than {_LARGEST_RECORD} bytes; thin it out")
+        heading, *lines = file.read_text(encoding="utf-8-sig").splitlines() or [""]
+        rows = np.array([line.split(",") for line in lines if line.strip()], float)
+    except (OSError, ValueError) as error:
+        raise Refusal(
+            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
+        ) from error
+    if heading.replace(" ", "") != "time,dx,dy,amount":
+        raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r:.80}")
+    if rows.shape[1:] != (4,):
+        raise Refusal(f"{file}: expected lines of four numbers, got those of {rows.shape}")
+    return RecordedMotion(rows[:, 0], rows[:, 1:])
+
+
+def check_sides(patch: Patch) -> None:
+    """Refuse a skin that no sensor is as large or small as."""
+    if patch.a not in _SIDE or patch.b not in _SIDE:
+        raise Refusal(
+            f"expected sides of {_SIDE}, got {patch.a:g} x {patch.b:g} m; lengths are in metres"
+        )
+
+
+def check_elements(m: int, n: int = 1) -> None:
+    """Refuse more elements than a device could send the readings of."""
+    if m * n > _MOST_ELEMENTS:
+        raise Refusal(f"expected at most {_MOST_ELEMENTS} elements, got {m} x {n}; take fewer")
+
+
+def _check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:
+    """Refuse more functions of the true shape than a few seconds and some memory are enough for."""
+    whole = isinstance(patch, Disk | Polygon)
+    mix = whole or patch.base_curvature or edge != "hinged"
+    most = _MOST_THAT_MIX if mix else _MOST_FUNCTIONS
+    most = min(most, _MOST_VALUES // (3 * elements))
+    if min(counts) > 0 and counts[0] * counts[1] > most:
+        raise Refusal(
+            f"expected at most {most} functions in all of the true shape of this skin with "
+            f"{elements} elements, got {counts[0]} x {counts[1]}; take fewer"
+        )
+
+
+def usual_reference(patch: Patch) -> tuple[int, int]:
+    """The number of functions of the true shape of a skin that says none."""
+    return (15, 1 if patch.strip else 15)

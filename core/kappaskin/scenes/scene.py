@@ -1,19 +1,47 @@
-"""What is in a scene: a skin, what touches it, and what spoils its readings."""
+"""A scene: a skin, what touches it and what disturbs its readings; its loads over time."""
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import Refusal
-from kappaskin.mechanics import Load, Plate
-from kappaskin.scenes.choice import LINEAR, Choice
+from kappaskin.frames import Array
+from kappaskin.mechanics import Indentation, IndentationSolver, Load, Plate, PointLoad
 from kappaskin.scenes.cylinders import Presentation
-from kappaskin.scenes.effects.effect import Effect, ReadingEffect
-from kappaskin.scenes.motion import Motion
-from kappaskin.scenes.stimulus import Indenter, Stimulus
+from kappaskin.scenes.effects import EFFECTS, Effect, ReadingEffect, Survey
+from kappaskin.scenes.stimulus import Indenter, Motion, Stimulus, contact_of
 from kappaskin.sensing import Sensor, SensorLayout, Transduction
+
+
+@dataclass(frozen=True)
+class EffectSelection:
+    """Which effects are simulated: those that matter, or all there are; `on` and `off` by name.
+
+    With `auto` an effect is left out when it and all others left out change no reading by more than
+    `accuracy`, a share of the scene's peak curvature.
+    """
+
+    auto: bool = False
+    accuracy: float = 0.01
+    on: frozenset[str] = frozenset()
+    off: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        if not 0 < self.accuracy < 1:
+            raise Refusal(f"expected an accuracy between 0 and 1 of the peak, got {self.accuracy}")
+        for name in sorted(self.on | self.off):
+            if name not in EFFECTS:
+                raise Refusal(f"expected effects among {', '.join(EFFECTS)}; got {name!r}")
+        if both := sorted(self.on & self.off):
+            raise Refusal(f"expected an effect to be on or off, got {', '.join(both)} as both")
+
+
+LINEAR = EffectSelection(off=frozenset({"finite-slope"}))
+"""All there is of the electronics, on a skin of which the gages sense what Eqs. 3-5 say."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +66,7 @@ class Scene:
     reference: tuple[int, int] = (15, 15)
     edge: str = "hinged"
     laid: Presentation | None = None
-    choice: Choice = LINEAR
+    choice: EffectSelection = LINEAR
     title: str = ""
     text: str = ""
 
@@ -134,3 +162,132 @@ def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Lo
             "held, press further inside"
         )
     return load.scaled(displacement / at)
+
+
+@dataclass(frozen=True, slots=True)
+class Playback:
+    """Playback of a scene: at `at` s when device time was `since` s, `speed` times as fast since.
+
+    At a speed of zero it stands still, while the device goes on reading it.
+    """
+
+    at: float = 0.0
+    since: float = 0.0
+    speed: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.at) and math.isfinite(self.since)):
+            raise Refusal(f"expected finite times in s to play a scene from, got {self}")
+        if not 0 <= self.speed <= 10:
+            raise Refusal(f"expected a speed of 0 to 10 to play a scene at, got {self.speed:g}")
+
+    def time(self, device_time: float) -> float:
+        """The time in s of the scene at `device_time` in s."""
+        return self.at + self.speed * (device_time - self.since)
+
+
+FROM_THE_BEGINNING = Playback()
+
+
+class AppliedLoads(NamedTuple):
+    """The loads on a skin at one moment: modal `force` (Ri, Rj) in N and `contact` (2,) in m.
+
+    That is the centre of force, NaN where nothing touches. `loads` make the force: those of the
+    scene, or a point load wherever a rigid object bears.
+    """
+
+    force: Array
+    contact: Array
+    loads: tuple[Load, ...]
+
+
+class LoadingHistory:
+    """The loads on the skin of `scene` over time, as if the skin were `plate`.
+
+    A rigid object is sought from where it was: asked in order, that is quick.
+    """
+
+    def __init__(self, scene: Scene, plate: Plate) -> None:
+        self._plate, self._basis = plate, scene.basis
+        self._press: IndentationSolver | None = None
+        self._last: Indentation | None = None
+        self.take(scene)
+
+    def take(self, scene: Scene) -> None:
+        """Go on with what touches the same skin in another `scene`."""
+        self._scene, self._indenter = scene, scene.indenter
+        if self._indenter and self._press is None:
+            self._press = IndentationSolver(self._plate, self._basis)
+
+    def __call__(self, time: float) -> AppliedLoads:
+        """What presses at `time` in s."""
+        stimulus = self._indenter
+        if stimulus is None or self._press is None or not isinstance(stimulus.what, Indenter):
+            loads = self._scene.loads_at(time)
+            force = np.zeros(self._basis.shape) if not loads else loads[0].modal(self._basis)
+            for load in loads[1:]:
+                force = force + load.modal(self._basis)
+            return AppliedLoads(force, contact_of(loads), loads)
+        pose = stimulus.pose_at(time)
+        if not pose.amount:
+            return AppliedLoads(np.zeros(self._basis.shape), np.full(2, np.nan), ())
+        self._last = found = stimulus.what.into(self._press, pose, self._last)
+        bearing = found.forces > 0
+        places = zip(found.points[bearing].tolist(), found.forces[bearing].tolist(), strict=True)
+        loads = tuple(PointLoad(x, y, force) for (x, y), force in places)
+        return AppliedLoads(found.modal, found.centre, loads)
+
+
+_MOMENTS = 48  # evenly over the scene, besides those of its motions and those halfway
+_LONGEST = 60.0  # s of a scene that nothing repeats in: what drifts has this long to do so
+_STEP = 1e-3  # s over which a rate is taken; less of a motion that is as fast
+
+
+def survey_times(scene: Scene) -> list[float]:
+    """The times in s, ascending, at which a survey samples a scene."""
+    if not (scene.moves or scene.laid):
+        return [0.0]
+    evenly = np.arange(_MOMENTS) * scene.duration / _MOMENTS
+    each = [np.array(s.motion.moments) for s in scene.stimuli if s.motion]
+    fastest = [(moments[1:] + moments[:-1]) / 2 for moments in each]  # of what eases
+    laid = scene.laid.middles if scene.laid else []
+    return np.unique(np.concatenate([evenly, *each, *fastest, laid])).tolist()
+
+
+def survey_duration(scene: Scene) -> float:
+    """Seconds after which a scene repeats; `_LONGEST` of one in which nothing moves."""
+    return scene.duration if scene.moves or scene.laid else _LONGEST
+
+
+def survey(scene: Scene) -> Survey:
+    """The survey of one repetition of `scene`, by which the sizes of effects are judged."""
+    basis = scene.basis
+    layout = replace(scene.layout, gage_length=0.0)
+    times = np.array(survey_times(scene))
+    M = layout.curvature_operator(basis)
+    compliance = scene.plate.compliance(basis)
+    pressing = LoadingHistory(scene, scene.plate)
+    step = min([_STEP, *(np.diff(s.motion.moments).min() / 4 for s in scene.stimuli if s.motion)])
+    pairs = [(pressing(t), pressing(t + step) if scene.moves else None) for t in times.tolist()]
+    forces = np.array([now.force.ravel() for now, _ in pairs])
+    later = np.array([(then or now).force.ravel() for now, then in pairs])
+    c = compliance.after(forces)
+    curvature = (c @ M.T).reshape(len(times), 3, len(layout))
+    if scene.laid is not None:
+        laid = [np.repeat(scene.laid.curvature(t), len(layout)) for t in times.tolist()]
+        curvature = np.reshape(laid, curvature.shape)
+    scan, read_after = scene.sensor().scan(), np.zeros(3 * len(layout))
+    read_after[scan.channels] = scan.times
+    return Survey(
+        scene.plate,
+        basis,
+        layout,
+        scene.transduction,
+        times,
+        forces,
+        c,
+        curvature,
+        np.abs(compliance.after(later - forces) @ M.T).max(axis=0) / step,
+        survey_duration(scene),
+        read_after,
+    )

@@ -1,4 +1,4 @@
-"""A scene to frames: the counts a real device would send, with the truth beside them."""
+"""Simulator: the counts that a real device would send of a scene, with the truth beside them."""
 
 import math
 import zlib
@@ -9,16 +9,19 @@ import numpy as np
 
 from kappaskin.frames import Array, Frame, Truth
 from kappaskin.mechanics import Load
-from kappaskin.scenes.effects.effect import Effect, ReadingEffect, SkinEffect
-from kappaskin.scenes.effects.finite_slope import FiniteSlope
-from kappaskin.scenes.effects.gage_length import GageLength
-from kappaskin.scenes.effects.link import CorruptedFrames, DroppedFrames
-from kappaskin.scenes.effects.skew import Skew
-from kappaskin.scenes.effects.temperature import Temperature
-from kappaskin.scenes.plan import effects_of, kept_of
-from kappaskin.scenes.playing import FROM_THE_BEGINNING, Playing
-from kappaskin.scenes.pressing import Pressed, Pressing
-from kappaskin.scenes.scene import Scene
+from kappaskin.scenes.effects import (
+    CorruptedFrames,
+    DroppedFrames,
+    Effect,
+    FiniteSlopeEffect,
+    GageLength,
+    ReadingEffect,
+    Skew,
+    SkinEffect,
+    Temperature,
+)
+from kappaskin.scenes.plan import effects_of, kept_effects
+from kappaskin.scenes.scene import FROM_THE_BEGINNING, AppliedLoads, LoadingHistory, Playback, Scene
 from kappaskin.sensing import Scan
 
 _ROOM = 20.0  # degrees Celsius
@@ -32,10 +35,10 @@ class Simulator:
     of its start. Every effect draws from a random stream of its own.
     """
 
-    def __init__(self, scene: Scene, playing: Playing = FROM_THE_BEGINNING) -> None:
+    def __init__(self, scene: Scene, playing: Playback = FROM_THE_BEGINNING) -> None:
         self.scene, self.playing = scene, playing
         self._still: Truth | None = None
-        self._kept = kept_of(scene)
+        self._kept = kept_effects(scene)
         self._take_skin()
         self._start_effects()
 
@@ -45,7 +48,7 @@ class Simulator:
         Another list of them, another seed or another number of elements does.
         """
         was, self.scene, self._still = self.scene, scene, None
-        before, self._kept = self._kept, kept_of(scene)
+        before, self._kept = self._kept, kept_effects(scene)
         same_elements = np.array_equal(scene.layout.positions, was.layout.positions)
         skin = (scene.plate, scene.edge, scene.reference, scene.layout.gage_length)
         same_skin = skin == (was.plate, was.edge, was.reference, was.layout.gage_length)
@@ -58,11 +61,11 @@ class Simulator:
         if not same_size or reading != (was.seed, _of_readings(before)):
             self._start_effects()
 
-    def play(self, playing: Playing) -> None:
+    def play(self, playing: Playback) -> None:
         """Go on with the scene from another of its times, or at another speed."""
         self.playing = playing
 
-    def _pressed(self, time: float) -> Pressed:
+    def _pressed(self, time: float) -> AppliedLoads:
         """What presses at device `time` in s."""
         return self._pressing(self.playing.time(time))
 
@@ -94,11 +97,14 @@ class Simulator:
         if GageLength not in kinds:
             layout = replace(layout, gage_length=0.0)
         self._basis = scene.basis
-        self._pressing, self._compliance = Pressing(scene, plate), plate.compliance(self._basis)
+        self._pressing, self._compliance = (
+            LoadingHistory(scene, plate),
+            plate.compliance(self._basis),
+        )
         self._take_stimuli()
         self._skewed = Skew in kinds
         self._scan = scene.sensor().scan()
-        sloped = [effect for effect in self._kept if isinstance(effect, FiniteSlope)]
+        sloped = [effect for effect in self._kept if isinstance(effect, FiniteSlopeEffect)]
         if sloped:
             self._sensed = sloped[0].sensed(self._basis, layout)
         else:

@@ -1,40 +1,41 @@
-"""A scene to the text of its file, which `read_scene` reads as the same scene."""
+"""Writing scene files: a scene to the text that `read_scene` reads as the same scene."""
 
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from kappaskin._toml import table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.mechanics import Load, RigidObject
 from kappaskin.scenes.cylinders import RADII, Presentation, schedule
-from kappaskin.scenes.effects import EFFECTS
-from kappaskin.scenes.effects.effect import Effect
-from kappaskin.scenes.effects.parameters import parameters
-from kappaskin.scenes.effects.strain_limit import StrainLimit
+from kappaskin.scenes.effects import EFFECTS, Effect, StrainLimit
+from kappaskin.scenes.keys import PartKind
 from kappaskin.scenes.plan import effects_of
-from kappaskin.scenes.read import ELECTRONICS, ELSEWHERE, FORMAT, LOOPS, read_scene
-from kappaskin.scenes.said import said_of
+from kappaskin.scenes.read import CHAINS, LOOPS, read_scene, usual_reference
 from kappaskin.scenes.scene import Scene
-from kappaskin.scenes.write_stimulus import TOUCH_UNITS, touch_of
+from kappaskin.scenes.schema import (
+    CYLINDERS,
+    EFFECT,
+    ELECTRONICS,
+    ELEMENTS,
+    FORMAT,
+    LOADS,
+    OBJECTS,
+    PARTS,
+    SCENE,
+    SKIN,
+    STEP,
+    TOUCH,
+)
+from kappaskin.scenes.stimulus import Indenter, Motion, MotionPath, MotionStep, Orbit, Stimulus
 from kappaskin.sensing import SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 
-_METRES = ("size", "rim_radius", "outline", "radius", "positions", "gage_length", "radii")
-_UNITS = {
-    **dict.fromkeys((*_METRES, "substrate_thickness", "gage_thickness"), "m"),
-    **{"rigidity": "N m", "tension": "N/m", "foundation": "N/m^3"},
-    **{"axial_stiffness": "N/m", "rim_stiffness": "N/m^2"},
-    **dict.fromkeys(("excitation", "balance_voltage", "rail", "full_scale", "offset"), "V"),
-    **dict.fromkeys(("gage_resistance", "dummy_resistance", "supply_resistance"), "ohm"),
-    **dict.fromkeys(("settling_time", "conversion_time", "hold"), "s"),
-    **{"dwell": "s on each", "rate": "frames/s"},
-}
-_EFFECT_UNITS = {"time_constant": "s", "thresholds": "1/m"}
 _MOST_CELLS = 2**20  # of a grid that is looked for
 
 
@@ -46,43 +47,41 @@ def write_scene(scene: Scene) -> str:
     """
     scene.sensor()  # as for a reader, a rate that cannot be kept is refused
     tables = [
-        table("", _top(scene), _UNITS),
-        table("[skin]", _skin(scene), _UNITS),
-        table("[elements]", _elements(scene.layout), _UNITS),
+        table("", _top(scene), SCENE.comments()),
+        table("[skin]", _skin(scene), SKIN.comments()),
+        table("[elements]", _elements(scene.layout), ELEMENTS.comments()),
         *_electronics(scene.transduction),
     ]
     if scene.laid is not None:
-        tables.append(table("[cylinders]", _cylinders(scene.laid, scene.plate.patch), _UNITS))
+        tables.append(
+            table("[cylinders]", _cylinders(scene.laid, scene.plate.patch), CYLINDERS.comments())
+        )
     tables += _effects(scene)
-    tables += [table("[[touch]]", touch_of(each), TOUCH_UNITS) for each in scene.stimuli]
+    tables += [table("[[touch]]", _touch(each), TOUCH.comments()) for each in scene.stimuli]
     text = "\n".join(tables)
     read_scene(text, Path(f"{scene.name}.toml"))  # it refuses what is beyond the limits of a file
     return text
 
 
 def _top(scene: Scene) -> dict[str, Any]:
-    usual = {
-        "title": scene.name,
-        "text": "",
-        "rate": 500.0,
-        "seed": 0,
-        "reference": [15, 1 if scene.plate.patch.strip else 15],
-        "accuracy": 0.01,
-    }
-    said = {
+    usual = {key: SCENE.key(key).default for key in SCENE.keys}
+    usual |= {"title": scene.name, "reference": usual_reference(scene.plate.patch)}
+    written = {
+        "format": FORMAT,
         "title": scene.title or scene.name,
         "text": scene.text,
         "rate": float(scene.rate),
         "seed": int(scene.seed),
-        "reference": [int(count) for count in scene.reference],
+        "reference": tuple(int(count) for count in scene.reference),
         "accuracy": float(scene.choice.accuracy),
     }
-    return {"format": FORMAT} | {key: said[key] for key in said if said[key] != usual[key]}
+    changes = {key: value for key, value in written.items() if value != usual[key]}
+    return {key: [*value] if isinstance(value, tuple) else value for key, value in changes.items()}
 
 
 def _skin(scene: Scene) -> dict[str, Any]:
-    held = {} if scene.edge == "hinged" else {"edge": scene.edge}
-    return {**_patch(scene.plate.patch), **said_of(scene.plate, without=("patch",)), **held}
+    held = {} if scene.edge == SKIN.key("edge").default else {"edge": scene.edge}
+    return {**_patch(scene.plate.patch), **_fields(scene.plate, without=("patch",)), **held}
 
 
 def _patch(patch: Patch) -> dict[str, Any]:
@@ -94,7 +93,7 @@ def _patch(patch: Patch) -> dict[str, Any]:
         case _:
             shape = {"shape": "strip"} if patch.strip else {}
             size = {"size": [float(patch.a), float(patch.b)]}
-            return {**shape, **size, **said_of(patch, without=("a", "b", "strip"))}
+            return {**shape, **size, **_fields(patch, without=("a", "b", "strip"))}
 
 
 def _elements(layout: SensorLayout) -> dict[str, Any]:
@@ -107,7 +106,7 @@ def _elements(layout: SensorLayout) -> dict[str, Any]:
             "elements of which some channels are dead; those that are dead are so as a whole"
         )
     placed = {"positions": layout.positions.tolist()} if grid is None else {"grid": list(grid[0])}
-    gages = said_of(layout, without=("patch", "positions", "live", "shape"))
+    gages = _fields(layout, without=("patch", "positions", "live", "shape"))
     return {**placed, **({"dead": dead} if dead else {}), **gages}
 
 
@@ -131,17 +130,20 @@ def _cells(places: Array, side: float) -> int:
 
 def _electronics(electronics: Transduction) -> list[str]:
     """The tables of what differs from the chain that the electronics are most like."""
-    each = {name: _changes(electronics, chain) for name, chain in ELECTRONICS.items()}
+    each = {name: _changes(electronics, chain) for name, chain in CHAINS.items()}
     like = min(each, key=lambda name: sum(map(len, each[name].values())))
-    told = [] if like == "modern" else [table("[electronics]", {"like": like})]
-    parts = {name: said for name, said in each[like].items() if said}
-    return told + [table(f"[electronics.{name}]", parts[name], _UNITS) for name in parts]
+    usual = ELECTRONICS.key("like").default
+    tables = [] if like == usual else [table("[electronics]", {"like": like})]
+    parts = {name: values for name, values in each[like].items() if values}
+    return tables + [
+        table(f"[electronics.{name}]", parts[name], PARTS[name].comments()) for name in parts
+    ]
 
 
 def _changes(electronics: Transduction, chain: Transduction) -> dict[str, dict[str, Any]]:
     """What each part says where it differs from that of `chain`."""
     names = [field.name for field in fields(chain)]
-    return {name: said_of(getattr(electronics, name), getattr(chain, name)) for name in names}
+    return {name: _fields(getattr(electronics, name), getattr(chain, name)) for name in names}
 
 
 def _cylinders(laid: Presentation, patch: Patch) -> dict[str, Any]:
@@ -155,8 +157,8 @@ def _cylinders(laid: Presentation, patch: Patch) -> dict[str, Any]:
             "expected cylinders in the order of a schedule, which is what a scene file can tell, "
             f"got {len(laid.steps)} other steps; take those of kappaskin.schedule"
         )
-    said = {"radii": list(radii)} if radii != RADII else {}
-    return {**({"hold": float(hold)} if hold else {}), **said, "dwell": float(laid.dwell)}
+    values = {"radii": list(radii)} if radii != RADII else {}
+    return {**({"hold": float(hold)} if hold else {}), **values, "dwell": float(laid.dwell)}
 
 
 def _effects(scene: Scene) -> list[str]:
@@ -167,27 +169,23 @@ def _effects(scene: Scene) -> list[str]:
             f"scene file, {', '.join(ordered)}; got {', '.join(names)}"
         )
     choice = _choice(scene)
-    told = [table("[effects]", choice)] if choice else []
-    return told + [
-        table(f"[effects.{effect.name}]", _effect(effect, scene), _units(effect))
+    tables = [table("[effects]", choice)] if choice else []
+    return tables + [
+        table(f"[effects.{effect.name}]", _effect(effect, scene), EFFECT.comments(effect.name))
         for effect in scene.effects
     ]
 
 
-def _units(effect: Effect) -> Mapping[str, str]:
-    return _EFFECT_UNITS | {key: within.unit for key, within in parameters(type(effect)).items()}
-
-
 def _effect(effect: Effect, scene: Scene) -> dict[str, Any]:
-    if type(effect) is not EFFECTS[effect.name] or effect.name in ELSEWHERE:
-        why = ELSEWHERE.get(effect.name, "it is none of those known")
+    if type(effect) is not EFFECTS[effect.name] or effect.elsewhere:
+        why = effect.elsewhere or "it is none of those known"
         raise Refusal(f"expected no {effect!r:.80} among the effects of a scene file: {why}")
     for name, loops in LOOPS.items():
         if effect == loops:
             return {"like": name}
     if isinstance(effect, StrainLimit) and effect.transduction != scene.transduction:
         raise Refusal("expected a strain limit of the scene's own electronics, got another's")
-    return said_of(effect, without=("transduction",))
+    return _fields(effect, without=("transduction",))
 
 
 def _choice(scene: Scene) -> dict[str, Any]:
@@ -204,3 +202,86 @@ def _choice(scene: Scene) -> dict[str, Any]:
     forced = {"on": on, "off": off}
     lists = {key: [name for name in EFFECTS if name in forced[key]] for key in forced}
     return named | {key: names for key, names in lists.items() if names}
+
+
+def _touch(stimulus: Stimulus) -> dict[str, Any]:
+    """What a [[touch]] says of the stimulus; what came from another file is refused."""
+    what = stimulus.what
+    values = _pressed(what) if isinstance(what, Indenter) else _load(what)
+    return {**values, **_motion(stimulus.motion)}
+
+
+def _name(among: Mapping[str, PartKind], one: object) -> str:
+    """What a file calls `one`; the first of two names for the same."""
+    for name, kind in among.items():
+        if type(one) is kind.made:
+            return name
+    raise Refusal(f"expected one of {', '.join(among)} to write in a scene file, got {one!r:.80}")
+
+
+def _load(load: Load) -> dict[str, Any]:
+    values = _fields(load, without=("force",))
+    return {"what": _name(LOADS, load), **values, "force": float(load.force)}
+
+
+def _pressed(what: Indenter) -> dict[str, Any]:
+    return {
+        "what": _object(what.rigid),
+        **_fields(what.rigid),
+        **_fields(what, without=("rigid",)),
+    }
+
+
+def _object(rigid: RigidObject) -> str:
+    name = _name(OBJECTS, rigid)
+    if name in ("mesh", "heights"):
+        raise Refusal(
+            f"expected an object that a scene file describes, got a {type(rigid).__name__}, which "
+            f"does not tell its file any more; write [[touch]] with what = {name!r} and the file "
+            "by hand"
+        )
+    return name
+
+
+def _motion(motion: Motion | None) -> dict[str, Any]:
+    match motion:
+        case None:
+            return {}
+        case Orbit():
+            return {"orbit": _fields(motion)}
+        case MotionPath():
+            return {"path": [_step(step) for step in motion.steps]}
+        case _:
+            raise Refusal(
+                f"expected an orbit or a path to write in a scene file, got a "
+                f"{type(motion).__name__}, which does not tell its file any more; write "
+                "[[touch]] with recorded = the file by hand"
+            )
+
+
+def _step(step: MotionStep) -> dict[str, Any]:
+    time = ("seconds", "ease")
+    values = _fields(step)
+    last = {key: values.pop(key) for key in time if key in values}
+    return {"step": _name(STEP.kinds, step), **values, **last}
+
+
+def _fields(owner: object, usual: object = None, without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The fields of a dataclass that are not as `usual`, their defaults when left out."""
+    hints = get_type_hints(type(owner))
+    values = dict[str, Any]()
+    for field in fields(cast("Any", owner)):
+        value = getattr(owner, field.name)
+        expected = field.default if usual is None else getattr(usual, field.name)
+        if field.init and field.name not in without and value != expected:
+            values[field.name] = _toml(value, hints[field.name])
+    return values
+
+
+def _toml(value: Any, kind: Any) -> Any:
+    """The `value` as TOML has it: a number where `kind` is float is one, however it came."""
+    if get_origin(kind) is tuple:
+        return [_toml(each, get_args(kind)[0]) for each in value]
+    if isinstance(value, bool | str):
+        return value
+    return float(value) if kind is float or float in get_args(kind) else int(value)

@@ -10,7 +10,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes import CorruptedFrames, DroppedFrames, Scene, Simulator
+from kappaskin.scenes import Scene, Simulator
+from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
 from kappaskin.sources import information
 from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.wire import (

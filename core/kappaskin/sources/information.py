@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.mechanics import Plate
-from kappaskin.scenes import SKIN, Within, check_sides
+from kappaskin.scenes import PARTS, check_sides
+from kappaskin.scenes.effects import Within
 from kappaskin.sensing import (
     Amplifier,
     Converter,
@@ -180,7 +181,7 @@ def _plate(patch: Patch, said: dict[str, Any]) -> Plate:
 def _check_sizes(plate: Plate, transduction: Transduction) -> None:
     """Refuse what no sensor is like, and no arithmetic is made for."""
     check_sides(plate.patch)
-    for name, within in SKIN.items():
+    for name, within in PARTS["skin"].limits.items():
         if (value := getattr(plate, name)) and value not in within:
             raise Refusal(f"expected a {name} of {within}, got {value:g}; give it in SI units")
     reads = abs(transduction.resolution) * max(map(abs, transduction.limits))

@@ -11,7 +11,7 @@ from kappaskin.contact import ForceTorqueSensor, Wrench
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
-from kappaskin.scenes import FROM_THE_BEGINNING, Playing, Scene, Simulator
+from kappaskin.scenes import FROM_THE_BEGINNING, Playback, Scene, Simulator
 from kappaskin.sensing import Scan, Sensor
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.clock import Known
@@ -47,7 +47,7 @@ class SimulatedSource:
         self._tape: Tape | None = None
         self._listed, self._runs = np.empty(0, np.intp), b""
 
-    def _become(self, scene: Scene, due: float, playing: Playing) -> None:
+    def _become(self, scene: Scene, due: float, playing: Playback) -> None:
         """Be the device of `scene`, whose next frame is due at device time `due` in s."""
         text = to_json(scene.sensor())
         # As anybody else would know it from what it says: in the last bit not what the scene has.
@@ -105,14 +105,14 @@ class SimulatedSource:
             tape.came(frame.host_time, encode_scan(*sent))
 
     @property
-    def playing(self) -> Playing:
+    def playing(self) -> Playback:
         """Where in its scene it is."""
         return self._simulator.playing
 
     def seek(self, at: float | None, speed: float) -> None:
         """Go on from the scene's time `at` in s, or from where it is, at another `speed`."""
         due = self._due()
-        self._simulator.play(Playing(self.playing.time(due) if at is None else at, due, speed))
+        self._simulator.play(Playback(self.playing.time(due) if at is None else at, due, speed))
 
     def scan(self, scanner: Scanner | None) -> None:
         """Read what `scanner` chooses from the next frame on; all channels without one."""

@@ -13,7 +13,8 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator, Fit, estimator_for
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate, PointLoad
-from kappaskin.scenes import Scene, Stimulus, UniformNoise, load_scene, scaled_to
+from kappaskin.scenes import Scene, Stimulus, load_scene, scaled_to
+from kappaskin.scenes.effects import UniformNoise
 from kappaskin.sensing import NormalCurvature, SensorLayout
 from kappaskin.skin import Patch
 

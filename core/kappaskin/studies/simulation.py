@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.scenes import EFFECTS, Choice, Plan, ReadingEffect, Scene, Simulator, plan
+from kappaskin.scenes import EffectSelection, Plan, Scene, Simulator, plan
+from kappaskin.scenes.effects import EFFECTS, ReadingEffect
 
 _MOST = 10_000_000  # readings: 80 MB for each array of them
 
@@ -66,7 +67,7 @@ _TURN = 0.02  # s that the frames of one turn may take
 
 def _only(scene: Scene, *names: str) -> Scene:
     """The scene with these effects alone."""
-    return replace(scene, choice=Choice(off=frozenset(EFFECTS) - set(names)))
+    return replace(scene, choice=EffectSelection(off=frozenset(EFFECTS) - set(names)))
 
 
 def _frame(scene: Scene, *names: str) -> Callable[[float], object]:

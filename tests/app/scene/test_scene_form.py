@@ -16,9 +16,9 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin import SCENES
+from kappaskin.scenes import Key, Unit
 from kappaskin_app.features.scene.scene_form.form import SceneForm
 from kappaskin_app.features.scene.scene_form.sections import sections_of
-from kappaskin_app.features.scene.scene_form.words import How
 from kappaskin_app.features.scene.scene_text import changes
 
 from .conftest import TEXTS, box_at, said_by
@@ -73,7 +73,7 @@ def _new_rows() -> dict[str, list[Any]]:
     new: dict[str, list[Any]] = {}
     for name, text in TEXTS.items():
         for row in _rows(text):
-            alike = (*row.place, row.kind, row.how.label)
+            alike = (*row.place, row.kind, row.key.label)
             if alike not in seen:
                 seen.add(alike)
                 new.setdefault(name, []).append(row)
@@ -116,11 +116,11 @@ def test_an_edit_of_any_row_changes_that_value_in_the_text_and_no_more(
             assert got == expected
             continue
         assert {p for p in before | after if before.get(p) != after.get(p)} == {row.place}
-        if isinstance(got, list) and not row.how.listed:
+        if isinstance(got, list) and not row.key.listed:
             assert got[1:] == row.value[1:]
             expected, got = expected[0], got[0]
         if isinstance(got, float):
-            assert got == pytest.approx(expected * row.how.scale, rel=1e-9)
+            assert got == pytest.approx(expected * row.key.unit.scale, rel=1e-9)
             assert len(repr(got)) < 14
         else:
             assert got == expected
@@ -187,7 +187,8 @@ def test_odd_toml_is_shown_and_stays_as_it_is(shown: Callable[[str], SceneForm],
 
 
 def test_tips_tell_unit_and_range() -> None:
-    assert How("a", "A tip.", "mm", 1e-3).explained == "A tip. In mm."
-    assert How("a", "A tip.", "mm", 1e-3, 0.0, 0.5).explained == "A tip. From 0 to 500 mm."
-    assert How("a", "A tip.", "N", 1.0, 2.0).explained == "A tip. At least 2 N."
-    assert How("a", "A tip.").explained == "A tip."
+    mm, newton = Unit("m", "mm", 1e-3), Unit("N", "N")
+    assert Key("a", "A tip.", mm).explained == "A tip. In mm."
+    assert Key("a", "A tip.", mm, 0.0, 0.5).explained == "A tip. From 0 to 500 mm."
+    assert Key("a", "A tip.", newton, 2.0).explained == "A tip. At least 2 N."
+    assert Key("a", "A tip.").explained == "A tip."

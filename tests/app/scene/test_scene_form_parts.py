@@ -13,11 +13,11 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QToolButton
 
 from kappaskin import EFFECTS
-from kappaskin.scenes import read_scene
+from kappaskin.scenes import PARTS, read_scene
 from kappaskin_app.features.scene.scene_form.form import SceneForm
-from kappaskin_app.features.scene.scene_form.section import Offer, Section
+from kappaskin_app.features.scene.scene_form.section import Addition, Section
 from kappaskin_app.features.scene.scene_form.sections import sections_of
-from kappaskin_app.features.scene.scene_text import changes, parts
+from kappaskin_app.features.scene.scene_text import changes
 
 from .conftest import TEXTS, TOUCHED, said_by
 
@@ -28,7 +28,7 @@ size = [0.1, 0.1]
 """
 
 
-def _offers(section: Section) -> list[Offer]:
+def _offers(section: Section) -> list[Addition]:
     each = [*section.offers, *section.more]
     found = [inner for offer in each for inner in (offer.inside or (offer,))]
     return found + [offer for part in section.sections for offer in _offers(part)]
@@ -52,10 +52,10 @@ def folder(tmp_path: Path) -> Path:
 
 
 _KINDS = [
-    *[("touch", kind) for kind in parts.kinds("touch")],
-    *[("effects", kind) for kind in parts.kinds("effects")],
-    *[("step", kind) for kind in parts.kinds("step")],
-    *[("skin", kind) for kind in parts.kinds("skin")],
+    *[("touch", kind) for kind in PARTS["touch"].kinds],
+    *[("effects", kind) for kind in PARTS["effects"].kinds],
+    *[("step", kind) for kind in PARTS["step"].kinds],
+    *[("skin", kind) for kind in PARTS["skin"].kinds],
 ]
 
 
@@ -64,12 +64,12 @@ def _with(part: str, kind: str) -> str:
     if part == "touch":
         return changes.add_touch(_PLAIN, kind)
     if part == "effects":
-        return changes.add_table(_PLAIN, ("effects", kind), parts.needed("effects", kind))
+        return changes.add_table(_PLAIN, ("effects", kind), PARTS["effects"].needed(kind))
     if part == "skin":
         named = changes.put_in(_PLAIN, ("skin",), "shape", "rectangle")
         return changes.change_kind(named, ("skin", "shape"), "skin", kind)
     touched = changes.add_touch(_PLAIN, "disc")
-    path = changes.put_in(touched, ("touch", 0), "path", parts.optional("touch")["path"])
+    path = changes.put_in(touched, ("touch", 0), "path", PARTS["touch"].optional()["path"])
     return changes.add_step(path, ("touch", 0, "path"), kind)
 
 
@@ -98,7 +98,7 @@ def test_whatever_a_plain_scene_may_have_besides_makes_a_valid_one(folder: Path)
 def test_every_effect_that_has_numbers_of_its_own_can_be_added() -> None:
     follow = {"tension", "foam", "fluid", "dead", "gage-length", "finite-slope"}
     follow |= {"skew", "saturation", "quantisation"}
-    assert set(parts.kinds("effects")) == set(EFFECTS) - follow
+    assert set(PARTS["effects"].kinds) == set(EFFECTS) - follow
 
 
 def test_what_a_menu_adds_is_said_once_and_removed_again_by_its_button(
@@ -109,7 +109,7 @@ def test_what_a_menu_adds_is_said_once_and_removed_again_by_its_button(
     said = said_by(form)
     _action(form, "Creep").trigger()
     assert len(said) == 1
-    assert tomllib.loads(said[0])["effects"]["creep"] == parts.needed("effects", "creep")
+    assert tomllib.loads(said[0])["effects"]["creep"] == PARTS["effects"].needed("creep")
     assert "\n\n[effects.creep]\nshare = 0.1\ntime_constant = 8.0\n\n[[touch]]" in said[0]
     box = next(b for b in form.boxes if ("effects", "creep", "share") in b.editors)
     crosses = [b for b in box.findChildren(QToolButton) if b.text() == "\N{MULTIPLICATION SIGN}"]
@@ -201,7 +201,7 @@ def test_a_slide_that_becomes_a_turn_gets_an_angle() -> None:
 
 def test_a_displacement_comes_instead_of_a_force_and_a_path_of_an_orbit() -> None:
     text = changes.put_in(TEXTS["two-contacts"], ("touch", 1), "displacement", 0.002)
-    text = changes.put_in(text, ("touch", 1), "path", parts.optional("touch")["path"])
+    text = changes.put_in(text, ("touch", 1), "path", PARTS["touch"].optional()["path"])
     touch = tomllib.loads(text)["touch"][1]
     assert {"displacement", "path"} <= set(touch)
     assert not {"force", "orbit"} & set(touch)

@@ -17,7 +17,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import Written
-from kappaskin_app.shell.touching import Held, touches_at
+from kappaskin_app.shell.touching import GrabbedStimulus, touches_at
 
 READY = [name for name in SCENES if load_scene(name).stimuli]
 
@@ -78,7 +78,7 @@ def test_a_touch_that_is_shifted_in_the_text_is_where_it_was_dragged_to(name) ->
     scene = load_scene(name)
     start = touches_at(scene, _pressed_at(scene))[0]
     x, y = start.load.centre().tolist()
-    held = Held.at_place(scene, _pressed_at(scene), x, y)
+    held = GrabbedStimulus.at_place(scene, _pressed_at(scene), x, y)
     assert held is not None
     moved = held.moved_to(x + 1e-3, y)
     assert held.moved
@@ -109,7 +109,7 @@ def test_a_touch_stops_at_the_rim() -> None:
     for name in ("sphere", "line", "two-contacts"):
         scene = load_scene(name)
         time = _pressed_at(scene)
-        held = Held.at_place(scene, time, 0.05, 0.05)
+        held = GrabbedStimulus.at_place(scene, time, 0.05, 0.05)
         assert held is not None
         before = held.moved_to(0.055, 0.05)
         assert held.moved_to(5.0, 0.05).stimuli == before.stimuli
@@ -119,13 +119,13 @@ def test_of_two_touches_the_nearer_one_is_held() -> None:
     scene = load_scene("two-contacts")
     time = _pressed_at(scene)
     for touch in touches_at(scene, time):
-        held = Held.at_place(scene, time, *touch.load.centre().tolist())
+        held = GrabbedStimulus.at_place(scene, time, *touch.load.centre().tolist())
         assert held is not None
         assert held.number == touch.number
 
 
 def test_what_lies_on_cylinders_has_nothing_to_hold() -> None:
-    assert Held.at_place(load_scene("calibration"), 0.0, 0.05, 0.05) is None
+    assert GrabbedStimulus.at_place(load_scene("calibration"), 0.0, 0.05, 0.05) is None
 
 
 def test_own_scenes_need_no_file(tmp_path: Path) -> None:

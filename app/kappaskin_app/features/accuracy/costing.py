@@ -11,7 +11,8 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin.scenes import GaussianNoise, Scene, UniformNoise
+from kappaskin.scenes import Scene
+from kappaskin.scenes.effects import GaussianNoise, UniformNoise
 from kappaskin.studies import (
     Cost,
     CostMeasurement,

@@ -23,7 +23,7 @@ from kappaskin.calibration import (
 from kappaskin.errors import Refusal
 from kappaskin.frames import OVERTAKEN, Estimate
 from kappaskin.live import Status
-from kappaskin.scenes import Step, schedule
+from kappaskin.scenes import CylinderStep, schedule
 from kappaskin.sensing import Sensor
 from kappaskin_app.shell.history import History
 
@@ -90,7 +90,7 @@ class Calibrating(QObject):
     # What is so.
 
     @property
-    def step(self) -> Step | None:
+    def step(self) -> CylinderStep | None:
         """What to lay the skin on now, None when nothing is to be."""
         return self.procedure.step if self.procedure else None
 

@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin.scenes import Step
+from kappaskin.scenes import CylinderStep
 from kappaskin.skin import Patch
 from kappaskin_app.theme import LIGHT, Theme
 
@@ -23,7 +23,7 @@ class CylinderView(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._step: Step | None = None
+        self._step: CylinderStep | None = None
         self._patch, self._theme = Patch(0.1, 0.1), LIGHT
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setToolTip(
@@ -38,7 +38,7 @@ class CylinderView(QWidget):
         high, wide = self.sizeHint().height(), self.fontMetrics().horizontalAdvance(_LONGEST)
         return QSize(max(220, high + wide + 16), high)
 
-    def show_step(self, step: Step, patch: Patch) -> None:
+    def show_step(self, step: CylinderStep, patch: Patch) -> None:
         if step is not self._step or patch is not self._patch:
             self._step, self._patch = step, patch
             self.update()
@@ -61,7 +61,7 @@ class CylinderView(QWidget):
 
     # From the side.
 
-    def _paint_side(self, painter: QPainter, area: QRectF, step: Step) -> None:
+    def _paint_side(self, painter: QPainter, area: QRectF, step: CylinderStep) -> None:
         theme = self._theme
         high = painter.fontMetrics().height()
         painter.save()
@@ -101,7 +101,7 @@ class CylinderView(QWidget):
 
     # From above.
 
-    def _paint_above(self, painter: QPainter, area: QRectF, step: Step) -> None:
+    def _paint_above(self, painter: QPainter, area: QRectF, step: CylinderStep) -> None:
         theme = self._theme
         per_m = min(area.width() / self._patch.a, area.height() / self._patch.b)
         width, height = self._patch.a * per_m, self._patch.b * per_m

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QVBoxLayout, QW
 
 from kappaskin.calibration import Procedure
 from kappaskin.frames import COMPONENTS
-from kappaskin.scenes import Step
+from kappaskin.scenes import CylinderStep
 from kappaskin_app.features.calibration.calibrating import Calibrating
 from kappaskin_app.features.calibration.cylinder import CylinderView
 from kappaskin_app.widgets.parts import (
@@ -79,7 +79,7 @@ class Steps(QWidget):
         around.addWidget(self.heading)
         around.addLayout(self.read)
 
-    def show_step(self, now: Calibrating, procedure: Procedure, step: Step | None) -> None:
+    def show_step(self, now: Calibrating, procedure: Procedure, step: CylinderStep | None) -> None:
         done, total = len(procedure.taken), len(procedure.steps)
         self.bar.setRange(0, 100 * total)
         self.bar.setValue(round(100 * (done + now.share)))
@@ -119,11 +119,11 @@ class Steps(QWidget):
                 cell.setText(text)
 
 
-def _what(step: Step) -> str:
+def _what(step: CylinderStep) -> str:
     return "Flat table" if step.flat else f"Cylinder of {1e3 * step.radius:g} mm"
 
 
-def _how(step: Step) -> str:
+def _how(step: CylinderStep) -> str:
     if step.flat:
         return "Nothing pressing on the skin.\n"
     face = "inner face on it" if step.face > 0 else "outer face on it"

@@ -14,7 +14,8 @@ from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin.mechanics import Plate
-from kappaskin.scenes import GaussianNoise, Scene, write_scene
+from kappaskin.scenes import Scene, write_scene
+from kappaskin.scenes.effects import GaussianNoise
 from kappaskin.sensing import SensorLayout, Transduction
 from kappaskin.skin import Patch
 from kappaskin.studies import Check, Design, Prospect, check, prospect

@@ -17,7 +17,7 @@ from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.simulation import OWN, text_of
-from kappaskin_app.shell.touching import Held, most_times
+from kappaskin_app.shell.touching import GrabbedStimulus, most_times
 
 
 class SceneEditing:
@@ -26,7 +26,7 @@ class SceneEditing:
     def __init__(self, history: History, session: Session, load: LoadHandle) -> None:
         self._history, self._session = history, session
         self._gesture, self._grabbed_end = -1, False
-        self._held: Held | None = None
+        self._held: GrabbedStimulus | None = None
         self._grabbed_load: Load | None = None
         self._place = (0.0, 0.0)
         self._grabbed_in: Written | None = None
@@ -90,7 +90,7 @@ class SceneEditing:
         self._gesture, self._grabbed_in = self._history.new_gesture(), settings.written
         # What is seen is in it: no other scene stays, nor does until this one is made.
         writes = settings.written is not None and not (session.refusal or session.making)
-        self._held = Held.at_place(session.scene, session.time, x, y) if writes else None
+        self._held = GrabbedStimulus.at_place(session.scene, session.time, x, y) if writes else None
         self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
         self._place = x, y
 

@@ -1,4 +1,4 @@
-"""What the plan says of every effect, and which are forced on or off."""
+"""Effects panel: the plan for every effect, and which are forced on or off."""
 
 from typing import Any
 
@@ -15,7 +15,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin.scenes import EFFECTS, Choice
+from kappaskin.scenes import EffectSelection
+from kappaskin.scenes.effects import EFFECTS
 from kappaskin_app.features.scene.scene_text.changes import OFF, ON, PLANNED
 from kappaskin_app.shell.effects import called, explained
 from kappaskin_app.theme import LIGHT, Theme
@@ -63,12 +64,12 @@ class EffectsPanel(QWidget):
         self.forces: dict[str, QComboBox] = {}
         self._cells: list[list[QTableWidgetItem]] = []
         self._rows: list[dict[str, Any]] = []
-        self._choice, self._theme = Choice(), LIGHT
+        self._choice, self._theme = EffectSelection(), LIGHT
         stack = QVBoxLayout(self)
         stack.addWidget(self.summary)
         stack.addWidget(self.table, 1)
 
-    def show_plan(self, rows: list[dict[str, Any]], choice: Choice) -> None:
+    def show_plan(self, rows: list[dict[str, Any]], choice: EffectSelection) -> None:
         """Show what `plan_rows` tells of a scene of which `choice` says what is simulated."""
         there = [row for row in rows if row["microseconds"] is not None]
         absent = [row for row in rows if row["microseconds"] is None]

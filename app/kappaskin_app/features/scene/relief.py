@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.scenes import Indenter, Pressed, Pressing, Scene, Stimulus, moments_of
+from kappaskin.scenes import AppliedLoads, Indenter, LoadingHistory, Scene, Stimulus, survey_times
 from kappaskin_app.shell.drawn_skin import DrawnSkin, Indices
 from kappaskin_app.shell.footprint import footprint
 
@@ -115,18 +115,18 @@ def _arrows(skin: DrawnSkin, places: Array, pulled: bool) -> Array:
     return np.stack([tips, tails] if pulled else [tails, tips], axis=1)
 
 
-def _hardest(scene: Scene, skin: DrawnSkin) -> tuple[Array, Pressed | None]:
+def _hardest(scene: Scene, skin: DrawnSkin) -> tuple[Array, AppliedLoads | None]:
     """Displacement (ny, nx) in m, inward, when the load has done most work, and what presses."""
     patch = scene.plate.patch
     ny, nx = skin.height.shape
     x, y = patch.grid(nx, ny)
-    times = moments_of(scene)
+    times = survey_times(scene)
     if scene.laid is not None:
         bent = [scene.laid.curvature(t) for t in times]
         k_xx, k_yy, k_xy = max(bent, key=lambda k: float(np.abs(k).max()))
         u, v = np.meshgrid(x - x.mean(), y - y.mean())
         return (k_xx - patch.base_curvature) * u**2 / 2 + k_yy * v**2 / 2 + k_xy * u * v, None
-    pressing, basis = Pressing(scene, scene.plate), scene.basis
+    pressing, basis = LoadingHistory(scene, scene.plate), scene.basis
     pressed = [pressing(t) for t in times]
     forces = np.array([moment.force.ravel() for moment in pressed])
     c = scene.plate.compliance(basis).after(forces)

@@ -1,44 +1,44 @@
-"""What spoils a reading; an empty list of effects spoils nothing."""
+"""Effects on readings: in the skin, its gages, the electronics and on the link."""
 
-from kappaskin.scenes.effects.converter import Quantisation as Quantisation
-from kappaskin.scenes.effects.converter import Saturation as Saturation
-from kappaskin.scenes.effects.creep import Creep as Creep
-from kappaskin.scenes.effects.cross_talk import CrossTalk as CrossTalk
 from kappaskin.scenes.effects.effect import NOTHING as NOTHING
 from kappaskin.scenes.effects.effect import Effect as Effect
 from kappaskin.scenes.effects.effect import LayoutEffect as LayoutEffect
 from kappaskin.scenes.effects.effect import ReadingEffect as ReadingEffect
-from kappaskin.scenes.effects.effect import Running as Running
+from kappaskin.scenes.effects.effect import RunningEffect as RunningEffect
 from kappaskin.scenes.effects.effect import Size as Size
 from kappaskin.scenes.effects.effect import SkinEffect as SkinEffect
+from kappaskin.scenes.effects.effect import Survey as Survey
+from kappaskin.scenes.effects.effect import Within as Within
+from kappaskin.scenes.effects.effect import parameters as parameters
+from kappaskin.scenes.effects.electronics import CrossTalk as CrossTalk
+from kappaskin.scenes.effects.electronics import MainsHum as MainsHum
+from kappaskin.scenes.effects.electronics import Quantisation as Quantisation
+from kappaskin.scenes.effects.electronics import Saturation as Saturation
+from kappaskin.scenes.effects.electronics import Skew as Skew
+from kappaskin.scenes.effects.failures import CorruptedFrames as CorruptedFrames
 from kappaskin.scenes.effects.failures import DeadElements as DeadElements
+from kappaskin.scenes.effects.failures import DroppedFrames as DroppedFrames
 from kappaskin.scenes.effects.failures import IntermittentElements as IntermittentElements
 from kappaskin.scenes.effects.failures import StuckElements as StuckElements
-from kappaskin.scenes.effects.finite_slope import FiniteSlope as FiniteSlope
-from kappaskin.scenes.effects.flicker import FlickerNoise as FlickerNoise
-from kappaskin.scenes.effects.gage_length import GageLength as GageLength
-from kappaskin.scenes.effects.hum import MainsHum as MainsHum
-from kappaskin.scenes.effects.hysteresis import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
-from kappaskin.scenes.effects.hysteresis import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS
-from kappaskin.scenes.effects.hysteresis import Hysteresis as Hysteresis
-from kappaskin.scenes.effects.link import CorruptedFrames as CorruptedFrames
-from kappaskin.scenes.effects.link import DroppedFrames as DroppedFrames
+from kappaskin.scenes.effects.gages import FIRST_GENERATION_LOOPS as FIRST_GENERATION_LOOPS
+from kappaskin.scenes.effects.gages import SECOND_GENERATION_LOOPS as SECOND_GENERATION_LOOPS
+from kappaskin.scenes.effects.gages import Creep as Creep
+from kappaskin.scenes.effects.gages import FiniteSlopeEffect as FiniteSlopeEffect
+from kappaskin.scenes.effects.gages import GageLength as GageLength
+from kappaskin.scenes.effects.gages import Hysteresis as Hysteresis
+from kappaskin.scenes.effects.gages import StrainLimit as StrainLimit
+from kappaskin.scenes.effects.gages import Temperature as Temperature
+from kappaskin.scenes.effects.gages import Tolerance as Tolerance
+from kappaskin.scenes.effects.noise import FlickerNoise as FlickerNoise
 from kappaskin.scenes.effects.noise import GaussianNoise as GaussianNoise
 from kappaskin.scenes.effects.noise import UniformNoise as UniformNoise
-from kappaskin.scenes.effects.parameters import Within as Within
-from kappaskin.scenes.effects.parameters import parameters as parameters
-from kappaskin.scenes.effects.skew import Skew as Skew
 from kappaskin.scenes.effects.skin import Fluid as Fluid
 from kappaskin.scenes.effects.skin import Foam as Foam
 from kappaskin.scenes.effects.skin import Tension as Tension
-from kappaskin.scenes.effects.strain_limit import StrainLimit as StrainLimit
-from kappaskin.scenes.effects.survey import Survey as Survey
-from kappaskin.scenes.effects.temperature import Temperature as Temperature
-from kappaskin.scenes.effects.tolerance import Tolerance as Tolerance
 
 _SKIN = (Tension, Foam, Fluid)
 _GAGES = (
-    *(FiniteSlope, GageLength, DeadElements),
+    *(FiniteSlopeEffect, GageLength, DeadElements),
     *(StrainLimit, Hysteresis, Creep, Temperature, Tolerance, IntermittentElements),
 )
 _ELECTRONICS = (

@@ -1,19 +1,140 @@
-"""What every effect is: something that spoils readings, and knows how much it would in a scene."""
+"""What every effect on readings has: a name, numbers within limits, and a size in a scene.
 
+The size of an effect is judged by a `Survey` of the scene, so that what does not matter there can
+be left out.
+"""
+
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache, cached_property
+from numbers import Integral, Real
+from typing import Any, ClassVar, get_type_hints
 
 import numpy as np
 
+from kappaskin.bases import Basis
+from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate
-from kappaskin.scenes.effects.parameters import check
-from kappaskin.scenes.effects.survey import Survey
-from kappaskin.sensing import SensorLayout
+from kappaskin.sensing import SensorLayout, Transduction
 
-Running = Callable[[Array, float], Array]
+
+@dataclass(frozen=True)
+class Within:
+    """Finite numbers from `least` to `most` in `unit`; only `whole` ones, `or_zero`, if it says so.
+
+    It annotates a field: `rise: Annotated[float, Within(-200, 200, "K")]`.
+    """
+
+    least: float
+    most: float = math.inf
+    unit: str = ""
+    whole: bool = False
+    or_zero: bool = False
+
+    def __contains__(self, value: object) -> bool:
+        if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
+            return False
+        try:
+            number = float(value)
+        except OverflowError:
+            return False
+        inside = self.least <= number <= self.most or (self.or_zero and not number)
+        return math.isfinite(number) and inside
+
+    def __str__(self) -> str:
+        upward = math.isinf(self.most)
+        text = f"at least {self.least:g}" if upward else f"{self.least:g} to {self.most:g}"
+        return f"{text} {self.unit}".rstrip() + (", a whole number" if self.whole else "")
+
+
+@cache
+def parameters(effect: type[Any]) -> dict[str, Within]:
+    """What each number that tells an effect of this class must be within, by its name."""
+    hints = get_type_hints(effect, include_extras=True)
+    return {
+        field.name: note
+        for field in fields(effect)
+        for note in getattr(hints[field.name], "__metadata__", ())
+        if isinstance(note, Within)
+    }
+
+
+def _check_ranges(name: str, effect: object) -> None:
+    """Refuse an `effect`, called `name`, that is told by a number out of its range."""
+    for parameter, within in parameters(type(effect)).items():
+        value = getattr(effect, parameter)
+        if value not in within:
+            raise Refusal(f"expected {name} with {parameter} of {within}, got {value!r:.80}")
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """S moments of a scene of `duration` s, as linear theory on the whole plate has them.
+
+    `coefficients` (S, N) in m at `times` (S,) in s are of `basis`; `forces` (S, N) in N the modal
+    forces that make them, all zero where the skin lies on a cylinder; `curvature` (S, 3, P) in 1/m
+    is what point-like elements of `layout` would read; `rates` (3 P,) in 1/m/s is the fastest that
+    each of them changes, and `read_after` (3 P,) in s when in a scan it is read.
+    """
+
+    plate: Plate
+    basis: Basis
+    layout: SensorLayout
+    transduction: Transduction
+    times: Array
+    forces: Array
+    coefficients: Array
+    curvature: Array
+    rates: Array
+    duration: float
+    read_after: Array
+
+    @cached_property
+    def peak(self) -> float:
+        """The largest reading in 1/m; that of one count where nothing touches."""
+        return max(float(np.abs(self.curvature).max(initial=0.0)), self.transduction.resolution)
+
+    @cached_property
+    def operator(self) -> Array:
+        """Coefficients to readings of point-like elements, (3 P, N)."""
+        return replace(self.layout, gage_length=0.0).curvature_operator(self.basis)
+
+    @cached_property
+    def wavenumber(self) -> float:
+        """k in 1/m of the scene: k^2 is the largest reading over the largest deflection."""
+        bent = np.abs(self.coefficients @ self.operator.T).max(initial=0.0)
+        deflection = self.coefficients @ self.basis.at(self.layout.positions).T
+        most = np.abs(deflection).max(initial=0.0)
+        return float(np.sqrt(bent / most)) if most else 0.0
+
+    @cached_property
+    def _whole(self) -> Array:
+        return self._on(self.plate)
+
+    def _on(self, plate: Plate) -> Array:
+        # A compliance is symmetric: the rows are C F.
+        return plate.compliance(self.basis).after(self.forces) @ self.operator.T
+
+    def readings_on(self, plate: Plate) -> Array:
+        """What point-like elements would read of the same forces on another `plate`, (S, 3 P)."""
+        return self._whole if plate == self.plate else self._on(plate)
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Slopes (S, 2, P) of the skin along x and y at its elements."""
+        places = self.layout.positions
+        along = [self.basis.at(places, *order) for order in ((1, 0), (0, 1))]
+        return np.stack([self.coefficients @ slope.T for slope in along], axis=1)
+
+    def share(self, change: Array) -> float:
+        """The largest `change` of a reading in 1/m as a share of the peak."""
+        return float(np.abs(change).max(initial=0.0)) / self.peak
+
+
+RunningEffect = Callable[[Array, float], Array]
 """An effect at work: curvature in 1/m and the time in s to the curvature that is read then."""
 
 
@@ -32,20 +153,31 @@ NOTHING = Size(0.0, 0.0)
 
 
 class Effect(ABC):
-    """One thing that spoils readings; its values compare equal when they spoil alike.
+    """One thing that disturbs readings; two that disturb alike compare equal.
 
-    An effect is told and judged without what it takes to work: that is imported when it starts.
+    To describe and judge one takes nothing of what it does: that is imported when it starts.
     """
 
     name: ClassVar[str]
     """What scenes and plans call it."""
     formula: ClassVar[str]
     """The number of its `Size`, in words."""
+    label: ClassVar[str] = ""
+    """What people call it, where that is not its name."""
+    example: ClassVar[Mapping[str, Any]] = {}
+    """What a scene file says of one; nothing of an effect that follows from the rest of it."""
+    elsewhere: ClassVar[str] = ""
+    """Where the rest of a scene file says it."""
     authored: ClassVar[bool] = False
     """Whether only a scene's author decides on it: a failure, whose `Size` tells of no error."""
 
     def __post_init__(self) -> None:
-        check(self.name, self)
+        _check_ranges(self.name, self)
+
+    @classmethod
+    def called(cls) -> str:
+        """What people call it."""
+        return cls.label or cls.name.replace("-", " ").capitalize()
 
     @abstractmethod
     def size(self, survey: Survey) -> Size:
@@ -59,7 +191,7 @@ class ReadingEffect(Effect):
     """Whether at work it takes many frames (T, C) in one call, as it would one after the other."""
 
     @abstractmethod
-    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         """The effect at work on curvature of `shape`, at rest, with a state of its own.
 
         It is given the frames in order of time, and leaves the array it is given alone.

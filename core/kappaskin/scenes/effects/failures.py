@@ -1,5 +1,6 @@
-"""Elements that fail: dead, stuck or intermittent, as a scene's author decides."""
+"""Failures, as a scene's author decides: of elements, and of the link from the device."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -7,9 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes.effects.effect import Effect, LayoutEffect, ReadingEffect, Running, Size
-from kappaskin.scenes.effects.parameters import Within
-from kappaskin.scenes.effects.survey import Survey
+from kappaskin.scenes.effects.effect import (
+    Effect,
+    LayoutEffect,
+    ReadingEffect,
+    RunningEffect,
+    Size,
+    Survey,
+    Within,
+)
 from kappaskin.sensing import SensorLayout
 
 
@@ -48,6 +55,8 @@ class DeadElements(_Failing, LayoutEffect):
     """The `elements` never read anything: the layout says so, and the device with it."""
 
     name: ClassVar = "dead"
+    label: ClassVar = "Dead elements"
+    elsewhere: ClassVar = "[elements] has those that are dead"
 
     def of(self, layout: SensorLayout) -> SensorLayout:
         return layout.without(self.elements)
@@ -58,10 +67,12 @@ class StuckElements(_Failing, ReadingEffect):
     """The `elements` read what they read at the first frame from `since` in s on, ever after."""
 
     name: ClassVar = "stuck"
+    label: ClassVar = "Stuck elements"
+    example: ClassVar = {"elements": [5]}
 
     since: Annotated[float, Within(0, 1e9, "s")] = 0.0
 
-    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.failures import stuck
 
         return stuck(self.channels(shape), self.since)
@@ -76,11 +87,48 @@ class IntermittentElements(_Failing, ReadingEffect):
     """
 
     name: ClassVar = "intermittent"
+    label: ClassVar = "Loose elements"
+    example: ClassVar = {"elements": [3]}
 
     on: Annotated[float, Within(1e-6, 1e9, "s")] = 1.0
     off: Annotated[float, Within(1e-6, 1e9, "s")] = 0.1
 
-    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> Running:
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.failures import intermittent
 
         return intermittent(self.channels(shape), self.on, self.off, rng)
+
+
+@dataclass(frozen=True)
+class _LinkFailure(Effect):
+    """The `share` of all frames is hit, each for itself."""
+
+    authored: ClassVar = True
+    formula: ClassVar = "share of the frames"
+
+    share: Annotated[float, Within(0, 1)]
+
+    def size(self, survey: Survey) -> Size:
+        return Size(self.share, 0.0)
+
+    def start(self, rng: np.random.Generator) -> Callable[[int], bool]:
+        """Whether frame n is hit: of a frame asked for twice, or out of turn, it is the same."""
+        from kappaskin.scenes.effects.at_work.failures import hits
+
+        return hits(self.share, rng)
+
+
+@dataclass(frozen=True)
+class DroppedFrames(_LinkFailure):
+    """The `share` of all frames never arrives."""
+
+    name: ClassVar = "dropped-frames"
+    example: ClassVar = {"share": 0.01}
+
+
+@dataclass(frozen=True)
+class CorruptedFrames(_LinkFailure):
+    """The `share` of all frames arrives with wrong bytes, which its checksum tells."""
+
+    name: ClassVar = "corrupted-frames"
+    example: ClassVar = {"share": 0.01}

@@ -7,9 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from kappaskin.mechanics import Plate
-from kappaskin.scenes.effects.effect import NOTHING, Size, SkinEffect
-from kappaskin.scenes.effects.parameters import Within
-from kappaskin.scenes.effects.survey import Survey
+from kappaskin.scenes.effects.effect import NOTHING, Size, SkinEffect, Survey, Within
 
 
 class _Backing(SkinEffect):
@@ -42,6 +40,7 @@ class Tension(_Backing):
     """The skin is pulled with `tension` T in N/m all round, as a drum head."""
 
     name: ClassVar = "tension"
+    elsewhere: ClassVar = "[skin] has the tension"
     formula: ClassVar = "T k^2 over the rest of the first mode's stiffness, D k^4 + k_f"
 
     tension: Annotated[float, Within(0, 1e6, "N/m")]
@@ -61,6 +60,7 @@ class Foam(_Backing):
     """The skin lies on foam with the `foundation` modulus k_f in N/m^3."""
 
     name: ClassVar = "foam"
+    elsewhere: ClassVar = "[skin] has the foundation"
     formula: ClassVar = (
         "k_f over the rest of the first mode's stiffness, D k^4 + T k^2: k_f a^4 / (4 D pi^4) of a "
         "square without tension"
@@ -83,6 +83,7 @@ class Fluid(_Backing):
     """The skin closes in a fluid that keeps its volume."""
 
     name: ClassVar = "fluid"
+    elsewhere: ClassVar = "[skin] has the fluid"
     formula: ClassVar = "volume displaced without it, over area times peak deflection"
 
     def of(self, plate: Plate) -> Plate:

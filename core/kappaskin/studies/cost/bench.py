@@ -15,7 +15,7 @@ from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator, estimator_for
 from kappaskin.frames import Array
-from kappaskin.scenes import Pressed, Pressing, Scene, Simulator, moments_of, planned
+from kappaskin.scenes import AppliedLoads, LoadingHistory, Scene, Simulator, planned, survey_times
 from kappaskin.sensing import Scan, Sensor, SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.studies.cost.settings import SCANS, Cost, Refused, Setting
@@ -98,10 +98,10 @@ def with_elements(scene: Scene, elements: tuple[int, int] | None) -> Scene:
     return replace(scene, layout=layout, rate=min(scene.rate, slowest))
 
 
-def _pressed(scene: Scene, times: Array) -> list[Pressed]:
+def _pressed(scene: Scene, times: Array) -> list[AppliedLoads]:
     """What presses so many `times` in s after the skin is pressed hardest, or always then."""
-    pressing = Pressing(scene, scene.plate)
-    found = {t: pressing(t) for t in moments_of(scene)}
+    pressing = LoadingHistory(scene, scene.plate)
+    found = {t: pressing(t) for t in survey_times(scene)}
     hardest = max(found, key=lambda t: sum(abs(load.force) for load in found[t].loads))
     after = [pressing(t) for t in (hardest + times).tolist()]
     pressed = all(np.isfinite(one.contact).all() for one in after)

@@ -8,19 +8,14 @@ from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, estimator_for
 from kappaskin.frames import Array
-from kappaskin.scenes import (
+from kappaskin.scenes import EffectSelection, Scene, Simulator, kept_effects, plan, survey_duration
+from kappaskin.scenes.effects import (
     EFFECTS,
-    Choice,
     CorruptedFrames,
     DeadElements,
     DroppedFrames,
     Effect,
     Saturation,
-    Scene,
-    Simulator,
-    kept_of,
-    plan,
-    time_to_watch,
 )
 from kappaskin.sensing import SensorLayout
 from kappaskin.studies.cost.bench import SETTLING, Bench, points_on, with_elements
@@ -80,7 +75,7 @@ def effect_costs(scene: Scene, setting: Setting) -> tuple[EffectCost, ...]:
     """
     bench = Bench(scene)
     scene = with_elements(scene, setting.elements)
-    planned, kept = plan(scene), frozenset(effect.name for effect in kept_of(scene))
+    planned, kept = plan(scene), frozenset(effect.name for effect in kept_effects(scene))
     seconds, judge = costs_of(scene, planned), _Judge(scene, setting, bench.contact)
     now = judge.answer(scene, kept)
     found: list[EffectCost] = []
@@ -130,12 +125,12 @@ class _Judge:
         self._scanned = SCANS[setting.scanned](scene.layout, contact)
         frames = np.arange(SETTLING + _EACH) / scene.rate
         # One after the other, however short the scene.
-        apart = max(time_to_watch(scene) / _PLACES, len(frames) / scene.rate)
+        apart = max(survey_duration(scene) / _PLACES, len(frames) / scene.rate)
         self._times = np.add.outer(apart * np.arange(_PLACES), frames)
 
     def answer(self, scene: Scene, names: frozenset[str]) -> _Answer:
         """The frames judged of `scene` with the effects of these `names`."""
-        scene = replace(scene, choice=Choice(off=frozenset(EFFECTS) - names))
+        scene = replace(scene, choice=EffectSelection(off=frozenset(EFFECTS) - names))
         simulator, scan = Simulator(scene), scene.sensor().scan()
         shapes, read = list[Array](), list[Array]()
         for time in self._times.ravel().tolist():

@@ -17,7 +17,8 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator, Fit, predicted_sd, stacked_fits
 from kappaskin.frames import Array, Touch, Truth
 from kappaskin.mechanics import Plate
-from kappaskin.scenes import Hysteresis, Indenter, Scene, Simulator, kept_of
+from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects
+from kappaskin.scenes.effects import Hysteresis
 from kappaskin.studies.cost.bench import points_on
 from kappaskin.studies.design.setup import PointSetup
 
@@ -136,7 +137,7 @@ def block_of(setup: PointSetup, estimator: Estimator, seed: int) -> FrameBlock:
 
 def _compensated(scene: Scene, read: Array) -> Array:
     """Readings (T, 3 P) in 1/m, one after the other, with the scene's loops undone."""
-    loops = [effect for effect in kept_of(scene) if isinstance(effect, Hysteresis)]
+    loops = [effect for effect in kept_effects(scene) if isinstance(effect, Hysteresis)]
     if not loops:
         raise Refusal("expected a scene with hysteresis to compensate, got none of it")
     undo = loops[0].operator(read.shape[1]).inverse.start()
@@ -215,7 +216,7 @@ def _covered(block: FrameBlock) -> Array:
 
 def noise_of(scene: Scene) -> float:
     """The standard deviation in 1/m of all noise there is that differs from reading to reading."""
-    each = [getattr(effect, "rms", 0.0) for effect in kept_of(scene)]
+    each = [getattr(effect, "rms", 0.0) for effect in kept_effects(scene)]
     return math.hypot(*each)
 
 

@@ -21,7 +21,7 @@ from kappaskin.estimation import (
     estimator_for,
     place_elements,
 )
-from kappaskin.scenes import Lines, Scene, Table, scene_of
+from kappaskin.scenes import Scene, TomlTable, scene_of
 
 # Tables [[draw]]: values that are drawn anew for every block of frames
 
@@ -131,7 +131,7 @@ KINDS = {
 """What values can be drawn from, by name."""
 
 
-def read_draw(table: Table) -> tuple[str, Distribution]:
+def read_draw(table: TomlTable) -> tuple[str, Distribution]:
     """The place in the file `what`, and what its values are drawn from."""
     place = table.get("what", str)
     made = table.make(table.choose("kind", KINDS))
@@ -206,7 +206,7 @@ class PointSetup:
     draws: tuple[tuple[str, Distribution], ...]
 
 
-def read_setup(top: Table, file: Path, known: Iterable[str]) -> PointSetup:
+def read_setup(top: TomlTable, file: Path, known: Iterable[str]) -> PointSetup:
     """The setup in a file's `top` table; `known` are the names of measures."""
     tables = fit, place, measure = [top.table(name) for name in ("fit", "place", "measure")]
     drawing = top.tables("draw")
@@ -228,7 +228,7 @@ def read_setup(top: Table, file: Path, known: Iterable[str]) -> PointSetup:
     return PointSetup(scene, *made, tuple(read_draw(table) for table in drawing))
 
 
-def _scene(top: Table, file: Path) -> Scene:
+def _scene(top: TomlTable, file: Path) -> Scene:
     """The scene, which must be complete without other files: workers have none."""
     for touch in top.tables("touch"):
         for key in _ELSEWHERE:
@@ -249,7 +249,7 @@ def _scene(top: Table, file: Path) -> Scene:
 def setup_of(content: dict[str, Any], known: Iterable[str]) -> PointSetup:
     """The setup of a point's `content`; its refusals name no file."""
     try:
-        return read_setup(Table(content, Lines(""), _NAME), Path("study.toml"), known)
+        return read_setup(TomlTable(content, "", _NAME), Path("study.toml"), known)
     except Refusal as refusal:
         raise Refusal(str(refusal).removeprefix(f"{_NAME}, line 1: ")) from refusal
 

@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes import Lines, Table, parsed, read_scene_text
+from kappaskin.scenes import TomlTable, parsed, read_scene_text
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.setup import Distribution, PointSetup, read_setup, setup_of
 
@@ -120,7 +120,7 @@ class Axis:
             yield dict(zip(self.places, values, strict=True))
 
 
-def read_axis(table: Table, most: int) -> Axis:
+def read_axis(table: TomlTable, most: int) -> Axis:
     """What a table [[vary]] goes through, `most` values of each thing at most."""
     places = {place: _values(table, place, most) for place in table}
     counts = {place: len(values) for place, values in places.items()}
@@ -132,7 +132,7 @@ def read_axis(table: Table, most: int) -> Axis:
     return Axis(places)
 
 
-def _values(table: Table, place: str, most: int) -> list[Any]:
+def _values(table: TomlTable, place: str, most: int) -> list[Any]:
     if not table.is_table(place):
         return table.listed(place)
     inner = table.table(place)
@@ -263,7 +263,7 @@ def load_study(name: str) -> Study:
 def read_study(text: str, file: Path) -> Study:
     """The study that `text`, of `file`, describes."""
     content = parsed(text, file)
-    top = Table(content, Lines(text), str(file))
+    top = TomlTable(content, text, str(file))
     tables, stopping = top.tables("vary"), top.table("stop")
     base = read_setup(top, file, MEASURES)
     stop = _stop(stopping, base.measure.what)
@@ -281,7 +281,7 @@ def read_study(text: str, file: Path) -> Study:
     return Study(file.stem, title, description, text, base, axes, stop, own)
 
 
-def _stop(table: Table, measured: tuple[str, ...]) -> Stop:
+def _stop(table: TomlTable, measured: tuple[str, ...]) -> Stop:
     made = table.make(Stop)
     table.done()
     among = {name: name for name in measured}
@@ -291,7 +291,7 @@ def _stop(table: Table, measured: tuple[str, ...]) -> Stop:
 
 
 def _check_places(
-    top: Table, axes: tuple[Axis, ...], draws: tuple[tuple[str, Distribution], ...]
+    top: TomlTable, axes: tuple[Axis, ...], draws: tuple[tuple[str, Distribution], ...]
 ) -> None:
     """Refuse what would be set twice, and what changes nothing that is simulated."""
     seen = list[list[str | int]]()
@@ -304,7 +304,7 @@ def _check_places(
 
 
 def _check_place(
-    table: Table, key: str, place: str, barred: tuple[str, ...], seen: list[list[str | int]]
+    table: TomlTable, key: str, place: str, barred: tuple[str, ...], seen: list[list[str | int]]
 ) -> None:
     with table.blamed(key):
         parts = parts_of(place)
@@ -318,7 +318,7 @@ def _check_place(
     seen.append(parts)
 
 
-def _check(table: Table, key: str, content: dict[str, Any], values: dict[str, Any]) -> None:
+def _check(table: TomlTable, key: str, content: dict[str, Any], values: dict[str, Any]) -> None:
     """Refuse `values` by place, given at a `key`, that the scene cannot have."""
     try:
         setup_of(with_values(content, values), MEASURES)

@@ -8,7 +8,8 @@ from kappaskin.bases import SineBasis
 from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate, PointLoad
-from kappaskin.scenes import TABLE_1_NOISE, UniformNoise, scaled_to
+from kappaskin.scenes import TABLE_1_NOISE, scaled_to
+from kappaskin.scenes.effects import UniformNoise
 from kappaskin.sensing import SECOND_GENERATION, SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.studies.figures import style

@@ -9,7 +9,8 @@ from kappaskin.bases import SineBasis
 from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate, PointLoad
-from kappaskin.scenes import UniformNoise, scaled_to
+from kappaskin.scenes import scaled_to
+from kappaskin.scenes.effects import UniformNoise
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.studies.figures import style

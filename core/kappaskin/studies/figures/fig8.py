@@ -8,17 +8,8 @@ import numpy as np
 from kappaskin.calibration import CalibrationReport, Procedure, Sweep, calibrate
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate
-from kappaskin.scenes import (
-    FIRST_GENERATION_LOOPS,
-    RADII,
-    SECOND_GENERATION_LOOPS,
-    Hysteresis,
-    Presentation,
-    Scene,
-    Simulator,
-    load_scene,
-    schedule,
-)
+from kappaskin.scenes import RADII, Presentation, Scene, Simulator, load_scene, schedule
+from kappaskin.scenes.effects import FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS, Hysteresis
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.studies.figures import style

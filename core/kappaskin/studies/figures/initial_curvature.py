@@ -23,7 +23,7 @@ import numpy as np
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
-from kappaskin.scenes import SECOND_GENERATION_LOOPS, ReadingEffect, Running
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, ReadingEffect, RunningEffect
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.studies.figures import style
@@ -38,7 +38,7 @@ _PRESS: Array = np.concatenate([np.linspace(0, 1, _STEPS + 1), np.linspace(1, 0,
 _PACE = 0.02  # s a step, for effects that know time: a press takes a second
 
 
-def _pressed(running: Running, base: float, change: Array) -> Array:
+def _pressed(running: RunningEffect, base: float, change: Array) -> Array:
     """Readings (cycles, steps, P) of presses by up to `change` (P,) of a tared skin."""
     bending = np.multiply.outer(base * np.linspace(0, 1, _BENDING), np.ones_like(change))
     pressing = base + np.multiply.outer(np.tile(_PRESS, _CYCLES), change)

@@ -1,3 +1,3 @@
-"""Forms over the text of a scene: what it says as editors, and an edit as the new text."""
+"""Forms that edit the text of a scene."""
 
 from kappaskin_app.features.scene.scene_form.form import SceneForm as SceneForm

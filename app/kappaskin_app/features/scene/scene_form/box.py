@@ -1,4 +1,4 @@
-"""One part of a scene as a titled box: its rows, its own parts, and buttons to add and remove."""
+"""Section box: the rows and parts of a section, with buttons to add and remove."""
 
 from collections.abc import Callable
 
@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.features.scene.scene_form.editors import Editor, editor_for
-from kappaskin_app.features.scene.scene_form.section import Change, Offer, Row, Section
+from kappaskin_app.features.scene.scene_form.section import Addition, Change, Row, Section
 from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import Place
 from kappaskin_app.guard import guarded
@@ -24,16 +24,16 @@ from kappaskin_app.guard import guarded
 _BUTTON, _EDGE = 20, 9  # px: the size of a small button, and how far in the last one stands
 _NO_ARROW = "QToolButton::menu-indicator { image: none; }"
 
-Wish = Callable[[Change], None]
+Request = Callable[[Change], None]
 _ADDING = "Choose from a list what is added to the scene; its text shows it at once."
 
 
 class SectionBox(QGroupBox):
-    """Shows a section; `wish` is told of every change of the text that a person makes."""
+    """Shows a section; `request` is told of every change of the text that a person makes."""
 
-    def __init__(self, section: Section, wish: Wish) -> None:
+    def __init__(self, section: Section, request: Request) -> None:
         super().__init__(section.title)
-        self._wish, self.section = wish, section
+        self._request, self.section = request, section
         self.editors: dict[Place, Editor] = {}
         self.stops: list[QWidget] = []
         self.labels: list[QLabel] = []
@@ -86,8 +86,8 @@ class SectionBox(QGroupBox):
 
     def _add_row(self, row: Row) -> None:
         editor = self._editor(row)
-        label = QLabel(row.how.label)
-        label.setToolTip(row.how.explained)
+        label = QLabel(row.key.label)
+        label.setToolTip(row.key.explained)
         label.setBuddy(editor.stops[0])
         self.labels.append(label)
         at = self.grid.rowCount()
@@ -98,10 +98,12 @@ class SectionBox(QGroupBox):
         self.grid.addLayout(across, at, 1)
 
     def _editor(self, row: Row, small: bool = False) -> Editor:
-        editor = editor_for(row, lambda value: self._wish(lambda t: row.changed(t, value)), small)
+        editor = editor_for(
+            row, lambda value: self._request(lambda t: row.changed(t, value)), small
+        )
         for number, stop in enumerate(editor.stops, 1):
             which = f", {number} of {len(editor.stops)}" if len(editor.stops) > 1 else ""
-            stop.setAccessibleName(stop.accessibleName() or f"{row.how.label}{which}")
+            stop.setAccessibleName(stop.accessibleName() or f"{row.key.label}{which}")
         self.editors[row.place] = editor
         self.stops += editor.stops
         return editor
@@ -151,12 +153,12 @@ class SectionBox(QGroupBox):
     def _removing(self, place: Place) -> QToolButton:
         button = _tool("\N{MULTIPLICATION SIGN}", "Remove", place)
         button.clicked.connect(
-            guarded(lambda: self._wish(lambda text: changes.remove(text, place)))
+            guarded(lambda: self._request(lambda text: changes.remove(text, place)))
         )
         self.stops.append(button)
         return button
 
-    def _menu_button(self, text: str, tip: str, offers: tuple[Offer, ...]) -> QToolButton:
+    def _menu_button(self, text: str, tip: str, offers: tuple[Addition, ...]) -> QToolButton:
         button = _tool(text, tip, ("add",))
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setMenu(self._menu(offers, button))
@@ -164,7 +166,7 @@ class SectionBox(QGroupBox):
         self.stops.append(button)
         return button
 
-    def _menu(self, offers: tuple[Offer, ...], parent: QWidget) -> QMenu:
+    def _menu(self, offers: tuple[Addition, ...], parent: QWidget) -> QMenu:
         menu = QMenu(parent)
         menu.setToolTipsVisible(True)
         for offer in offers:
@@ -178,7 +180,7 @@ class SectionBox(QGroupBox):
             action = QAction(offer.words, menu)
             menu.addAction(action)
             action.setToolTip(offer.tip)
-            action.triggered.connect(guarded(lambda *_, o=offer: self._wish(o.change)))
+            action.triggered.connect(guarded(lambda *_, o=offer: self._request(o.change)))
         return menu
 
 

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin.scenes import Key
 from kappaskin_app.features.scene.scene_form.numbers import (
     NumberBox,
     WholeNumberBox,
@@ -25,14 +26,13 @@ from kappaskin_app.features.scene.scene_form.numbers import (
     shown,
 )
 from kappaskin_app.features.scene.scene_form.section import Row
-from kappaskin_app.features.scene.scene_form.words import DEGREE, How
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import ChoiceBox, well_behaved
 
 _WIDEST = 300  # px of an editor that is no line of text
 _TYPED = QRegularExpression(r"[-+0-9.eE,; ]*")
 
-Said = Callable[[Any], None]
+Report = Callable[[Any], None]
 
 
 @dataclass
@@ -59,28 +59,28 @@ class Editor:
             self.fill(value)
 
 
-def editor_for(row: Row, said: Said, small: bool = False) -> Editor:
-    """An editor that tells `said` of each value that a person gives it."""
+def editor_for(row: Row, report: Report, small: bool = False) -> Editor:
+    """An editor that tells `report` of each value that a person gives it."""
     count, _, kind = row.kind.rpartition(" ")
     if count:
-        editor = _several(row, kind, int(count), said, small)
+        editor = _several(row, kind, int(count), report, small)
     elif kind in _MAKERS:
-        editor = _MAKERS[kind](row, said)
+        editor = _MAKERS[kind](row, report)
     else:
-        editor = _spin(row, kind, row.usual, said, small)
+        editor = _spin(row, kind, row.usual, report, small)
+    tip = row.key.explained + (" Pairs stand with ; in between." if kind == "pairs" else "")
     for widget in editor.stops:
         well_behaved(widget)
-        widget.setToolTip(row.how.explained)
+        widget.setToolTip(tip)
     editor.widget.setObjectName(".".join(map(str, row.place)))
     editor.show(row.value)
     return editor
 
 
-def _spin(row: Row, kind: str, usual: Any, said: Said, small: bool) -> Editor:
-    how = row.how
-    box = _whole_box(how, said) if kind == "whole" else _number_box(how, usual, said)
-    if how.unit:
-        box.setSuffix(f"{'' if how.unit == DEGREE[0] else ' '}{how.unit}")
+def _spin(row: Row, kind: str, usual: Any, report: Report, small: bool) -> Editor:
+    key = row.key
+    box = _whole_box(key, report) if kind == "whole" else _number_box(key, usual, report)
+    box.setSuffix(key.unit.suffix)
     box.setKeyboardTracking(False)
     box.setAlignment(Qt.AlignmentFlag.AlignRight)
     if small:
@@ -96,19 +96,19 @@ def _spin(row: Row, kind: str, usual: Any, said: Said, small: bool) -> Editor:
     return Editor(box, fill)
 
 
-def _number_box(how: How, usual: Any, said: Said) -> NumberBox:
-    box = NumberBox(how, usual)
-    box.valueChanged.connect(guarded(lambda value: said(meant(value, how))))
+def _number_box(key: Key, usual: Any, report: Report) -> NumberBox:
+    box = NumberBox(key, usual)
+    box.valueChanged.connect(guarded(lambda value: report(meant(value, key.unit))))
     return box
 
 
-def _whole_box(how: How, said: Said) -> WholeNumberBox:
-    box = WholeNumberBox(how)
-    box.valueChanged.connect(guarded(said))
+def _whole_box(key: Key, report: Report) -> WholeNumberBox:
+    box = WholeNumberBox(key)
+    box.valueChanged.connect(guarded(report))
     return box
 
 
-def _several(row: Row, kind: str, count: int, said: Said, small: bool) -> Editor:
+def _several(row: Row, kind: str, count: int, report: Report, small: bool) -> Editor:
     holder = QWidget()
     across = QHBoxLayout(holder)
     across.setContentsMargins(0, 0, 0, 0)
@@ -116,13 +116,13 @@ def _several(row: Row, kind: str, count: int, said: Said, small: bool) -> Editor
     usual = row.usual if isinstance(row.usual, list) and len(row.usual) == count else []
     largest = max((one for one in usual if isinstance(one, int | float)), default=None)
 
-    def one_said(index: int) -> Said:
+    def report_one(index: int) -> Report:
         def tell(value: Any) -> None:
-            said([*editor.value[:index], value, *editor.value[index + 1 :]])
+            report([*editor.value[:index], value, *editor.value[index + 1 :]])
 
         return tell
 
-    each = [_spin(row, kind, largest, one_said(index), True) for index in range(count)]
+    each = [_spin(row, kind, largest, report_one(index), True) for index in range(count)]
     for one in each:
         across.addWidget(one.widget)
 
@@ -140,18 +140,18 @@ def _as_wide_as_there_is_room(widget: QWidget) -> None:
     widget.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
 
-def _switch(row: Row, said: Said) -> Editor:
+def _switch(row: Row, report: Report) -> Editor:
     box = QCheckBox()
-    box.toggled.connect(guarded(said))
+    box.toggled.connect(guarded(report))
     return Editor(box, _quietly(box, box.setChecked))
 
 
-def _choice(row: Row, said: Said) -> Editor:
+def _choice(row: Row, report: Report) -> Editor:
     box = ChoiceBox()
-    for value, words in row.how.choices:
+    for value, words in row.key.choices:
         box.addItem(words, value)
     _as_wide_as_there_is_room(box)
-    box.activated.connect(guarded(lambda index: said(box.itemData(index))))
+    box.activated.connect(guarded(lambda index: report(box.itemData(index))))
 
     def fill(value: Any) -> None:
         if box.findData(value) < 0:
@@ -170,7 +170,7 @@ def _quietly(widget: QWidget, fill: Callable[[Any], None]) -> Callable[[Any], No
 
 
 def _line(
-    line: QLineEdit, words: Callable[[Any], str], read: Callable[[str, Any], Any], said: Said
+    line: QLineEdit, words: Callable[[Any], str], read: Callable[[str, Any], Any], report: Report
 ) -> Editor:
     """An editor of one line; what cannot be read is what it was."""
     line.setMinimumWidth(60)
@@ -190,18 +190,18 @@ def _line(
             value = editor.value
         fill(value)
         if value != editor.value:
-            said(value)
+            report(value)
 
     line.editingFinished.connect(guarded(finished))
     editor = Editor(line, fill)
     return editor
 
 
-def _text(row: Row, said: Said) -> Editor:
-    return _line(QLineEdit(), str, lambda text, _: text, said)
+def _text(row: Row, report: Report) -> Editor:
+    return _line(QLineEdit(), str, lambda text, _: text, report)
 
 
-def _literal(row: Row, said: Said) -> Editor:
+def _literal(row: Row, report: Report) -> Editor:
     """What has no editor of its own, as TOML says it."""
 
     def words(value: Any) -> str:
@@ -213,7 +213,7 @@ def _literal(row: Row, said: Said) -> Editor:
             raise ValueError("expected one value")
         return found["value"]
 
-    return _line(QLineEdit(), words, read, said)
+    return _line(QLineEdit(), words, read, report)
 
 
 def _numbers_line() -> QLineEdit:
@@ -222,31 +222,32 @@ def _numbers_line() -> QLineEdit:
     return line
 
 
-def _numbers(row: Row, said: Said) -> Editor:
+def _numbers(row: Row, report: Report) -> Editor:
     def words(values: list[Any]) -> str:
-        return ", ".join(shown(value, row.how) for value in values)
+        return ", ".join(shown(value, row.key.unit) for value in values)
 
     def read(text: str, before: list[Any]) -> list[Any]:
-        return read_numbers(text, before, row.how, whole=row.kind == "wholes")
+        return read_numbers(text, before, row.key.unit, whole=row.kind == "wholes")
 
-    return _line(_numbers_line(), words, read, said)
+    return _line(_numbers_line(), words, read, report)
 
 
-def _pairs(row: Row, said: Said) -> Editor:
+def _pairs(row: Row, report: Report) -> Editor:
     def words(pairs: list[list[Any]]) -> str:
-        return "; ".join(", ".join(shown(one, row.how) for one in pair) for pair in pairs)
+        return "; ".join(", ".join(shown(one, row.key.unit) for one in pair) for pair in pairs)
 
     def read(text: str, before: list[list[Any]]) -> list[list[Any]]:
         each = [part for part in text.split(";") if part.strip(" ,")]
         befores = [*before, *([[]] * len(each))]
         return [
-            read_numbers(*both, row.how, whole=False) for both in zip(each, befores, strict=False)
+            read_numbers(*both, row.key.unit, whole=False)
+            for both in zip(each, befores, strict=False)
         ]
 
-    return _line(_numbers_line(), words, read, said)
+    return _line(_numbers_line(), words, read, report)
 
 
-_MAKERS: dict[str, Callable[[Row, Said], Editor]] = {
+_MAKERS: dict[str, Callable[[Row, Report], Editor]] = {
     "switch": _switch,
     "choice": _choice,
     "text": _text,

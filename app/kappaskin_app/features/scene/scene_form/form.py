@@ -1,4 +1,4 @@
-"""The forms of a scene: they show what its text says, and make the text that a person wishes."""
+"""Scene form: editors of what the text of a scene says; every edit makes a new text."""
 
 import tomllib
 from itertools import pairwise
@@ -52,7 +52,7 @@ class SceneForm(QScrollArea):
         """The editor of the value at `place`."""
         return next(b.editors[place].widget for b in self.boxes if place in b.editors)
 
-    def _wish(self, change: Change) -> None:
+    def _request(self, change: Change) -> None:
         if self._showing or not self._content.isEnabled():
             return
         text = change(self._text)
@@ -103,7 +103,7 @@ class SceneForm(QScrollArea):
     def _box(self, section: Section, there: dict[tuple[object, ...], SectionBox]) -> SectionBox:
         box = there.pop(section.structure, None)
         if box is None:
-            return SectionBox(section, self._wish)
+            return SectionBox(section, self._request)
         box.show_section(section)
         return box
 

@@ -1,10 +1,10 @@
-"""One part of a scene as a form shows it: rows of values, parts of its own, what may be added."""
+"""Sections of a scene form: rows of values, parts of their own, and what may be added."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from kappaskin_app.features.scene.scene_form.words import How
+from kappaskin.scenes import Key
 from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import Place
 
@@ -21,7 +21,7 @@ class Row:
 
     place: Place
     kind: str
-    how: How
+    key: Key
     value: Any
     usual: Any = None
     part: str = ""
@@ -34,13 +34,13 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Offer:
+class Addition:
     """Something that may be put in, in words; or others `inside`."""
 
     words: str
     tip: str
     change: Change = str
-    inside: "tuple[Offer, ...]" = ()
+    inside: "tuple[Addition, ...]" = ()
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Section:
     place: Place
     rows: tuple[Row, ...] = ()
     sections: "tuple[Section, ...]" = ()
-    offers: tuple[Offer, ...] = ()
+    offers: tuple[Addition, ...] = ()
     adding: str = ""
-    more: tuple[Offer, ...] = ()
+    more: tuple[Addition, ...] = ()
     removable: bool = False
     step: bool = False
     tip: str = ""
@@ -67,7 +67,7 @@ class Section:
         """All but the values: what its editors are made from."""
         return (
             *(self.title, self.place, self.adding),
-            tuple((row.place, row.kind, row.how) for row in self.rows),
+            tuple((row.place, row.kind, row.key) for row in self.rows),
             tuple(section.structure for section in self.sections),
             tuple(offer.words for offer in (*self.offers, *self.more)),
         )

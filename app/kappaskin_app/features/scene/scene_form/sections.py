@@ -1,87 +1,89 @@
-"""What the text of a scene says to what its forms show: parts with rows, and what may be added."""
+"""The sections that a scene's text calls for, from the schema of scene files."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
+from kappaskin.scenes import PARTS, Key, instead_of
 from kappaskin_app.features.scene.scene_form.kinds import kind_of
-from kappaskin_app.features.scene.scene_form.section import Change, Offer, Row, Section
-from kappaskin_app.features.scene.scene_form.words import how_of, named, words_of
+from kappaskin_app.features.scene.scene_form.section import Addition, Change, Row, Section
 from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import Place
-from kappaskin_app.features.scene.scene_text.parts import instead_of, kinds, known, needed, optional
 from kappaskin_app.shell.effects import called, explained
 
 _ELECTRONICS = ("bridge", "multiplexer", "amplifier", "converter")
 _ORDER = ("step", "seconds", "by", "to", "times", "ease")
 
-Said = Mapping[str, Any]
+Values = Mapping[str, Any]
 
 
-def sections_of(said: Said) -> tuple[Section, ...]:
+def sections_of(values: Values) -> tuple[Section, ...]:
     """What a scene's TOML says, part by part in the order of its forms."""
-    touches = _tables(said, "touch", ())
+    touches = _tables(values, "touch", ())
     found = [
-        _section("Scene", "scene", "", said, ()),
-        _skin(_table(said, "skin")),
-        _section("Elements", "elements", "", _table(said, "elements"), ("elements",)),
-        _electronics(_table(said, "electronics")),
+        _section("Scene", "scene", "", values, ()),
+        _skin(_table(values, "skin")),
+        _section("Elements", "elements", "", _table(values, "elements"), ("elements",)),
+        _electronics(_table(values, "electronics")),
         *(_touch(f"Touch {n}", *touch) for n, touch in enumerate(touches, 1)),
     ]
-    if "cylinders" not in said:
+    if "cylinders" not in values:
         found.append(_more_touches([str(touch.get("what")) for _, touch in touches]))
-    found.append(_effects(_table(said, "effects")))
-    if "cylinders" in said:
-        table, place = _table(said, "cylinders"), ("cylinders",)
+    found.append(_effects(_table(values, "effects")))
+    if "cylinders" in values:
+        table, place = _table(values, "cylinders"), ("cylinders",)
         found.append(_section("Cylinders", "cylinders", "", table, place, removable=True))
     return tuple(found)
 
 
-def _section(title: str, part: str, kind: str, said: Said, place: Place, **more: Any) -> Section:
+def _section(
+    title: str, part: str, kind: str, values: Values, place: Place, **more: Any
+) -> Section:
     """What a table says that has no parts, or whose parts are `more`."""
-    rows = _rows(part, kind, said, place)
-    offers = (*_offers(part, kind, said, place), *more.pop("offers", ()))
+    rows = _rows(part, kind, values, place)
+    offers = (*_offers(part, kind, values, place), *more.pop("offers", ()))
     return Section(title, place, rows, offers=offers, **more)
 
 
-def _skin(said: Said) -> Section:
-    return _section("Skin", "skin", str(said.get("shape", "rectangle")), said, ("skin",))
+def _skin(values: Values) -> Section:
+    return _section("Skin", "skin", str(values.get("shape", "rectangle")), values, ("skin",))
 
 
-def _electronics(said: Said) -> Section:
-    sections, offers = list[Section](), list[Offer]()
+def _electronics(values: Values) -> Section:
+    sections, offers = list[Section](), list[Addition]()
     for part in _ELECTRONICS:
         place = ("electronics", part)
-        section = _section(named(part), part, "", _table(said, part), place)
-        if part in said:
+        section = _section(PARTS[part].label, part, "", _table(values, part), place)
+        if part in values:
             sections.append(section)
         else:
-            offers.append(Offer(section.title, "", inside=section.offers))
+            offers.append(Addition(section.title, "", inside=section.offers))
     return _section(
-        *("Electronics", "electronics", "", said, ("electronics",)),
+        *("Electronics", "electronics", "", values, ("electronics",)),
         sections=tuple(sections),
         offers=offers,
     )
 
 
-def _touch(title: str, place: Place, said: Said) -> Section:
+def _touch(title: str, place: Place, values: Values) -> Section:
     return _section(
-        *(title, "touch", str(said.get("what")), said, place),
-        sections=_motion(place, said),
+        *(title, "touch", str(values.get("what")), values, place),
+        sections=_motion(place, values),
         removable=True,
     )
 
 
-def _motion(place: Place, said: Said) -> tuple[Section, ...]:
+def _motion(place: Place, values: Values) -> tuple[Section, ...]:
     found = list[Section]()
-    if "orbit" in said:
-        orbit, at = _table(said, "orbit"), (*place, "orbit")
-        found.append(_section(named("orbit"), "orbit", "", orbit, at, removable=True))
-    if "path" in said:
+    if "orbit" in values:
+        orbit, at = _table(values, "orbit"), (*place, "orbit")
+        found.append(_section(PARTS["orbit"].label, "orbit", "", orbit, at, removable=True))
+    if "path" in values:
         at = (*place, "path")
         found.append(
             Section(
-                *(named("path"), at),
-                sections=tuple(_step(*step) for step in _tables(said, "path", place)),
+                *(PARTS["touch"].key("path").label, at),
+                sections=tuple(_step(*step) for step in _tables(values, "path", place)),
                 adding="Add step",
                 more=_offers_of_kinds("step", lambda kind: _adding_step(at, kind)),
                 removable=True,
@@ -90,9 +92,9 @@ def _motion(place: Place, said: Said) -> tuple[Section, ...]:
     return tuple(found)
 
 
-def _step(place: Place, said: Said) -> Section:
-    ordered = {key: said[key] for key in sorted(said, key=_turn)}
-    return _section("", "step", str(said.get("step")), ordered, place, step=True, removable=True)
+def _step(place: Place, values: Values) -> Section:
+    ordered = {key: values[key] for key in sorted(values, key=_turn)}
+    return _section("", "step", str(values.get("step")), ordered, place, step=True, removable=True)
 
 
 def _turn(key: str) -> int:
@@ -101,98 +103,100 @@ def _turn(key: str) -> int:
 
 def _more_touches(there: list[str]) -> Section:
     """A rigid object presses alone, and so do cylinders; loads may be many."""
-    rigid = {kind for kind in kinds("touch") if "depth" in known("touch", kind)}
+    touch = PARTS["touch"]
+    rigid = {kind for kind in touch.kinds if "depth" in touch.known(kind)}
     offers = _offers_of_kinds("touch", lambda kind: lambda text: changes.add_touch(text, kind))
     if rigid & set(there):
         offers = ()
     elif there:
-        offers = tuple(
-            o for o, kind in zip(offers, kinds("touch"), strict=True) if kind not in rigid
-        )
+        offers = tuple(o for o, kind in zip(offers, touch.kinds, strict=True) if kind not in rigid)
     else:
-        said = {"dwell": optional("cylinders")["dwell"]}
-        laid = Offer(
+        values = {"dwell": PARTS["cylinders"].key("dwell").beginning}
+        laid = Addition(
             "Cylinders",
             "Lay the skin on one cylinder after the other, as a calibration does.",
-            lambda text: changes.add_table(text, ("cylinders",), said),
+            lambda text: changes.add_table(text, ("cylinders",), values),
         )
         offers = (*offers, laid)
     tip = "" if offers else "A rigid object presses alone: remove it first, or change what it is."
     return Section("", ("touch", "more"), adding="Add touch", more=offers, tip=tip)
 
 
-def _effects(said: Said) -> Section:
-    there = [name for name, table in said.items() if isinstance(table, Mapping)]
+def _effects(values: Values) -> Section:
+    there = [name for name, table in values.items() if isinstance(table, Mapping)]
     blocks = tuple(
         _section(
-            *(called(name), "effects", name, said[name], ("effects", name)),
+            *(called(name), "effects", name, values[name], ("effects", name)),
             removable=True,
             tip=explained(name),
         )
         for name in there
     )
     more = tuple(
-        Offer(called(name), explained(name), _adding_effect(name))
-        for name in kinds("effects")
+        Addition(called(name), explained(name), _adding_effect(name))
+        for name in PARTS["effects"].kinds
         if name not in there
     )
     return Section("Effects", ("effects",), sections=blocks, adding="Add effect", more=more)
 
 
 def _adding_effect(name: str) -> Change:
-    return lambda text: changes.add_table(text, ("effects", name), needed("effects", name))
+    return lambda text: changes.add_table(text, ("effects", name), PARTS["effects"].needed(name))
 
 
 def _adding_step(place: Place, kind: str) -> Change:
     return lambda text: changes.add_step(text, place, kind)
 
 
-def _offers_of_kinds(part: str, adding: Callable[[str], Change]) -> tuple[Offer, ...]:
-    key = "step" if part == "step" else "what"
-    return tuple(Offer(words_of(part, key, kind), "", adding(kind)) for kind in kinds(part))
+def _offers_of_kinds(part: str, adding: Callable[[str], Change]) -> tuple[Addition, ...]:
+    kinds = PARTS[part].kinds
+    return tuple(Addition(one.label, "", adding(name)) for name, one in kinds.items())
 
 
-def _table(said: Said, key: str) -> Said:
-    found = said.get(key)
+def _table(values: Values, key: str) -> Values:
+    found = values.get(key)
     return found if isinstance(found, Mapping) else {}
 
 
-def _tables(said: Said, key: str, place: Place) -> list[tuple[Place, Said]]:
+def _tables(values: Values, key: str, place: Place) -> list[tuple[Place, Values]]:
     """The tables of an array with their places; a table by itself is an array of one."""
-    found = said.get(key)
+    found = values.get(key)
     if isinstance(found, Mapping):
         return [((*place, key), found)]
     many = enumerate(found) if isinstance(found, list) else ()
     return [((*place, key, n), one) for n, one in many if isinstance(one, Mapping)]
 
 
-def _rows(part: str, kind: str, said: Said, place: Place) -> tuple[Row, ...]:
-    may, found = known(part, kind), list[Row]()
-    for key, value in said.items():
-        if isinstance(value, Mapping) or key == "path" or (part == "scene" and key not in may):
+def _rows(part: str, kind: str, values: Values, place: Place) -> tuple[Row, ...]:
+    may, found = PARTS[part].known(kind), list[Row]()
+    for name, value in values.items():
+        if isinstance(value, Mapping) or name == "path" or (part == "scene" and name not in may):
             continue
-        how, usual = how_of(part, kind, key), may.get(key)
-        says = part if (part, key) in _SAYS else ""
-        found.append(Row((*place, key), kind_of(value, how, usual), how, value, usual, says))
+        key = _key(part, kind, name)
+        says = part if name == PARTS[part].chosen_by else ""
+        found.append(Row((*place, name), kind_of(value, key), key, value, may.get(name), says))
     return tuple(found)
 
 
-_SAYS = (("skin", "shape"), ("touch", "what"), ("step", "step"))
+def _key(part: str, kind: str, name: str) -> Key:
+    """What is declared of a key; that of an effect tells what the effect does, too."""
+    key = PARTS[part].key(name, kind)
+    return replace(key, tip=f"{key.tip} {explained(kind)}".strip()) if part == "effects" else key
 
 
-def _offers(part: str, kind: str, said: Said, place: Place) -> tuple[Offer, ...]:
+def _offers(part: str, kind: str, values: Values, place: Place) -> tuple[Addition, ...]:
     """What else a table may say."""
-    found = list[Offer]()
-    for key, value in known(part, kind).items():
-        if key in said:
+    found = list[Addition]()
+    for name, value in PARTS[part].known(kind).items():
+        if name in values:
             continue
-        how = how_of(part, kind, key)
-        instead = sorted(instead_of(key) & set(said))
-        words = how.label + "".join(
-            f" instead of {how_of(part, kind, other).label.lower()}" for other in instead
+        key = _key(part, kind, name)
+        instead = sorted(instead_of(name) & set(values))
+        words = key.label + "".join(
+            f" instead of {_key(part, kind, other).label.lower()}" for other in instead
         )
-        found.append(Offer(words, how.explained, _putting_in(place, key, value)))
-    return () if part == "effects" and "like" in said else tuple(found)
+        found.append(Addition(words, key.explained, _putting_in(place, name, value)))
+    return () if part == "effects" and "like" in values else tuple(found)
 
 
 def _putting_in(place: Place, key: str, value: Any) -> Change:

@@ -1,4 +1,4 @@
-"""The text of a scene to that of one a little different; comments, order and all else stay."""
+"""Edits of the text of a scene; comments, order and all else stay as written."""
 
 from kappaskin_app.features.scene.scene_text.changes import OFF as OFF
 from kappaskin_app.features.scene.scene_text.changes import ON as ON

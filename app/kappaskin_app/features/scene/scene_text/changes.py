@@ -1,4 +1,4 @@
-"""The text of a scene to the text with one thing changed; all else stays as it is written.
+"""Edits of a scene's text: one value, table or name of an effect; the rest stays as written.
 
 Each raises `Refusal` for a text that is no TOML, and KeyError or IndexError for a place that there
 is not.
@@ -11,8 +11,8 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AbstractTable, AoT, InlineTable, Table
 
+from kappaskin.scenes import PARTS, instead_of
 from kappaskin_app.features.scene.scene_text.parsing import parsed
-from kappaskin_app.features.scene.scene_text.parts import alike, instead_of, known, missing, needed
 from kappaskin_app.features.scene.scene_text.places import placed
 
 Place = tuple[str | int, ...]
@@ -44,8 +44,8 @@ def put_in(text: str, place: Place, key: str, value: Any) -> str:
         if isinstance(name, str) and name not in owner:
             owner[name] = _new(owner, is_super=name != place[-1])
         owner = owner[name]
-    said = {name: one for name, one in owner.items() if name not in instead_of(key)}
-    _set(document, place, said | {key: value})
+    values = {name: one for name, one in owner.items() if name not in instead_of(key)}
+    _set(document, place, values | {key: value})
     return _tidy(text, document)
 
 
@@ -68,7 +68,7 @@ def remove(text: str, place: Place) -> str:
     return _tidy(text, document)
 
 
-def add_table(text: str, place: Place, said: dict[str, Any]) -> str:
+def add_table(text: str, place: Place, values: dict[str, Any]) -> str:
     """The text with the table at `place` that says this."""
     document = parsed(text)
     owner: Any = document
@@ -76,14 +76,14 @@ def add_table(text: str, place: Place, said: dict[str, Any]) -> str:
         if name not in owner:
             owner[name] = tomlkit.table(is_super_table=True)
         owner = owner[name]
-    owner[str(place[-1])] = _item(said) if isinstance(owner, InlineTable) else _table(said)
+    owner[str(place[-1])] = _item(values) if isinstance(owner, InlineTable) else _table(values)
     return _tidy(text, document)
 
 
 def add_touch(text: str, kind: str) -> str:
     """The text with one more touch of this kind, at a like place of the skin that is there."""
-    said = placed(needed("touch", kind), parsed(text).get("skin"))
-    return _add(text, ("touch",), {"what": kind} | said)
+    values = placed(PARTS["touch"].needed(kind), parsed(text).get("skin"))
+    return _add(text, ("touch",), {"what": kind} | values)
 
 
 def add_step(text: str, path: Place, kind: str) -> str:
@@ -94,7 +94,7 @@ def add_step(text: str, path: Place, kind: str) -> str:
     many = _at(parsed(text), path)
     before = isinstance(many, list) and many and _lifts(many[-1]) and not _lifts({"step": kind})
     return _add(
-        text, path, {"step": kind} | needed("step", kind), len(many) - 1 if before else None
+        text, path, {"step": kind} | PARTS["step"].needed(kind), len(many) - 1 if before else None
     )
 
 
@@ -110,17 +110,23 @@ def change_kind(text: str, place: Place, part: str, kind: str) -> str:
     document = parsed(text)
     at, key = place[:-1], str(place[-1])
     owner = _at(document, at)
-    may = known(part, kind)
-    said = {
+    may = PARTS[part].known(kind)
+    values = {
         name: value
         for name, value in owner.items()
-        if name == key or (name in may and alike(_plain(value), may[name]))
+        if name == key or (name in may and _alike(_plain(value), may[name]))
     }
-    more = missing(part, kind, said)
+    more = PARTS[part].missing(kind, values)
     if part == "touch":
         more = placed(more, document.get("skin"))
-    _set(document, at, said | {key: kind} | more)
+    _set(document, at, values | {key: kind} | more)
     return _tidy(text, document)
+
+
+def _alike(value: Any, other: Any) -> bool:
+    """Whether two values are of a kind, as far as a form is concerned."""
+    numbers = [isinstance(one, int | float) and not isinstance(one, bool) for one in (value, other)]
+    return all(numbers) or (not any(numbers) and type(value) is type(other))
 
 
 def forced(text: str, effect: str, how: str) -> str:
@@ -159,21 +165,21 @@ def _plain(value: Any) -> Any:
     return value.unwrap() if hasattr(value, "unwrap") else value
 
 
-def _set(document: Any, place: Place, said: dict[str, Any]) -> None:
+def _set(document: Any, place: Place, values: dict[str, Any]) -> None:
     """Make the table at `place` say this, in the order that it has."""
     owner = _at(document, place)
     if isinstance(owner, InlineTable):  # made anew, or its last comma stands without a space
-        _at(document, place[:-1])[place[-1]] = _item({k: _plain(v) for k, v in said.items()})
+        _at(document, place[:-1])[place[-1]] = _item({k: _plain(v) for k, v in values.items()})
         return
     for key in list(owner):
-        if key not in said:
+        if key not in values:
             del owner[key]
-    for key, value in said.items():
+    for key, value in values.items():
         if key not in owner or owner[key] != value:
             owner[key] = _item(value)
 
 
-def _add(text: str, place: Place, said: dict[str, Any], index: int | None = None) -> str:
+def _add(text: str, place: Place, values: dict[str, Any], index: int | None = None) -> str:
     """The text with one more table in the array at `place`, at its end or at `index`."""
     document = parsed(text)
     owner = _at(document, place[:-1])
@@ -187,14 +193,14 @@ def _add(text: str, place: Place, said: dict[str, Any], index: int | None = None
         many.append(_table(kept))
     many.insert(
         len(many) if index is None else index,
-        _table(said) if isinstance(many, AoT) else _item(said),
+        _table(values) if isinstance(many, AoT) else _item(values),
     )
     return _tidy(text, document)
 
 
-def _table(said: Mapping[str, Any]) -> Table:
+def _table(values: Mapping[str, Any]) -> Table:
     table = tomlkit.table()
-    for key, value in said.items():
+    for key, value in values.items():
         table[key] = _item(value)
     return table
 
@@ -217,9 +223,9 @@ def _written(value: Any) -> str:
 
 def _unname(document: Any, effect: str) -> None:
     """Name an effect no longer that is not there any more."""
-    said = document.get("effects", {})
+    values = document.get("effects", {})
     for key in ("choose", "on", "off"):
-        if isinstance(named := said.get(key), list) and effect in named:
+        if isinstance(named := values.get(key), list) and effect in named:
             named.remove(effect)
 
 

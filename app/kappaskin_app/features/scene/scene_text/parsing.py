@@ -1,4 +1,4 @@
-"""The text of a scene to what it says, its layout included."""
+"""Parsing of a scene's text with its layout."""
 
 from typing import Any
 

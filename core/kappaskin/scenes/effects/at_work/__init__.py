@@ -1,1 +1,1 @@
-"""Effects at work: imported one by one, when a scene calls for them."""
+"""Effects at work: what each does to readings, imported when a scene calls for it."""

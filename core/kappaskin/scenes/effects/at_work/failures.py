@@ -1,15 +1,17 @@
-"""Stuck and intermittent elements at work."""
+"""Failures of elements and of the link, at work."""
 
 import math
+from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.frames import Array
-from kappaskin.scenes.effects.effect import Running
+from kappaskin.scenes.effects.effect import RunningEffect
 
 
-def stuck(channels: NDArray[np.intp], since: float) -> Running:
+def stuck(channels: NDArray[np.intp], since: float) -> RunningEffect:
     held: Array | None = None
 
     def read(curvature: Array, time: float) -> Array:
@@ -26,7 +28,7 @@ def stuck(channels: NDArray[np.intp], since: float) -> Running:
 
 def intermittent(
     channels: NDArray[np.intp], on: float, off: float, rng: np.random.Generator
-) -> Running:
+) -> RunningEffect:
     there = rng.random(len(channels[0])) < on / (on + off)
     last = math.nan
 
@@ -44,3 +46,18 @@ def intermittent(
         return flat.reshape(curvature.shape)
 
     return read
+
+
+_AT_ONCE = 256  # frames
+
+
+def hits(share: float, rng: np.random.Generator) -> Callable[[int], bool]:
+    key = int(rng.integers(2**63))
+
+    # Numbered draws: a frame's own, whichever were asked for before.
+    @lru_cache(1)
+    def part(number: int) -> list[bool]:
+        draws = np.random.Generator(np.random.Philox(counter=number * _AT_ONCE, key=key))
+        return [each < share for each in draws.random(_AT_ONCE).tolist()]
+
+    return lambda n: part(n // _AT_ONCE)[n % _AT_ONCE]

@@ -1,0 +1,136 @@
+"""Effects in the electronics: mains hum, skew, cross-talk, saturation and quantisation."""
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from kappaskin.scenes.effects.effect import (
+    Effect,
+    ReadingEffect,
+    RunningEffect,
+    Size,
+    Survey,
+    Within,
+)
+from kappaskin.sensing import Transduction
+
+
+@dataclass(frozen=True)
+class MainsHum(ReadingEffect):
+    """A sine of `amplitude` in 1/m and `frequency` in Hz, alike in all channels of a frame.
+
+    Its phase at time 0 is drawn with the scene's seed: the mains know of no scene, and a fixed one
+    would favour some frames in every run.
+    """
+
+    name: ClassVar = "mains-hum"
+    example: ClassVar = {"amplitude": 0.5}
+    formula: ClassVar = "amplitude over peak curvature"
+
+    amplitude: Annotated[float, Within(0, 1e4, "1/m")]
+    frequency: Annotated[float, Within(1, 1000, "Hz")] = 50.0
+
+    def size(self, survey: Survey) -> Size:
+        number = self.amplitude / survey.peak
+        return Size(number, number)
+
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
+        from kappaskin.scenes.effects.at_work.electronics import hum
+
+        return hum(self.amplitude, self.frequency, rng)
+
+
+@dataclass(frozen=True)
+class Skew(Effect):
+    """Channels are read one after the other while the skin moves; `Scan.times` says when."""
+
+    name: ClassVar = "skew"
+    elsewhere: ClassVar = "the converter's times make it"
+    formula: ClassVar = "scan time times rate of curvature over peak curvature"
+
+    def size(self, survey: Survey) -> Size:
+        number = survey.read_after.max() * survey.rates.max() / survey.peak
+        change = float((survey.read_after * survey.rates).max()) / survey.peak
+        # However fast it moves, a reading goes from one peak to the opposite one at most.
+        return Size(float(number), min(change, 2.0))
+
+
+@dataclass(frozen=True)
+class CrossTalk(ReadingEffect):
+    """y_c = x_c + s (y_(c-1) - x_c): of the voltage before it a channel keeps the `share` s.
+
+    One capacitor behind the multiplexer is charged by one channel after the other, in the order of
+    a whole scan: 0 to 3 P - 1, component by component, and on with the next frame's channel 0. It
+    begins at rest.
+    """
+
+    name: ClassVar = "cross-talk"
+    example: ClassVar = {"share": 0.02}
+    formula: ClassVar = "share kept of the channel scanned before"
+
+    share: Annotated[float, Within(0, 0.5)]
+
+    def size(self, survey: Survey) -> Size:
+        K = survey.curvature.reshape(len(survey.times), -1)
+        largest = np.abs(K).max(axis=0, initial=0.0)
+        between_frames = float(largest[0] + largest[-1])
+        step = max(float(np.abs(np.diff(K)).max(initial=0.0)), between_frames)
+        # |y_c - x_c| <= s (|x_(c-1) - x_c| + |y_(c-1) - x_(c-1)|), so the largest is s/(1-s) steps.
+        return Size(self.share, self.share / (1 - self.share) * step / survey.peak)
+
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
+        from kappaskin.scenes.effects.at_work.electronics import cross_talk
+
+        return cross_talk(self.share, shape)
+
+
+@dataclass(frozen=True)
+class Quantisation(ReadingEffect):
+    """Curvature is that of the count next to it, as `transduction` counts: no rails, only steps."""
+
+    name: ClassVar = "quantisation"
+    elsewhere: ClassVar = "the converter makes it"
+    at_once: ClassVar = True
+    formula: ClassVar = "half a count over peak curvature"
+
+    transduction: Transduction
+
+    def size(self, survey: Survey) -> Size:
+        number = self.transduction.resolution / 2 / survey.peak
+        return Size(number, number)
+
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
+        from kappaskin.scenes.effects.at_work.electronics import quantisation
+
+        return quantisation(self.transduction)
+
+
+@dataclass(frozen=True)
+class Saturation(ReadingEffect):
+    """Curvature stays between the lowest and the highest count of `transduction`."""
+
+    name: ClassVar = "saturation"
+    elsewhere: ClassVar = "the amplifier and the converter make it"
+    at_once: ClassVar = True
+    formula: ClassVar = "largest curvature over that at the rail on its side"
+
+    transduction: Transduction
+
+    @property
+    def rails(self) -> tuple[float, float]:
+        """The curvature in 1/m of the lowest and of the highest count, below and above zero."""
+        electronics = self.transduction
+        shift = electronics.offset / electronics.sensitivity
+        low, high = electronics.limits
+        return low * electronics.resolution - shift, high * electronics.resolution - shift
+
+    def size(self, survey: Survey) -> Size:
+        (low, high), K = self.rails, survey.curvature
+        number = float(np.maximum(K / low, K / high).max(initial=0.0))
+        return Size(number, survey.share(np.clip(K, low, high) - K))
+
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
+        from kappaskin.scenes.effects.at_work.electronics import saturation
+
+        return saturation(*self.rails)

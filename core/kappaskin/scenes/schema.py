@@ -1,0 +1,598 @@
+"""The schema of a scene file: every key with its kind, default, limits, unit and words.
+
+`PARTS` declares each table of a file once. Reading and writing, the app's forms and the tables of
+the guide come from it.
+"""
+
+import math
+from typing import Any
+
+from kappaskin.bases import EDGES
+from kappaskin.mechanics import (
+    Block,
+    Cylinder,
+    DiscLoad,
+    GaussianLoad,
+    HeightMap,
+    LineLoad,
+    Mesh,
+    Plate,
+    PointLoad,
+    Punch,
+    RectangleLoad,
+    Sphere,
+    Wedge,
+)
+from kappaskin.scenes.cylinders import RADII
+from kappaskin.scenes.effects import EFFECTS, Effect, Within
+from kappaskin.scenes.keys import Key, Part, PartKind, Unit, fields_of
+from kappaskin.scenes.scene import EffectSelection, Scene
+from kappaskin.scenes.stimulus import (
+    EASES,
+    HoldStep,
+    Orbit,
+    PressStep,
+    ReleaseStep,
+    SlideStep,
+    TapStep,
+    TurnStep,
+)
+from kappaskin.scenes.tables import REQUIRED
+from kappaskin.sensing import Amplifier, Converter, HalfBridge, Multiplexer, SensorLayout
+from kappaskin.skin import Disk, Patch, Polygon
+
+_SECOND = Unit.same("s")
+_MM, _UM = Unit("m", "mm", 1e-3), Unit("m", "\N{MICRO SIGN}m", 1e-6)
+_US, _DEGREE = Unit("s", "\N{MICRO SIGN}s", 1e-6), Unit("rad", "\N{DEGREE SIGN}", math.pi / 180)
+_NEWTON, _VOLT = Unit.same("N"), Unit.same("V")
+_OHM = Unit.same("ohm", "\N{GREEK CAPITAL LETTER OMEGA}")
+
+
+def _choices(**words: str) -> tuple[tuple[str, str], ...]:
+    return tuple(words.items())
+
+
+FORMAT = 1
+
+SCENE = Part(
+    "Scene",
+    {
+        "format": Key("Format", "The format of the file: 1.", kind=int, offered=False),
+        "title": Key(
+            "Title",
+            "What lists of scenes call it; the name of the file when left out.",
+            example="A scene",
+        ),
+        "text": Key("Text", "What there is to see.", offered=False),
+        "rate": Key(
+            "Frame rate",
+            "How many frames the sensor sends.",
+            Unit.same("frames/s"),
+            limits=Within(1e-3, 1e6, "frames/s"),
+        ),
+        "seed": Key(
+            "Seed",
+            "Another number draws other noise; the same one draws the same again.",
+            limits=Within(0, 2**64, whole=True),
+        ),
+        "accuracy": Key(
+            "Accuracy",
+            "Effects that change readings by less are left out: a share of the peak curvature.",
+            least=0.0,
+            most=1.0,
+        ),
+        "reference": Key(
+            "Functions",
+            "Along x and along y: of what the true shape is made. A strip has one along y.",
+            least=1,
+        ),
+    },
+    (Scene, EffectSelection),
+)
+
+SKIN = Part(
+    "Skin",
+    {
+        "shape": Key(
+            "Shape",
+            "The outline. A strip is held at its two ends along x and alike all along y.",
+            kind=str,
+            default="rectangle",
+        ),
+        "size": Key(
+            "Size", "Lengths of the skin along x and y.", _MM, 0.0, kind=tuple[float, float]
+        ),
+        "rim_radius": Key("Radius", "Radius of the disk.", _MM, 0.0, kind=float),
+        "outline": Key(
+            "Corners",
+            "x, y of one corner after the other.",
+            _MM,
+            kind=tuple[tuple[float, float], ...],
+        ),
+        "radius": Key(
+            "Bent to radius", "The skin at rest is an arc along x.", _MM, 0.0, example=0.05
+        ),
+        "edge": Key(
+            "Edge",
+            "How the skin is held along its rim. Hinged: it turns freely there; sliding: the ends "
+            "of a bent one slide; clamped: it cannot turn; elastic: the rim gives.",
+            choices=tuple((edge, edge.capitalize()) for edge in EDGES),
+        ),
+        "rigidity": Key(
+            "Rigidity",
+            "How stiff the skin is against bending.",
+            Unit.same("N m"),
+            limits=Within(1e-12, 1e6, "N m", or_zero=True),
+        ),
+        "tension": Key(
+            "Tension",
+            "How strongly it is stretched, like a drum head.",
+            Unit.same("N/m"),
+            limits=Within(1e-9, 1e6, "N/m", or_zero=True),
+            example=10.0,
+        ),
+        "foundation": Key(
+            "Foam",
+            "Foam below: its pressure per displacement.",
+            Unit.same("N/m^3", "N/m\N{SUPERSCRIPT THREE}"),
+            limits=Within(1e-9, 1e12, "N/m^3", or_zero=True),
+            example=1e4,
+        ),
+        "fluid": Key(
+            "Fluid below",
+            "It keeps its volume: pressed in here, the skin bulges there.",
+            example=True,
+        ),
+        "poisson": Key("Poisson's ratio", "Matters where an edge gives or the skin is bent."),
+        "rim_stiffness": Key(
+            "Rim stiffness",
+            "Of the springs below an elastic rim.",
+            Unit.same("N/m^2", "N/m\N{SUPERSCRIPT TWO}"),
+            limits=Within(1e-9, 1e12, "N/m^2", or_zero=True),
+        ),
+        "axial_stiffness": Key(
+            "Axial stiffness",
+            "Of a bent skin that stretches along its axis.",
+            Unit.same("N/m"),
+            limits=Within(1e-9, 1e12, "N/m", or_zero=True),
+            example=1e4,
+        ),
+    },
+    (Plate, Scene, Patch),
+    {
+        "rectangle": PartKind("Rectangle", Patch, {"size": [0.1, 0.1]}, ("radius",)),
+        "strip": PartKind("Strip", Patch, {"size": [0.1, 0.02]}, ("radius",)),
+        "disk": PartKind("Disk", Disk, {"rim_radius": 0.05}),
+        "polygon": PartKind(
+            "Polygon",
+            Polygon,
+            {"outline": [[0.0, 0.0], [0.1, 0.0], [0.1, 0.06], [0.05, 0.1], [0.0, 0.06]]},
+        ),
+    },
+    "shape",
+)
+
+ELEMENTS = Part(
+    "Elements",
+    {
+        "grid": Key(
+            "Grid",
+            "How many elements along x and along y.",
+            least=1,
+            kind=tuple[int, int],
+            default=(10, 10),
+            example=[10, 10],
+        ),
+        "positions": Key(
+            "Places",
+            "x, y of one element after the other.",
+            _MM,
+            kind=tuple[tuple[float, float], ...],
+            example=[[0.03, 0.03], [0.07, 0.03], [0.03, 0.07], [0.07, 0.07]],
+        ),
+        "dead": Key(
+            "Dead",
+            "Numbers of the elements that never read anything, from 0.",
+            kind=tuple[int, ...],
+            default=(),
+            example=[0],
+        ),
+        "gage_length": Key(
+            "Gage length", "A gage reads the mean along so much.", _MM, 0.0, example=0.001
+        ),
+    },
+    (SensorLayout,),
+)
+
+ELECTRONICS = Part(
+    "Electronics",
+    {
+        "like": Key(
+            "Built like",
+            "The electronics that all the rest differs from.",
+            kind=str,
+            default="modern",
+            choices=_choices(modern="Modern", second="Second prototype", first="First prototype"),
+        )
+    },
+)
+
+BRIDGE = Part(
+    "Half-bridge",
+    {
+        "gage_factor": Key("Gage factor", "Change of a gage's resistance over its strain."),
+        "substrate_thickness": Key("Substrate", "Thickness between the gages.", _UM, 0.0),
+        "gage_thickness": Key("Gage thickness", "Thickness of a gage.", _UM, 0.0),
+        "excitation": Key("Excitation", "Voltage across a half-bridge.", _VOLT, 0.0),
+        "gage_resistance": Key("Gage", "Resistance of a gage that is not bent.", _OHM, 0.0),
+        "gage_mismatch": Key(
+            "Mismatch",
+            "By what share the lower gage of a pair exceeds the upper one.",
+            least=-1.0,
+            most=1.0,
+            example=0.0001,
+        ),
+        "dummy_resistance": Key("Dummy", "Lower arm of the dummy half-bridge.", _OHM, 0.0),
+        "balance_voltage": Key(
+            "Balance", "Where the middle of the dummy stands.", _VOLT, 0.0, example=2.5
+        ),
+    },
+    (HalfBridge,),
+)
+
+MULTIPLEXER = Part(
+    "Multiplexer",
+    {
+        "settling_time": Key("Settling", "Wait before each conversion.", _US, 0.0, example=1e-6),
+        "supply_resistance": Key(
+            "Supply", "Resistance between the excitation and a half-bridge.", _OHM, 0.0
+        ),
+    },
+    (Multiplexer,),
+)
+
+AMPLIFIER = Part(
+    "Amplifier",
+    {
+        "gain": Key("Gain", "Output over input of the amplifier.", least=0.0),
+        "rail": Key("Rail", "The output stays between minus and plus this.", _VOLT, 0.0),
+    },
+    (Amplifier,),
+)
+
+CONVERTER = Part(
+    "Converter",
+    {
+        "bits": Key("Resolution", "Bits of a reading.", Unit.same("bits"), 8, 24, comment=""),
+        "full_scale": Key("Full scale", "Reads between minus and plus this.", _VOLT, 0.0),
+        "offset": Key("Offset", "What it reads of no voltage.", _VOLT),
+        "conversion_time": Key("Conversion", "Time that it takes for one channel.", _US, 0.0),
+    },
+    (Converter,),
+)
+
+
+def _length(label: str, tip: str, least: float = 0.0, **more: Any) -> Key:
+    """A length of a touch, of which most are such: no comment behind it says so again."""
+    return Key(label, tip, _MM, least, kind=float, comment="", **more)
+
+
+_FORCE, _IN_THE_MIDDLE = {"force": 0.1}, {"x": 0.05, "y": 0.05}
+_HARDER = {"force": 0.2}
+_ALONG_X = {"width": _length("Width", "Along x.")}
+
+LOADS = {
+    "point": PartKind("Point load", PointLoad, _IN_THE_MIDDLE | _FORCE, ("displacement",)),
+    "line": PartKind(
+        "Line load",
+        LineLoad,
+        {"x0": 0.03, "y0": 0.05, "x1": 0.07, "y1": 0.05} | _FORCE,
+        ("displacement",),
+    ),
+    "disc": PartKind(
+        "Disc load", DiscLoad, _IN_THE_MIDDLE | {"radius": 0.005} | _FORCE, ("displacement",)
+    ),
+    "rectangle": PartKind(
+        "Rectangle load",
+        RectangleLoad,
+        _IN_THE_MIDDLE | {"width": 0.01, "height": 0.006} | _FORCE,
+        ("displacement",),
+        _ALONG_X,
+    ),
+    "gaussian": PartKind(
+        "Soft round load", GaussianLoad, _IN_THE_MIDDLE | {"sd": 0.003} | _FORCE, ("displacement",)
+    ),
+}
+OBJECTS = {
+    "sphere": PartKind("Ball", Sphere, _IN_THE_MIDDLE | {"radius": 0.02} | _HARDER, ("depth",)),
+    "cylinder": PartKind(
+        "Cylinder",
+        Cylinder,
+        _IN_THE_MIDDLE | {"radius": 0.01, "length": 0.05} | _HARDER,
+        ("depth", "turn"),
+    ),
+    "wedge": PartKind(
+        "Edge",
+        Wedge,
+        _IN_THE_MIDDLE | {"angle": 1.5707963, "length": 0.04, "width": 0.02} | _HARDER,
+        ("depth", "turn", "tip_radius"),
+    ),
+    "punch": PartKind(
+        "Flat punch", Punch, _IN_THE_MIDDLE | {"radius": 0.005} | _HARDER, ("depth",)
+    ),
+    "block": PartKind(
+        "Block",
+        Block,
+        _IN_THE_MIDDLE | {"length": 0.03, "width": 0.02} | _HARDER,
+        ("depth", "turn"),
+    ),
+    "heights": PartKind(
+        "Relief from a file",
+        HeightMap,
+        {"file": "heights.npy"}
+        | _IN_THE_MIDDLE
+        | {"length": 0.03, "width": 0.03, "relief": 0.002}
+        | _HARDER,
+        ("depth", "turn"),
+    ),
+    "mesh": PartKind(
+        "Mesh from a file",
+        Mesh,
+        {"file": "mesh.stl"} | _IN_THE_MIDDLE | _HARDER,
+        ("depth", "turn", "unit"),
+    ),
+}
+
+TOUCH = Part(
+    "Touch",
+    {
+        "what": Key(
+            "What",
+            "What presses: a load is given, of a rigid object the skin finds how it lies against "
+            "it.",
+            kind=str,
+            offered=False,
+        ),
+        "x": _length("x", "From the corner x = y = 0, along the skin.", -math.inf),
+        "y": _length("y", "From the corner x = y = 0, across the skin.", -math.inf),
+        "x0": _length("x of one end", "From the corner x = y = 0.", -math.inf),
+        "y0": _length("y of one end", "From the corner x = y = 0.", -math.inf),
+        "x1": _length("x of the other", "From the corner x = y = 0.", -math.inf),
+        "y1": _length("y of the other", "From the corner x = y = 0.", -math.inf),
+        "force": Key(
+            "Force",
+            "How hard it presses at most.",
+            _NEWTON,
+            kind=float,
+            limits=Within(-1e6, 1e6, "N"),
+        ),
+        "displacement": _length(
+            "Displacement", "As hard as moves the skin below it so far.", -math.inf, example=0.002
+        ),
+        "depth": Key(
+            *("Depth", "How deep it is pressed in, however hard that is.", _MM, 0.0),
+            kind=float,
+            example=0.002,
+        ),
+        "radius": _length("Radius", "Radius of what presses."),
+        "sd": _length("Spread", "Standard deviation of the force about its centre."),
+        "length": _length("Length", "Along x, before it is turned."),
+        "width": _length("Width", "Along y, before it is turned."),
+        "height": _length("Height", "Along y."),
+        "angle": Key("Angle", "Between the flanks of the edge.", _DEGREE, 0.0, math.pi),
+        "tip_radius": _length("Tip radius", "To which the edge is rounded.", example=0.001),
+        "turn": Key(
+            "Turned by",
+            "About the skin's normal, from x to y.",
+            _DEGREE,
+            kind=float,
+            default=0.0,
+            example=0.7853982,
+        ),
+        "relief": _length("Relief", "From its lowest to its highest place."),
+        "file": Key("File", "Its name, in the folder of the scene.", kind=str),
+        "unit": Key(
+            "Unit of length",
+            "How many metres one unit of the file is.",
+            least=0.0,
+            kind=float,
+            default=1.0,
+            example=1e-3,
+        ),
+        "orbit": Key(
+            "Motion in a circle",
+            "It goes round its place, pressing all the time.",
+            example={"radius": 0.01, "period": 4.0},
+        ),
+        "path": Key(
+            "Motion in steps",
+            "It presses, holds, slides and so on, again and again.",
+            example=[
+                {"step": "press", "seconds": 0.5},
+                {"step": "hold", "seconds": 1.0},
+                {"step": "release", "seconds": 0.5},
+            ],
+        ),
+        "recorded": Key(
+            "Recorded motion",
+            "A CSV with time, dx, dy and amount, in the folder of the scene.",
+            kind=str,
+            example="motion.csv",
+        ),
+    },
+    kinds=LOADS | OBJECTS,
+    chosen_by="what",
+)
+
+ORBIT = Part(
+    "Motion in a circle",
+    {
+        "radius": Key("Radius", "Of the circle that it goes round.", _MM, 0.0, example=0.01),
+        "period": Key("Once in", "Time of one round.", _SECOND, 0.0, example=4.0),
+    },
+    (Orbit,),
+)
+
+STEP = Part(
+    "Step",
+    {
+        "step": Key(
+            "Step",
+            "Press until the force or depth is reached; hold; release; slide or roll aside, "
+            "pressing as before; turn about the skin's normal; tap, ending lifted.",
+            kind=str,
+            offered=False,
+        ),
+        "seconds": Key("Takes", "How long the step takes.", _SECOND, 0.0),
+        "by": Key("By", "How far along x and along y.", _MM),
+        "to": Key(
+            "To share",
+            "The share of the force or depth that it presses to.",
+            Unit("", "of full"),
+            0.0,
+        ),
+        "times": Key("Times", "How many taps.", Unit("", "times"), 1, 1000),
+        "ease": Key(
+            "Ease",
+            "Smooth: it begins and ends at rest without a jerk.",
+            kind=str,
+            default=next(iter(EASES)),
+            example="linear",
+            choices=_choices(smooth="Smooth", linear="Steady"),
+        ),
+    },
+    kinds={
+        "press": PartKind("Press", PressStep, {"seconds": 0.5}, ("to",)),
+        "hold": PartKind("Hold", HoldStep, {"seconds": 1.0}),
+        "release": PartKind("Release", ReleaseStep, {"seconds": 0.5}),
+        "slide": PartKind("Slide", SlideStep, {"by": [0.01, 0.0], "seconds": 1.0}),
+        "roll": PartKind("Roll", SlideStep, {"by": [0.01, 0.0], "seconds": 1.0}),
+        "turn": PartKind(
+            "Turn",
+            TurnStep,
+            {"by": 1.5707963, "seconds": 1.0},
+            keys={"by": Key("By", "About the skin's normal, from x to y.", _DEGREE)},
+        ),
+        "tap": PartKind("Tap", TapStep, {"times": 3, "seconds": 1.0}),
+    },
+    chosen_by="step",
+)
+
+CYLINDERS = Part(
+    "Cylinders",
+    {
+        "dwell": Key(
+            "On each for",
+            "How long the skin lies on each cylinder.",
+            _SECOND,
+            kind=float,
+            default=1.0,
+            limits=Within(1e-3, 1e6, "s"),
+            comment="s on each",
+        ),
+        "radii": Key(
+            "Radii",
+            "Of the cylinders it is laid on; eight from 100 to 13 mm when left out.",
+            _MM,
+            kind=tuple[float, ...],
+            default=(),
+            example=list(RADII),
+            limits=Within(1e-4, 1e3, "m"),
+        ),
+        "hold": Key(
+            "First stay for",
+            "On the smallest cylinder, to see its creep.",
+            _SECOND,
+            kind=float,
+            default=0.0,
+            example=10.0,
+            limits=Within(0, 1e6, "s"),
+        ),
+    },
+)
+
+
+_EFFECT_KEYS: dict[str, dict[str, Key]] = {
+    "strain-limit": {"share": Key("Share", "Of what goes beyond that stays.")},
+    "hysteresis": {
+        "like": Key(
+            "Loops of",
+            "Of which prototype.",
+            kind=str,
+            choices=_choices(second="Second prototype", first="First prototype"),
+        ),
+        "thresholds": Key("Thresholds", "Of the plays.", Unit.same("1/m")),
+        "weights": Key("Weights", "Of the plays."),
+    },
+    "creep": {"share": Key("Share", "Of a reading that goes in time.")},
+    "intermittent": {
+        "on": Key("There for", "On average, at a time."),
+        "off": Key("Away for", "On average, at a time."),
+    },
+    "cross-talk": {"share": Key("Share", "That a channel keeps of the one before.")},
+}
+"""Keys that mean something else in one effect than in others."""
+
+
+def _kind_of(effect: type[Effect]) -> PartKind:
+    """The kind of table that tells an effect; it may leave out what has a default."""
+    may = (name for name, (_, default, _) in fields_of(effect).items() if default is not REQUIRED)
+    keys = _EFFECT_KEYS.get(effect.name, {})
+    return PartKind(effect.called(), effect, effect.example, tuple(may), keys)
+
+
+def _named(label: str, tip: str) -> Key:
+    """A list of effects by name."""
+    return Key(label, tip, kind=tuple[str, ...], default=(), offered=False)
+
+
+EFFECT = Part(
+    "Effects",
+    {
+        "choose": Key(
+            "Choose",
+            "Which effects are simulated: auto, all, linear or a list.",
+            kind=str | tuple[str, ...],
+            default="auto",
+            offered=False,
+        ),
+        "on": _named("On", "Effects that are simulated in any case."),
+        "off": _named("Off", "Effects that are left out in any case."),
+        "time_constant": Key("Time constant", "Time to within a third of the end.", _SECOND),
+        "elements": Key("Elements", "Their numbers, from 0."),
+        "rms": Key("RMS", "Root mean square of the noise."),
+        "share": Key("Share", "Of all frames."),
+        "rise": Key("Rise", "How much warmer the skin becomes."),
+        "offset": Key("Offset", "Curvature that a reading is off by for each kelvin."),
+        "spread": Key("Offset spread", "Of the offsets, as a share of their mean.", example=0.3),
+        "gain": Key("Gain", "Change of the gage factor for each kelvin.", example=1e-4),
+        "seed": Key("Seed", "The skin's own: another one draws another skin."),
+        "gain_sd": Key("Gain spread", "Standard deviation of the gains about 1."),
+        "offset_sd": Key("Offset spread", "Standard deviation of the offsets about 0."),
+        "amplitude": Key("Amplitude", "Of the hum."),
+        "frequency": Key("Frequency", "Of the mains."),
+        "asymmetry": Key("Asymmetry", "How many times wider loops are on positive curvature."),
+        "low": Key("From frequency", "Where the band of the noise begins."),
+        "high": Key("To frequency", "Where the band of the noise ends."),
+        "since": Key("Since", "Stuck from then on.", example=1.0),
+    },
+    kinds={effect.name: _kind_of(effect) for effect in EFFECTS.values() if effect.example},
+)
+
+PARTS = {
+    "scene": SCENE,
+    "skin": SKIN,
+    "elements": ELEMENTS,
+    "electronics": ELECTRONICS,
+    "bridge": BRIDGE,
+    "multiplexer": MULTIPLEXER,
+    "amplifier": AMPLIFIER,
+    "converter": CONVERTER,
+    "touch": TOUCH,
+    "orbit": ORBIT,
+    "step": STEP,
+    "cylinders": CYLINDERS,
+    "effects": EFFECT,
+}
+"""Every table of a scene file: the four after the electronics are parts of those, an orbit and the
+steps of a path those of a touch."""

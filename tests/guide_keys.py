@@ -1,0 +1,134 @@
+"""The guide's tables of what a scene file may say, from the schema of its keys.
+
+Run `python tests/guide_keys.py` when a key came, went or changed.
+"""
+
+from pathlib import Path
+from types import UnionType
+from typing import Any, get_args, get_origin
+
+from kappaskin.scenes import PARTS, Key
+
+PAGE = Path(__file__).parents[1] / "resources" / "kappaskin_resources" / "guide" / "scenes.md"
+HEADING = "## Every key"
+_OPENING = """
+Lengths are in metres in a file, whatever unit the window shows. A key without a usual value must
+be said, or another one in its stead: a force or a displacement, a force or a depth.
+"""
+_PLACES = {
+    "scene": "At the top",
+    "skin": "`[skin]`",
+    "elements": "`[elements]`",
+    "electronics": "`[electronics]`",
+    "bridge": "`[electronics.bridge]`",
+    "multiplexer": "`[electronics.multiplexer]`",
+    "amplifier": "`[electronics.amplifier]`",
+    "converter": "`[electronics.converter]`",
+    "touch": "`[[touch]]`, by `what`",
+    "orbit": "`orbit` of a touch",
+    "step": "Each of the `path` of a touch, by `step`",
+    "cylinders": "`[cylinders]`",
+    "effects": "`[effects]`",
+}
+_WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+
+
+def told() -> str:
+    """The last section of the page."""
+    tables = [f"{HEADING}\n{_OPENING}"]
+    for part, place in _PLACES.items():
+        tables.append(f"### {place}\n\n{_table(part)}")
+        if part == "effects":
+            tables.append(f"### `[effects.NAME]`, by its name\n\n{_table(part, of_kinds=True)}")
+    return "\n".join(tables)
+
+
+def _table(name: str, of_kinds: bool = False) -> str:
+    """The keys of a part: those that it has of no kind, or of all kinds, too."""
+    part = PARTS[name]
+    rows: dict[tuple[str, ...], list[str]] = {}
+    of_some = {key for kind in part.kinds for key in _known(name, kind)}
+    for key, declared in part.keys.items():
+        if not of_kinds and (key not in of_some or not declared.offered):
+            rows[_row(key, part.key(key))] = []
+    if of_kinds or name != "effects":
+        for kind in part.kinds:
+            for key in _known(name, kind):
+                rows.setdefault(_row(key, part.key(key, kind)), []).append(kind)
+    there = any(rows.values())
+    head = ("key", *(("of",) if there else ()), "value", "unit", "usual", "what it is")
+    lines = [_line(head), "|---" * len(head) + "|"]
+    for row, kinds in rows.items():
+        of = (_of(kinds, list(part.kinds)),) if there else ()
+        lines.append(_line((row[0], *of, *row[1:])))
+    return "\n".join(lines) + "\n"
+
+
+def _known(name: str, kind: str) -> list[str]:
+    """The keys that a kind of a part has of its own, or shares with some others."""
+    of = PARTS[name].kinds[kind]
+    return list(dict.fromkeys([*of.needs, *of.may, *of.keys]))
+
+
+def _of(kinds: list[str], every: list[str]) -> str:
+    """Which kinds have a key: all, all but a few, or some."""
+    others = [kind for kind in every if kind not in kinds]
+    if not kinds or not others:
+        return "all"
+    if len(others) < 3 < len(kinds):
+        return "all but " + ", ".join(f"`{kind}`" for kind in others)
+    return ", ".join(f"`{kind}`" for kind in kinds)
+
+
+def _row(name: str, key: Key) -> tuple[str, ...]:
+    return f"`{name}`", _value(key), key.unit.name, _usual(key.default), f"{key.label}. {key.tip}"
+
+
+def _value(key: Key) -> str:
+    """Of what kind a value is, among which or within what range."""
+    if key.choices:
+        return ", ".join(f"`{name}`" for name, _ in key.choices)
+    if key.kind is None:
+        return "steps" if isinstance(key.example, list) else "table"
+    low, high = (f"{bound:.6g}" for bound in key.bounds)
+    least = "" if low == "-inf" else f", at least {low}"
+    within = least if high == "inf" else f", {low} to {high}"
+    if key.limits is not None and key.limits.or_zero:
+        within = f", 0 or {key.limits.least:.6g} to {high}"
+    return _kind(key.kind) + within
+
+
+def _kind(kind: Any) -> str:
+    if isinstance(kind, UnionType):
+        return " or ".join(_kind(one) for one in get_args(kind) if one is not type(None))
+    if get_origin(kind) is not tuple:
+        return _WORDS[kind]
+    first, *others = get_args(kind)
+    if others != [...]:
+        return f"pair of {_kind(first)}s"
+    return "list of pairs" if get_origin(first) is tuple else f"list of {_kind(first)}s"
+
+
+def _usual(default: Any) -> str:
+    match default:
+        case None | () | "":
+            return "none"
+        case tuple():
+            return f"`{list(default)}`"
+        case bool():
+            return f"`{str(default).lower()}`"
+        case float() | int():
+            return f"{default:.6g}"
+        case str():
+            return f"`{default}`"
+        case _:
+            return ""
+
+
+def _line(cells: tuple[str, ...]) -> str:
+    return f"| {' | '.join(cells)} |".replace("  ", " ")
+
+
+if __name__ == "__main__":
+    page = PAGE.read_text(encoding="utf-8").partition(HEADING)[0].rstrip()
+    PAGE.write_text(f"{page}\n\n{told()}", encoding="utf-8", newline="\n")
