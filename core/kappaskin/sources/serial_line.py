@@ -16,6 +16,7 @@ from kappaskin.sources.interpreter import Interpreter
 from kappaskin.sources.line import Line
 from kappaskin.sources.ports import holders, port_called, serial_ports
 from kappaskin.sources.scanning import Scanning
+from kappaskin.sources.source import register_scheme
 from kappaskin.sources.tape import Tape
 from kappaskin.sources.taping import Taping
 from kappaskin.sources.telling import Telling
@@ -318,3 +319,6 @@ class SerialSource:
     def close(self) -> None:
         if self._line is not None:
             self._line.close()
+
+
+register_scheme("", SerialSource)

@@ -11,12 +11,13 @@ from kappaskin.contact import ForceTorqueSensor, Wrench
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
-from kappaskin.scenes import FROM_THE_BEGINNING, Playing, Scene, Simulator
+from kappaskin.scenes import FROM_THE_BEGINNING, Playing, Scene, Simulator, load_scene
 from kappaskin.sensing import Scan, Sensor
 from kappaskin.sources.accounting import Accounting
 from kappaskin.sources.clock import Known
 from kappaskin.sources.information import from_json, to_json
 from kappaskin.sources.scanning import in_few_runs
+from kappaskin.sources.source import SIMULATION, register_scheme
 from kappaskin.sources.tape import Tape
 from kappaskin.sources.wire import MOST_RUNS, encode_scan, pack_runs
 
@@ -188,3 +189,6 @@ class SimulatedSource:
 
     def close(self) -> None:
         """Nothing is held open."""
+
+
+register_scheme(SIMULATION, lambda name: SimulatedSource(load_scene(name)))

@@ -5,11 +5,8 @@ from typing import Protocol
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
-from kappaskin.scenes import load_scene
 from kappaskin.sensing import Sensor
 from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.serial_line import SerialSource as SerialSource
-from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
 from kappaskin.sources.tape import Tape
 
 SIMULATION = "sim:"
@@ -52,13 +49,14 @@ class Source(Protocol):
     def close(self) -> None: ...
 
 
-_schemes: dict[str, Callable[[str], Source]] = {
-    SIMULATION: lambda name: SimulatedSource(load_scene(name)),
-}
+_schemes: dict[str, Callable[[str], Source]] = {}
 
 
 def register_scheme(scheme: str, opened: Callable[[str], Source]) -> None:
-    """Open names that begin with `scheme`, such as `replay:`, by `opened` with what follows it."""
+    """Open names that begin with `scheme`, such as `replay:`, by `opened` with what follows it.
+
+    The empty scheme opens every other name.
+    """
     _schemes[scheme] = opened
 
 
@@ -67,11 +65,9 @@ def open_source(name: str) -> Source:
 
     `replay:` is registered by the room `recording`, as soon as that is imported.
     """
-    for scheme, opened in _schemes.items():
-        if name.startswith(scheme):
-            return opened(name.removeprefix(scheme))
     if not name.strip():
         raise SourceError(
             "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"
         )
-    return SerialSource(name)
+    scheme = max((scheme for scheme in _schemes if name.startswith(scheme)), key=len)
+    return _schemes[scheme](name.removeprefix(scheme))
