@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QGuiApplication
 
-from kappaskin.calibration import data_folder
+from kappaskin.calibration import tare_folder
 from kappaskin.errors import Refusal
 from kappaskin.studies import FIGURES
 from kappaskin_app.actions import Actions
@@ -136,7 +136,7 @@ class Menus(QObject):
 
     def _copy_python(self) -> None:
         """Put a script on the clipboard, and what it reads into a folder."""
-        window, folder = self._window, data_folder().parent / "scripts"
+        window, folder = self._window, tare_folder().parent / "scripts"
         try:
             script = script_of(window.session, window.history.settings, folder)
             for name, content in script.files.items():

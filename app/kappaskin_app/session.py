@@ -16,7 +16,7 @@ from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.scenes import Presentation, Scene, Step
 from kappaskin.sensing import Sensor
-from kappaskin.sources import LISTS
+from kappaskin.sources import SCAN_LISTS_PER_SECOND
 from kappaskin_app.ahead import Ahead
 from kappaskin_app.guard import guarded
 from kappaskin_app.history import History
@@ -64,7 +64,7 @@ def _turn(region: Region) -> float:
     """
     if region.around not in ("elements", "skin") or not region.share:
         return 0.0
-    return _LATE / (LISTS * region.share)
+    return _LATE / (SCAN_LISTS_PER_SECOND * region.share)
 
 
 class Session(QObject):

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin.calibration import Tares, data_folder
+from kappaskin.calibration import TareStore, tare_folder
 from kappaskin.live import Engine
 from kappaskin_app.adopting import settings_left
 from kappaskin_app.beginning import Beginning
@@ -94,7 +94,7 @@ class MainWindow(QMainWindow):
         self.session = Session(self.history, engine or Engine(), self)
         self.wishes = Wishes(self.history, self.session)
         self.calibrating = Calibrating(self.history, self)
-        self.taring = Taring(self.history, self.session.engine, Tares(data_folder()), self)
+        self.taring = Taring(self.history, self.session.engine, TareStore(tare_folder()), self)
         self.seeing = Seeing(self.history, self)
         self.costing = Costing(self.history, self.session, self.wishes, self)
         self.panels, self.display = Panels(), Display(self.session)

@@ -8,21 +8,21 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
 
-Memory = dict[str, NDArray[np.float64]]
+State = dict[str, NDArray[np.float64]]
 
 
-class Remembering:
+class Stateful:
     """Something whose past is in its attributes `REMEMBERED`: arrays, numbers, or such things."""
 
     __slots__ = ()
     REMEMBERED: ClassVar[tuple[str, ...]] = ()
 
-    def remembered(self, before: str = "") -> Memory:
+    def remembered(self, before: str = "") -> State:
         """All that it remembers; what it has none of yet is left out."""
-        found: Memory = {}
+        found: State = {}
         for name in self.REMEMBERED:
             value = getattr(self, name)
-            if isinstance(value, Remembering):
+            if isinstance(value, Stateful):
                 found |= value.remembered(f"{before}{name}.")
             elif value is not None:
                 found[before + name] = np.array(value, float)
@@ -32,7 +32,7 @@ class Remembering:
         """Go on from what another of the same kind and sizes `remembered`."""
         for name in self.REMEMBERED:
             value = getattr(self, name)
-            if isinstance(value, Remembering):
+            if isinstance(value, Stateful):
                 value.recall(memory, f"{before}{name}.")
             elif value is not None:
                 setattr(self, name, _like(before + name, value, memory))

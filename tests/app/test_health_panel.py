@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from kappaskin import WHY, Finding, Health, Patch, Phase, SensorLayout, Status, load_scene
+from kappaskin import WHY, Finding, Health, Patch, SensorLayout, Status, load_scene
+from kappaskin.calibration import PressPhase
 from kappaskin_app.map_testing import MapTesting
 from kappaskin_app.panels.health import HealthPanel
 from kappaskin_app.shades import SHADES
@@ -118,7 +119,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert window.testing.running
     assert not window.session.running  # the load rests, until it is dragged
     until(lambda: window.membrane.asked.actor.visibility)
-    until(lambda: window.testing.test.phase is Phase.PRESS)
+    until(lambda: window.testing.test.phase is PressPhase.PRESS)
     assert "Press it now" in page.words.text()
     asked = window.testing.test.asked
     x, y = window.session.scene.layout.positions[asked]

@@ -19,7 +19,7 @@ from kappaskin.sources import PseudoDevice
 fcntl, pty, tty = map(pytest.importorskip, ("fcntl", "pty", "tty"))
 
 SCENE = replace(load_scene("centre"), rate=100.0)
-TEXT = information.to_json(SCENE.sensor())
+TEXT = information.sensor_to_json(SCENE.sensor())
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +29,7 @@ def soon(monkeypatch):
 
 @pytest.fixture
 def hasty(monkeypatch):
-    monkeypatch.setattr("kappaskin.sources.serial_line._PATIENCE", 0.9)
+    monkeypatch.setattr("kappaskin.sources.serial_source._PATIENCE", 0.9)
     monkeypatch.setattr("kappaskin.sources.diagnosis._SEARCH", 1.2)
 
 

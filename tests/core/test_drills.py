@@ -219,9 +219,9 @@ def test_a_clock_that_is_ahead_is_so_in_pings_too() -> None:
 
 
 def test_another_number_is_said_in_information_only() -> None:
-    text = information.to_json(load_scene("centre").sensor())
+    text = information.sensor_to_json(load_scene("centre").sensor())
     [said] = Says("serial_number", "other")(Information(0, 0.0, text))
-    assert information.from_json(said.text).serial_number == "other"
+    assert information.sensor_from_json(said.text).serial_number == "other"
     scan = Samples(1, 0.0, np.arange(3), np.zeros(3, np.int32))
     assert Says("serial_number", "other")(scan) == untold(scan) == [scan]
     assert untold(said) == []

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from kappaskin import load_scene
-from kappaskin.sources import Information, Interpreter, Reply, Samples, to_json
+from kappaskin.sources import Information, Interpreter, Reply, Samples, sensor_to_json
 from kappaskin.sources.clock import ClockMap
 
 SENSOR = load_scene("centre").sensor()
-TEXT = to_json(SENSOR)
+TEXT = sensor_to_json(SENSOR)
 
 
 def samples(*channels: int) -> Samples:
@@ -47,7 +47,7 @@ def test_a_sensor_is_made_once_of_a_text_that_several_lines_share() -> None:
 def test_of_many_devices_only_the_last_few_are_remembered() -> None:
     made = {}
     for number in range(20):
-        text = to_json(replace(SENSOR, name=f"hand {number}"))
+        text = sensor_to_json(replace(SENSOR, name=f"hand {number}"))
         assert Interpreter("loop://", made).learn(text)
         assert text in made
         assert len(made) <= 8
@@ -95,7 +95,7 @@ def test_a_device_that_sends_what_it_says_it_has_not_gives_no_frame_any_more() -
 
 @pytest.mark.parametrize("wired", [None, np.roll(np.arange(SENSOR.channels), 5)])
 def test_a_frame_has_the_numbers_that_its_channels_are_wired_to(wired) -> None:
-    means = taught(to_json(replace(SENSOR, channel_map=wired)))
+    means = taught(sensor_to_json(replace(SENSOR, channel_map=wired)))
 
     frame = means.frame(samples(0, 5, 9), 9.0)
 

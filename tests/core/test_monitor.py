@@ -11,7 +11,7 @@ from kappaskin import SourceError, load_scene
 from kappaskin.cli import main
 from kappaskin.sources import (
     Command,
-    Monitor,
+    WireMonitor,
     encode_information,
     encode_reply,
     encode_samples,
@@ -22,7 +22,7 @@ from kappaskin.sources.wire import Fault
 tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
 
 SENSOR = load_scene("centre").sensor()
-INFORMATION = encode_information(0, 0.5, information.to_json(SENSOR))
+INFORMATION = encode_information(0, 0.5, information.sensor_to_json(SENSOR))
 
 
 def scan(sequence: int) -> bytes:
@@ -38,7 +38,7 @@ class Device:
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self.port = os.ttyname(slave)
-        self.monitor = Monitor(self.port, lambda: self._now)
+        self.monitor = WireMonitor(self.port, lambda: self._now)
         os.close(slave)
 
     def says(self, data: bytes) -> str:
@@ -155,7 +155,7 @@ def test_a_line_that_is_gone_is_said_and_cut_messages_counted(device) -> None:
 
 def test_a_port_that_cannot_be_opened_says_why() -> None:
     with pytest.raises(SourceError, match="no such port"):
-        Monitor("/dev/there-is-none")
+        WireMonitor("/dev/there-is-none")
     assert main(["monitor", "/dev/there-is-none"]) == 2
 
 

@@ -193,7 +193,7 @@ def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost
 
 
 def test_at_its_end_it_sends_what_is_in_the_outbox_to_who_takes_it(monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.sources.device._PATIENCE", 30.0)
+    monkeypatch.setattr("kappaskin.sources.pseudo_device._PATIENCE", 30.0)
     clock = Clock()
     device = PseudoDevice(SCENE, clock)
     listener = Listener(device.port)
@@ -215,7 +215,7 @@ def test_at_its_end_it_sends_what_is_in_the_outbox_to_who_takes_it(monkeypatch) 
 
 
 def test_a_listener_that_is_late_has_all_of_it_before_the_port_is_closed(monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.sources.device._PATIENCE", 30.0)
+    monkeypatch.setattr("kappaskin.sources.pseudo_device._PATIENCE", 30.0)
     device = PseudoDevice(replace(SCENE, rate=20.0))
     listener = Listener(device.port)
     stop = threading.Event()

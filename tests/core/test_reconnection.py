@@ -30,7 +30,7 @@ from kappaskin.sources import (
     encode_samples,
     information,
     ports,
-    serial_line,
+    serial_source,
 )
 from kappaskin.sources.decoder import FROM_HOST
 
@@ -41,7 +41,7 @@ termios, tty = map(pytest.importorskip, ("termios", "tty"))
 SPEEDS = {getattr(termios, f"B{rate}", None): rate for rate in BAUD_RATES}
 
 SENSOR = load_scene("centre").sensor()
-TEXT = information.to_json(SENSOR)
+TEXT = information.sensor_to_json(SENSOR)
 CHANNELS = np.arange(12)
 PERIOD = 0.002  # s from one scan to the next
 
@@ -99,7 +99,7 @@ class Device:
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch):
-    monkeypatch.setattr(serial_line, "_RETRY", 0.02)
+    monkeypatch.setattr(serial_source, "_RETRY", 0.02)
 
 
 @pytest.fixture
@@ -373,7 +373,7 @@ def test_half_a_message_at_the_end_of_the_line_is_cut_off_and_no_part_of_the_nex
 
 def test_a_plug_is_found_by_its_serial_number_under_another_name(plug, opened, monkeypatch):
     here = []
-    for module in (ports, serial_line):
+    for module in (ports, serial_source):
         monkeypatch.setattr(module, "serial_ports", lambda: list(here))
     device = plug()
     here.append(Port(str(device.link), "Fingertip", "Kappa", "A-7", (1, 2)))
@@ -449,8 +449,8 @@ def test_the_baud_rate_is_searched_while_bytes_mean_nothing(plug, opened, rate):
 
 
 def test_what_is_no_device_is_said_once_every_rate_was_tried(plug, opened, monkeypatch):
-    monkeypatch.setattr(serial_line, "_DWELL", 0.02)
-    monkeypatch.setattr(serial_line, "_PATIENCE", 0.1)
+    monkeypatch.setattr(serial_source, "_DWELL", 0.02)
+    monkeypatch.setattr(serial_source, "_PATIENCE", 0.1)
     device, tried = plug(), set()
     reader = Reader(opened(device))
 
@@ -524,7 +524,7 @@ def test_a_refusal_by_the_device_is_told_in_its_words(streaming):
 def test_a_port_taken_meanwhile_is_waited_for(streaming, plug, monkeypatch):
     device, reader = streaming
     pull(device, reader)
-    real, refused = serial_line.Line, []
+    real, refused = serial_source.SerialConnection, []
 
     def busy(url, clock):
         if len(refused) < 3:
@@ -532,7 +532,7 @@ def test_a_port_taken_meanwhile_is_waited_for(streaming, plug, monkeypatch):
             raise SourceError(f"{url}: busy, a program has it open; close that program")
         return real(url, clock)
 
-    monkeypatch.setattr(serial_line, "Line", busy)
+    monkeypatch.setattr(serial_source, "SerialConnection", busy)
     back = plug()
     reader.until(lambda: "close that program; it is tried again" in reader.source.trouble)
     reader.until(back.heard)

@@ -10,7 +10,7 @@ import pytest
 from kappaskin import Event, Frame, Refusal, SensorLayout, load_scene
 from kappaskin.recording import Recorder, Recording, ReplayedSource
 from kappaskin.recording import messages as m
-from kappaskin.sources import SimulatedSource, encode_information, encode_samples, to_json
+from kappaskin.sources import SimulatedSource, encode_information, encode_samples, sensor_to_json
 
 RATE, FRAMES, GAP = 500.0, 1000, 1.25
 FIRST, LAST = 0, FRAMES - 1
@@ -269,10 +269,10 @@ def test_a_device_that_gives_way_to_another_does_so_again(tmp_path, clock) -> No
     one_ = load_scene("centre").sensor()
     other = replace(one_, layout=SensorLayout.regular(one_.layout.patch, 4, 4))
     line = Line(path)
-    line.says(encode_information(0, 0.0, to_json(one_)))
+    line.says(encode_information(0, 0.0, sensor_to_json(one_)))
     line.scans(one_, 1, 20)
     line.says(b"nothing that means anything")
-    line.says(encode_information(21, 0.021, to_json(other)))
+    line.says(encode_information(21, 0.021, sensor_to_json(other)))
     line.scans(other, 22, 20)
     line.ends()
     line.says(encode_information(0, 0.0, json.dumps({"name": "of no use"})))

@@ -21,7 +21,7 @@ from kappaskin.sources import (
     Source,
     encode_information,
     encode_samples,
-    to_json,
+    sensor_to_json,
 )
 
 SCENE = replace(load_scene("circle"), rate=100.0)
@@ -71,7 +71,7 @@ def on_a_line(request: pytest.FixtureRequest) -> Iterator[SerialSource]:
     tty.setraw(slave)
     source = SerialSource(os.ttyname(slave))
     os.close(slave)
-    os.write(master, encode_information(0, 0.0, to_json(SENSOR)))
+    os.write(master, encode_information(0, 0.0, sensor_to_json(SENSOR)))
     for n in range(1, FRAMES + 1):
         counts = np.full(SENSOR.channels, n, np.int32)
         os.write(master, encode_samples(n, n / 100, np.arange(SENSOR.channels), counts, 2))
@@ -142,7 +142,7 @@ def test_a_tape_gets_what_the_same_frames_are_made_of(source) -> None:
     scans = {message.sequence: message for message in came if isinstance(message, Samples)}
     met = [told[0] for name, told in tape.told if name == "met"]
     met += [message.text for message in came if isinstance(message, Information)]
-    assert to_json(SENSOR) in met
+    assert sensor_to_json(SENSOR) in met
     for frame in frames:
         np.testing.assert_array_equal(scans[frame.sequence].counts, frame.counts)
     assert "mapped" in [name for name, _ in tape.told]

@@ -38,7 +38,7 @@ class Served(PseudoDevice):
 
     def become(self, scene):
         """Say that it is the sensor of another scene."""
-        self._information = information.to_json(scene.sensor())
+        self._information = information.sensor_to_json(scene.sensor())
         self._introduce()
 
     def unplug(self):

@@ -16,7 +16,7 @@ from kappaskin.sources import (
     Command,
     Decoder,
     Information,
-    Kind,
+    MessageKind,
     Operation,
     Reply,
     Samples,
@@ -24,8 +24,7 @@ from kappaskin.sources import (
     encode_reply,
     encode_samples,
 )
-from kappaskin.sources.accounting import Sequence
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, SequenceCounter
 from kappaskin.sources.wire import LONGEST, Fault, Message, encode, encode_command
 
 SEQUENCES = st.integers(0, 2**32 - 1)
@@ -130,7 +129,7 @@ def test_more_runs_of_channels_than_a_byte_counts_are_refused() -> None:
 
 def test_a_payload_that_is_too_long_is_refused() -> None:
     with pytest.raises(Refusal, match="at most 262144 bytes, got 262145"):
-        encode(Kind.INFORMATION, 0, 0.0, bytes(LONGEST + 1))
+        encode(MessageKind.INFORMATION, 0, 0.0, bytes(LONGEST + 1))
 
 
 @given(SEQUENCES, st.sampled_from(Operation), st.binary(max_size=40))
@@ -401,8 +400,8 @@ def test_the_share_that_was_thrown_away_is_told_in_two_digits(thrown: int, share
 # Sequence numbers
 
 
-def taken(numbers: list[int]) -> tuple[Sequence, list[bool]]:
-    sequence, answers = Sequence(), []
+def taken(numbers: list[int]) -> tuple[SequenceCounter, list[bool]]:
+    sequence, answers = SequenceCounter(), []
     for number in numbers:
         answers.append(sequence.take(number % 2**32))
         assert sequence.good == sequence.accepted + sequence.duplicate

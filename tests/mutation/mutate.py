@@ -46,7 +46,7 @@ _ARGUMENTS = ["-x", "-q", "--assert=plain", "--rootdir", str(ROOT)]
 ROOMS = {
     "touch": ("touch/*", "touch products contact_object evidence footing placing skins tare"),
     "wire": (
-        "sources/wire sources/decoder sources/accounting sources/interpreter",
+        "sources/wire sources/decoder sources/interpreter",
         "wire wire_vectors diagnosis interpreter",
     ),
     "fit": ("fit/*", "estimators least_squares fast bayes prior robust tracking finite_slope"),

@@ -1,16 +1,75 @@
-"""Which element answered to which press, to the map of the channels, in words and as a list."""
+"""Channel map: which element answers to which press, and what is wrong with the map."""
 
 from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from kappaskin.bases import basis_for
-from kappaskin.calibration.press_judge import ELSEWHERE, OK, Pressed
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.mechanics import PointLoad
 from kappaskin.sensing import Sensor, SensorLayout
+
+OK, ELSEWHERE, NOTHING, UNCLEAR, SKIPPED = "ok", "elsewhere", "nothing", "unclear", "skipped"
+
+_BESIDE = 1.6  # distances of elements: no further apart are those beside each other
+_AS_GOOD = 0.75  # of the strongest answer: one beside it that answers so much was pressed too
+_ALSO = 0.8  # of the same: one elsewhere that answers so much leaves it unclear
+
+
+@dataclass(frozen=True, eq=False)
+class PressResult:
+    """What came of pressing the element `asked` for: one of `OK`, `ELSEWHERE` and so on.
+
+    `element` answered most, None where none did. `answer` (3, P) in 1/m is what all changed by.
+    """
+
+    asked: int
+    verdict: str
+    element: int | None
+    answer: Array
+    why: str = ""
+
+    def __str__(self) -> str:
+        if self.verdict == ELSEWHERE:
+            return f"element {self.element} answers in the place of element {self.asked}"
+        words = {
+            OK: "answers",
+            NOTHING: "does not answer, nor does any other",
+            SKIPPED: "was not pressed",
+        }
+        return f"element {self.asked} {words.get(self.verdict, f'is not clear: {self.why}')}"
+
+
+def judge_press(layout: SensorLayout, asked: int, answer: Array) -> PressResult:
+    """Which element was pressed by the change `answer` (3, P) of all, and if it was `asked`.
+
+    Where a skin is pressed it bends most, whichever of its components is read as which: no fit is
+    asked, and none of what the map says of other elements.
+    """
+    # Where it bulges it was let go: under a finger that moved on from elsewhere.
+    strength = np.linalg.norm(np.where(layout.live, np.minimum(answer, 0.0), 0.0), axis=0)
+    peak = int(strength.argmax())
+    apart = np.linalg.norm(layout.positions - layout.positions[peak], axis=1)
+    near = apart <= _BESIDE * _pitch(layout)
+    also = np.where(near, 0.0, strength)
+    if also.max() > _ALSO * strength[peak]:
+        why = f"elements {peak} and {int(also.argmax())} answer alike"
+        return PressResult(asked, UNCLEAR, peak, answer, why)
+    if near[asked] and strength[asked] >= _AS_GOOD * strength[peak]:
+        peak = asked
+    return PressResult(asked, OK if peak == asked else ELSEWHERE, peak, answer)
+
+
+def _pitch(layout: SensorLayout) -> float:
+    """The median distance in m of an element to the nearest other one."""
+    if len(layout) < 2:
+        return 1.0
+    apart, _ = scipy.spatial.KDTree(layout.positions).query(layout.positions, 2)
+    return float(np.median(np.asarray(apart)[:, 1]))
+
 
 Indices = NDArray[np.intp]
 
@@ -21,7 +80,7 @@ _NAMED = 6  # of them one by one
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class MapVerdict:
     """Whether the map was `confirmed`, and what was found, in `words`.
 
     `order` (3 P,) is the map that was found: `readings[order]` are those of the channels in their
@@ -36,7 +95,7 @@ class Verdict:
         return "; ".join(self.words)
 
 
-def verdict_of(sensor: Sensor, done: tuple[Pressed, ...]) -> Verdict:
+def map_verdict(sensor: Sensor, done: tuple[PressResult, ...]) -> MapVerdict:
     """What pressing some elements tells of the channel map."""
     layout = sensor.layout
     told = [pressed for pressed in done if pressed.verdict in (OK, ELSEWHERE)]
@@ -44,20 +103,20 @@ def verdict_of(sensor: Sensor, done: tuple[Pressed, ...]) -> Verdict:
     found = {p.asked: p.element for p in told if p.element is not None}
     elements, words = _elements(layout, found)
     if elements is None:
-        return Verdict(False, (*words, *_some(open_)), None)
+        return MapVerdict(False, (*words, *_some(open_)), None)
     orders, more = _components(sensor, told, elements)
     words = [*words, *more]
     order = np.concatenate([orders[c] * len(layout) + elements for c in range(3)])
     if not words and told and not open_:
-        return Verdict(True, (f"the map is right: {_counted(told)} where pressed",), order)
+        return MapVerdict(True, (f"the map is right: {_counted(told)} where pressed",), order)
     if not told:
         words = ["nothing is told of the map"]
     elif not words:
         words = [f"nothing wrong was found: {_counted(told)} where pressed"]
-    return Verdict(False, (*words, *_some(open_)), order if told else None)
+    return MapVerdict(False, (*words, *_some(open_)), order if told else None)
 
 
-def _counted(told: list[Pressed]) -> str:
+def _counted(told: list[PressResult]) -> str:
     return "1 element answers" if len(told) == 1 else f"{len(told)} elements answer"
 
 
@@ -144,7 +203,7 @@ def _line_words(what: str, to: Indices) -> list[str]:
 
 
 def _components(
-    sensor: Sensor, told: list[Pressed], elements: Indices
+    sensor: Sensor, told: list[PressResult], elements: Indices
 ) -> tuple[NDArray[np.intp], list[str]]:
     """Which component reads xx, yy and xy of each element (3, P), and what is wrong in words."""
     P = len(sensor.layout)

@@ -1,4 +1,4 @@
-"""A sweep to a calibration and what it is worth: lines, loops, creep, and who passed."""
+"""Calibration report: a sweep to a calibration, how good it is, and which channels failed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -8,17 +8,102 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kappaskin.calibration.calibration import Calibration, fingerprint
-from kappaskin.calibration.holds import identify_creep
-from kappaskin.calibration.judge import DEAD, Limits, failures_of
-from kappaskin.calibration.lines import Lines, lines
-from kappaskin.calibration.loops import identify, thresholds
-from kappaskin.calibration.procedure import Sweep
+from kappaskin.calibration.identification import (
+    LineFits,
+    fit_lines,
+    identify_creep,
+    identify_hysteresis,
+    play_thresholds,
+)
+from kappaskin.calibration.sweep import Sweep
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Mask
 from kappaskin.scenes import FACES, FEWEST_RADII, Running, Step, check_strain, pairs
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, StandardLinearSolid
 
-_Part = TypeVar("_Part", Lines, PrandtlIshlinskii)
+DEAD = "dead, as the device itself says"
+
+
+@dataclass(frozen=True)
+class ChannelLimits:
+    """What a channel must keep within to pass.
+
+    The gain relative to nominal; the offset, the error of a reading left out of the fit and the
+    noise of one frame as shares of the largest curvature applied; and how much of a small change
+    must show at once, the rest being hidden in the loops.
+    """
+
+    least_gain: float = 0.5
+    most_gain: float = 2.0
+    offset: float = 0.5
+    error: float = 0.05
+    noise: float = 0.1
+    linear: float = 0.25
+
+    def reason(
+        self, most: float, gain: float, offset: float, error: float, noise: float, linear: float
+    ) -> str | None:
+        """Why a channel fails that was bent up to `most` in 1/m; None when it passes."""
+        offset_limit, error_limit, noise_limit = (
+            share * most for share in (self.offset, self.error, self.noise)
+        )
+        # Not >, or NaN would pass.
+        judged = (
+            (
+                self.least_gain <= gain <= self.most_gain,
+                f"gain {gain:.3g}, expected {self.least_gain:g} to {self.most_gain:g}; is the gage "
+                "broken, wired in reverse, or were the faces swapped?",
+            ),
+            (
+                abs(offset) <= offset_limit,
+                f"offset {offset:.3g} 1/m, expected at most {offset_limit:.3g}; balance the bridge",
+            ),
+            (
+                error <= error_limit,
+                f"error {error:.3g} 1/m, expected at most {error_limit:.3g}; is the gage bonded, "
+                "and did the skin follow the cylinders?",
+            ),
+            (
+                noise <= noise_limit,
+                f"noise {noise:.3g} 1/m, expected at most {noise_limit:.3g}; look for a loose wire",
+            ),
+            (
+                linear >= self.linear,
+                f"shows {100 * linear:.0f} % of a small change, expected at least "
+                f"{100 * self.linear:.0f} %; the rest hides in its loops",
+            ),
+        )
+        return next((why for fine, why in judged if not fine), None)
+
+
+def failures_of(
+    sweep: Sweep,
+    sensor: Sensor,
+    limits: ChannelLimits,
+    fitted: LineFits,
+    noise: Array,
+    linear: Array,
+) -> dict[int, str]:
+    """Why each channel failed that did; `noise` in 1/m and `linear` are (C,)."""
+    most = np.repeat(np.abs(sweep.curvature).max(axis=0), sensor.channels // 3)
+    dead = ~sensor.layout.live.ravel()
+    found: dict[int, str] = {}
+    for c in range(sensor.channels):
+        missing = np.flatnonzero(np.isnan(sweep.readings[:, c]))
+        numbers = (most, fitted.gain, fitted.offset, fitted.left_out, noise, linear)
+        if dead[c]:
+            found[c] = DEAD
+        elif len(missing):
+            found[c] = (
+                f"on a rail or not read on {len(missing)} of {len(sweep.steps)} steps, first on "
+                f"step {missing[0] + 1}; lower the amplifier's gain"
+            )
+        elif why := limits.reason(*(float(values[c]) for values in numbers)):
+            found[c] = why
+    return found
+
+
+_Part = TypeVar("_Part", LineFits, PrandtlIshlinskii)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +117,8 @@ class CalibrationReport:
     """
 
     calibration: Calibration
-    line: Lines
-    fitted: Lines
+    line: LineFits
+    fitted: LineFits
     gaps: Array
     gaps_left: Array
     noise: Array
@@ -166,17 +251,19 @@ def _telling(x: Array, flat: Mask) -> Mask:
 
 def _by_component(
     sweep: Sweep, readings: Array, least: float
-) -> tuple[Lines, Lines, PrandtlIshlinskii]:
+) -> tuple[LineFits, LineFits, PrandtlIshlinskii]:
     """Lines, fits and loops of all channels, fitted component by component."""
     flat = np.array([step.flat for step in sweep.steps])
     radii = len({step.radius for step in sweep.steps if not step.flat})
-    parts: list[tuple[Lines, Lines, PrandtlIshlinskii]] = []
+    parts: list[tuple[LineFits, LineFits, PrandtlIshlinskii]] = []
     for x, y in zip(sweep.curvature.T, np.split(readings, 3, axis=1), strict=True):
         used = _telling(x, flat)
-        line = lines(x[used], y[used])
-        parts.append((line, *identify(x, y, used, thresholds(x, radii), line, least)))
+        line = fit_lines(x[used], y[used])
+        parts.append(
+            (line, *identify_hysteresis(x, y, used, play_thresholds(x, radii), line, least))
+        )
     of_lines, fitted, loops = zip(*parts, strict=True)
-    return _joined(Lines, of_lines), _joined(Lines, fitted), _joined(PrandtlIshlinskii, loops)
+    return _joined(LineFits, of_lines), _joined(LineFits, fitted), _joined(PrandtlIshlinskii, loops)
 
 
 def _joined(kind: type[_Part], parts: Sequence[_Part]) -> _Part:
@@ -206,7 +293,7 @@ def _needed(loops: PrandtlIshlinskii, passed: Mask) -> PrandtlIshlinskii | None:
 
 
 def calibrate(
-    sweep: Sweep, sensor: Sensor, date: datetime, limits: Limits | None = None
+    sweep: Sweep, sensor: Sensor, date: datetime, limits: ChannelLimits | None = None
 ) -> CalibrationReport:
     """What a `sweep` of `sensor`, taken on `date`, says of every channel.
 
@@ -220,7 +307,7 @@ def calibrate(
     with np.errstate(divide="ignore", invalid="ignore"):  # a stuck channel, which fails
         noise = np.sqrt((sweep.noise**2).mean(axis=0)) / np.abs(fitted.gain)
         by_line = (sweep.readings - line.offset) / line.gain
-    failures = failures_of(sweep, sensor, limits or Limits(), fitted, noise, loops.linear)
+    failures = failures_of(sweep, sensor, limits or ChannelLimits(), fitted, noise, loops.linear)
     passed = np.ones(sensor.channels, bool)
     passed[list(failures)] = False
     if not passed.any():
@@ -248,3 +335,41 @@ def calibrate(
     return CalibrationReport(
         calibration, line, fitted, _gaps(sweep, by_line), _gaps(sweep, left), noise
     )
+
+
+_WORST = 5  # channels that are named
+
+
+def report_summary(report: CalibrationReport) -> list[str]:
+    """What a person wants to know of a calibration, line by line."""
+    calibration, P = report.calibration, len(report.noise) // 3
+
+    def spread(values: Array) -> str:
+        return f"{values.min():.3g} to {values.max():.3g}"
+
+    lines = [
+        f"{calibration.name} {calibration.serial_number}: {int(report.passed.sum())} of "
+        f"{int(report.passed.sum()) + len(report.failed)} channels passed; curvature in 1/m",
+        f"{'':<11}{'gain':<18}{'offset':<18}{'widest loop (left)':<22}error (of a line alone)",
+    ]
+    for c, name in enumerate(COMPONENTS):
+        here = np.flatnonzero(report.passed[c * P : (c + 1) * P]) + c * P
+        if here.size:
+            loops = report.gaps[:, here].max(), report.gaps_left[:, here].max()
+            errors = report.fitted.left_out[here].max(), report.line.left_out[here].max()
+            lines.append(
+                f"{name:<11}{spread(report.fitted.gain[here]):<18}"
+                f"{spread(report.fitted.offset[here]):<18}"
+                f"{'{:.2f} ({:.2f})'.format(*loops):<22}{errors[0]:.3f} ({errors[1]:.2f})"
+            )
+    if calibration.creep:
+        share = float(np.median(calibration.creep.share[report.passed]))
+        lines.append(f"creep      {100 * share:.1f} % in {calibration.creep.time_constant:.3g} s")
+    worst = np.argsort(np.where(report.passed, -report.fitted.left_out, 0.0))[:_WORST]
+    told = (f"{_named(c, P)} {report.fitted.left_out[c]:.3f}" for c in worst)
+    lines.append(f"worst      {', '.join(told)}")
+    return lines + [f"failed     {_named(c, P)}: {why}" for c, why in report.failed.items()]
+
+
+def _named(channel: int, elements: int) -> str:
+    return f"{COMPONENTS[channel // elements]} of element {channel % elements}"

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from kappaskin.calibration import calibrate as calibrated
-from kappaskin.calibration import check_place, save_calibration, summary, take_sweep
+from kappaskin.calibration import check_writable, report_summary, save_calibration, take_sweep
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
 from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
@@ -63,7 +63,7 @@ def calibrate(
     json
         Print one JSON object with every channel instead of a summary.
     """
-    check_place(out)
+    check_writable(out)
     try:
         sensor, sweep = take_sweep(
             source,
@@ -82,5 +82,5 @@ def calibrate(
     if json:
         print_json(report.to_json())
     else:
-        print(*summary(report), sep="\n")
+        print(*report_summary(report), sep="\n")
     return FAILED if report.failed else 0

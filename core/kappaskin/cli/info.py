@@ -7,7 +7,7 @@ from typing import Any
 from kappaskin.cli.common import Switch, print_json
 from kappaskin.recording import Recording, decode
 from kappaskin.recording import messages as m
-from kappaskin.sources import from_json
+from kappaskin.sources import sensor_from_json
 
 
 def info(file: Path, *, json: Switch = False) -> None:
@@ -62,5 +62,5 @@ def _said(recording: Recording) -> dict[str, Any]:
 
 
 def _device(text: str) -> str:
-    sensor = from_json(text)
+    sensor = sensor_from_json(text)
     return f"{sensor.name} {sensor.serial_number}, {sensor.layout}, firmware {sensor.firmware}"

@@ -4,7 +4,7 @@ import math
 import time
 
 from kappaskin.cli.common import FAILED, Switch, check_time, stops
-from kappaskin.sources import Monitor
+from kappaskin.sources import WireMonitor
 
 _READ = 0.1  # s
 
@@ -29,7 +29,7 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
     """
     check_time(seconds, "listen")
     stopped = stops()
-    listening, end = Monitor(port), time.monotonic() + seconds
+    listening, end = WireMonitor(port), time.monotonic() + seconds
     try:
         if reset:
             listening.reset()

@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from kappaskin.calibration import Tares, data_folder
+from kappaskin.calibration import TareStore, tare_folder
 from kappaskin.cli.common import FAILED, check_time, stops
 from kappaskin.errors import Refusal
 from kappaskin.live import LOST, STREAMING, Engine, Status
@@ -91,7 +91,7 @@ def _recorded(engine: Engine, seconds: float, stopped: list[int]) -> Status:
 
 def _use_tare(engine: Engine, sensor: Sensor) -> None:
     if not sensor.simulated:
-        tare = Tares(data_folder()).load(sensor.serial_number).fit_for(sensor)
+        tare = TareStore(tare_folder()).load(sensor.serial_number).fit_for(sensor)
         engine.set_up(replace(Setup(), tare=tare))
 
 

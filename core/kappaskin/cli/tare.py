@@ -7,7 +7,7 @@ from datetime import datetime
 
 import numpy as np
 
-from kappaskin.calibration import Rest, Tare, Tares, Taring, data_folder
+from kappaskin.calibration import Rest, Tare, TareMeasurement, TareStore, tare_folder
 from kappaskin.cli.common import Switch
 from kappaskin.contact import LoadSeeker
 from kappaskin.errors import Refusal
@@ -33,7 +33,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
     undo
         Use no tare of this sensor any more, instead of taking one.
     """
-    tares = Tares(data_folder())
+    tares = TareStore(tare_folder())
     with closing(open_source(source)) as opened:
         sensor = _met(opened)
         if undo:
@@ -59,7 +59,7 @@ def _met(source: Source) -> Sensor:
 
 
 def _taken(source: Source, sensor: Sensor, used: Tare | None) -> Tare:
-    taring = Taring(sensor, time.monotonic())
+    taring = TareMeasurement(sensor, time.monotonic())
     while not taring.done(time.monotonic()):
         for frame in source.read(_READ):
             taring.take(frame.device_time, frame.host_time, sensor.nominal(frame))

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.cli.common import FAILED, progress
 from kappaskin.recording import Verdict, verifying
 
@@ -21,7 +21,7 @@ def verify(file: Path) -> int:
         The recording.
     """
     # As the engine does: products are summed in another order by more than one thread.
-    with Beside[float | Verdict]("verify", verifying, file) as work:
+    with BackgroundProcess[float | Verdict]("verify", verifying, file) as work:
         verdict = progress(work.wait(), Verdict)
     print(f"{file}: {verdict.words}")
     return 0 if verdict.same else FAILED

@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import DTypeLike
 from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
-from kappaskin._state import Remembering
+from kappaskin._state import Stateful
 from kappaskin.frames import Array
 
 _BLOCK, _BLOCK_OF_READINGS = 16, 32  # columns that LAPACK reflects at once: the fastest, of 128
@@ -31,7 +31,7 @@ class Learned:
         return (self.surprise / variance - self.spread) / 2
 
 
-class MovingModes(Remembering):
+class MovingModes(Stateful):
     """Amplitudes x (F,) of modes and their rates, expected (2, F), with covariance root' root.
 
     Each mode is a stationary Gaussian process of Matern's class 3/2 with the rate

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin._state import Remembering
+from kappaskin._state import Stateful
 from kappaskin.estimation.kalman import Learned
 from kappaskin.frames import Array
 
@@ -25,7 +25,7 @@ _RATIOS = np.exp(np.linspace(math.log(1e-4), math.log(1e14), 145))
 
 
 @dataclass(slots=True)
-class Level(Remembering):
+class Level(Stateful):
     """What is known of the noise and the signal, kept up to date.
 
     `variance` of a reading, known as from `count` readings, infinitely many when it was told; the

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from kappaskin._state import Memory, Remembering
+from kappaskin._state import State, Stateful
 from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import Evidence
@@ -73,7 +73,7 @@ class _Verdict:
 # well, needs blocks of Q alone: K_E is off by Q_EE^-1 (Q K)_E, with covariance sigma^2 Q_EE^-1
 # (leaving one out, as in kriging: doi:10.1007/BF01033232). Leaving E out changes
 # Q to Q - Q_.E Q_EE^-1 Q_E. for the rest.
-class Robust(Estimator, Remembering):
+class Robust(Estimator, Stateful):
     """Least squares from the elements that agree with each other.
 
     An element is suspected when its three readings are further from what the others tell of them
@@ -272,14 +272,14 @@ def _crossed(left: Array, right: Array, P: int) -> Array:
     return np.matmul(left, right.swapaxes(1, 2))
 
 
-class _History(Remembering):
+class _History(Stateful):
     """Why some of P elements are suspected, as far as the last frames tell."""
 
     def __init__(self, P: int) -> None:
         self._P = P
         self._frames: deque[tuple[Array, Mask, Array]] = deque(maxlen=_FRAMES)
 
-    def remembered(self, before: str = "") -> Memory:
+    def remembered(self, before: str = "") -> State:
         frames = [np.vstack(frame).astype(float) for frame in self._frames]
         return {f"{before}frames": np.array(frames)} if frames else {}
 

@@ -9,7 +9,7 @@ from typing import ClassVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kappaskin._state import Remembering
+from kappaskin._state import Stateful
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.choosing import telling_most
@@ -53,7 +53,7 @@ class TrackedSpread:
         return np.linalg.norm(rows @ self._half.T, axis=-1)
 
 
-class Tracking(Estimator, Remembering):
+class Tracking(Estimator, Stateful):
     """`fit = Tracking(basis, layout)`; `fit(curvature)` follows frame after frame.
 
     A Kalman filter of what the skin does: a plate under loads that nobody knows (`prior_root`),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kappaskin._processes import Haste
+from kappaskin._processes import ProcessPriority
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.estimation import Region
 from kappaskin.frames import Event, Frame
@@ -65,7 +65,7 @@ class Loop:
         self._compared = Compared(beside, self._builder, status.beside or Computed())
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
-        self._haste = Haste()
+        self._haste = ProcessPriority()
         self._arrivals, self._pace = Arrivals(), Pace()
         self._changing, self._again = False, math.inf
 

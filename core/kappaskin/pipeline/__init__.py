@@ -5,5 +5,5 @@ from kappaskin.pipeline.pipeline import Setup as Setup
 from kappaskin.pipeline.quantities import QUANTITIES as QUANTITIES
 from kappaskin.pipeline.quantities import ErrorBars as ErrorBars
 from kappaskin.pipeline.quantities import Quantities as Quantities
-from kappaskin.pipeline.quantities import of_form as of_form
+from kappaskin.pipeline.quantities import curvature_invariant as curvature_invariant
 from kappaskin.pipeline.reconstruct import reconstruct as reconstruct

@@ -1,4 +1,4 @@
-"""A frame of counts to an estimate of shape and contact; everything it can is computed once."""
+"""Pipeline: a frame of counts to an estimate of shape and contact, factored once per setup."""
 
 import math
 import time
@@ -9,16 +9,56 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin._state import Memory, Remembering
+from kappaskin._state import State, Stateful
 from kappaskin.bases import Basis, ValueMap, basis_for
-from kappaskin.calibration import Calibration, Corrector, DriftWatch, Rest, Tare
+from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import NO_TOUCH, LoadSeeker, PointContact, contact_geometry
-from kappaskin.errors import RankDeficient
+from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import METHODS, RIM_SD, Fit, estimator_for
-from kappaskin.frames import Array, Estimate, Frame, Truth
+from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
 from kappaskin.health import LeftOut, leave_out
-from kappaskin.pipeline.frame_assembly import Hold
 from kappaskin.sensing import Sensor
+
+
+class FrameAssembly(Stateful):
+    """Holds the last reading of each of `channels` until it is `age` s old on the device's clock.
+
+    A channel that was scanned is never filled in: on a rail it has no reading, however fresh the
+    last one. A clock that went back, as of a device that restarted, holds nothing from before.
+    """
+
+    REMEMBERED = ("_values", "_times")
+
+    def __init__(self, channels: int, age: float) -> None:
+        if not (math.isfinite(age) and age >= 0):
+            raise Refusal(f"expected readings to be held for at least 0 s, got {age}")
+        self._age = age
+        self._values = np.full(channels, np.nan)
+        self._times = np.full(channels, -np.inf)
+        self._listed, self._listed_whole = np.empty(0, np.intp), False
+
+    def is_whole(self, frame: Frame) -> bool:
+        """Whether every channel was read; scans of one list share it, so it is seldom counted."""
+        if frame.channels is not self._listed:
+            counts = np.bincount(frame.channels, minlength=len(self._values))
+            self._listed, self._listed_whole = frame.channels, bool((counts == 1).all())
+        return self._listed_whole
+
+    def __call__(self, frame: Frame, curvature: Array) -> tuple[Array, Mask]:
+        """The `curvature` (3, P) of `frame` with held readings, and which of it is fresh (3, P)."""
+        flat = curvature.ravel()
+        if self.is_whole(frame):
+            np.copyto(self._values, flat)
+            self._times.fill(frame.device_time)
+            return curvature, np.isfinite(curvature)
+        self._times[self._times > frame.device_time + OVERTAKEN] = -np.inf
+        self._values[frame.channels] = flat[frame.channels]
+        self._times[frame.channels] = frame.device_time
+        age = frame.device_time - self._times
+        known = (age >= 0) & (age < self._age)
+        held = np.where(known, self._values, flat)
+        return held.reshape(curvature.shape), np.isfinite(curvature)
+
 
 _LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undecided
 
@@ -54,7 +94,7 @@ class _Past:
     """
 
     correct: Corrector | None
-    hold: Hold
+    hold: FrameAssembly
     passed: list[Frame] = field(default_factory=list[Frame])
 
 
@@ -73,10 +113,12 @@ class Pipeline:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
-        self.past = _Past(self._corrector(setup.calibration), Hold(sensor.channels, setup.hold))
+        self.past = _Past(
+            self._corrector(setup.calibration), FrameAssembly(sensor.channels, setup.hold)
+        )
         self._zero = self._shift(setup.tare)
         edge = setup.edge or sensor.edge
-        self.drift = None if setup.tare is None else DriftWatch(LoadSeeker(sensor, edge))
+        self.drift = None if setup.tare is None else DriftMonitor(LoadSeeker(sensor, edge))
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
@@ -233,7 +275,7 @@ class Pipeline:
         if _estimating(self) == _estimating(before):
             self.fit = before.fit
 
-    def remembered(self) -> Memory:
+    def remembered(self) -> State:
         """What estimates depend on besides their frames, by name; also of frames passed over."""
         for earlier in self.past.passed:
             self.past.hold(earlier, self.curvature(earlier))
@@ -241,16 +283,16 @@ class Pipeline:
         found = self.past.hold.remembered("hold.")
         if self.past.correct is not None:
             found |= self.past.correct.remembered("correct.")
-        if isinstance(self.fit, Remembering):
+        if isinstance(self.fit, Stateful):
             found |= self.fit.remembered("fit.")
         return found
 
-    def recall(self, memory: Memory) -> None:
+    def recall(self, memory: State) -> None:
         """Go on from what another of the same sensor and setup `remembered`."""
         self.past.hold.recall(memory, "hold.")
         if self.past.correct is not None:
             self.past.correct.recall(memory, "correct.")
-        if isinstance(self.fit, Remembering):
+        if isinstance(self.fit, Stateful):
             self.fit.recall(memory, "fit.")
 
     def pass_over(self, frame: Frame) -> None:

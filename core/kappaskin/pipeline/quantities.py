@@ -31,7 +31,7 @@ _OF_FORM = ("first", "second", "mean", "gaussian")
 _AT_ONCE = 2**21  # values of functions that are worked out at once
 
 
-def of_form(name: str, form: Array) -> Array:
+def curvature_invariant(name: str, form: Array) -> Array:
     """A principal, the mean or the Gaussian curvature (...) of `form` (3, ...): xx, yy, xy."""
     xx, yy, xy = form
     if name == "gaussian":
@@ -113,7 +113,9 @@ class Quantities:
     def at_rest(self, name: str) -> float:
         """What a skin at rest has, in SI units."""
         H = self.layout.patch.base_curvature
-        return float(of_form(name, np.array([H, 0.0, 0.0]))) if name in _OF_FORM else 0.0
+        return (
+            float(curvature_invariant(name, np.array([H, 0.0, 0.0]))) if name in _OF_FORM else 0.0
+        )
 
     def on_surface(self, name: str, estimate: Estimate) -> Array:
         """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
@@ -126,7 +128,7 @@ class Quantities:
             unknown = np.full(estimate.surface.shape, np.nan)
             return unknown if bars is None else bars.on_surface(estimate.noise)
         if name in _OF_FORM:
-            return of_form(name, self._form(estimate.coefficients))
+            return curvature_invariant(name, self._form(estimate.coefficients))
         if name not in COMPONENTS:
             raise Refusal(f"expected a quantity that a surface has, got {name!r}; ask of_elements")
         if name not in self._changes:
@@ -140,7 +142,9 @@ class Quantities:
         """
         xx, yy, xy = form = self._form(estimate.coefficients)
         angle = np.arctan2(xy, (xx - yy) / 2) / 2
-        return np.stack([of_form("first", form), of_form("second", form), angle])
+        return np.stack(
+            [curvature_invariant("first", form), curvature_invariant("second", form), angle]
+        )
 
     def of_elements(self, name: str, estimate: Estimate) -> Array:
         """The values (P,) in SI units: of curvature as each element reads it; NaN where missing."""
@@ -149,7 +153,7 @@ class Quantities:
         if name.startswith("residual_"):
             return estimate.residual[COMPONENTS.index(name.removeprefix("residual_"))]
         if name in _OF_FORM:
-            return of_form(name, self._read(estimate.curvature))
+            return curvature_invariant(name, self._read(estimate.curvature))
         corners, weights = self._at_elements
         values = self.on_surface(name, estimate).ravel()[corners]
         return np.sum(np.where(weights > 0, values, 0.0) * weights, axis=1)

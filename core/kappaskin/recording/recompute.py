@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
-from kappaskin._state import Memory
+from kappaskin._state import State
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Frame
 from kappaskin.pipeline import Pipeline, Setup
@@ -31,7 +31,7 @@ class Retrace:
         self._reenact = Reenactment(str(recording.path))
         self.sensor: Sensor | None = None
         self.pipeline: Pipeline | None = None
-        self._memory: Memory = {}
+        self._memory: State = {}
         self._made = 0
         self._waiting: deque[Frame] = deque()
         self._last: Estimate | None = None

@@ -15,12 +15,12 @@ from kappaskin.recording.reading import Message
 from kappaskin.sensing import Sensor
 from kappaskin.sources import (
     Accounting,
+    ClockState,
     Command,
     Decoder,
     FromDevice,
     Information,
     Interpreter,
-    Known,
     RecordedClock,
     Samples,
 )
@@ -89,7 +89,7 @@ class Reenactment:
 
     def _map(self, said: dict[str, Any]) -> None:
         numbers = (said[name] for name in ("at", "offset", "half", "drift", "spread"))
-        known = Known((*numbers, bool(said["doubted"])), int(said["wraps"]), said["last"])
+        known = ClockState((*numbers, bool(said["doubted"])), int(said["wraps"]), said["last"])
         if math.isnan(said["since"]):
             self._times.recall(known)
         else:

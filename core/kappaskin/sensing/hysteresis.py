@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin._state import Remembering
+from kappaskin._state import Stateful
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
@@ -66,7 +66,7 @@ class PrandtlIshlinskii:
         return Plays(self)
 
 
-class Plays(Remembering):
+class Plays(Stateful):
     """The positions of all plays; called with each frame, it moves them."""
 
     REMEMBERED = ("_w",)
@@ -135,7 +135,7 @@ class StandardLinearSolid:
         return Restoring(self)
 
 
-class _Slow(Remembering):
+class _Slow(Stateful):
     """The slow part s and the curvature before, both (C,)."""
 
     REMEMBERED = ("_s", "_x", "_time")

@@ -21,7 +21,7 @@ _WRAP = 2**32 * 1e-6  # s after which a counter of 32 bits in us begins again at
 _LONGEST = 2**64 * 1e-6  # s, what the wire can say
 
 
-class Known(NamedTuple):
+class ClockState(NamedTuple):
     """What is known of a clock: the `map` that `ClockMap` tells, and how its counter went on.
 
     `map` is at, offset, half, drift, spread (see `ClockMap.bound`) and whether they are in doubt.
@@ -98,10 +98,10 @@ class ClockMap:
         return self._spread * 1e6 if len(self._exchanges) > 1 else math.inf
 
     @property
-    def known(self) -> Known:
+    def known(self) -> ClockState:
         """All that `taken`, `sd` and `unwrap` depend on."""
         told = self._at, self._offset, self._half, self._drift, self._spread, self._doubted > 0
-        return Known(told, self._wraps, self._last)
+        return ClockState(told, self._wraps, self._last)
 
     # What comes.
 
@@ -245,14 +245,14 @@ class RecordedClock(ClockMap):
 
     def __init__(self) -> None:
         super().__init__()
-        self.coming: deque[tuple[float, Known]] = deque(maxlen=_MESSAGES)
+        self.coming: deque[tuple[float, ClockState]] = deque(maxlen=_MESSAGES)
 
-    def recall(self, known: Known) -> None:
+    def recall(self, known: ClockState) -> None:
         """Go on from what was known at one moment."""
         self._wraps, self._last = known.wraps, known.last
         self._go_over(known)
 
-    def _go_over(self, known: Known) -> None:
+    def _go_over(self, known: ClockState) -> None:
         self._know(*known.map[:5])
         self._doubted = int(known.map[5])
 

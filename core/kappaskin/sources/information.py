@@ -25,7 +25,7 @@ from kappaskin.sensing import (
 from kappaskin.skin import Disk, Patch, Polygon
 
 
-def to_json(sensor: Sensor) -> str:
+def sensor_to_json(sensor: Sensor) -> str:
     """The information text of `sensor`: SI units, channels counted component by component."""
     layout, stiffness, wired = sensor.layout, sensor.plate.axial_stiffness, sensor.channel_map
     where = {"grid": layout.shape} if layout.shape else {"positions": layout.positions.tolist()}
@@ -68,7 +68,7 @@ _Part = TypeVar("_Part", HalfBridge, Multiplexer, Amplifier, Converter)
 
 _OF_THE_PLATE = ("tension", "foundation", "poisson", "rim_stiffness")
 # What a flat plate hinged along its edges need not say.
-UNSAID: dict[str, Any] = {
+DEFAULTS: dict[str, Any] = {
     "base_curvature": 0.0,
     "strip": False,
     "edge": "hinged",
@@ -102,7 +102,7 @@ def _parsed(text: str) -> dict[str, Any]:
     said = json.loads(text, parse_float=_number, parse_constant=_number)
     if not isinstance(said, dict):
         raise TypeError(f"expected an object with keys, got {said!r:.80}")
-    found = UNSAID | cast("dict[str, Any]", said)
+    found = DEFAULTS | cast("dict[str, Any]", said)
     for what, (kind, names) in _KINDS.items():
         for name in names:
             # Of Python's kinds, true and false are numbers too; of JSON's they are not.
@@ -191,7 +191,7 @@ def _check_sizes(plate: Plate, transduction: Transduction) -> None:
         )
 
 
-def from_json(text: str) -> Sensor:
+def sensor_from_json(text: str) -> Sensor:
     """The sensor that `text` tells of; raises `SourceError` when it cannot be understood."""
     try:
         said = _parsed(text)

@@ -41,7 +41,7 @@ class Interpreter:
         if text != self.text:
             self.sensor, self.text, self.known = None, "", False
             try:
-                self.sensor = self._made.get(text) or information.from_json(text)
+                self.sensor = self._made.get(text) or information.sensor_from_json(text)
             except SourceError as error:
                 self.unusable = f"{self._url}: {error}"
                 return False

@@ -13,12 +13,11 @@ from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
 from kappaskin.scenes import FROM_THE_BEGINNING, Playing, Scene, Simulator, load_scene
 from kappaskin.sensing import Scan, Sensor
-from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.clock import Known
-from kappaskin.sources.information import from_json, to_json
-from kappaskin.sources.scanning import in_few_runs
-from kappaskin.sources.source import SIMULATION, register_scheme
-from kappaskin.sources.tape import Tape
+from kappaskin.sources.clock import ClockState
+from kappaskin.sources.commands import in_few_runs
+from kappaskin.sources.decoder import Accounting
+from kappaskin.sources.information import sensor_from_json, sensor_to_json
+from kappaskin.sources.source import SIMULATION, InputRecorder, register_scheme
 from kappaskin.sources.wire import MOST_RUNS, encode_scan, pack_runs
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
@@ -45,14 +44,14 @@ class SimulatedSource:
         self._base_noise = np.random.default_rng(scene.seed)
         self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
-        self._tape: Tape | None = None
+        self._tape: InputRecorder | None = None
         self._listed, self._runs = np.empty(0, np.intp), b""
 
     def _become(self, scene: Scene, due: float, playing: Playing) -> None:
         """Be the device of `scene`, whose next frame is due at device time `due` in s."""
-        text = to_json(scene.sensor())
+        text = sensor_to_json(scene.sensor())
         # As anybody else would know it from what it says: in the last bit not what the scene has.
-        sensor = from_json(text)
+        sensor = sensor_from_json(text)
         self._simulator, self._text, self._sensor = Simulator(scene, playing), text, sensor
         # Since frame `_first`, due at device time `_since`, frames come at `_rate`.
         self._first, self._since = self._n, due
@@ -73,7 +72,7 @@ class SimulatedSource:
 
     def play(self, scene: Scene) -> None:
         """Go on with another scene, from the same moment; one that is refused changes nothing."""
-        if to_json(scene.sensor()) == self._text:
+        if sensor_to_json(scene.sensor()) == self._text:
             self._change(scene)
             return
         self._become(scene, self._due(), self.playing)
@@ -89,14 +88,14 @@ class SimulatedSource:
             self._simulator.change(was)
             raise
 
-    def record(self, tape: Tape | None) -> None:
+    def record(self, tape: InputRecorder | None) -> None:
         """Tell `tape` from now on what such a device would send; nobody without one."""
         self._tape = tape
         if tape is not None:
             tape.met(self._text)
-            tape.mapped(math.nan, Known((0.0, self._start, 0.0, 0.0, 0.0, False), 0, math.nan))
+            tape.mapped(math.nan, ClockState((0.0, self._start, 0.0, 0.0, 0.0, False), 0, math.nan))
 
-    def _record(self, tape: Tape, frames: list[Frame]) -> None:
+    def _record(self, tape: InputRecorder, frames: list[Frame]) -> None:
         width = 2 if self._simulator.scene.transduction.converter.bits <= 16 else 4
         for frame in frames:
             tape.simulated(frame)

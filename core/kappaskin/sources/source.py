@@ -1,4 +1,4 @@
-"""Sources of frames: a simulation in this process, bytes on a line, and registered schemes."""
+"""Sources of frames: what every source offers, who records it, and how one is opened by name."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -6,8 +6,40 @@ from typing import Protocol
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
-from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.tape import Tape
+from kappaskin.sources.clock import ClockState
+from kappaskin.sources.decoder import Accounting
+
+
+class InputRecorder(Protocol):
+    """Takes down what a source reads, before anybody computes with it."""
+
+    def met(self, text: str) -> None:
+        """The device is the one that the information `text` tells of."""
+        ...
+
+    def came(self, host_time: float, data: bytes) -> None:
+        """These bytes came at `host_time` in s."""
+        ...
+
+    def sent(self, host_time: float, data: bytes) -> None:
+        """These bytes were sent."""
+        ...
+
+    def ended(self, host_time: float) -> None:
+        """The line is gone; what comes next comes over another one."""
+        ...
+
+    def mapped(self, since: float, known: ClockState) -> None:
+        """From the scan of device time `since` in s on, times are mapped by what is now `known`.
+
+        That scan is among the bytes told next; NaN for whichever comes next.
+        """
+        ...
+
+    def simulated(self, frame: Frame) -> None:
+        """The frame told next is simulated, and has a truth."""
+        ...
+
 
 SIMULATION = "sim:"
 
@@ -34,7 +66,7 @@ class Source(Protocol):
         """The device's temperature in degrees Celsius, as it told last; NaN if it does not."""
         ...
 
-    def record(self, tape: Tape | None) -> None:
+    def record(self, tape: InputRecorder | None) -> None:
         """Tell `tape` from now on all that frames come from; nobody without one."""
         ...
 

@@ -40,7 +40,7 @@ MOST_RUNS = 255
 _LONGEST_REASON = 200  # bytes
 
 
-class Kind(IntEnum):
+class MessageKind(IntEnum):
     INFORMATION = 1
     SAMPLES = 2
     COMMAND = 3
@@ -128,7 +128,7 @@ def encode(kind: int, sequence: int, time: float, payload: bytes) -> bytes:
 
 def encode_information(sequence: int, time: float, text: str) -> bytes:
     """The bytes of an information message."""
-    return encode(Kind.INFORMATION, sequence, time, text.encode())
+    return encode(MessageKind.INFORMATION, sequence, time, text.encode())
 
 
 def encode_samples(
@@ -141,12 +141,12 @@ def encode_samples(
 def encode_scan(sequence: int, time: float, runs: bytes, counts: Counts, width: int) -> bytes:
     """The bytes of a samples message of the channels that `pack_runs` made `runs` of."""
     payload = bytes([width]) + runs + counts.astype(f"<i{width}").tobytes()
-    return encode(Kind.SAMPLES, sequence, time, payload)
+    return encode(MessageKind.SAMPLES, sequence, time, payload)
 
 
 def encode_command(sequence: int, time: float, operation: int, arguments: bytes = b"") -> bytes:
     """The bytes of a command."""
-    return encode(Kind.COMMAND, sequence, time, bytes([operation]) + arguments)
+    return encode(MessageKind.COMMAND, sequence, time, bytes([operation]) + arguments)
 
 
 def encode_reply(
@@ -156,7 +156,7 @@ def encode_reply(
     if fault:
         data = data[:_LONGEST_REASON]
     payload = _REPLY.pack(to.sequence, to.operation, fault) + data
-    return encode(Kind.REPLY, sequence, time, payload)
+    return encode(MessageKind.REPLY, sequence, time, payload)
 
 
 def pack_runs(channels: Sequence[int] | NDArray[np.intp]) -> bytes:

@@ -3,7 +3,7 @@
 from collections.abc import Generator, Iterable, Sequence
 from itertools import islice
 
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.scenes import Scene
 from kappaskin.studies.cost.bench import Bench, costs
@@ -46,7 +46,7 @@ class Measuring:
     ) -> None:
         Bench(scene)  # or refused here
         self.effects: dict[Setting, Effects] = {}
-        self._beside = Beside("kappaskin-cost", _told, scene, settings, effects_with)
+        self._beside = BackgroundProcess("kappaskin-cost", _told, scene, settings, effects_with)
 
     @property
     def done(self) -> bool:

@@ -13,9 +13,9 @@ from kappaskin.sources import (
     Decoder,
     FromDevice,
     Information,
-    Line,
     Reply,
     Samples,
+    SerialConnection,
     encode_information,
     encode_reply,
     encode_samples,
@@ -46,7 +46,7 @@ class Relay:
     called, and only then.
     """
 
-    def __init__(self, device: Line, folder: Path) -> None:
+    def __init__(self, device: SerialConnection, folder: Path) -> None:
         self._device, self._decoder = device, Decoder()
         self._link = folder / "port"
         self.port = str(self._link)

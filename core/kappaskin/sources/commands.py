@@ -1,4 +1,4 @@
-"""What a scanner chooses to commands that let a device scan it, until the device says it does."""
+"""Commands to a device: the greeting, pings, scan lists and frame rates, and their replies."""
 
 import math
 import struct
@@ -10,25 +10,106 @@ from numpy.typing import NDArray
 
 from kappaskin.estimation import Scanner
 from kappaskin.sensing import Sensor
-from kappaskin.sources.wire import MOST_RUNS, RATE_UNIT, Operation, Reply, pack_runs
+from kappaskin.sources.clock import ClockMap
+from kappaskin.sources.wire import (
+    MOST_RUNS,
+    RATE_UNIT,
+    UNKNOWN_TEMPERATURE,
+    VERSION,
+    Fault,
+    Operation,
+    Reply,
+    encode_command,
+    pack_runs,
+)
 
-_ALL = pack_runs([])
-_DEAF = (
+_PING = 0.5  # s between two pings
+_PING_UNANSWERED = 3.0  # s between two, to a device that does not answer
+_PING_TIMEOUT = 2.0  # s within which a ping is answered
+_ANSWER = struct.Struct("<Qh")
+
+
+class DeviceCommands:
+    """Commands to one device, and what became of them.
+
+    `write` sends bytes, or gives them up. `refusal` says which command was refused last, and why.
+    """
+
+    def __init__(self, write: Callable[[bytes], object], times: ClockMap) -> None:
+        self._write, self._times = write, times
+        self._sequence = 0
+        self._pings: dict[int, float] = {}
+        self._answered = self._asked = -math.inf
+        self.temperature, self.refusal = math.nan, ""
+
+    def ask(self, operation: Operation, now: float, arguments: bytes = b"") -> int:
+        """Send one command at host time `now` in s, its number; it may be lost on the line."""
+        self._sequence = (self._sequence + 1) % 2**32
+        self._write(encode_command(self._sequence, now, operation, arguments))
+        return self._sequence
+
+    def greet(self, now: float) -> None:
+        """Begin: every channel is wanted, and to know who is there."""
+        # By the clock: a device that did not see the last host go would take the first commands of
+        # the next, were they counted from one, for repeated ones.
+        self._sequence = round(now * 1e3) % 2**32
+        self.ask(Operation.HELLO, now, bytes([VERSION, VERSION]))
+        self.ask(Operation.IDENTIFY, now)
+        self.ask(Operation.SCAN_LIST, now, pack_runs([]))
+        self.ask(Operation.START, now)
+
+    def attend(self, now: float) -> bool:
+        """Ping when it is time to; whether it was."""
+        pause = _PING if now - self._answered < _PING_TIMEOUT else _PING_UNANSWERED
+        if now - self._asked < (_PING if math.isinf(self._asked) else pause):
+            return False
+        self._asked = now
+        self._pings = {q: sent for q, sent in self._pings.items() if now - sent < _PING_TIMEOUT}
+        self.ask(Operation.PING, now)
+        self._pings[self._sequence] = now
+        return True
+
+    def take(self, reply: Reply, now: float) -> None:
+        """Take note of a reply that came at host time `now`."""
+        if reply.fault:
+            self.refusal = f"the device refused {operation_name(reply.operation)}: {reply.reason}"
+            if reply.fault == Fault.NO_COMMON_VERSION:
+                self.refusal += f"; this program speaks {VERSION}: update the older of the two"
+            return
+        sent = self._pings.pop(reply.command, None)
+        if reply.operation != Operation.PING or sent is None or len(reply.data) != _ANSWER.size:
+            return
+        received_us, hundredths = _ANSWER.unpack(reply.data)
+        self._answered = now
+        self._times.exchange(sent, received_us * 1e-6, reply.time, now)
+        self.temperature = math.nan if hundredths == UNKNOWN_TEMPERATURE else hundredths / 100
+
+
+def operation_name(operation: int) -> str:
+    """What is asked for with this number, in words."""
+    try:
+        return Operation(operation).name.lower().replace("_", " ")
+    except ValueError:
+        return f"operation {operation}"
+
+
+_ALL_CHANNELS = pack_runs([])
+_NO_REPLY = (
     "expected a device that takes commands, got no reply to them; it goes on scanning what it "
     "chooses: update its firmware, or check the line from the host to it"
 )
 
-Ask = Callable[[Operation, float, bytes], int]
+SendCommand = Callable[[Operation, float, bytes], int]
 
-LISTS = 20
+SCAN_LISTS_PER_SECOND = 20
 """Lists a second that a device is asked to scan, at most."""
 
-_PAUSE = 1 / LISTS
+_PAUSE = 1 / SCAN_LISTS_PER_SECOND
 _AGAIN = 0.5  # s after which a command without a reply is sent again
-_PATIENCE = 2.0  # s after which a device is taken for one that obeys nothing
+_REPLY_TIMEOUT = 2.0  # s after which a device is taken for one that obeys nothing
 
 
-class Scanning:
+class ScanControl:
     """Lets one device scan what a scanner chooses; everything without one.
 
     `refusal` says why the device scans something else; empty when it does as asked.
@@ -41,7 +122,9 @@ class Scanning:
 
     def begin(self) -> None:
         """A device is there that scans everything, at its own rate."""
-        self._list: bytes | None = _ALL  # asked for last; None while nobody knows what it does
+        self._list: bytes | None = (
+            _ALL_CHANNELS  # asked for last; None while nobody knows what it does
+        )
         self._rate: int | None = None  # asked for last; None for the device's own
         self._forget()
 
@@ -58,13 +141,13 @@ class Scanning:
             self._list = None
         self._forget()
 
-    def attend(self, now: float, sensor: Sensor, ask: Ask) -> None:
+    def attend(self, now: float, sensor: Sensor, ask: SendCommand) -> None:
         """Send what is to be sent at host time `now` in s."""
         pause = _AGAIN if self._asked else _PAUSE
         if now - self._sent < pause or not self._takes_lists:
             return
-        if self._scanner is not None and now - self._since > _PATIENCE:
-            self.refusal = _DEAF
+        if self._scanner is not None and now - self._since > _REPLY_TIMEOUT:
+            self.refusal = _NO_REPLY
         if wanted := list(self._asked.values()) or self._wanted(sensor):
             self._sent, self._since = now, min(self._since, now)
             self._asked = {ask(what, now, how): (what, how) for what, how in wanted}
@@ -83,11 +166,11 @@ class Scanning:
     def _next(self, sensor: Sensor) -> tuple[bytes, int | None]:
         """The next list, and the rate in frames per 1000 s; none where it was never another."""
         if self._scanner is None:
-            return _ALL, None if self._rate is None else _paced(sensor.rate)
+            return _ALL_CHANNELS, None if self._rate is None else _paced(sensor.rate)
         scan = self._scanner()
         channels, rate = scan.channels, _paced(min(self._scanner.rate, scan.rate))
         if len(channels) == sensor.channels:
-            return _ALL, rate
+            return _ALL_CHANNELS, rate
         if sensor.channel_map is not None:
             channels = np.argsort(sensor.channel_map)[channels]
         return pack_runs(in_few_runs(channels)), rate

@@ -51,7 +51,7 @@ class PseudoDevice:
     def __init__(self, scene: Scene, clock: Callable[[], float] = time.monotonic) -> None:
         self._scene, self._simulator, self._clock = scene, Simulator(scene), clock
         self._sensor = scene.sensor()
-        self._information = information.to_json(self._sensor)
+        self._information = information.sensor_to_json(self._sensor)
         if not hasattr(os, "openpty"):
             raise Refusal("expected a system with pseudo-terminals (Linux, macOS)")
         import tty  # there is none on Windows
@@ -248,7 +248,7 @@ class PseudoDevice:
         except Refusal as refusal:
             raise _Refused(Fault.OUT_OF_RANGE, str(refusal)) from refusal
         self._scene, self._sensor = scene, scene.sensor()
-        self._information = information.to_json(self._sensor)
+        self._information = information.sensor_to_json(self._sensor)
         return struct.pack("<I", asked)
 
     def close(self) -> None:

@@ -1,33 +1,171 @@
-"""Bytes on a serial line, or any URL that pyserial opens, to frames; a line that may vanish."""
+"""Serial source: frames from a port, or any URL that pyserial opens; reconnects by itself."""
 
+import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from kappaskin.errors import SourceError
 from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
-from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.asking import Asking
-from kappaskin.sources.clock import ClockMap
-from kappaskin.sources.decoder import Decoder
+from kappaskin.sources.clock import ClockMap, ClockState
+from kappaskin.sources.commands import DeviceCommands, ScanControl
+from kappaskin.sources.decoder import Accounting, Decoder, SequenceCounter
 from kappaskin.sources.interpreter import Interpreter
-from kappaskin.sources.line import Line
-from kappaskin.sources.ports import holders, port_called, serial_ports
-from kappaskin.sources.scanning import Scanning
-from kappaskin.sources.source import register_scheme
-from kappaskin.sources.tape import Tape
-from kappaskin.sources.taping import Taping
-from kappaskin.sources.telling import Telling
-from kappaskin.sources.tuning import Tuning
-from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
+from kappaskin.sources.ports import (
+    BaudRateSearch,
+    SerialConnection,
+    holders,
+    port_called,
+    serial_ports,
+)
+from kappaskin.sources.source import InputRecorder, register_scheme
+from kappaskin.sources.wire import (
+    VERSION,
+    Command,
+    FromDevice,
+    Information,
+    Reply,
+    Samples,
+    encode_samples,
+)
+
+_LONGEST = 500  # characters: a device may say anything of itself, and each status has 64 events
+_SUMMED = 1.0  # s of which lost messages are told together
+
+
+class _EventLog:
+    """Gathers events until they are taken; what was lost is told of the numbers in `sequence`."""
+
+    def __init__(self, sequence: SequenceCounter, clock: Callable[[], float]) -> None:
+        self._sequence, self._clock = sequence, clock
+        self._events: list[Event] = []
+        self._lost = self._restarts = 0  # that were told
+        self._summed_at = 0.0
+
+    def __call__(self, kind: str, text: str) -> None:
+        """Tell this too."""
+        self._events.append(Event(self._clock(), kind, text[:_LONGEST]))
+
+    def taken(self) -> list[Event]:
+        """What happened since the last time that this was asked."""
+        told, self._events = self._events, []
+        return told
+
+    def met(self, was: Sensor | None, now: Sensor) -> None:
+        """Tell what is new of the device that is there `now`."""
+        name = _device_name(now)
+        if was is None:
+            self("met", f"{name}, firmware {now.firmware}")
+        elif was.serial_number != now.serial_number:
+            self("other", f"another device: {name} instead of {was.serial_number}")
+        elif now.firmware != was.firmware:
+            self("firmware", f"firmware {now.firmware} instead of {was.firmware}")
+        elif now is not was:
+            self("changed", f"{name} says something else of itself than before")
+
+    def resumed(self, sensor: Sensor, away: float, same: bool, lost: int) -> None:
+        """Tell that the `same` device is back after `away` s, in which so many were `lost`."""
+        again = "" if self._sequence.restarts == self._restarts else ", from its beginning"
+        self._lost, self._restarts = self._lost + lost, self._sequence.restarts
+        if same:
+            text = f"{_device_name(sensor)} is back after {away:.1f} s{again}: {lost} messages lost"
+            self("back", text)
+
+    def restarted(self) -> bool:
+        """Whether the device started anew since the last look, which is told."""
+        restarted = self._sequence.restarts > self._restarts
+        if restarted:
+            self._restarts = self._sequence.restarts
+            self("restarted", "the device started anew while it was connected")
+        return restarted
+
+    def losses(self) -> None:
+        """Tell of what was lost, now and then."""
+        lost, now = self._sequence.lost - self._lost, self._clock()
+        if lost and now - self._summed_at >= _SUMMED:
+            if lost > 0:
+                self("gap", f"{lost} messages lost")
+            self._lost, self._summed_at = self._sequence.lost, now
+
+
+def _device_name(sensor: Sensor) -> str:
+    return f"{sensor.name} {sensor.serial_number}"
+
+
+class _RecordingTap:
+    """Tells a tape all that frames come from, as the interpreter `means` it; nobody without one."""
+
+    def __init__(self, means: Interpreter) -> None:
+        self._means = means
+        self._tape: InputRecorder | None = None
+        self._told: ClockState | None = None  # of the clock
+        self._mapped: list[tuple[float, ClockState]] = []
+        self._met = ""  # what was told of the device
+
+    def to(self, tape: InputRecorder | None) -> None:
+        """Tell this one from now on."""
+        self._tape, self._told, self._mapped = tape, None, []
+
+    def begin(self, now: float, waiting: Iterable[tuple[float, FromDevice]], held: bytes) -> None:
+        """Tell of the device, of messages `waiting` to be read, and of bytes `held` of the next."""
+        if self._tape is None:
+            return
+        self._met = ""
+        if self._means.sensor is not None:  # frames go through what was made of one that is gone
+            self._meet(self._tape)
+            if not self._means.known:
+                self._tape.ended(now)
+        for came, message in waiting:
+            if isinstance(message, Samples):
+                sequence, began, channels, counts = message
+                self._tape.came(came, encode_samples(sequence, began, channels, counts, 4))
+        self._told = self._means.times.known
+        self._tape.mapped(math.nan, self._told)
+        if held:
+            self._tape.came(now, held)
+
+    def sent(self, now: float, data: bytes) -> None:
+        if self._tape is not None:
+            self._tape.sent(now, data)
+
+    def ended(self, now: float) -> None:
+        if self._tape is not None:
+            self._tape.ended(now)
+
+    def map(self, since: float) -> None:
+        """Take note of what is known of the clock from the scan at device time `since` on."""
+        if self._tape is None:
+            return
+        known = self._means.times.known
+        if self._told is None or known.map != self._told.map:
+            self._mapped.append((since, known))
+            self._told = known
+
+    def came(self, came: list[tuple[float, bytes]]) -> None:
+        """Tell of the bytes that were read, and before them of how their times are mapped."""
+        if self._tape is None:
+            return
+        for since, known in self._mapped:
+            self._tape.mapped(since, known)
+        self._mapped = []
+        for now, data in came:
+            self._tape.came(now, data)
+        if self._means.known:
+            self._meet(self._tape)  # told in those bytes: here for whoever begins after them
+
+    def _meet(self, tape: InputRecorder) -> None:
+        if self._means.text != self._met:
+            self._met = self._means.text
+            tape.met(self._met)
+
 
 _PATIENCE = 3.0  # s that a device may say nothing, or not what it is
 _DWELL = 0.8  # s of bytes that mean nothing, after which another baud rate is tried
 _RETRY = 0.25  # s between two tries to open a port that is gone
 _UNREAD = 2**22  # counts kept until the device says what they are of
-_EACH = 64  # counts that take as much memory as a message beside its own
+_MESSAGE_OVERHEAD = 64  # counts that take as much memory as a message beside its own
 _APART, _DRIFT = 0.5, 0.01  # s, and share, by which two clocks that both went on may differ
 
 
@@ -45,14 +183,14 @@ class SerialSource:
         self._means = Interpreter(url)
         self._absent = ""
         self._pending: deque[tuple[float, FromDevice]] = deque()
-        self._tell = Telling(self._decoder.sequence, clock)
+        self._tell = _EventLog(self._decoder.sequence, clock)
         self._overrun, self._next_try = 0, 0.0
         self._gone_at: float | None = None  # when the line was lost, until the device is back
         self._last: tuple[float, float] | None = None  # device and host time of the last message
-        self._scanning = Scanning()
-        self._taping = Taping(self._means)
-        self._line: Line | None = None
-        self._begin(Line(url, clock))
+        self._scanning = ScanControl()
+        self._taping = _RecordingTap(self._means)
+        self._line: SerialConnection | None = None
+        self._begin(SerialConnection(url, clock))
 
     @property
     def sensor(self) -> Sensor | None:
@@ -65,17 +203,17 @@ class SerialSource:
 
     # The line: there, gone, back.
 
-    def _begin(self, line: Line) -> None:
+    def _begin(self, line: SerialConnection) -> None:
         """Listen on `line`, and ask who is there."""
         now = self._clock()
         self._line = line
         self._opened = self._heard = self._good_at = self._tuned = now
         self._bytes_before = self._decoder.accounting().bytes_in
         self._holders: list[str] = []
-        self._tuning = Tuning(line.baud_rate)
+        self._tuning = BaudRateSearch(line.baud_rate)
         times = ClockMap()
         self._means.begin(times)
-        self._asking = Asking(self._send, times)
+        self._asking = DeviceCommands(self._send, times)
         self._asking.greet(now)
         self._scanning.begin()
 
@@ -83,7 +221,7 @@ class SerialSource:
         if self._line is not None and self._line.write(data):
             self._taping.sent(self._clock(), data)
 
-    def record(self, tape: Tape | None) -> None:
+    def record(self, tape: InputRecorder | None) -> None:
         """Tell `tape` from now on all that frames come from; nobody without one."""
         now = self._clock()
         self._taping.to(tape)
@@ -105,7 +243,7 @@ class SerialSource:
         if self._line is not None:
             self._line.reset()
 
-    def _end(self, line: Line) -> None:
+    def _end(self, line: SerialConnection) -> None:
         """Give the line up; the device may come back."""
         self._overrun += line.overrun
         line.close()
@@ -129,7 +267,7 @@ class SerialSource:
             return
         self._next_try = now + _RETRY
         try:
-            self._begin(Line(self._where(), self._clock))
+            self._begin(SerialConnection(self._where(), self._clock))
         except SourceError as error:
             self._absent = f"{error}; it is tried again until it opens"
 
@@ -185,7 +323,9 @@ class SerialSource:
         """Keep the newest messages, of `most` counts together."""
         counts = 0
         for kept, (_, message) in enumerate(reversed(self._pending)):
-            counts += _EACH + (len(message.counts) if isinstance(message, Samples) else 0)
+            counts += _MESSAGE_OVERHEAD + (
+                len(message.counts) if isinstance(message, Samples) else 0
+            )
             if counts > most:
                 self._drop(len(self._pending) - kept)
                 return
@@ -259,7 +399,7 @@ class SerialSource:
             self._scanning.begin()
         self._tell.losses()
 
-    def _attend(self, line: Line) -> None:
+    def _attend(self, line: SerialConnection) -> None:
         """Ping, and say what to scan; try other baud rates on bytes that mean nothing."""
         now = self._clock()
         if self._means.known and self._means.sensor is not None:

@@ -20,7 +20,7 @@ from kappaskin.errors import Refusal
 from kappaskin.sensing import Sensor
 
 FORMAT = 1
-KEPT = 10
+MOST_SAVED = 10
 """How many tares of one sensor are kept, the newest."""
 
 _LARGEST = 2**26  # bytes
@@ -28,7 +28,7 @@ _KEYS = {"format", "sha256", "used", "tare"}
 
 
 @dataclass(frozen=True)
-class Kept:
+class SavedTares:
     """The `tares` of one sensor, the oldest first, and the one `used`, if one is."""
 
     tares: tuple[Tare, ...] = ()
@@ -43,12 +43,12 @@ class Kept:
         return None
 
 
-def data_folder() -> Path:
+def tare_folder() -> Path:
     """The folder of this user's tares."""
     return platformdirs.user_data_path("kappaskin", appauthor=False) / "tares"
 
 
-class Tares:
+class TareStore:
     """The tares kept in a `folder`."""
 
     def __init__(self, folder: Path) -> None:
@@ -64,14 +64,14 @@ class Tares:
         mark = hashlib.sha256(serial_number.encode(errors="surrogatepass")).hexdigest()[:12]
         return self.folder / f"{plain or 'sensor'}-{mark}.toml"
 
-    def load(self, serial_number: str) -> Kept:
+    def load(self, serial_number: str) -> SavedTares:
         """What is kept of a sensor; a file that is damaged is refused, none is an empty one."""
         path = self.path(serial_number)
         try:
             with path.open("rb") as file:
                 data = file.read(_LARGEST + 1)
         except FileNotFoundError:
-            return Kept()
+            return SavedTares()
         except OSError as error:
             raise Refusal(f"{path}: cannot be read ({error}); check its permissions") from error
         try:
@@ -89,7 +89,7 @@ class Tares:
         except Refusal:
             before = ()
         others = [kept for kept in before if kept != tare]
-        self._write(tare.serial_number, Kept((*others, tare)[-KEPT:], tare))
+        self._write(tare.serial_number, SavedTares((*others, tare)[-MOST_SAVED:], tare))
 
     def use(self, serial_number: str, tare: Tare | None) -> None:
         """Use one that is kept, or none; nothing is written where nothing changes."""
@@ -97,9 +97,9 @@ class Tares:
         if tare is not None and tare not in kept.tares:
             self.add(tare)
         elif tare != kept.used:
-            self._write(serial_number, Kept(kept.tares, tare))
+            self._write(serial_number, SavedTares(kept.tares, tare))
 
-    def _write(self, serial_number: str, kept: Kept) -> None:
+    def _write(self, serial_number: str, kept: SavedTares) -> None:
         """Write the file whole or not at all."""
         path = self.path(serial_number)
         part = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -117,12 +117,12 @@ class Tares:
             ) from error
 
 
-def tare_text(tare: Tare) -> str:
+def tare_to_toml(tare: Tare) -> str:
     """The text of a file with one tare."""
-    return _text(Kept((tare,), tare))
+    return _text(SavedTares((tare,), tare))
 
 
-def tare_in(data: bytes, name: str) -> Tare:
+def tare_from_toml(data: bytes, name: str) -> Tare:
     """The tare in the `data` that `tare_text` made, of a file that refusals call `name`."""
     try:
         kept = _kept(data, None)
@@ -133,18 +133,18 @@ def tare_in(data: bytes, name: str) -> Tare:
     return kept.used
 
 
-def _content(kept: Kept) -> dict[str, Any]:
+def _content(kept: SavedTares) -> dict[str, Any]:
     used = kept.used.digest if kept.used else ""
     return {"used": used, "tare": [tare.content for tare in kept.tares]}
 
 
-def _text(kept: Kept) -> str:
+def _text(kept: SavedTares) -> str:
     content = _content(kept)
     head = {"format": FORMAT, "sha256": digest(content), "used": content["used"]}
     return "\n".join([table("", head), *(table("[[tare]]", said) for said in content["tare"])])
 
 
-def _kept(data: bytes, serial_number: str | None) -> Kept:
+def _kept(data: bytes, serial_number: str | None) -> SavedTares:
     """The tares in a file of the sensor of this number, or of whichever."""
     if len(data) > _LARGEST:
         raise ValueError(f"it has more than {_LARGEST} bytes")
@@ -159,7 +159,7 @@ def _kept(data: bytes, serial_number: str | None) -> Kept:
     tares = tuple(_tare(one) for one in content["tare"])
     if serial_number is not None and any(t.serial_number != serial_number for t in tares):
         raise ValueError("it is of another sensor")
-    return Kept(tares, next((tare for tare in tares if tare.digest == said["used"]), None))
+    return SavedTares(tares, next((tare for tare in tares if tare.digest == said["used"]), None))
 
 
 def _tare(said: dict[str, Any]) -> Tare:
