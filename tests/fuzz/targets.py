@@ -314,7 +314,7 @@ def _recorded() -> tuple[bytes, bytes]:
         recorder.plays(scene)
         pipeline = Pipeline(source.sensor, Setup(Ni=3, Nj=3, nx=5, ny=5))
         recorder.set_up(pipeline)
-        recorder.remembered(pipeline.remembered())
+        recorder.remembered(pipeline.state())
         recorder.happened(Event(0.0, "note", "seed"))
         frames: list[Frame] = []
         while len(frames) < 4:

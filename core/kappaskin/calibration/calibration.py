@@ -142,7 +142,7 @@ def digest(content: dict[str, dict[str, Any]]) -> str:
 class Corrector(Stateful):
     """A calibration at work: each frame of readings to curvature, with a memory of those before."""
 
-    REMEMBERED = ("_last", "_time", "_restore", "_straighten")
+    STATE = ("_last", "_time", "_restore", "_straighten")
 
     def __init__(self, calibration: Calibration) -> None:
         failed = np.isnan(calibration.gain)

@@ -43,7 +43,7 @@ class MovingModes(Stateful):
     triangle on top of what is added): no rounding can make a variance negative.
     """
 
-    REMEMBERED = ("mean", "root")
+    STATE = ("mean", "root")
 
     def __init__(self, wavenumbers: Array, dtype: DTypeLike) -> None:
         # Typed as float64: what holds for one holds for the other.

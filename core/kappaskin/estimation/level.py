@@ -33,7 +33,7 @@ class Level(Stateful):
     number, a share as large as `rounding` is not known.
     """
 
-    REMEMBERED = ("variance", "count", "rounding", "amplitude", "speed")
+    STATE = ("variance", "count", "rounding", "amplitude", "speed")
 
     variance: float
     count: float

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from kappaskin._state import State, Stateful
+from kappaskin._state import StateArrays, Stateful
 from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import Evidence
@@ -86,7 +86,7 @@ class Robust(Estimator, Stateful):
     then told as large.
     """
 
-    REMEMBERED = ("_history",)
+    STATE = ("_history",)
 
     def _set_up(self) -> None:
         basis, layout = self.basis, self.layout
@@ -279,19 +279,19 @@ class _History(Stateful):
         self._P = P
         self._frames: deque[tuple[Array, Mask, Array]] = deque(maxlen=_FRAMES)
 
-    def remembered(self, before: str = "") -> State:
+    def state(self, prefix: str = "") -> StateArrays:
         frames = [np.vstack(frame).astype(float) for frame in self._frames]
-        return {f"{before}frames": np.array(frames)} if frames else {}
+        return {f"{prefix}frames": np.array(frames)} if frames else {}
 
-    def recall(self, memory: Mapping[str, NDArray[np.float64]], before: str = "") -> None:
-        kept = memory.get(f"{before}frames", np.empty((0, 7, self._P)))
-        if kept.ndim != 3 or kept.shape[1:] != (7, self._P):
+    def restore(self, state: Mapping[str, NDArray[np.float64]], prefix: str = "") -> None:
+        saved = state.get(f"{prefix}frames", np.empty((0, 7, self._P)))
+        if saved.ndim != 3 or saved.shape[1:] != (7, self._P):
             raise Refusal(
-                f"expected {before}frames of shape (T, 7, {self._P}) to go on from, got "
-                f"shape {kept.shape}"
+                f"expected {prefix}frames of shape (T, 7, {self._P}) to go on from, got "
+                f"shape {saved.shape}"
             )
         self._frames.clear()
-        self._frames.extend((frame[:3], frame[3] > 0, frame[4:]) for frame in kept)
+        self._frames.extend((frame[:3], frame[3] > 0, frame[4:]) for frame in saved)
 
     def __call__(self, K: Array, suspects: Mask, off: Array) -> NDArray[np.uint8]:
         """Numbers (P,) of `WHY` for readings K (3, P) that are `off` (3, P) in 1/m."""

@@ -68,7 +68,7 @@ class Tracking(Estimator, Stateful):
 
     remembers: ClassVar = True
     has_prior: ClassVar = True
-    REMEMBERED = ("_filter", "_level", "_now", "_left", "_read")
+    STATE = ("_filter", "_level", "_now", "_left", "_read")
 
     def _set_up(self) -> None:
         if not self.readable.any():
@@ -88,10 +88,10 @@ class Tracking(Estimator, Stateful):
         self._left = np.full(self._A.shape[0], np.nan)
         self._read = np.full(self._A.shape[0], -math.inf)
 
-    def recall(self, memory: Mapping[str, Array], before: str = "") -> None:
-        if f"{before}_level.variance" in memory and self._level is None:
+    def restore(self, state: Mapping[str, Array], prefix: str = "") -> None:
+        if f"{prefix}_level.variance" in state and self._level is None:
             self._level = Level(0.0, 0.0, 0.0)
-        super().recall(memory, before)
+        super().restore(state, prefix)
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
         """The fit to a skin at rest by which nothing is remembered."""

@@ -44,7 +44,7 @@ class Keeping:
         self.listen(source)
         if side.pipeline is not None:
             recorder.set_up(side.pipeline)
-            recorder.remembered(side.pipeline.remembered())
+            recorder.remembered(side.pipeline.state())
             if side.left is not None:
                 recorder.left_out(*side.left)
 

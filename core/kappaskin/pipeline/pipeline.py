@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin._state import State, Stateful
+from kappaskin._state import StateArrays, Stateful
 from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import NO_TOUCH, LoadSeeker, PointContact, contact_geometry
@@ -27,7 +27,7 @@ class FrameAssembly(Stateful):
     last one. A clock that went back, as of a device that restarted, holds nothing from before.
     """
 
-    REMEMBERED = ("_values", "_times")
+    STATE = ("_values", "_times")
 
     def __init__(self, channels: int, age: float) -> None:
         if not (math.isfinite(age) and age >= 0):
@@ -275,25 +275,25 @@ class Pipeline:
         if _estimating(self) == _estimating(before):
             self.fit = before.fit
 
-    def remembered(self) -> State:
+    def state(self) -> StateArrays:
         """What estimates depend on besides their frames, by name; also of frames passed over."""
         for earlier in self.past.passed:
             self.past.hold(earlier, self.curvature(earlier))
         self.past.passed.clear()
-        found = self.past.hold.remembered("hold.")
+        found = self.past.hold.state("hold.")
         if self.past.correct is not None:
-            found |= self.past.correct.remembered("correct.")
+            found |= self.past.correct.state("correct.")
         if isinstance(self.fit, Stateful):
-            found |= self.fit.remembered("fit.")
+            found |= self.fit.state("fit.")
         return found
 
-    def recall(self, memory: State) -> None:
-        """Go on from what another of the same sensor and setup `remembered`."""
-        self.past.hold.recall(memory, "hold.")
+    def restore(self, state: StateArrays) -> None:
+        """Go on from the `state` of another of the same sensor and setup."""
+        self.past.hold.restore(state, "hold.")
         if self.past.correct is not None:
-            self.past.correct.recall(memory, "correct.")
+            self.past.correct.restore(state, "correct.")
         if isinstance(self.fit, Stateful):
-            self.fit.recall(memory, "fit.")
+            self.fit.restore(state, "fit.")
 
     def pass_over(self, frame: Frame) -> None:
         """Remember the readings of a frame of which nobody waits for the estimate."""

@@ -91,7 +91,7 @@ class Reenactment:
         numbers = (said[name] for name in ("at", "offset", "half", "drift", "spread"))
         known = ClockState((*numbers, bool(said["doubted"])), int(said["wraps"]), said["last"])
         if math.isnan(said["since"]):
-            self._times.recall(known)
+            self._times.restore(known)
         else:
             self._times.coming.append((said["since"], known))
 

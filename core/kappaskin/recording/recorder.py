@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kappaskin._state import State, Stateful
+from kappaskin._state import StateArrays, Stateful
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Event, Frame, Truth
 from kappaskin.pipeline import Pipeline
@@ -127,7 +127,7 @@ class Recorder:
         self._file.put(m.SETUP, self._now, encode(m.STRING, {"data": text}))
         self._views = _Views(pipeline)
 
-    def remembered(self, memory: State) -> None:
+    def remembered(self, memory: StateArrays) -> None:
         """The pipeline goes on from this."""
         for name, values in memory.items():
             said = {"name": name, "shape": values.shape, "values": values.ravel()}

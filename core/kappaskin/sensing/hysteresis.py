@@ -69,7 +69,7 @@ class PrandtlIshlinskii:
 class Plays(Stateful):
     """The positions of all plays; called with each frame, it moves them."""
 
-    REMEMBERED = ("_w",)
+    STATE = ("_w",)
 
     def __init__(self, operator: PrandtlIshlinskii) -> None:
         self._r, self._p = operator.thresholds, operator.weights
@@ -138,7 +138,7 @@ class StandardLinearSolid:
 class _Slow(Stateful):
     """The slow part s and the curvature before, both (C,)."""
 
-    REMEMBERED = ("_s", "_x", "_time")
+    STATE = ("_s", "_x", "_time")
 
     def __init__(self, solid: StandardLinearSolid) -> None:
         self._share, self._tau = solid.share, solid.time_constant

@@ -247,7 +247,7 @@ class RecordedClock(ClockMap):
         super().__init__()
         self.coming: deque[tuple[float, ClockState]] = deque(maxlen=_MESSAGES)
 
-    def recall(self, known: ClockState) -> None:
+    def restore(self, known: ClockState) -> None:
         """Go on from what was known at one moment."""
         self._wraps, self._last = known.wraps, known.last
         self._go_over(known)
