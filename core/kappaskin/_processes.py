@@ -16,10 +16,12 @@ from kappaskin.errors import Refusal
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
-
 _AHEAD = 10  # of 40 steps of priority
 
 Context: TypeAlias = "ForkServerContext | SpawnContext"
+
+_Item = TypeVar("_Item")
+_GRACE = 1.0  # s to clear up in once the one that asked is gone
 
 
 @contextmanager
@@ -92,10 +94,6 @@ class ProcessPriority:
                 os.setpriority(
                     os.PRIO_PROCESS, thread.native_id or 0, self._usual - (_AHEAD if on else 0)
                 )
-
-
-_Item = TypeVar("_Item")
-_GRACE = 1.0  # s to clear up in once the one that asked is gone
 
 
 def end_with_parent() -> None:

@@ -24,6 +24,22 @@ _MOST_CHANNELS = 2**14  # whose numbers the engine can tell with every status
 _STEPS = 200  # towards the reading of a straight skin; a quarter of the rest or more goes in each
 _REST = 1e-6  # 1/m, as near as it need be
 
+FORMAT = 1
+OLDEST = timedelta(days=180)
+"""Age beyond which a calibration is not trusted: glue and bonding go on changing."""
+
+_AHEAD = timedelta(days=1)  # that the clock of the machine that calibrated may have been ahead
+_LARGEST = 2**26  # bytes
+_KEYS = {
+    "device": {"name", "serial_number", "firmware", "layout", "date"},
+    "line": {"gain", "offset", "gain_sd", "offset_sd"},
+    "hysteresis": {"thresholds", "weights", "linear", "stretch"},
+    "creep": {"share", "time_constant"},
+}
+
+_OPTIONAL = {"hysteresis", "creep"}
+_AGAIN = "calibrate again, or restore the file from a copy"
+
 
 def fingerprint(layout: SensorLayout) -> str:
     """A hash of the skin's sides and of where its elements are, to a nanometre.
@@ -199,21 +215,6 @@ class Corrector(Stateful):
         return left
 
 
-FORMAT = 1
-OLDEST = timedelta(days=180)
-"""Age beyond which a calibration is not trusted: glue and bonding go on changing."""
-
-_AHEAD = timedelta(days=1)  # that the clock of the machine that calibrated may have been ahead
-_LARGEST = 2**26  # bytes
-_KEYS = {
-    "device": {"name", "serial_number", "firmware", "layout", "date"},
-    "line": {"gain", "offset", "gain_sd", "offset_sd"},
-    "hysteresis": {"thresholds", "weights", "linear", "stretch"},
-    "creep": {"share", "time_constant"},
-}
-_OPTIONAL = {"hysteresis", "creep"}
-
-
 def calibration_to_toml(calibration: Calibration) -> str:
     """The text of the file."""
     tables = [table("", {"format": FORMAT, "sha256": calibration.digest})]
@@ -264,9 +265,6 @@ def _parsed(path: Path, data: bytes) -> dict[str, Any]:
         return tomllib.loads(data.decode())
     except (ValueError, RecursionError) as error:
         raise Refusal(f"{path}: is no calibration file ({error!s:.120}); {_AGAIN}") from error
-
-
-_AGAIN = "calibrate again, or restore the file from a copy"
 
 
 def _checked(path: Path, said: dict[str, Any]) -> dict[str, Any]:

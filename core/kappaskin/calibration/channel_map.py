@@ -18,6 +18,12 @@ _BESIDE = 1.6  # distances of elements: no further apart are those beside each o
 _AS_GOOD = 0.75  # of the strongest answer: one beside it that answers so much was pressed too
 _ALSO = 0.8  # of the same: one elsewhere that answers so much leaves it unclear
 
+Indices = NDArray[np.intp]
+_CLEARLY = 0.5  # of the squares left: by so much another order of components explains more
+_FUNCTIONS = 15  # along each side, of the shape it makes
+_ORDERS = tuple(permutations(range(3)))
+_NAMED = 6  # of them one by one
+
 
 @dataclass(frozen=True, eq=False)
 class PressResult:
@@ -69,14 +75,6 @@ def _pitch(layout: SensorLayout) -> float:
         return 1.0
     apart, _ = scipy.spatial.KDTree(layout.positions).query(layout.positions, 2)
     return float(np.median(np.asarray(apart)[:, 1]))
-
-
-Indices = NDArray[np.intp]
-
-_CLEARLY = 0.5  # of the squares left: by so much another order of components explains more
-_FUNCTIONS = 15  # along each side, of the shape it makes
-_ORDERS = tuple(permutations(range(3)))
-_NAMED = 6  # of them one by one
 
 
 @dataclass(frozen=True, eq=False)

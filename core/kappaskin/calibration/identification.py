@@ -8,6 +8,15 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import PrandtlIshlinskii, StandardLinearSolid
 
+_PLAYS = 10  # at most, up to half of the range
+_MOST_STEPS = 12  # of Gauss-Newton at most, in log a
+_LONGEST_STEP = 0.3  # step in log a
+_CONVERGED = 1e-5  # step in log a
+_DECISIVE = 0.5  # share of a reading that the fit leaves to others, below which it decides alone
+_MOST_ASYMMETRY = np.log(4.0)  # log a: loops of one side at most four times as wide as the other's
+_MOST_SHARE = 0.9
+_SETTLING = 0.01  # share of a hold, after the skin was bent, that is left out
+
 
 @dataclass(frozen=True, eq=False)
 class LineFits:
@@ -50,14 +59,6 @@ def fit_lines(x: Array, y: Array) -> LineFits:
         np.sqrt((e**2).mean(axis=0)) / scale,
         np.sqrt(((e / (1 - h[:, None])) ** 2).mean(axis=0)) / scale,
     )
-
-
-_PLAYS = 10  # at most, up to half of the range
-_MOST_STEPS = 12  # of Gauss-Newton at most, in log a
-_LONGEST_STEP = 0.3  # step in log a
-_CONVERGED = 1e-5  # step in log a
-_DECISIVE = 0.5  # share of a reading that the fit leaves to others, below which it decides alone
-_MOST_ASYMMETRY = np.log(4.0)  # log a: loops of one side at most four times as wide as the other's
 
 
 def play_thresholds(x: Array, radii: int) -> Array:
@@ -244,10 +245,6 @@ def identify_hysteresis(
             shares = fit.G / fit.G.sum()
             q[c], p[:, c], a[c] = shares[0], shares[1:], np.exp(fit.log_a)
     return LineFits(*numbers), PrandtlIshlinskii(np.tile(r[:, None], C), p, q, a)
-
-
-_MOST_SHARE = 0.9
-_SETTLING = 0.01  # share of a hold, after the skin was bent, that is left out
 
 
 def _bent_at(course: Array) -> int:

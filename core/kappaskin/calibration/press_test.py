@@ -37,6 +37,14 @@ _MOVING = 6.0  # the same, that a skin at rest may move by
 _LET_GO = 3.0  # times as far as it is bent in, it bulges where it was let go
 _OVER = 0.25  # of its peak: less is left when a press is over
 
+_MOST_ELEMENTS = 400  # elements: more nobody presses
+_OF_THE_RANGE = 0.5  # of what a channel can read, that a simulated finger makes of it
+_FINEST = 15  # functions along each side at least: or a bent strip answers everywhere alike
+_HELD = 0.2  # s that it stays
+_GIVEN_UP = 5.0  # s after which nothing will answer to it
+_READ = 0.02  # s that one read may wait
+_LONGEST = 3600.0  # s that one may take to press
+
 
 class PressPhase(Enum):
     """What is waited for."""
@@ -129,9 +137,6 @@ class PressDetector:
         if most < _OVER * self._most:
             return True
         return now - self._pressed > _STILL and self._whole() and self._still(self._last())
-
-
-_MOST_ELEMENTS = 400  # elements: more nobody presses
 
 
 def elements_to_press(layout: SensorLayout, quick: bool) -> tuple[int, ...]:
@@ -232,14 +237,6 @@ class PressTest:
     def verdict(self) -> MapVerdict:
         """What the map is, as far as was pressed."""
         return map_verdict(self.sensor, tuple(self.done))
-
-
-_OF_THE_RANGE = 0.5  # of what a channel can read, that a simulated finger makes of it
-_FINEST = 15  # functions along each side at least: or a bent strip answers everywhere alike
-_HELD = 0.2  # s that it stays
-_GIVEN_UP = 5.0  # s after which nothing will answer to it
-_READ = 0.02  # s that one read may wait
-_LONGEST = 3600.0  # s that one may take to press
 
 
 def _ask(test: PressTest, tell: Report) -> None:

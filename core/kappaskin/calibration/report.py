@@ -23,6 +23,9 @@ from kappaskin.sensing import PrandtlIshlinskii, Sensor, StandardLinearSolid
 
 DEAD = "dead, as the device itself says"
 
+_Part = TypeVar("_Part", LineFits, PrandtlIshlinskii)
+_WORST = 5  # channels that are named
+
 
 @dataclass(frozen=True)
 class ChannelLimits:
@@ -101,9 +104,6 @@ def failures_of(
         elif why := limits.reason(*(float(values[c]) for values in numbers)):
             found[c] = why
     return found
-
-
-_Part = TypeVar("_Part", LineFits, PrandtlIshlinskii)
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,9 +335,6 @@ def calibrate(
     return CalibrationReport(
         calibration, line, fitted, _gaps(sweep, by_line), _gaps(sweep, left), noise
     )
-
-
-_WORST = 5  # channels that are named
 
 
 def report_summary(report: CalibrationReport) -> list[str]:

@@ -29,6 +29,14 @@ _FEWEST_FRAMES = 2  # whose spread tells the noise
 _SETTLED = 1.0  # s at the end of a hold that count as its reading
 _COURSE_POINTS = 500  # moments that are kept of a hold
 
+_READ = 0.05  # s that one read may wait
+_SILENCE = 5.0  # s without a frame after which the source counts as dead
+_MOST_FRAMES = 5000  # kept of one step, evenly: more tell no more
+_LONGEST = 3600.0  # s on one step
+Report = Callable[[str], None]
+Prompt = Callable[[str], str]
+"""A question to the answer that was typed."""
+
 
 @dataclass(frozen=True, eq=False)
 class StepReadings:
@@ -189,16 +197,6 @@ def _course(times: Array, readings: Array) -> tuple[Array, Array]:
     sizes = np.diff(starts, append=len(times))
     sums = np.add.reduceat(readings, starts, axis=0)
     return np.add.reduceat(times, starts) / sizes, sums / sizes[:, None]
-
-
-_READ = 0.05  # s that one read may wait
-_SILENCE = 5.0  # s without a frame after which the source counts as dead
-_MOST_FRAMES = 5000  # kept of one step, evenly: more tell no more
-_LONGEST = 3600.0  # s on one step
-
-Report = Callable[[str], None]
-Prompt = Callable[[str], str]
-"""A question to the answer that was typed."""
 
 
 @dataclass

@@ -22,6 +22,24 @@ from kappaskin.sensing import Sensor
 
 _MOST_CHANNELS = 2**16  # whose numbers the engine can tell with every status
 
+_PLAIN = ("name", "serial_number", "layout", "date", "temperature", "frames", "seconds")
+
+SECONDS = 1.0
+"""How long the readings of a tare are averaged, by the device's clock."""
+
+_PATIENCE = 5.0  # s after which a tare is given up
+_FEWEST = 20  # frames
+_MOST = 500  # frames, kept evenly: more tell no more
+_MOST_NUMBERS = 2**23
+_ROUNDING = 0.999  # of the time between two that are kept
+_PARTS = 8  # of the time, that are held against each other
+_OFTEN = 0.9  # of the frames that a channel must be in
+_BLIND = 0.1  # of the channels that may read nothing
+_STIR = 2.0  # times the noise of a frame, by which no part may be off
+_TAU = 2.0  # s over which a drift is averaged
+_EVERY = 0.02  # s between two frames that count
+_LOOK = 0.5  # s between two looks
+
 
 @dataclass(frozen=True, eq=False)
 class Tare:
@@ -98,27 +116,6 @@ class Tare:
                 f"{sensor.name} {sensor.serial_number} has {sensor.layout} in other places than "
                 "when it was tared; tare it again"
             )
-
-
-_PLAIN = ("name", "serial_number", "layout", "date", "temperature", "frames", "seconds")
-
-
-SECONDS = 1.0
-"""How long the readings of a tare are averaged, by the device's clock."""
-
-_PATIENCE = 5.0  # s after which a tare is given up
-_FEWEST = 20  # frames
-_MOST = 500  # frames, kept evenly: more tell no more
-_MOST_NUMBERS = 2**23
-_ROUNDING = 0.999  # of the time between two that are kept
-_PARTS = 8  # of the time, that are held against each other
-_OFTEN = 0.9  # of the frames that a channel must be in
-_BLIND = 0.1  # of the channels that may read nothing
-_STIR = 2.0  # times the noise of a frame, by which no part may be off
-
-_TAU = 2.0  # s over which a drift is averaged
-_EVERY = 0.02  # s between two frames that count
-_LOOK = 0.5  # s between two looks
 
 
 @dataclass(frozen=True, eq=False)

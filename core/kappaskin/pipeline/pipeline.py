@@ -19,6 +19,8 @@ from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
 from kappaskin.health import LeftOut, leave_out
 from kappaskin.sensing import Sensor
 
+_LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undecided
+
 
 class FrameAssembly(Stateful):
     """Holds the last reading of each of `channels` until it is `age` s old on the device's clock.
@@ -58,9 +60,6 @@ class FrameAssembly(Stateful):
         known = (age >= 0) & (age < self._age)
         held = np.where(known, self._values, flat)
         return held.reshape(curvature.shape), np.isfinite(curvature)
-
-
-_LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undecided
 
 
 @dataclass(frozen=True)
