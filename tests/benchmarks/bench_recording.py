@@ -43,7 +43,7 @@ def test_recording_takes_little_of_a_core(figure, ratio, tmp_path) -> None:
 
     sent = [encode_samples(f.sequence, f.device_time, f.channels, f.counts, 2) for f in frames]
     for kind, tell in (
-        ("a device", lambda recorder, n: recorder.came(frames[n].host_time, sent[n])),
+        ("a device", lambda recorder, n: recorder.received(frames[n].host_time, sent[n])),
         (
             "a simulation with its truth",
             lambda recorder, n: source._record(recorder, [frames[n]]),  # noqa: SLF001 - as `read`

@@ -378,7 +378,7 @@ def test_a_device_whose_line_is_lost_in_the_middle_leaves_no_file(run, tmp_path)
     closer.start()
     found = run("calibrate", device.port, "--out", tmp_path / "s.toml", "--dwell", 0.05, *FAST[:2])
     closer.join()
-    refused(found, "the line is gone", tmp_path)
+    refused(found, "connection lost", tmp_path)
     assert "3/55" in found[2]
 
 

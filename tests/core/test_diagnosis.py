@@ -159,7 +159,7 @@ def test_losses_are_told_in_words():
     )
     told = "12 of 30,210 messages lost; 0.3 % of bytes discarded: checksum 120"
     assert many.words == told
-    assert replace(many, restarts=1).words == f"{told}; the device began anew once"
-    assert replace(many, restarts=2).words == f"{told}; the device began anew 2 times"
+    assert replace(many, restarts=1).words == f"{told}; the device restarted once"
+    assert replace(many, restarts=2).words == f"{told}; the device restarted 2 times"
     assert "100 % of bytes" in replace(many, bytes_in=120).words
     assert "under 0.001 % of bytes" in replace(many, bytes_in=10**9).words

@@ -70,17 +70,17 @@ def test_another_text_and_a_channel_that_is_not_there_are_of_another_device() ->
     means = taught()
     last = SENSOR.channels - 1
 
-    assert means.upsets(Information(0, 0.0, TEXT + " "))
-    assert not means.upsets(Information(0, 0.0, TEXT))
-    assert means.upsets(samples(0, last + 1, 2))
-    assert not means.upsets(samples(0, last, 2))
-    assert not means.upsets(samples())
-    assert not means.upsets(Reply(0, 0.0, 0, 8, 0, b""))
+    assert means.is_of_another(Information(0, 0.0, TEXT + " "))
+    assert not means.is_of_another(Information(0, 0.0, TEXT))
+    assert means.is_of_another(samples(0, last + 1, 2))
+    assert not means.is_of_another(samples(0, last, 2))
+    assert not means.is_of_another(samples())
+    assert not means.is_of_another(Reply(0, 0.0, 0, 8, 0, b""))
 
 
-def test_before_a_device_says_what_it_is_nothing_upsets_and_no_frame_comes() -> None:
+def test_before_a_device_says_what_it_is_nothing_is_of_another_and_no_frame_comes() -> None:
     means = Interpreter("loop://")
-    assert not means.upsets(samples(60_000))
+    assert not means.is_of_another(samples(60_000))
     assert means.frame(samples(0), 9.0) is None
 
 

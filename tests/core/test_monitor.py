@@ -66,7 +66,7 @@ class Device:
     def unplugged(self) -> str:
         """What is told when it is gone."""
         self.unplug()
-        return self._text(lambda: self.monitor.gone)
+        return self._text(lambda: self.monitor.lost)
 
     def unplug(self) -> None:
         if self._master >= 0:
@@ -149,8 +149,8 @@ def test_a_line_that_is_gone_is_said_and_cut_messages_counted(device) -> None:
     device.says(scan(0)[:100])
     text = device.unplugged()
     assert "discarded    100 bytes: cut off" in text
-    assert text.count("the line is gone") == 1
-    assert device.monitor.gone
+    assert text.count("connection lost") == 1
+    assert device.monitor.lost
 
 
 def test_a_port_that_cannot_be_opened_says_why() -> None:

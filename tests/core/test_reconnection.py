@@ -167,7 +167,7 @@ def pull(device, reader):
     before = reader.kinds().count("gone")
     device.pull()
     reader.until(lambda: reader.kinds().count("gone") > before)
-    assert "plug it in, and it goes on" in reader.source.trouble
+    assert "plug it in to continue" in reader.source.trouble
 
 
 def put_back(plug, reader, name="ttyACM0"):
@@ -209,7 +209,7 @@ def test_a_device_that_began_anew_while_away_is_not_said_to_have_lost_messages(s
     time.sleep(0.6)  # or its clock could as well have gone on
     put_back(plug, reader).say(encode_information(40, 0.0, TEXT) + scan(41, 0.001))
     reader.took(41)
-    assert reader.told("back").endswith(", from its beginning: 0 messages lost")
+    assert reader.told("back").endswith(", restarted: 0 messages lost")
     seen = reader.source.accounting()
     assert (seen.lost, seen.restarts, seen.balanced) == (0, 1, True)
 
@@ -278,7 +278,7 @@ def test_information_that_changes_on_the_line_is_said(streaming):
     device, reader = streaming
     device.say(encode_information(11, 0.022, text_of(dead_channels=[7])) + stream(12, 14))
     reader.took(13)
-    assert "says something else of itself" in reader.told("changed")
+    assert "another description of itself" in reader.told("changed")
 
 
 def test_a_device_that_says_much_of_itself_is_told_of_in_few_words(streaming):
@@ -293,7 +293,7 @@ def test_a_device_that_begins_anew_on_the_line_is_said_and_goes_on(streaming):
     reader.took(509)
     device.say(encode_information(0, 0.0, TEXT) + stream(1, 4))
     reader.took(3)
-    assert "started anew while it was connected" in reader.told("restarted")
+    assert "restarted while it was connected" in reader.told("restarted")
     assert reader.source.accounting().restarts == 1
     assert reader.source.accounting().balanced
 
@@ -445,7 +445,7 @@ def test_the_baud_rate_is_searched_while_bytes_mean_nothing(plug, opened, rate):
     assert device.baud_rate() == rate
     told = [event.text for event in reader.events if event.kind == "rate"]
     usual = rate == BAUD_RATES[0]
-    assert told == ([] if usual else [f"the device speaks at {rate} baud"])
+    assert told == ([] if usual else [f"the device sends at {rate} baud"])
 
 
 def test_what_is_no_device_is_said_once_every_rate_was_tried(plug, opened, monkeypatch):
@@ -534,7 +534,7 @@ def test_a_port_taken_meanwhile_is_waited_for(streaming, plug, monkeypatch):
 
     monkeypatch.setattr(serial_source, "SerialConnection", busy)
     back = plug()
-    reader.until(lambda: "close that program; it is tried again" in reader.source.trouble)
+    reader.until(lambda: "close that program; retrying" in reader.source.trouble)
     reader.until(back.heard)
     back.say(encode_information(12, 0.024, TEXT) + scan(13))
     reader.took(13)

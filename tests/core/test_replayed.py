@@ -98,7 +98,7 @@ def test_a_word_about_the_clock_ends_no_gap(tmp_path, clock, written_out) -> Non
     path = tmp_path / "gap.mcap"
     recorder = Recorder(path, 0.0)
     for when in (0.0, 0.1, 0.8, 1.5, 2.2, 2.25, 2.5, 2.6, 3.5):
-        recorder.came(when, encode_information(0, 0.0, "{}"))
+        recorder.received(when, encode_information(0, 0.0, "{}"))
         written_out(recorder)
     recorder.close()
     with closing(ReplayedSource(path, clock, clock.sleep)) as source:
@@ -253,10 +253,10 @@ class Line:
 
     def says(self, data):
         self._time += 1e-3
-        self._recorder.came(self._time, data)
+        self._recorder.received(self._time, data)
 
     def ends(self):
-        self._recorder.ended(self._time)
+        self._recorder.disconnected(self._time)
 
     def scans(self, sensor, first, count):
         for n in range(first, first + count):

@@ -15,7 +15,7 @@ def tried(tuning: BaudRateSearch, rate: int, count: int) -> list[int]:
 def test_every_rate_is_tried_round_and_round() -> None:
     tuning = BaudRateSearch(BAUD_RATES[0])
     assert tried(tuning, BAUD_RATES[0], 7) == [*BAUD_RATES[1:], BAUD_RATES[0]]
-    assert tuning.told == "at any baud rate from 115200 to 2000000:"
+    assert tuning.tried == "at any baud rate from 115200 to 2000000:"
 
 
 def test_a_rate_that_was_right_is_tried_again_after_each_other_one() -> None:

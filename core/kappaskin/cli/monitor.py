@@ -33,10 +33,10 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
     try:
         if reset:
             listening.reset()
-        while not (stopped or listening.gone) and time.monotonic() < end:
+        while not (stopped or listening.lost) and time.monotonic() < end:
             for line in listening.read(_READ):
                 print(line, flush=True)
     finally:
         listening.close()
     print(listening.summary())
-    return FAILED if listening.gone or not listening.accounting().accepted else 0
+    return FAILED if listening.lost or not listening.accounting().accepted else 0

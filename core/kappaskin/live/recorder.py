@@ -64,7 +64,7 @@ class Keeping:
     def ended(self) -> None:
         """The source brings nothing more."""
         if self._recorder is not None and self._live:
-            self._recorder.ended(time.monotonic())
+            self._recorder.disconnected(time.monotonic())
 
     def set_up(self, side: Side) -> None:
         """Another pipeline is in use."""

@@ -93,7 +93,7 @@ class Reenactment:
         if math.isnan(said["since"]):
             self._times.restore(known)
         else:
-            self._times.coming.append((said["since"], known))
+            self._times.changes.append((said["since"], known))
 
     def _came(self, now: float, data: bytes) -> Iterator[Frame]:
         messages = self._decoder.feed(data)

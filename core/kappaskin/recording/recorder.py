@@ -60,10 +60,10 @@ class Recorder:
 
     # What the source tells.
 
-    def met(self, text: str) -> None:
-        self._file.put(m.DEVICE, self._now, encode(m.STRING, {"data": text}))
+    def connected(self, information: str) -> None:
+        self._file.put(m.DEVICE, self._now, encode(m.STRING, {"data": information}))
 
-    def came(self, host_time: float, data: bytes) -> None:
+    def received(self, host_time: float, data: bytes) -> None:
         self._now = host_time
         self._file.put(m.LINES, host_time, m.pack_line(host_time, False, data))
 
@@ -71,12 +71,12 @@ class Recorder:
         self._now = host_time
         self._file.put(m.LINES, host_time, m.pack_line(host_time, True, data))
 
-    def ended(self, host_time: float) -> None:
-        """No bytes at all came: the line is gone."""
-        self.came(host_time, b"")
+    def disconnected(self, host_time: float) -> None:
+        """Recorded as no bytes at all."""
+        self.received(host_time, b"")
 
-    def mapped(self, since: float, known: ClockState) -> None:
-        at, offset, half, drift, spread, doubted = known.map
+    def clock(self, since: float, state: ClockState) -> None:
+        at, offset, half, drift, spread, doubted = state.map
         said = {
             "since": since,
             "at": at,
@@ -85,8 +85,8 @@ class Recorder:
             "drift": drift,
             "spread": spread,
             "doubted": doubted,
-            "wraps": known.wraps,
-            "last": known.last,
+            "wraps": state.wraps,
+            "last": state.last,
         }
         self._file.put(m.CLOCKS, self._now, encode(m.CLOCK, said))
 

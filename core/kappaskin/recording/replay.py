@@ -287,7 +287,7 @@ class ReplayedSource:
         told, self._events = self._events, []
         return told
 
-    def record(self, tape: InputRecorder | None) -> None:
+    def record(self, recorder: InputRecorder | None) -> None:
         """Not recorded again: it is a recording."""
 
     def accounting(self) -> Accounting:

@@ -32,10 +32,17 @@ _LATE = 64  # how far back a sequence number may be late rather than a restart o
 
 _SMALLEST_SHARE = 1e-5  # share below which its size is not told
 
+FROM_DEVICE = frozenset((MessageKind.INFORMATION, MessageKind.SAMPLES, MessageKind.REPLY))
+FROM_HOST = frozenset((MessageKind.COMMAND,))
+_WHOLE = 0x2144DF1C  # the CRC-32 of any bytes that their own CRC-32 follows
+_SAMPLES_KIND = int(MessageKind.SAMPLES)
+_COUNTS = np.dtype(np.int32)
+_LISTS = 64  # scan lists that are cached as arrays
+
 
 @dataclass(frozen=True, slots=True)
 class Accounting:
-    """What became of every byte and every sequence number since a source was opened.
+    """Counts of every byte and every sequence number since a source was opened, by their fate.
 
     bytes_in = bytes_good + sum of discarded + buffered; good = accepted + duplicate;
     span = accepted + lost.
@@ -59,15 +66,15 @@ class Accounting:
 
     @property
     def words(self) -> str:
-        """Losses in words, such as "12 of 30,210 messages lost; 0.3 % of bytes discarded"."""
-        told = [f"{self.lost:,} of {self.span:,} messages lost"]
+        """Losses as text, such as "12 of 30,210 messages lost; 0.3 % of bytes discarded"."""
+        parts = [f"{self.lost:,} of {self.span:,} messages lost"]
         if thrown := self.bytes_discarded:
             why = ", ".join(f"{reason} {n:,}" for reason, n in self.discarded if n)
-            told.append(f"{_percent(thrown / self.bytes_in)} of bytes discarded: {why}")
+            parts.append(f"{_percent(thrown / self.bytes_in)} of bytes discarded: {why}")
         if self.restarts:
             times = "once" if self.restarts == 1 else f"{self.restarts} times"
-            told.append(f"the device began anew {times}")
-        return "; ".join(told)
+            parts.append(f"the device restarted {times}")
+        return "; ".join(parts)
 
     @property
     def balanced(self) -> bool:
@@ -88,12 +95,12 @@ def _percent(share: float) -> str:
 
 
 class SequenceCounter:
-    """Tells accepted, duplicate, late and lost sequence numbers apart, through wrap and restart."""
+    """Counts accepted, duplicate, late and lost sequence numbers, through wrap and restart."""
 
     def __init__(self) -> None:
         self.good = self.accepted = self.duplicate = self.lost = self.span = self.restarts = 0
         self._next: int | None = None
-        # The number expected when the line was interrupted, and the first one since.
+        # The number expected when the connection was lost, and the first one since.
         self._before: int | None = None
         self._first: int | None = None
         self._missing: set[int] = set()
@@ -126,14 +133,14 @@ class SequenceCounter:
         return True
 
     def interrupt(self) -> None:
-        """The line is gone: whether the next number goes on from the last is to be said then."""
+        """The connection was lost; `resume` says later whether the numbers continue."""
         if self._next is not None:
             self._before = self._next
         self._next = self._first = None
         self._missing.clear()
 
     def resume(self, same: bool) -> None:
-        """Say of the first number since whether the device went on, or began anew."""
+        """Say whether the numbers since are of the `same` run of the device, or it restarted."""
         if self._before is None or self._first is None:
             return
         gap = (self._first - self._before) % SEQUENCES
@@ -154,17 +161,8 @@ class SequenceCounter:
             self._missing = {s for s in self._missing if (self._next - s) % SEQUENCES <= _LATE}
 
 
-FROM_DEVICE = frozenset((MessageKind.INFORMATION, MessageKind.SAMPLES, MessageKind.REPLY))
-FROM_HOST = frozenset((MessageKind.COMMAND,))
-
-_WHOLE = 0x2144DF1C  # the CRC-32 of any bytes that their own CRC-32 follows
-_SAMPLES_KIND = int(MessageKind.SAMPLES)
-_COUNTS = np.dtype(np.int32)
-_LISTS = 64  # scan lists that are remembered as arrays
-
-
 class _ScanList(NamedTuple):
-    """The `head` of a samples payload, its channels and how counts are told; `size` of it all."""
+    """The `head` of a samples payload, its channels and the type of counts; `size` of it all."""
 
     head: bytes
     size: int
@@ -176,7 +174,7 @@ _NO_LIST = _ScanList(b"", -1, np.empty(0, np.intp), np.dtype("<i2"))
 
 
 class Decoder:
-    """Takes bytes as they come and gives the messages of `kinds` in them; never raises."""
+    """Finds the messages of `kinds` in bytes as they arrive; never raises."""
 
     def __init__(self, kinds: frozenset[MessageKind] = FROM_DEVICE) -> None:
         self.sequence = SequenceCounter()
@@ -232,7 +230,7 @@ class Decoder:
         return messages
 
     def _skip(self, stream: bytes, at: int, reason: str) -> int:
-        """Throw bytes away up to where the next message may begin; where that is."""
+        """Discard bytes up to where the next message may begin; where that is."""
         found = stream.find(MAGIC, at + 1)
         if found < 0:
             found = max(at + 1, len(stream) - stream.endswith(MAGIC[:1]))
@@ -251,7 +249,7 @@ class Decoder:
         return Samples(sequence, time, channels, counts)
 
     def _take_list(self, stream: bytes, at: int, stop: int) -> bool:
-        """Go over to the list of channels that a payload begins with; whether it is one."""
+        """Use the list of channels that a payload begins with; whether it is a valid one."""
         if stop - at < 2:
             return False
         head = stream[at : at + 2 + 4 * stream[at + 1]]
@@ -297,14 +295,14 @@ class Decoder:
         )
 
     def line_ended(self) -> None:
-        """Count what is buffered as cut off: the rest of it will not come."""
+        """Count what is buffered as cut off: the rest of it will not arrive."""
         if self._held:
             self._discarded["cut off"] += self._held
             self._parts, self._held, self._needed = [], 0, HEAD
 
 
 def _read(kind: int, sequence: int, time: float, payload: bytes) -> Message | str:
-    """What a payload says, or why it means nothing."""
+    """The message in a payload, or why there is none."""
     if kind == MessageKind.INFORMATION:
         return read_information(sequence, time, payload) or "content"
     if kind == MessageKind.REPLY:

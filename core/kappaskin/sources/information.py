@@ -1,4 +1,4 @@
-"""What a device says it is, as JSON on the wire and as a `Sensor` in the program."""
+"""Device information: a sensor's description as JSON on the wire, and back."""
 
 import json
 import math
@@ -67,7 +67,7 @@ _READS = Within(1e-3, 1e9, "1/m")
 _Part = TypeVar("_Part", HalfBridge, Multiplexer, Amplifier, Converter)
 
 _OF_THE_PLATE = ("tension", "foundation", "poisson", "rim_stiffness")
-# What a flat plate hinged along its edges need not say.
+# What a flat plate hinged along its edges may leave out.
 DEFAULTS: dict[str, Any] = {
     "base_curvature": 0.0,
     "strip": False,
@@ -192,7 +192,7 @@ def _check_sizes(plate: Plate, transduction: Transduction) -> None:
 
 
 def sensor_from_json(text: str) -> Sensor:
-    """The sensor that `text` tells of; raises `SourceError` when it cannot be understood."""
+    """The sensor that `text` describes; a `SourceError` where it cannot be understood."""
     try:
         said = _parsed(text)
         layout = _layout(said)

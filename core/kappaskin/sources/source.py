@@ -9,51 +9,50 @@ from kappaskin.sensing import Sensor
 from kappaskin.sources.clock import ClockState
 from kappaskin.sources.decoder import Accounting
 
+SIMULATION = "sim:"
+
 
 class InputRecorder(Protocol):
-    """Takes down what a source reads, before anybody computes with it."""
+    """Records all that a source's frames are made of, in order, before they are computed with."""
 
-    def met(self, text: str) -> None:
-        """The device is the one that the information `text` tells of."""
+    def connected(self, information: str) -> None:
+        """The device is the one that this information text describes."""
         ...
 
-    def came(self, host_time: float, data: bytes) -> None:
-        """These bytes came at `host_time` in s."""
+    def received(self, host_time: float, data: bytes) -> None:
+        """These bytes arrived at `host_time` in s."""
         ...
 
     def sent(self, host_time: float, data: bytes) -> None:
         """These bytes were sent."""
         ...
 
-    def ended(self, host_time: float) -> None:
-        """The line is gone; what comes next comes over another one."""
+    def disconnected(self, host_time: float) -> None:
+        """The connection was lost; the next bytes are of another one."""
         ...
 
-    def mapped(self, since: float, known: ClockState) -> None:
-        """From the scan of device time `since` in s on, times are mapped by what is now `known`.
+    def clock(self, since: float, state: ClockState) -> None:
+        """From the scan of device time `since` in s on, the map of times has this `state`.
 
-        That scan is among the bytes told next; NaN for whichever comes next.
+        That scan is among the bytes recorded next; NaN for whichever comes next.
         """
         ...
 
     def simulated(self, frame: Frame) -> None:
-        """The frame told next is simulated, and has a truth."""
+        """The frame recorded next is simulated, and has a truth."""
         ...
-
-
-SIMULATION = "sim:"
 
 
 class Source(Protocol):
-    """Yields frames; nothing after it can tell a simulated from a real one."""
+    """Where frames come from; nothing after it can tell a simulated device from a real one."""
 
     @property
     def sensor(self) -> Sensor | None:
-        """What the device says it is; None until it has said so."""
+        """The sensor that the device describes; None until it has sent its information."""
         ...
 
     def read(self, timeout: float) -> list[Frame]:
-        """The frames that came, after at most `timeout` s; a `Refusal` when there will be none."""
+        """The frames that arrived, after at most `timeout` s; a `Refusal` if none ever will."""
         ...
 
     @property
@@ -63,15 +62,15 @@ class Source(Protocol):
 
     @property
     def temperature(self) -> float:
-        """The device's temperature in degrees Celsius, as it told last; NaN if it does not."""
+        """The device's temperature in degrees Celsius, the last one reported; NaN without."""
         ...
 
-    def record(self, tape: InputRecorder | None) -> None:
-        """Tell `tape` from now on all that frames come from; nobody without one."""
+    def record(self, recorder: InputRecorder | None) -> None:
+        """Give `recorder` from now on all that frames are made of; nobody without one."""
         ...
 
     def events(self) -> list[Event]:
-        """What happened since this was last asked."""
+        """The events since the last call."""
         ...
 
     def accounting(self) -> Accounting:

@@ -46,9 +46,9 @@ class _Listener(Recorder):
 
     told = 0
 
-    def came(self, host_time: float, data: bytes) -> None:
+    def received(self, host_time: float, data: bytes) -> None:
         self.told += len(data)
-        super().came(host_time, data)
+        super().received(host_time, data)
 
 
 def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> Outcome:
