@@ -32,7 +32,7 @@ from kappaskin import (
     load_scene,
     schedule,
 )
-from kappaskin.calibration import report_summary, take_sweep
+from kappaskin.calibration import take_sweep
 from kappaskin.calibration.calibration import read_calibration
 from kappaskin.errors import SourceError
 from kappaskin.scenes import ReadingEffect
@@ -230,7 +230,7 @@ def test_a_person_is_asked_for_each_cylinder_and_shown_what_was_read(monkeypatch
     assert np.abs(sweep.readings - expected).max() < 0.3
     report = calibrate(sweep, sensor, datetime.now(UTC))
     assert report.passed.all()
-    assert "48 of 48 channels passed" in report_summary(report)[0]
+    assert "48 of 48 channels passed" in report.summary()[0]
 
 
 def test_a_frame_that_another_overtook_spoils_no_step(monkeypatch) -> None:
@@ -390,7 +390,7 @@ def test_a_device_that_is_already_on_its_way_is_refused(run, tmp_path) -> None:
         os.close(line)
         out = tmp_path / "s.toml"
         found = run("calibrate", device.port, "--out", out, "--dwell", 0.05, *FAST[:2])
-    refused(found, "step 1 was not seen: the device presents step.*start it anew", tmp_path)
+    refused(found, "step 1 was not seen: the device presents step.*restart it", tmp_path)
 
 
 def started(port: str, out: Path, **streams: Any) -> subprocess.Popen[str]:

@@ -214,7 +214,7 @@ def test_a_newer_format_is_refused_with_its_remedy(path):
 @pytest.mark.parametrize("version", ["0", "-1", "1.0", '"1"', "true"])
 def test_a_format_that_is_none_is_refused(path, version):
     edit(path, "format = 1", f"format = {version}")
-    refused(path, "says no format of calibration")
+    refused(path, "has no format of a calibration")
 
 
 @pytest.mark.parametrize("heading", ["device", "line", "failures"])

@@ -106,7 +106,7 @@ def exchanged(a, b, axis):
         (GRID[::-1].ravel(), "rows are mirrored"),
         (GRID[:, ::-1].ravel(), "columns are mirrored"),
         (GRID[::-1, ::-1].ravel(), "columns are mirrored; rows are mirrored"),
-        (GRID.T.ravel(), "columns and rows are taken for each other"),
+        (GRID.T.ravel(), "columns and rows are exchanged"),
     ],
 )
 @pytest.mark.parametrize("quick", [True, False])

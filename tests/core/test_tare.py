@@ -402,8 +402,8 @@ def drift_after(scene, seconds=6.0, tare=None):
     for frame in frames_of(scene, seconds):
         pipeline(frame)
         if frame.sequence % 10 == 0:
-            pipeline.drift.tell()
-    return pipeline.drift.tell()
+            pipeline.drift.current()
+    return pipeline.drift.current()
 
 
 def test_drift_is_what_the_readings_wandered_by():
@@ -419,9 +419,9 @@ def test_frames_that_others_overtook_do_not_keep_the_drift_from_being_told():
     for n in range(300):
         late = 0.05 if n % 50 == 49 else 0.0
         watch.follow(0.02 * n - late, off, np.zeros((9, 9)), 0.2)
-        watch.tell()
+        watch.current()
 
-    assert watch.tell().curvature == pytest.approx(0.5, rel=0.1)
+    assert watch.current().curvature == pytest.approx(0.5, rel=0.1)
 
 
 def test_noise_is_no_drift():
@@ -452,7 +452,7 @@ def test_a_load_is_no_drift_and_what_was_told_before_it_stays():
             simulator.change(SCENE)
         pipeline(simulator.frame(n, lambda: 0.0))
         if n % 10 == 9:
-            told.append(pipeline.drift.tell())
+            told.append(pipeline.drift.current())
 
     loaded = [drift.loaded for drift in told]
     assert not any(loaded[:50])
@@ -471,7 +471,7 @@ def test_another_tare_does_not_forget_how_the_skin_was_bent():
     before = Pipeline(SENSOR, Setup(calibration=calibration))
     after = Pipeline(SENSOR, Setup(calibration=calibration, tare=tare_of(0.5)))
 
-    after.go_on_from(before)
+    after.continue_from(before)
 
     assert after.past.correct is before.past.correct
     assert after.past.hold is not before.past.hold

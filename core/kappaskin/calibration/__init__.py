@@ -15,7 +15,6 @@ from kappaskin.calibration.press_test import press_elements as press_elements
 from kappaskin.calibration.report import CalibrationReport as CalibrationReport
 from kappaskin.calibration.report import ChannelLimits as ChannelLimits
 from kappaskin.calibration.report import calibrate as calibrate
-from kappaskin.calibration.report import report_summary as report_summary
 from kappaskin.calibration.sweep import Procedure as Procedure
 from kappaskin.calibration.sweep import Sweep as Sweep
 from kappaskin.calibration.sweep import take_sweep as take_sweep

@@ -20,7 +20,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, SensorLayout, StandardLinearSolid
 
-_MOST_CHANNELS = 2**14  # whose numbers the engine can tell with every status
+_MOST_CHANNELS = 2**14  # whose numbers the engine can send with every status
 _STEPS = 200  # towards the reading of a straight skin; a quarter of the rest or more goes in each
 _REST = 1e-6  # 1/m, as near as it need be
 
@@ -95,8 +95,8 @@ class Calibration:
 
     @property
     def content(self) -> dict[str, dict[str, Any]]:
-        """Everything it says, by heading and key, as text, dates, numbers and lists of numbers."""
-        said: dict[str, dict[str, Any]] = {
+        """Everything in it, by heading and key, as text, dates, numbers and lists of numbers."""
+        content: dict[str, dict[str, Any]] = {
             "device": {
                 "name": self.name,
                 "serial_number": self.serial_number,
@@ -112,13 +112,15 @@ class Calibration:
         }
         if self.hysteresis:
             names = ("thresholds", "weights", "linear", "stretch")
-            said["hysteresis"] = {name: getattr(self.hysteresis, name).tolist() for name in names}
+            content["hysteresis"] = {
+                name: getattr(self.hysteresis, name).tolist() for name in names
+            }
         if self.creep:
-            said["creep"] = {
+            content["creep"] = {
                 "share": self.creep.share.tolist(),
                 "time_constant": self.creep.time_constant,
             }
-        return said
+        return content
 
     @cached_property
     def digest(self) -> str:
@@ -145,18 +147,18 @@ class Calibration:
             )
 
     def start(self) -> "Corrector":
-        """The calibration at work on a skin that was at rest until now."""
+        """The correction of readings of a skin that was at rest until now."""
         return Corrector(self)
 
 
 def digest(content: dict[str, dict[str, Any]]) -> str:
     """SHA-256 of `content`, whatever the order of its keys."""
-    told = json.dumps(content, sort_keys=True, default=str)
-    return hashlib.sha256(told.encode()).hexdigest()
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 class Corrector(Stateful):
-    """A calibration at work: each frame of readings to curvature, with a memory of those before."""
+    """Readings to curvature, frame by frame, with the memory that hysteresis and creep have."""
 
     STATE = ("_last", "_time", "_restore", "_straighten")
 
@@ -199,31 +201,31 @@ class Corrector(Stateful):
         return k
 
     def remanence(self) -> Array:
-        """What creep and loops have left in the readings (C,) of a skin straight again, in 1/m.
+        """What creep and hysteresis have left in the readings (C,) of a straight skin, in 1/m.
 
-        The reading that would now be told as no curvature, without the offset.
+        The reading, without the offset, that would now be corrected to no curvature.
         """
         left = np.zeros_like(self._offset)
         if self._restore is None and self._straighten is None:
             return left
         for _ in range(_STEPS):
-            told = copy.deepcopy(self)(self._offset + left, self._time)
-            told = np.where(np.isfinite(told), told, 0.0)
-            if np.abs(told).max() < _REST:
+            corrected = copy.deepcopy(self)(self._offset + left, self._time)
+            corrected = np.where(np.isfinite(corrected), corrected, 0.0)
+            if np.abs(corrected).max() < _REST:
                 break
-            left = left - self._slope * told
+            left = left - self._slope * corrected
         return left
 
 
 def calibration_to_toml(calibration: Calibration) -> str:
     """The text of the file."""
     tables = [table("", {"format": FORMAT, "sha256": calibration.digest})]
-    tables += [table(f"[{heading}]", said) for heading, said in calibration.content.items()]
+    tables += [table(f"[{heading}]", values) for heading, values in calibration.content.items()]
     return "\n".join(tables)
 
 
 def check_writable(path: Path) -> None:
-    """Refuse a `path` that no file can be written to, before a person spends minutes on it."""
+    """Refuse a `path` that cannot be written to, before a person spends minutes on a sweep."""
     place = path.parent
     if path.is_dir() or not (place.is_dir() and os.access(place, os.W_OK)):
         raise Refusal(
@@ -267,23 +269,23 @@ def _parsed(path: Path, data: bytes) -> dict[str, Any]:
         raise Refusal(f"{path}: is no calibration file ({error!s:.120}); {_AGAIN}") from error
 
 
-def _checked(path: Path, said: dict[str, Any]) -> dict[str, Any]:
-    """The headings of a file that is of our format, complete and as it was written."""
-    version = said.pop("format", None)
+def _checked(path: Path, content: dict[str, Any]) -> dict[str, Any]:
+    """The headings of a file of this format, complete and as it was written."""
+    version = content.pop("format", None)
     if type(version) is not int or version < 1:
-        raise Refusal(f"{path}: says no format of calibration, got {version!r:.40}; {_AGAIN}")
+        raise Refusal(f"{path}: has no format of a calibration, got {version!r:.40}; {_AGAIN}")
     if version > FORMAT:
         raise Refusal(
             f"{path}: has format {version}, this program reads up to {FORMAT}; update kappaskin"
         )
-    stated = said.pop("sha256", None)
+    stated = content.pop("sha256", None)
     expected = set(_KEYS) | {"failures"}
-    if unknown := set(said) - expected:
+    if unknown := set(content) - expected:
         raise Refusal(f"{path}: has unknown headings {sorted(unknown)}; {_AGAIN}")
-    if missing := expected - _OPTIONAL - set(said):
+    if missing := expected - _OPTIONAL - set(content):
         raise Refusal(f"{path}: lacks the headings {sorted(missing)}; {_AGAIN}")
     for heading, keys in _KEYS.items():
-        found: Any = said.get(heading, dict.fromkeys(keys))
+        found: Any = content.get(heading, dict.fromkeys(keys))
         if not isinstance(found, dict):
             raise Refusal(f"{path}: {heading} is no heading; {_AGAIN}")
         names = set(cast("dict[str, Any]", found))
@@ -292,9 +294,9 @@ def _checked(path: Path, said: dict[str, Any]) -> dict[str, Any]:
                 f"{path}: [{heading}] lacks {sorted(keys - names)} and has unknown "
                 f"{sorted(names - keys)}; {_AGAIN}"
             )
-    if stated != digest(said):
+    if stated != digest(content):
         raise Refusal(f"{path}: is damaged or was edited (its SHA-256 differs); {_AGAIN}")
-    return said
+    return content
 
 
 def _array(values: Any) -> Array:
@@ -302,27 +304,27 @@ def _array(values: Any) -> Array:
 
 
 def read_calibration(path: Path) -> Calibration:
-    """The calibration in `path`, whosever it is and however old."""
+    """The calibration in `path`, of any sensor and however old."""
     return calibration_from_toml(_contents(path), path)
 
 
 def calibration_from_toml(data: bytes, path: Path) -> Calibration:
     """The calibration in the `data` of a file that refusals call `path`."""
-    said = _checked(path, _parsed(path, data))
-    device, hysteresis, creep = said["device"], said.get("hysteresis"), said.get("creep")
+    content = _checked(path, _parsed(path, data))
+    device, hysteresis, creep = content["device"], content.get("hysteresis"), content.get("creep")
     try:
         if not all(isinstance(device[key], str) for key in _KEYS["device"] - {"date"}):
-            raise TypeError(f"expected the device in words, got {device}")
+            raise TypeError(f"expected texts for the device, got {device}")
         return Calibration(
             *(device[key] for key in ("name", "serial_number", "firmware", "layout", "date")),
-            *(_array(said["line"][key]) for key in ("gain", "offset", "gain_sd", "offset_sd")),
+            *(_array(content["line"][key]) for key in ("gain", "offset", "gain_sd", "offset_sd")),
             hysteresis=PrandtlIshlinskii(**{k: _array(v) for k, v in hysteresis.items()})
             if hysteresis
             else None,
             creep=StandardLinearSolid(_array(creep["share"]), float(creep["time_constant"]))
             if creep
             else None,
-            failures=tuple((int(c), str(why)) for c, why in said["failures"].items()),
+            failures=tuple((int(c), str(why)) for c, why in content["failures"].items()),
         )
     except (ValueError, TypeError, AttributeError, OverflowError) as error:
         raise Refusal(f"{path}: cannot be used ({error}); {_AGAIN}") from error

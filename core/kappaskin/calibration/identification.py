@@ -20,11 +20,11 @@ _SETTLING = 0.01  # share of a hold, after the skin was bent, that is left out
 
 @dataclass(frozen=True, eq=False)
 class LineFits:
-    """How well reading = gain * curvature + offset holds, for C channels.
+    """Fits of reading = gain * curvature + offset for C channels, and how good they are.
 
     `gain` has no unit (1 is nominal), `offset` is in 1/m of reading; `gain_sd` and `offset_sd` are
-    their standard errors. `rms` is what the fit leaves, and `left_out` what it would leave of a
-    reading that it had not seen, both as curvature in 1/m.
+    their standard errors. `rms` is the residual, and `left_out` that of a reading which was
+    left out of the fit, both as curvature in 1/m.
     """
 
     gain: Array
@@ -75,7 +75,7 @@ def play_thresholds(x: Array, radii: int) -> Array:
 
 
 def play_positions(u: Array, slope: Array, r: Array) -> tuple[Array, Array]:
-    """Where plays of thresholds `r` (J,) stand on the ways `u` (S, C) from rest, (S, J, C).
+    """Positions (S, J, C) of plays of thresholds `r` (J,) along the paths `u` (S, C) from rest.
 
     And their derivatives, given those of u, `slope` (S, C): a play that is dragged moves with u.
     """
@@ -93,7 +93,7 @@ def play_positions(u: Array, slope: Array, r: Array) -> tuple[Array, Array]:
 def _columns(
     x: Array, y: Array, used: Mask, r: Array, log_a: Array, o: Array
 ) -> tuple[Array, Array]:
-    """What readings `y` (S, C) are linear in, and its derivative along log a, (U, J + 1, C).
+    """The regressors (U, J + 1, C) of readings `y` (S, C), and their derivative along log a.
 
     Of the U steps that are `used` (S,). reading = o + E(G_0 u + sum_j G_j w_j), u = E^-1(x). Since
     E(g z) = g E(z) for every gain g above zero, gain times weight is one number G_j; and the sign
@@ -173,7 +173,7 @@ def _fits(x: Array, y: Array, used: Mask, r: Array, offset: Array) -> list[_Fitt
 
 
 def _needed(fit: _Fitted, line_squares: float, least: float) -> bool:
-    """Whether the loops say more than a line, by the Bayesian information criterion."""
+    """Whether the loops explain more than a line, by the Bayesian information criterion."""
     n, k = fit.J.shape
     floor = n * least**2
 
@@ -185,7 +185,7 @@ def _needed(fit: _Fitted, line_squares: float, least: float) -> bool:
 
 
 def _left_out(fit: _Fitted, h: Array) -> Array:
-    """What the fit would leave (U,) of each reading that it had not seen, leverages `h` (U,).
+    """The residual (U,) of each reading if it had not been fitted, by the leverages `h` (U,).
 
     e / (1 - h) holds while the same G stay above zero; without a reading that decides one of them
     by itself others take its place, and the fit is done again.
@@ -224,7 +224,7 @@ def _numbers(fit: _Fitted) -> tuple[float, ...]:
 def identify_hysteresis(
     x: Array, y: Array, used: Mask, r: Array, line: LineFits, least: float
 ) -> tuple[LineFits, PrandtlIshlinskii]:
-    """The loops in readings `y` (S, C) on curvatures `x` (S,) in 1/m, and what the fits are worth.
+    """The hysteresis in readings `y` (S, C) on curvatures `x` (S,) in 1/m, and the quality of fit.
 
     The channels share nothing but the thresholds `r` (J,) in 1/m. Glue and bonding differ from gage
     to gage, which the paper blames for the loops and their asymmetry, and a sweep of n radii tells

@@ -41,13 +41,13 @@ _MOST_ELEMENTS = 400  # elements: more nobody presses
 _OF_THE_RANGE = 0.5  # of what a channel can read, that a simulated finger makes of it
 _FINEST = 15  # functions along each side at least: or a bent strip answers everywhere alike
 _HELD = 0.2  # s that it stays
-_GIVEN_UP = 5.0  # s after which nothing will answer to it
+_GIVEN_UP = 5.0  # s after which nothing will respond to it
 _READ = 0.02  # s that one read may wait
 _LONGEST = 3600.0  # s that one may take to press
 
 
 class PressPhase(Enum):
-    """What is waited for."""
+    """What a press test waits for."""
 
     REST = "rest"
     PRESS = "press"
@@ -55,11 +55,10 @@ class PressPhase(Enum):
 
 
 class PressDetector:
-    """What C channels answer to one press: their change `peak` (C,) in 1/m when it was hardest.
+    """Detects one press in the readings of C channels, wherever these are.
 
-    The change is that from the rest before it. `phase` says what is waited for: a rest, a press,
-    the end of it; after that `peak` is no longer None. Whatever the readings are, nothing here asks
-    where their channels are.
+    `peak` (C,) in 1/m is their change from the rest before it when it was hardest; None until the
+    press is over. `phase` says what is waited for: a rest, a press, the end of it.
     """
 
     def __init__(self, channels: int, resolution: float) -> None:
@@ -72,8 +71,8 @@ class PressDetector:
         self._hardest, self._most, self._pressed = np.zeros(channels), 0.0, 0.0
 
     def __call__(self, time: float, readings: Array) -> None:
-        """Take in `readings` (C,) in 1/m at `time` in s, NaN where one is missing."""
-        if self._kept and time < self._kept[-1][0]:  # a device that began anew
+        """Take the `readings` (C,) in 1/m at `time` in s, NaN where one is missing."""
+        if self._kept and time < self._kept[-1][0]:  # a device that restarted
             self._kept.clear()
         # A reading that is missing now, as on a rail, is taken for the last one there was.
         self._held = np.where(np.isnan(readings), self._held, readings)
@@ -93,7 +92,7 @@ class PressDetector:
         return np.array([reading for _, reading in kept])
 
     def _whole(self) -> bool:
-        """Whether what is kept is long enough to tell a rest."""
+        """Whether what is kept is long enough to be a rest."""
         return self._kept[-1][0] - self._kept[0][0] >= _WHOLE * _STILL
 
     def _still(self, kept: Array) -> bool:
@@ -140,10 +139,10 @@ class PressDetector:
 
 
 def elements_to_press(layout: SensorLayout, quick: bool) -> tuple[int, ...]:
-    """The elements to press, all that are live, or of a grid the few that tell of its lines.
+    """The elements to press, all that are live, or of a grid a few in each row and column.
 
-    Those few have two elements in each column and in each row. So they tell any exchange of rows,
-    of columns and of components, but not of two elements among those that they leave out.
+    Those few have two elements in each column and in each row. They reveal any exchange of rows, of
+    columns and of components, but not of two elements that are both left out.
     """
     live = cast("Mask", layout.live[:2].any(axis=0))
     chosen = np.flatnonzero(live)
@@ -161,11 +160,11 @@ def elements_to_press(layout: SensorLayout, quick: bool) -> tuple[int, ...]:
 
 
 class PressTest:
-    """Asks for one of the `elements` after the other, and takes what the channels answer.
+    """Asks for one of the `elements` after the other, and takes the readings of each press.
 
-    `asked` is what is to be pressed now, `phase` whether a rest, the press or its end is waited
-    for, `done` what came of those before. A test is over when none is asked for; its `verdict` then
-    says what the map is.
+    `asked` is the element to press now, `phase` whether a rest, the press or its end is waited
+    for, `done` holds the results of those before. A test is over when none is asked for; then its
+    `verdict` is complete.
     """
 
     def __init__(self, sensor: Sensor, elements: tuple[int, ...]) -> None:
@@ -194,7 +193,7 @@ class PressTest:
         return self._listener.phase
 
     def take(self, time: float, readings: Array) -> PressResult | None:
-        """Take in `readings` (3 P,) in 1/m at `time` in s; what came of a press that is over.
+        """Take the `readings` (3 P,) in 1/m at `time` in s; the result of a press that is over.
 
         As the device numbers its channels, not as a fit that trusts the map sees them.
         """
@@ -215,7 +214,7 @@ class PressTest:
         return pressed
 
     def nothing_came(self) -> PressResult | None:
-        """Note that nothing answered where it was pressed, and go on."""
+        """Note that no element responded to the press, and continue."""
         return self._go_on(NOTHING)
 
     def skip(self) -> PressResult | None:
@@ -239,32 +238,32 @@ class PressTest:
         return map_verdict(self.sensor, tuple(self.done))
 
 
-def _ask(test: PressTest, tell: Report) -> None:
+def _ask(test: PressTest, report: Report) -> None:
     layout, asked = test.sensor.layout, test.asked
     if asked is not None:
         x, y = layout.positions[asked] * 1e3
         number = f"{len(test.done) + 1}/{len(test.elements)}"
-        tell(f"{number}  press element {asked}, at ({x:.1f}, {y:.1f}) mm, and let go")
+        report(f"{number}  press element {asked}, at ({x:.1f}, {y:.1f}) mm, and let go")
 
 
-def _fed(test: PressTest, sensor: Sensor, frames: list[Frame], tell: Report) -> None:
+def _take_frames(test: PressTest, sensor: Sensor, frames: list[Frame], report: Report) -> None:
     for frame in frames:
         if pressed := test.take(frame.device_time, sensor.nominal(frame)):
-            tell(f"    {pressed}")
-            _ask(test, tell)
+            report(f"    {pressed}")
+            _ask(test, report)
 
 
-def _follow(listener: DeviceReadings, test: PressTest, patience: float, tell: Report) -> None:
-    """Wait for whoever presses; what does not answer for `patience` s is gone on from."""
-    _ask(test, tell)
+def _follow(listener: DeviceReadings, test: PressTest, patience: float, report: Report) -> None:
+    """Wait for whoever presses; after `patience` s without a response it is the next element."""
+    _ask(test, report)
     done, waited = 0, time.monotonic()
     while not test.over:
-        _fed(test, listener.sensor, listener.frames(), tell)
+        _take_frames(test, listener.sensor, listener.frames(), report)
         if len(test.done) > done:
             done, waited = len(test.done), time.monotonic()
         elif time.monotonic() - waited > patience and (pressed := test.nothing_came()):
-            tell(f"    {pressed}")
-            _ask(test, tell)
+            report(f"    {pressed}")
+            _ask(test, report)
 
 
 def _finger(scene: Scene) -> Callable[[int], Scene]:
@@ -284,58 +283,58 @@ def _finger(scene: Scene) -> Callable[[int], Scene]:
     return pressed
 
 
-def _simulated(name: str, quick: bool, tell: Report) -> PressTest:
-    """The scene called `name`, pressed by itself as fast as it can be computed."""
+def _simulated(name: str, quick: bool, report: Report) -> PressTest:
+    """The scene called `name`, pressed as fast as it can be computed."""
     clock, pressed = VirtualClock(), _finger(load_scene(name))
     bare = replace(pressed(0), stimuli=())
     source = SimulatedSource(bare, clock, clock.sleep)
     test = PressTest(source.sensor, elements_to_press(bare.layout, quick))
-    _ask(test, tell)
+    _ask(test, report)
     while (asked := test.asked) is not None:
         for scene, until in ((bare, PressPhase.PRESS), (pressed(asked), PressPhase.RELEASE)):
             source.play(scene)
-            _wait(source, test, tell, lambda until=until: test.phase is until)
+            _wait(source, test, report, lambda until=until: test.phase is until)
         end = clock() + _HELD
-        _wait(source, test, tell, lambda end=end: clock() > end)
+        _wait(source, test, report, lambda end=end: clock() > end)
         source.play(bare)
         before = len(test.done)
-        _wait(source, test, tell, lambda before=before: len(test.done) > before)
+        _wait(source, test, report, lambda before=before: len(test.done) > before)
     return test
 
 
 def _wait(
-    source: SimulatedSource, test: PressTest, tell: Report, ended: Callable[[], bool]
+    source: SimulatedSource, test: PressTest, report: Report, ended: Callable[[], bool]
 ) -> None:
-    """Read until something has `ended`, or for so long that nothing will come of it."""
+    """Read until `ended()`, or for so long that nothing will respond."""
     frames = 0
     while not ended() and test.asked is not None:
         came = source.read(_READ)
         frames += len(came)
-        _fed(test, source.sensor, came, tell)
+        _take_frames(test, source.sensor, came, report)
         if frames > _GIVEN_UP * source.sensor.rate:
             if pressed := test.nothing_came():
-                tell(f"    {pressed}")
-                _ask(test, tell)
+                report(f"    {pressed}")
+                _ask(test, report)
             return
 
 
 def press_elements(
-    name: str, tell: Report, *, quick: bool = False, patience: float = 20.0
+    name: str, report: Report, *, quick: bool = False, patience: float = 20.0
 ) -> tuple[PressTest, MapVerdict]:
     """The test of the source called `name` and its verdict on the channel map.
 
-    Asks for each element, or where `quick` for the few that tell of a grid's lines, and takes what
-    answers. A simulation presses by itself. After `patience` s without an answer it goes on.
+    Asks for each element, or where `quick` for a few of a grid, and notices what responds. A
+    simulation presses by itself. After `patience` s without a response the next one is asked for.
     """
     if not 0 < patience <= _LONGEST:
         raise Refusal(
             f"expected a patience above zero and at most {_LONGEST:g} s, got {patience:g}"
         )
     if name.startswith(SIMULATION):
-        test = _simulated(name.removeprefix(SIMULATION), quick, tell)
+        test = _simulated(name.removeprefix(SIMULATION), quick, report)
         return test, test.verdict()
     with closing(open_source(name)) as source:
         listener = DeviceReadings(source)
         test = PressTest(listener.sensor, elements_to_press(listener.sensor.layout, quick))
-        _follow(listener, test, patience, tell)
+        _follow(listener, test, patience, report)
         return test, test.verdict()

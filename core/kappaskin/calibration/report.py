@@ -133,7 +133,7 @@ class CalibrationReport:
         return {c: why for c, why in self.calibration.failures if why != DEAD}
 
     def to_json(self) -> dict[str, Any]:
-        """Everything it tells as JSON values, None for what is not a number."""
+        """Everything as JSON values, None for what is not a number."""
         calibration = self.calibration
         columns = {
             "gain": self.fitted.gain,
@@ -171,6 +171,38 @@ class CalibrationReport:
                 for c in range(3 * P)
             ],
         }
+
+    def summary(self) -> list[str]:
+        """The report as lines of text: passed channels, ranges, the worst, and why any failed."""
+        calibration, P = self.calibration, len(self.noise) // 3
+
+        def spread(values: Array) -> str:
+            return f"{values.min():.3g} to {values.max():.3g}"
+
+        lines = [
+            f"{calibration.name} {calibration.serial_number}: {int(self.passed.sum())} of "
+            f"{int(self.passed.sum()) + len(self.failed)} channels passed; curvature in 1/m",
+            f"{'':<11}{'gain':<18}{'offset':<18}{'widest loop (left)':<22}error (of a line alone)",
+        ]
+        for c, name in enumerate(COMPONENTS):
+            here = np.flatnonzero(self.passed[c * P : (c + 1) * P]) + c * P
+            if here.size:
+                loops = self.gaps[:, here].max(), self.gaps_left[:, here].max()
+                errors = self.fitted.left_out[here].max(), self.line.left_out[here].max()
+                lines.append(
+                    f"{name:<11}{spread(self.fitted.gain[here]):<18}"
+                    f"{spread(self.fitted.offset[here]):<18}"
+                    f"{'{:.2f} ({:.2f})'.format(*loops):<22}{errors[0]:.3f} ({errors[1]:.2f})"
+                )
+        if calibration.creep:
+            share = float(np.median(calibration.creep.share[self.passed]))
+            lines.append(
+                f"creep      {100 * share:.1f} % in {calibration.creep.time_constant:.3g} s"
+            )
+        worst = np.argsort(np.where(self.passed, -self.fitted.left_out, 0.0))[:_WORST]
+        named = (f"{_named(c, P)} {self.fitted.left_out[c]:.3f}" for c in worst)
+        lines.append(f"worst      {', '.join(named)}")
+        return lines + [f"failed     {_named(c, P)}: {why}" for c, why in self.failed.items()]
 
 
 def _known(value: float) -> float | None:
@@ -215,7 +247,7 @@ def _check(sweep: Sweep, sensor: Sensor) -> None:
 
 
 def _in_time(sweep: Sweep, run: Running) -> Array:
-    """What `run` makes of the readings (S, C), given also the course of the hold."""
+    """The readings (S, C) after `run`, which is given the readings during the hold too."""
     times = np.concatenate([sweep.times, sweep.moments])
     readings = np.concatenate([sweep.readings, sweep.course])
     out = np.empty_like(readings)
@@ -225,7 +257,7 @@ def _in_time(sweep: Sweep, run: Running) -> Array:
 
 
 def _creep(sweep: Sweep, least: float) -> tuple[StandardLinearSolid | None, Array]:
-    """The creep that the hold shows, if there was one, and the readings (S, C) without it."""
+    """The creep seen during the hold, if there was one, and the readings (S, C) without it."""
     if not len(sweep.moments):
         return None, sweep.readings
     if not sweep.steps[0].flat:
@@ -238,8 +270,8 @@ def _creep(sweep: Sweep, least: float) -> tuple[StandardLinearSolid | None, Arra
     return creep, _in_time(sweep, lambda reading, time: restore(reading - rest, time) + rest)
 
 
-def _telling(x: Array, flat: Mask) -> Mask:
-    """Which steps (S,) tell of the channels with curvature `x` (S,), some of them `flat` (S,).
+def _informative(x: Array, flat: Mask) -> Mask:
+    """The steps (S,) to fit channels of curvature `x` (S,) to; some of the steps are `flat` (S,).
 
     Those that do not bend them would blame on them what bending across them does. And before the
     skin was first bent as far as it ever was, its loops are those of an unknown past: then every
@@ -249,7 +281,7 @@ def _telling(x: Array, flat: Mask) -> Mask:
     return since & (flat | (x != 0))
 
 
-def _by_component(
+def _fitted_components(
     sweep: Sweep, readings: Array, least: float
 ) -> tuple[LineFits, LineFits, PrandtlIshlinskii]:
     """Lines, fits and loops of all channels, fitted component by component."""
@@ -257,7 +289,7 @@ def _by_component(
     radii = len({step.radius for step in sweep.steps if not step.flat})
     parts: list[tuple[LineFits, LineFits, PrandtlIshlinskii]] = []
     for x, y in zip(sweep.curvature.T, np.split(readings, 3, axis=1), strict=True):
-        used = _telling(x, flat)
+        used = _informative(x, flat)
         line = fit_lines(x[used], y[used])
         parts.append(
             (line, *identify_hysteresis(x, y, used, play_thresholds(x, radii), line, least))
@@ -295,7 +327,7 @@ def _needed(loops: PrandtlIshlinskii, passed: Mask) -> PrandtlIshlinskii | None:
 def calibrate(
     sweep: Sweep, sensor: Sensor, date: datetime, limits: ChannelLimits | None = None
 ) -> CalibrationReport:
-    """What a `sweep` of `sensor`, taken on `date`, says of every channel.
+    """The calibration that a `sweep` of `sensor`, taken on `date`, gives, and how good it is.
 
     Refused when it has fewer than three radii, one face only, no way back or strains beyond the
     elastic limit, or when no channel passes.
@@ -303,7 +335,7 @@ def calibrate(
     _check(sweep, sensor)
     least = sensor.transduction.resolution
     creep, readings = _creep(sweep, least)
-    line, fitted, loops = _by_component(sweep, readings, least)
+    line, fitted, loops = _fitted_components(sweep, readings, least)
     with np.errstate(divide="ignore", invalid="ignore"):  # a stuck channel, which fails
         noise = np.sqrt((sweep.noise**2).mean(axis=0)) / np.abs(fitted.gain)
         by_line = (sweep.readings - line.offset) / line.gain
@@ -335,37 +367,6 @@ def calibrate(
     return CalibrationReport(
         calibration, line, fitted, _gaps(sweep, by_line), _gaps(sweep, left), noise
     )
-
-
-def report_summary(report: CalibrationReport) -> list[str]:
-    """What a person wants to know of a calibration, line by line."""
-    calibration, P = report.calibration, len(report.noise) // 3
-
-    def spread(values: Array) -> str:
-        return f"{values.min():.3g} to {values.max():.3g}"
-
-    lines = [
-        f"{calibration.name} {calibration.serial_number}: {int(report.passed.sum())} of "
-        f"{int(report.passed.sum()) + len(report.failed)} channels passed; curvature in 1/m",
-        f"{'':<11}{'gain':<18}{'offset':<18}{'widest loop (left)':<22}error (of a line alone)",
-    ]
-    for c, name in enumerate(COMPONENTS):
-        here = np.flatnonzero(report.passed[c * P : (c + 1) * P]) + c * P
-        if here.size:
-            loops = report.gaps[:, here].max(), report.gaps_left[:, here].max()
-            errors = report.fitted.left_out[here].max(), report.line.left_out[here].max()
-            lines.append(
-                f"{name:<11}{spread(report.fitted.gain[here]):<18}"
-                f"{spread(report.fitted.offset[here]):<18}"
-                f"{'{:.2f} ({:.2f})'.format(*loops):<22}{errors[0]:.3f} ({errors[1]:.2f})"
-            )
-    if calibration.creep:
-        share = float(np.median(calibration.creep.share[report.passed]))
-        lines.append(f"creep      {100 * share:.1f} % in {calibration.creep.time_constant:.3g} s")
-    worst = np.argsort(np.where(report.passed, -report.fitted.left_out, 0.0))[:_WORST]
-    told = (f"{_named(c, P)} {report.fitted.left_out[c]:.3f}" for c in worst)
-    lines.append(f"worst      {', '.join(told)}")
-    return lines + [f"failed     {_named(c, P)}: {why}" for c, why in report.failed.items()]
 
 
 def _named(channel: int, elements: int) -> str:

@@ -25,13 +25,13 @@ from kappaskin.scenes import (
 from kappaskin.sensing import Sensor
 from kappaskin.sources import SIMULATION, SimulatedSource, Source, open_source
 
-_FEWEST_FRAMES = 2  # whose spread tells the noise
+_FEWEST_FRAMES = 2  # whose spread gives the noise
 _SETTLED = 1.0  # s at the end of a hold that count as its reading
 _COURSE_POINTS = 500  # moments that are kept of a hold
 
 _READ = 0.05  # s that one read may wait
 _SILENCE = 5.0  # s without a frame after which the source counts as dead
-_MOST_FRAMES = 5000  # kept of one step, evenly: more tell no more
+_MOST_FRAMES = 5000  # kept of one step, evenly: more add nothing
 _LONGEST = 3600.0  # s on one step
 Report = Callable[[str], None]
 Prompt = Callable[[str], str]
@@ -40,10 +40,10 @@ Prompt = Callable[[str], str]
 
 @dataclass(frozen=True, eq=False)
 class StepReadings:
-    """What came of one step: `mean` and `noise` (C,) in 1/m of `frames` frames, at `time` in s.
+    """The readings of one step: `mean` and `noise` (C,) in 1/m of `frames` frames, at `time` in s.
 
-    NaN marks a channel that was dead or on a rail in any of them. Of a hold, `moments` (T,) in s
-    and what was read then, `course` (T, C) in 1/m, tell how it went.
+    NaN marks a channel that was dead or on a rail in any of them. `moments` (T,) in s and `course`
+    (T, C) in 1/m are the times and readings during a hold.
     """
 
     step: Step
@@ -57,14 +57,14 @@ class StepReadings:
     def __str__(self) -> str:
         """The median channel of each component beside the curvature of the step."""
         mean, noise = (values.reshape(3, -1) for values in (self.mean, self.noise))
-        told = [
+        parts = [
             f"{name} {_median(mean[c]):+.1f} (cylinder {self.step.curvature[c]:+.1f})"
             for c, name in enumerate(COMPONENTS)
         ]
         missing = int(np.isnan(self.mean).sum())
         return (
-            f"{', '.join(told)} 1/m, noise {_median(noise.ravel()):.2g} 1/m in {self.frames} frames"
-            + (f"; {missing} channels dead or on a rail" if missing else "")
+            f"{', '.join(parts)} 1/m, noise {_median(noise.ravel()):.2g} 1/m in "
+            f"{self.frames} frames" + (f"; {missing} channels dead or on a rail" if missing else "")
         )
 
 
@@ -75,11 +75,11 @@ def _median(values: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What a skin read on every step of a calibration.
+    """The readings of a skin on every step of a calibration.
 
     `readings` (S, C) are nominal curvature in 1/m (Eq. 8), NaN where dead or on a rail; `noise`
     (S, C) in 1/m is the standard deviation of one frame; `times` (S,) in s. `moments` (T,) and
-    `course` (T, C) tell how the hold went, and are empty without one.
+    `course` (T, C) are the times and readings during the hold, and are empty without one.
     """
 
     steps: tuple[Step, ...]
@@ -108,7 +108,7 @@ class Sweep:
 
 
 class Procedure:
-    """A calibration being taken: knows the next step, takes its frames, goes back if asked."""
+    """A calibration in progress: the next step, and the readings of those before it."""
 
     def __init__(self, sensor: Sensor, steps: tuple[Step, ...]) -> None:
         check_strain(steps, sensor)
@@ -161,7 +161,7 @@ class Procedure:
         before = self.taken[-1].time if self.taken else -math.inf
         if not (np.diff(times, prepend=before) >= 0).all():
             raise Refusal(
-                f"the device's clock went back on step {step.number}: it restarted; begin anew"
+                f"the device's clock went back on step {step.number}: it restarted; start again"
             )
         if np.isnan(readings).any(axis=0).all():
             raise Refusal(
@@ -201,7 +201,7 @@ def _course(times: Array, readings: Array) -> tuple[Array, Array]:
 
 @dataclass
 class VirtualClock:
-    """A clock that whoever sleeps by it moves: a simulation need not be waited for."""
+    """A clock that moves when someone sleeps by it: no waiting for a simulation."""
 
     now: float = 0.0
 
@@ -248,7 +248,7 @@ class DeviceReadings:
             if not found and time.monotonic() - begun > _SILENCE:
                 raise Refusal(f"no frame came for {_SILENCE:g} s; is the device still sending?")
         if self._source.sensor is not self.sensor:
-            raise Refusal("another device answered in the middle; begin anew with this one")
+            raise Refusal("another device answered in the middle; start again with this one")
         return found
 
     def read(self, frames: list[Frame]) -> tuple[Array, Array]:
@@ -259,15 +259,15 @@ class DeviceReadings:
 
 
 def _keep_frame(kept: list[Frame], frame: Frame, seconds: float) -> None:
-    """Add `frame` to those `kept` of a step of so many `seconds`, unless it comes too soon."""
+    """Add `frame` to those `kept` of a step of so many `seconds`, unless it is too early."""
     after = frame.device_time - kept[-1].device_time if kept else math.inf
-    # One that others overtook is left out; a clock that went back is for the procedure to refuse.
+    # One that others overtook is left out; a clock that went back is refused by the procedure.
     if after >= seconds / _MOST_FRAMES or after < -OVERTAKEN:
         kept.append(frame)
 
 
 def _follow(
-    listener: DeviceReadings, procedure: Procedure, laid: Presentation, tell: Report
+    listener: DeviceReadings, procedure: Procedure, laid: Presentation, report: Report
 ) -> None:
     """Take the steps as they are presented, by the device's own clock."""
     kept: list[Frame] = []
@@ -276,14 +276,14 @@ def _follow(
             index, step = laid.index(frame.device_time), procedure.step
             if step and index == step.number and kept:
                 taken = procedure.take(*listener.read(kept))
-                tell(f"{step.number}/{len(laid.steps)}  {step}\n    {taken}")
+                report(f"{step.number}/{len(laid.steps)}  {step}\n    {taken}")
                 kept, step = [], procedure.step
             if step is None:
                 return
             if index != step.number - 1:
                 raise Refusal(
-                    f"step {step.number} was not seen: the device presents step {index + 1}; start "
-                    "it anew, then this command at once"
+                    f"step {step.number} was not seen: the device presents step {index + 1}; "
+                    "restart it, then run this command at once"
                 )
             if laid.settled(frame.device_time):
                 _keep_frame(kept, frame, max(laid.dwell, step.hold))
@@ -308,37 +308,37 @@ def _prompt(step: Step, total: int, again: bool) -> str:
 
 
 def _ask_for_steps(
-    listener: DeviceReadings, procedure: Procedure, seconds: float, ask: Prompt, tell: Report
+    listener: DeviceReadings, procedure: Procedure, seconds: float, prompt: Prompt, report: Report
 ) -> None:
     """Ask for each step and take it, until all are done."""
-    tell(ADVICE)
+    report(ADVICE)
     while step := procedure.step:
-        answer = ask(_prompt(step, len(procedure.steps), bool(procedure.taken)))
+        answer = prompt(_prompt(step, len(procedure.steps), bool(procedure.taken)))
         if answer.strip().lower() == "r" and procedure.taken:
             procedure.redo()
             continue
         frames = _recorded(listener, max(seconds, step.hold))
         try:
-            tell(f"    {procedure.take(*listener.read(frames))}")
+            report(f"    {procedure.take(*listener.read(frames))}")
         except Refusal as refusal:
-            tell(f"    {refusal}; the same step again")
+            report(f"    {refusal}; the same step again")
 
 
 def take_sweep(
     name: str,
     radii: tuple[float, ...] | None,
-    ask: Prompt,
-    tell: Report,
+    prompt: Prompt,
+    report: Report,
     *,
     seconds: float = 1.0,
     hold: float = 0.0,
     dwell: float | None = None,
 ) -> tuple[Sensor, Sweep]:
-    """What the source called `name` says it is, and what it reads on cylinders of `radii` in m.
+    """The sensor of the source called `name`, and its sweep over cylinders of `radii` in m.
 
-    Without radii they are those that it can read (`radii_for`). Asks for each cylinder and averages
-    `seconds` of frames on it. Nobody is asked when the source goes through the steps by itself,
-    from its own time 0 on and for `dwell` s each, as a simulation does.
+    Without radii they are those that it can read (`radii_for`). Prompts for each cylinder and
+    averages `seconds` of frames on it. There is no prompt when the source goes through the steps
+    by itself, from its own time 0 on and for `dwell` s each, as a simulation does.
     """
     for what, value in (("seconds", seconds), ("dwell", dwell or seconds), ("hold", hold or 1.0)):
         if not 0 < value <= _LONGEST:
@@ -354,7 +354,7 @@ def take_sweep(
         steps = _steps(listener.sensor, radii, hold)
         procedure = Procedure(listener.sensor, steps)
         if dwell is None:
-            _ask_for_steps(listener, procedure, seconds, ask, tell)
+            _ask_for_steps(listener, procedure, seconds, prompt, report)
         else:
-            _follow(listener, procedure, Presentation(steps, dwell), tell)
+            _follow(listener, procedure, Presentation(steps, dwell), report)
         return listener.sensor, procedure.sweep()

@@ -1,9 +1,8 @@
 """Tare: the reading of a skin at rest, taken as its zero, and how far it has drifted since.
 
-A tare is refused while the skin moves or is loaded. What can be told apart and what cannot is said
-in `LoadSeeker`: against the tare before, or a calibration, a load need only stand out of what the
-elements have wandered since. Where neither is known, it must stand out of how far the elements are
-off by themselves: a fainter one is taken for their offsets.
+A tare is refused while the skin moves or is loaded. `LoadSeeker` says how small a load is found:
+against the tare before, or a calibration, a load need only stand out of the drift since. Where
+neither is known, it must stand out of the offsets of the elements: a fainter one is taken for them.
 """
 
 import math
@@ -20,7 +19,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, OVERTAKEN, Array
 from kappaskin.sensing import Sensor
 
-_MOST_CHANNELS = 2**16  # whose numbers the engine can tell with every status
+_MOST_CHANNELS = 2**16  # whose numbers the engine can send with every status
 
 _PLAIN = ("name", "serial_number", "layout", "date", "temperature", "frames", "seconds")
 
@@ -29,16 +28,16 @@ SECONDS = 1.0
 
 _PATIENCE = 5.0  # s after which a tare is given up
 _FEWEST = 20  # frames
-_MOST = 500  # frames, kept evenly: more tell no more
+_MOST = 500  # frames, kept evenly: more add nothing
 _MOST_NUMBERS = 2**23
 _ROUNDING = 0.999  # of the time between two that are kept
-_PARTS = 8  # of the time, that are held against each other
+_PARTS = 8  # of the time, that are compared with each other
 _OFTEN = 0.9  # of the frames that a channel must be in
 _BLIND = 0.1  # of the channels that may read nothing
 _STIR = 2.0  # times the noise of a frame, by which no part may be off
 _TAU = 2.0  # s over which a drift is averaged
 _EVERY = 0.02  # s between two frames that count
-_LOOK = 0.5  # s between two looks
+_CHECK = 0.5  # s between two checks for a load
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,11 +87,11 @@ class Tare:
 
     @property
     def content(self) -> dict[str, Any]:
-        """Everything it says, by key, as text, dates, numbers and lists of numbers."""
-        said: dict[str, Any] = {key: getattr(self, key) for key in _PLAIN}
+        """Everything in it, by key, as text, dates, numbers and lists of numbers."""
+        content: dict[str, Any] = {key: getattr(self, key) for key in _PLAIN}
         if self.temperature is None:
-            del said["temperature"]
-        return said | {key: getattr(self, key).tolist() for key in ("offset", "offset_sd")}
+            del content["temperature"]
+        return content | {key: getattr(self, key).tolist() for key in ("offset", "offset_sd")}
 
     @cached_property
     def digest(self) -> str:
@@ -120,9 +119,9 @@ class Tare:
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """What a straight skin is known to read: `zero` (C,) in 1/m, by the `tare` if there is one.
+    """The expected readings of a skin at rest: `zero` (C,) in 1/m, by the `tare` if there is one.
 
-    Its loops and its creep add `remanence` (C,) for a while.
+    Hysteresis and creep add `remanence` (C,) for a while.
     """
 
     zero: Array
@@ -131,7 +130,7 @@ class Rest:
 
 
 class TareMeasurement:
-    """Takes frames until there are enough of them; `begun` in s on the host's clock."""
+    """Collects frames from `begun` on, in s on the host's clock, until they suffice for a tare."""
 
     def __init__(self, sensor: Sensor, begun: float) -> None:
         self.sensor, self._begun = sensor, begun
@@ -140,7 +139,7 @@ class TareMeasurement:
         self._readings: list[Array] = []
 
     def take(self, device_time: float, host_time: float, nominal: Array) -> None:
-        """Take in what a frame read, `nominal` (3, P) in 1/m; what came before the beginning not.
+        """Take the readings of a frame, `nominal` (3, P) in 1/m, unless it is too early.
 
         Refused when the device's clock went back.
         """
@@ -156,7 +155,7 @@ class TareMeasurement:
         self._readings.append(nominal.ravel())
 
     def done(self, now: float) -> bool:
-        """Whether there is enough, or it took too long."""
+        """Whether there are enough frames, or it took too long."""
         span = self._times[-1] - self._times[0] if self._times else 0.0
         enough = span >= SECONDS and len(self._times) >= _FEWEST
         return enough or now > self._begun + _PATIENCE
@@ -209,7 +208,7 @@ class _Found:
 
 
 def _still(sensor: Sensor, seeker: LoadSeeker, readings: Array) -> _Found:
-    """What `readings` (n, C) are on average, if they hold still but for noise."""
+    """The mean of `readings` (n, C), refused if they move by more than noise."""
     used = ~np.isnan(readings).all(axis=0)
     # A channel may be missing in a frame or two: its mean stands for it.
     mean = np.full(readings.shape[1], np.nan)
@@ -236,7 +235,7 @@ def _check_still(
     part = off[int(squares.argmax())]
     by_noise = noise / math.sqrt(frames)
     allowed = _STIR * noise + sensor.transduction.resolution
-    # Elements that are off are off all the time: what changes is noise, or a load.
+    # Offsets of elements are constant: what changes is noise, or a load.
     if squares.max() > allowed**2 or seeker(part, by_noise**2, share=0.0) is not None:
         channel = int(np.nanargmax(np.abs(part)))
         raise Refusal(
@@ -261,7 +260,7 @@ def _check_unloaded(sensor: Sensor, seeker: LoadSeeker, found: _Found, rest: Res
     then = f"{simulated if sensor.simulated else 'lift what touches the skin'}, then tare again"
     if rest.tare is not None:
         then += (
-            "; if nothing does, it was bent or mounted anew since the tare of "
+            "; if nothing does, it was bent or mounted again since the tare of "
             f"{rest.tare.date:%Y-%m-%d %H:%M}: undo that one first"
         )
     raise Refusal(
@@ -276,11 +275,11 @@ def _force(force: float) -> str:
 
 @dataclass(frozen=True)
 class Drift:
-    """How far the tared readings of an unloaded skin have wandered.
+    """The drift of the tared readings of an unloaded skin.
 
     `curvature` in 1/m, the RMS over the channels; `displacement` in m, the farthest that the
-    surface is told to have moved; when, in s on the device's clock. `loaded` says that the skin is
-    now: the drift is the last from before. Shown, never taken off.
+    estimated surface has moved; `device_time` in s when. `loaded` says that the skin is now: the
+    drift is the last from before. It is shown, never subtracted.
     """
 
     curvature: float = math.nan
@@ -290,13 +289,13 @@ class Drift:
 
 
 class DriftMonitor:
-    """Averages the readings of a tared skin, and tells the drift in them while nothing presses."""
+    """Averages the readings of a tared skin, and gives their drift while nothing presses."""
 
     def __init__(self, seeker: LoadSeeker) -> None:
         self._seeker = seeker
-        self._told = Drift()
+        self._drift = Drift()
         self._next: Drift | None = None
-        self._loaded, self._looked, self._frames = False, -math.inf, 0
+        self._loaded, self._checked, self._frames = False, -math.inf, 0
         self._begin(math.nan, np.empty(0), np.empty(0), math.nan)
 
     def _begin(self, time: float, curvature: Array, surface: Array, noise: float) -> None:
@@ -306,7 +305,7 @@ class DriftMonitor:
         self._frames = 1
 
     def follow(self, device_time: float, curvature: Array, surface: Array, noise: float) -> None:
-        """Take in readings (3, P) in 1/m with their `noise`, and the surface (ny, nx) in m."""
+        """Take the readings (3, P) in 1/m of a frame, their `noise`, and the surface (ny, nx)."""
         elapsed = device_time - self._time
         if -OVERTAKEN <= elapsed < _EVERY or not math.isfinite(noise):  # too soon, or overtaken
             return
@@ -321,21 +320,21 @@ class DriftMonitor:
         self._surface += a * (np.nan_to_num(surface) - self._surface)
         self._variance = (1 - a) ** 2 * self._variance + (a * noise) ** 2
 
-    def tell(self) -> Drift:
+    def current(self) -> Drift:
         """The drift, as far as it is known."""
-        if not (self._frames and self._time - max(self._begun + _TAU, self._looked + _LOOK) >= 0):
-            return self._told
-        self._looked = self._time
+        if not (self._frames and self._time - max(self._begun + _TAU, self._checked + _CHECK) >= 0):
+            return self._drift
+        self._checked = self._time
         mean = self._mean.ravel()
         # As a frame shows it: a fainter trace of a load than one would see is drift, too.
         loaded = self._seeker(mean, self._noise**2) is not None
         if loaded or self._loaded:
             # The average just after a load holds some of it still, as does the one before it shows.
             self._loaded, self._next, self._frames = loaded, None, 0
-            self._told = replace(self._told, loaded=True)
-            return self._told
-        self._told = self._next or self._told
+            self._drift = replace(self._drift, loaded=True)
+            return self._drift
+        self._drift = self._next or self._drift
         square = float(np.nanmean(mean**2)) - self._variance
         farthest = float(np.abs(self._surface).max())
         self._next = Drift(math.sqrt(max(square, 0.0)), farthest, self._time)
-        return self._told
+        return self._drift

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from kappaskin.calibration import calibrate as calibrated
-from kappaskin.calibration import check_writable, report_summary, save_calibration, take_sweep
+from kappaskin.calibration import check_writable, save_calibration, take_sweep
 from kappaskin.cli.common import FAILED, Switch, print_json
 from kappaskin.errors import Refusal
 from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
@@ -82,5 +82,5 @@ def calibrate(
     if json:
         print_json(report.to_json())
     else:
-        print(*report_summary(report), sep="\n")
+        print(*report.summary(), sep="\n")
     return FAILED if report.failed else 0

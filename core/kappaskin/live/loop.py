@@ -323,7 +323,7 @@ class Loop:
                 status,
                 accounting=source.accounting(),
                 temperature=source.temperature,
-                drift=watch.tell() if watch else None,
+                drift=watch.current() if watch else None,
                 rate=self._arrivals.rate(now),
                 reader_gap=self._arrivals.gap(now),
                 last_frame=self._arrivals.last,
