@@ -16,20 +16,20 @@ from kappaskin.errors import Refusal
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
-_AHEAD = 10  # of 40 steps of priority
+_RAISED = 10  # of 40 steps of priority
 
 Context: TypeAlias = "ForkServerContext | SpawnContext"
 
 _Item = TypeVar("_Item")
-_GRACE = 1.0  # s to clear up in once the one that asked is gone
+_GRACE = 1.0  # s to clean up in once the parent has ended
 
 
 @contextmanager
 def process_context() -> Generator[Context]:
-    """What begins processes that compute in one thread each.
+    """A context that starts processes which compute in one thread each.
 
-    Where the system can, they come from a process that has loaded the library and does nothing
-    else: one begins in 0.1 s instead of 0.8. A plain fork would copy Qt's threads' locks.
+    Where the system can, they are forked from a process that has loaded the library and does
+    nothing else: one starts in 0.1 s instead of 0.8. A plain fork would copy Qt's threads' locks.
     """
     context: Context = multiprocessing.get_context("spawn")
     if "forkserver" in multiprocessing.get_all_start_methods():
@@ -41,7 +41,7 @@ def process_context() -> Generator[Context]:
     os.environ.update(dict.fromkeys(names, "1"))
     try:
         if context.get_start_method() == "forkserver":
-            _begin_deaf()
+            _start_forkserver()
         yield context
     finally:
         for name, value in was.items():
@@ -52,7 +52,7 @@ def process_context() -> Generator[Context]:
 
 
 def preload_library() -> None:
-    """Begin to load the library in a process beside; an `Engine` that waits for it begins sooner.
+    """Begin to load the library in a background process; an `Engine` started later starts sooner.
 
     Nothing where the system cannot fork from such a process.
     """
@@ -60,10 +60,10 @@ def preload_library() -> None:
         pass
 
 
-def _begin_deaf() -> None:
-    """Begin the process that the others come from, deaf to Ctrl+C, as they are then.
+def _start_forkserver() -> None:
+    """Start the process that the others are forked from; it ignores Ctrl+C, as they do then.
 
-    The signal goes to every process of a terminal, and would break that one off while it loads.
+    The signal goes to every process of a terminal, and would stop that one while it loads.
     """
     from multiprocessing import forkserver, resource_tracker
 
@@ -76,9 +76,9 @@ def _begin_deaf() -> None:
 
 
 class ProcessPriority:
-    """Lets this process come before others that want a core, where the system allows it.
+    """Raises the priority of this process where the system allows it.
 
-    Linux alone, and there for whom the limits (`nice` in limits.conf, or root) let ask for it.
+    On Linux alone, for root and those whose limits (`nice` in limits.conf) allow it.
     """
 
     def __init__(self) -> None:
@@ -86,13 +86,13 @@ class ProcessPriority:
         self._usual = os.getpriority(os.PRIO_PROCESS, 0) if self._linux else 0
 
     def __call__(self, on: bool) -> None:
-        """Come before others from now on, or no more."""
+        """Raise the priority, or set it back."""
         if not self._linux:
             return
         for thread in threading.enumerate():  # each has its own; those that follow inherit it
             with suppress(OSError):
                 os.setpriority(
-                    os.PRIO_PROCESS, thread.native_id or 0, self._usual - (_AHEAD if on else 0)
+                    os.PRIO_PROCESS, thread.native_id or 0, self._usual - (_RAISED if on else 0)
                 )
 
 
@@ -108,13 +108,13 @@ def _watch_parent() -> None:
         os._exit(1)
 
 
-def _tell(
+def _send_items(
     pipe: "Connection[Any, None]", make: Callable[..., Iterable[Any]], about: tuple[Any, ...]
 ) -> None:
-    """What the child process does: each item in a tuple, a refusal, and None at the end."""
+    """Send each item in a tuple, or a refusal, and None at the end; runs in the child process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
     end_with_parent()
-    with suppress(OSError):  # who asked has gone
+    with suppress(OSError):  # the parent has ended
         try:
             for item in make(*about):
                 pipe.send((item,))
@@ -126,8 +126,8 @@ def _tell(
 class BackgroundProcess(Generic[_Item]):
     """Computes the items of `make(*about)` in a process, called `name`, of one thread.
 
-    No call here but `wait` waits. It ends when it is done, when `close` is called, or when the
-    process that started it is gone.
+    No call here but `wait` waits. The process ends when it is done, when `close` is called, or
+    when the process that started it has ended.
     """
 
     def __init__(self, name: str, make: Callable[..., Iterable[_Item]], *about: object) -> None:
@@ -136,16 +136,16 @@ class BackgroundProcess(Generic[_Item]):
         self._pipe = cast("Connection[None, tuple[_Item] | Refusal | None]", ours)
         with process_context() as context:
             self._process = context.Process(
-                target=_tell, args=(theirs, make, about), name=name, daemon=True
+                target=_send_items, args=(theirs, make, about), name=name, daemon=True
             )
             self._process.start()
         theirs.close()
 
     def poll(self) -> list[_Item]:
-        """What has been told since the last call.
+        """The items computed since the last call.
 
-        Raises a `Refusal` when that is what came of it or when the process has died, once all that
-        came before is told.
+        Raises the `Refusal` of the computation, or one where the process has died, once all items
+        before it were returned.
         """
         found: list[_Item] = []
         while not self.done and self._pipe.poll():
@@ -154,12 +154,12 @@ class BackgroundProcess(Generic[_Item]):
             except Refusal as refusal:
                 if not found:
                     raise
-                self._refused, self.done = refusal, False  # the next call tells
+                self._refused, self.done = refusal, False  # the next call raises it
                 break
         return found
 
     def wait(self) -> Generator[_Item]:
-        """Each item as soon as it is told, to the end."""
+        """Each item as soon as it is computed, to the end."""
         while not self.done:
             yield from self._next()
 
@@ -169,15 +169,15 @@ class BackgroundProcess(Generic[_Item]):
             self.done = True
             raise self._refused
         try:
-            told = self._pipe.recv()
+            received = self._pipe.recv()
         except (EOFError, OSError):
             self.done = True
-            raise Refusal("the process that works on it ended unexpectedly; ask again") from None
-        if isinstance(told, Refusal):
+            raise Refusal("the background process ended unexpectedly; try again") from None
+        if isinstance(received, Refusal):
             self.done = True
-            raise told
-        self.done = told is None
-        return [] if told is None else [told[0]]
+            raise received
+        self.done = received is None
+        return [] if received is None else [received[0]]
 
     def close(self) -> None:
         """Stop and end the process."""

@@ -37,7 +37,7 @@ def test_one_that_computes_for_long_ends_soon_after_who_asked(monkeypatch) -> No
     monkeypatch.setattr(_processes, "_GRACE", 0.0)
     monkeypatch.setattr(_processes.signal, "signal", lambda *_: None)
     told, asked = Pipe(duplex=False)
-    _processes._tell(asked, _waiting_for(ended), ())  # noqa: SLF001
+    _processes._send_items(asked, _waiting_for(ended), ())  # noqa: SLF001
     asked.close()
     told.close()
     assert ended == ["who asked", "it"]

@@ -1,4 +1,4 @@
-"""Frame to estimate: all that a setup can precompute is computed once."""
+"""Pipeline: frames to estimates, and files of readings to files of shapes."""
 
 from kappaskin.pipeline.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline.pipeline import Setup as Setup

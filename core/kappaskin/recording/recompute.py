@@ -93,7 +93,7 @@ class Retrace:
         self._pass_over(len(self._waiting))
         was, made = self.pipeline, Pipeline(self.sensor, setup, self._made)
         if was is not None:
-            made.go_on_from(was)
+            made.continue_from(was)
         self.pipeline, self._made = made, self._made + 1
 
     def _pass_over(self, count: int) -> None:
