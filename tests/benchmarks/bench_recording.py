@@ -7,7 +7,8 @@ import numpy as np
 
 from kappaskin import Pipeline, Setup, load_scene
 from kappaskin.recording import Recorder, Recording, Written
-from kappaskin.sources import SimulatedSource, encode_samples
+from kappaskin.sources import SimulatedSource
+from kappaskin.sources.wire import encode_samples
 
 RATE = 1000.0  # frames/s
 FRAMES = 4000

@@ -16,8 +16,8 @@ import kappaskin_app
 import kappaskin_resources
 from kappaskin import load_scene
 from kappaskin.live import Engine
-from kappaskin.sources import Decoder, MessageKind, encode_information, encode_samples, information
-from kappaskin.sources.wire import LONGEST, encode
+from kappaskin.sources import Decoder, information
+from kappaskin.sources.wire import LONGEST, MessageKind, encode, encode_information, encode_samples
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,8 @@ import pytest
 from kappaskin import load_scene
 from kappaskin.cli import main
 from kappaskin.cli.common import FAILED
-from kappaskin.sources import Accounting, diagnose, encode_information, information
+from kappaskin.sources import Accounting, diagnose, information
+from kappaskin.sources.wire import encode_information
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources import PseudoDevice

@@ -14,8 +14,8 @@ pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 
 from kappaskin import Frame, SourceError, load_scene
 from kappaskin.cli import main
-from kappaskin.sources import BAUD_RATES, Information, Operation, Reply, Samples, information
-from kappaskin.sources.wire import Fault
+from kappaskin.sources import BAUD_RATES, information
+from kappaskin.sources.wire import Fault, Information, Operation, Reply, Samples
 from kappaskin.studies import drills_text, run_drills
 from kappaskin.studies.drills.devices import DRILLS as OF_DEVICES
 from kappaskin.studies.drills.drill import Drill

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from kappaskin import load_scene
-from kappaskin.sources import Information, Interpreter, Reply, Samples, sensor_to_json
+from kappaskin.sources import Interpreter, sensor_to_json
 from kappaskin.sources.clock import ClockMap
+from kappaskin.sources.wire import Information, Reply, Samples
 
 SENSOR = load_scene("centre").sensor()
 TEXT = sensor_to_json(SENSOR)

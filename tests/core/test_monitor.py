@@ -9,15 +9,8 @@ import pytest
 
 from kappaskin import SourceError, load_scene
 from kappaskin.cli import main
-from kappaskin.sources import (
-    Command,
-    WireMonitor,
-    encode_information,
-    encode_reply,
-    encode_samples,
-    information,
-)
-from kappaskin.sources.wire import Fault
+from kappaskin.sources import WireMonitor, information
+from kappaskin.sources.wire import Command, Fault, encode_information, encode_reply, encode_samples
 
 tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
 

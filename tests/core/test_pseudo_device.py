@@ -19,8 +19,17 @@ import pytest
 from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
 from kappaskin.live import LOST, STREAMING, Engine, Status
 from kappaskin.scenes import CorruptedFrames, DroppedFrames, Orbit
-from kappaskin.sources import Decoder, Information, Operation, Reply, Samples, SerialSource
-from kappaskin.sources.wire import Fault, Message, encode_command, pack_runs
+from kappaskin.sources import Decoder, SerialSource
+from kappaskin.sources.wire import (
+    Fault,
+    Information,
+    Message,
+    Operation,
+    Reply,
+    Samples,
+    encode_command,
+    pack_runs,
+)
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources import PseudoDevice

@@ -20,19 +20,9 @@ from kappaskin import Pipeline, Port, Setup, SourceError, load_scene
 from kappaskin.live.recorder import Keeping
 from kappaskin.recording import Recording
 from kappaskin.recording.recompute import Retrace
-from kappaskin.sources import (
-    BAUD_RATES,
-    Decoder,
-    Operation,
-    SerialSource,
-    encode_information,
-    encode_reply,
-    encode_samples,
-    information,
-    ports,
-    serial_source,
-)
+from kappaskin.sources import BAUD_RATES, Decoder, SerialSource, information, ports, serial_source
 from kappaskin.sources.decoder import FROM_HOST
+from kappaskin.sources.wire import Operation, encode_information, encode_reply, encode_samples
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,8 @@ import pytest
 from kappaskin import Event, Frame, Refusal, SensorLayout, load_scene
 from kappaskin.recording import Recorder, Recording, ReplayedSource
 from kappaskin.recording import messages as m
-from kappaskin.sources import SimulatedSource, encode_information, encode_samples, sensor_to_json
+from kappaskin.sources import SimulatedSource, sensor_to_json
+from kappaskin.sources.wire import encode_information, encode_samples
 
 RATE, FRAMES, GAP = 500.0, 1000, 1.25
 FIRST, LAST = 0, FRAMES - 1

@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Region, Scanner, load_scene
-from kappaskin.sources import Operation, Reply
 from kappaskin.sources.commands import ScanControl, in_few_runs
-from kappaskin.sources.wire import MOST_RUNS, Fault, pack_runs, unpack_runs
+from kappaskin.sources.wire import MOST_RUNS, Fault, Operation, Reply, pack_runs, unpack_runs
 
 SENSOR = load_scene("centre").sensor()
 BY_HAND = Region("elements", elements=(3, 4), share=0.0)

@@ -19,14 +19,8 @@ import pytest
 import serial
 
 from kappaskin import Frame, Sensor, SourceError, load_scene
-from kappaskin.sources import (
-    SerialSource,
-    encode_information,
-    encode_samples,
-    information,
-    open_source,
-    ports,
-)
+from kappaskin.sources import SerialSource, information, open_source, ports
+from kappaskin.sources.wire import encode_information, encode_samples
 
 pty = pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 grp, tty = map(pytest.importorskip, ("grp", "tty"))

@@ -12,17 +12,8 @@ import pytest
 from kappaskin import Frame, load_scene
 from kappaskin.recording import Recorder, Recording, ReplayedSource
 from kappaskin.recording.recorded_frames import Reenactment
-from kappaskin.sources import (
-    Decoder,
-    Information,
-    Samples,
-    SerialSource,
-    SimulatedSource,
-    Source,
-    encode_information,
-    encode_samples,
-    sensor_to_json,
-)
+from kappaskin.sources import Decoder, SerialSource, SimulatedSource, Source, sensor_to_json
+from kappaskin.sources.wire import Information, Samples, encode_information, encode_samples
 
 SCENE = replace(load_scene("circle"), rate=100.0)
 SENSOR = SCENE.sensor()

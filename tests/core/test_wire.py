@@ -11,21 +11,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin.errors import Refusal
-from kappaskin.sources import (
-    Accounting,
+from kappaskin.sources import Accounting, Decoder
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, SequenceCounter
+from kappaskin.sources.wire import (
+    LONGEST,
     Command,
-    Decoder,
+    Fault,
     Information,
+    Message,
     MessageKind,
     Operation,
     Reply,
     Samples,
+    encode,
+    encode_command,
     encode_information,
     encode_reply,
     encode_samples,
 )
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, SequenceCounter
-from kappaskin.sources.wire import LONGEST, Fault, Message, encode, encode_command
 
 SEQUENCES = st.integers(0, 2**32 - 1)
 MICROSECONDS = st.integers(0, 2**53)

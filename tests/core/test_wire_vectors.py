@@ -8,18 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kappaskin.sources import (
+from kappaskin.sources import Decoder
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
+from kappaskin.sources.wire import (
     Command,
-    Decoder,
+    Fault,
     Information,
+    Message,
     MessageKind,
     Operation,
     Reply,
     Samples,
+    encode,
     encode_samples,
+    pack_runs,
 )
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
-from kappaskin.sources.wire import Fault, Message, encode, pack_runs
 
 VECTORS = json.loads((files("kappaskin_resources") / "wire" / "vectors.json").read_text("utf-8"))
 KINDS = {"device": FROM_DEVICE, "host": FROM_HOST}

@@ -35,19 +35,18 @@ from kappaskin.publish.client import Client
 from kappaskin.recording import Recorder, ReplayedSource, Verdict, repairing, verifying
 from kappaskin.recording.messages import TOPICS
 from kappaskin.scenes import SECOND_GENERATION_LOOPS, Creep, read_scene
-from kappaskin.sources import (
+from kappaskin.sources import Decoder, SimulatedSource, information
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
+from kappaskin.sources.wire import (
     Command,
-    Decoder,
     MessageKind,
     Operation,
-    SimulatedSource,
+    encode,
+    encode_command,
     encode_information,
     encode_reply,
     encode_samples,
-    information,
 )
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
-from kappaskin.sources.wire import encode, encode_command
 from kappaskin_app.lessons.reading import READY, read_lesson
 
 Read = Callable[[bytes, Path], object]

@@ -1,5 +1,6 @@
-"""Sources of frames: simulation, serial line."""
+"""Sources of frames: a serial port, a simulation; the wire format and its devices."""
 
+from kappaskin.sources import wire as wire
 from kappaskin.sources.clock import ClockState as ClockState
 from kappaskin.sources.clock import RecordedClock as RecordedClock
 from kappaskin.sources.commands import SCAN_LISTS_PER_SECOND as SCAN_LISTS_PER_SECOND
@@ -24,13 +25,3 @@ from kappaskin.sources.source import InputRecorder as InputRecorder
 from kappaskin.sources.source import Source as Source
 from kappaskin.sources.source import open_source as open_source
 from kappaskin.sources.source import register_scheme as register_scheme
-from kappaskin.sources.wire import Command as Command
-from kappaskin.sources.wire import FromDevice as FromDevice
-from kappaskin.sources.wire import Information as Information
-from kappaskin.sources.wire import MessageKind as MessageKind
-from kappaskin.sources.wire import Operation as Operation
-from kappaskin.sources.wire import Reply as Reply
-from kappaskin.sources.wire import Samples as Samples
-from kappaskin.sources.wire import encode_information as encode_information
-from kappaskin.sources.wire import encode_reply as encode_reply
-from kappaskin.sources.wire import encode_samples as encode_samples

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
-from kappaskin.sources import BAUD_RATES, FromDevice
+from kappaskin.sources import BAUD_RATES, wire
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.outcome import Outcome
 from kappaskin.studies.drills.relay import Spoil, clean
@@ -43,7 +43,7 @@ def _cuts(stand: Stand) -> Outcome:
     stand.settle()
     cut = Cut()
 
-    def many(message: FromDevice) -> list[FromDevice]:
+    def many(message: wire.FromDevice) -> list[wire.FromDevice]:
         return [message] * 4
 
     stand.relay.rewrite, stand.relay.spoil = many, cut

@@ -8,28 +8,17 @@ from contextlib import suppress
 from pathlib import Path
 
 from kappaskin.frames import Counts
-from kappaskin.sources import (
-    Command,
-    Decoder,
-    FromDevice,
-    Information,
-    Reply,
-    Samples,
-    SerialConnection,
-    encode_information,
-    encode_reply,
-    encode_samples,
-)
+from kappaskin.sources import Decoder, SerialConnection, wire
 
 _OUTBOX = 2**21  # bytes that wait; beyond it a message goes unsent, as from a device
 _BLOCK = 4096
 _KEPT = 16384  # scans that are remembered: more than wait anywhere
 
-Rewrite = Callable[[FromDevice], list[FromDevice]]
+Rewrite = Callable[[wire.FromDevice], list[wire.FromDevice]]
 Spoil = Callable[[bytes], bytes]
 
 
-def unchanged(message: FromDevice) -> list[FromDevice]:
+def unchanged(message: wire.FromDevice) -> list[wire.FromDevice]:
     return [message]
 
 
@@ -92,7 +81,7 @@ class Relay:
         """Pass on what has come."""
         for _, data in self._device.take(0.0):
             for message in self._decoder.feed(data):
-                if not isinstance(message, Command):
+                if not isinstance(message, wire.Command):
                     for made in self.rewrite(message):
                         self.send(made)
         if not self.held:
@@ -112,11 +101,11 @@ class Relay:
             while os.read(self._master, _BLOCK):
                 pass
 
-    def send(self, message: FromDevice) -> bytes:
+    def send(self, message: wire.FromDevice) -> bytes:
         """Send a message under the next number; its bytes before they are spoilt."""
         number, self.sequence = self.sequence, (self.sequence + 1) % 2**32
         self.spent += 1
-        if isinstance(message, Samples):
+        if isinstance(message, wire.Samples):
             self.sent[number] = message.counts
             if len(self.sent) > _KEPT:
                 del self.sent[next(iter(self.sent))]
@@ -145,13 +134,13 @@ class Relay:
                     self._outbox[0] = data[done:]
 
 
-def _bytes_of(message: FromDevice, number: int) -> bytes:
-    if isinstance(message, Information):
-        return encode_information(number, message.time, message.text)
-    if isinstance(message, Reply):
-        command = Command(message.command, message.operation, b"")
-        return encode_reply(number, message.time, command, message.fault, message.data)
+def _bytes_of(message: wire.FromDevice, number: int) -> bytes:
+    if isinstance(message, wire.Information):
+        return wire.encode_information(number, message.time, message.text)
+    if isinstance(message, wire.Reply):
+        command = wire.Command(message.command, message.operation, b"")
+        return wire.encode_reply(number, message.time, command, message.fault, message.data)
     narrow = abs(message.counts).max(initial=0) < 2**15
-    return encode_samples(
+    return wire.encode_samples(
         number, message.time, message.channels, message.counts, 2 if narrow else 4
     )

@@ -4,7 +4,7 @@ import json
 import struct
 from dataclasses import dataclass
 
-from kappaskin.sources import FromDevice, Information, Operation, Reply
+from kappaskin.sources import wire
 
 _ANSWER = struct.Struct("<Qh")  # as to a ping: when it came in us, how warm it is
 
@@ -15,8 +15,12 @@ class Times:
 
     ahead: float
 
-    def __call__(self, message: FromDevice) -> list[FromDevice]:
-        if isinstance(message, Reply) and message.operation == Operation.PING and not message.fault:
+    def __call__(self, message: wire.FromDevice) -> list[wire.FromDevice]:
+        if (
+            isinstance(message, wire.Reply)
+            and message.operation == wire.Operation.PING
+            and not message.fault
+        ):
             received_us, temperature = _ANSWER.unpack(message.data)
             received_us = max(0, received_us + round(self.ahead * 1e6))
             message = message._replace(data=_ANSWER.pack(received_us, temperature))
@@ -30,14 +34,14 @@ class Says:
     key: str
     value: str
 
-    def __call__(self, message: FromDevice) -> list[FromDevice]:
-        if not isinstance(message, Information):
+    def __call__(self, message: wire.FromDevice) -> list[wire.FromDevice]:
+        if not isinstance(message, wire.Information):
             return [message]
         return [
             message._replace(text=json.dumps(json.loads(message.text) | {self.key: self.value}))
         ]
 
 
-def untold(message: FromDevice) -> list[FromDevice]:
+def untold(message: wire.FromDevice) -> list[wire.FromDevice]:
     """As from a device that does not say what it is."""
-    return [] if isinstance(message, Information) else [message]
+    return [] if isinstance(message, wire.Information) else [message]

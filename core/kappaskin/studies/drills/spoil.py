@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.sources import MessageKind
+from kappaskin.sources import wire
 from kappaskin.studies.drills.uart import heard
 
 _BURST = 64  # bytes, the mean of a burst of garbage
@@ -53,7 +53,7 @@ class Cut:
     whole: bool = True
 
     def __call__(self, data: bytes) -> bytes:
-        if data[_KIND] != MessageKind.SAMPLES:
+        if data[_KIND] != wire.MessageKind.SAMPLES:
             return data
         self.whole, self.length = not self.whole, len(data)
         if self.whole:
