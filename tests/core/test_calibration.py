@@ -663,10 +663,10 @@ def test_a_pipeline_that_goes_on_from_another_remembers_what_that_one_saw(second
     part = replace(part, channels=part.channels[:100], counts=part.counts[:100])
 
     after = Pipeline(sensor, Setup(5, 5, calibration=second.calibration))
-    after.go_on_from(used)
-    other.go_on_from(used)  # its readings are not corrected: it has nothing to take over
+    after.continue_from(used)
+    other.continue_from(used)  # its readings are not corrected: it has nothing to take over
     stranger = pipeline_of(second.calibration)
-    stranger.go_on_from(used)  # of another sensor
+    stranger.continue_from(used)  # of another sensor
 
     went_on, alone = after(part).curvature, stranger(part).curvature
     assert np.isfinite(went_on).all()  # the others are held

@@ -87,7 +87,7 @@ def recorded(
                 setup = step
             made = Pipeline(source.sensor, setup)
             if pipeline is not None and pipeline.sensor is source.sensor:
-                made.go_on_from(pipeline)
+                made.continue_from(pipeline)
             pipeline = made
             recorder.set_up(pipeline)
             end = clock.now + seconds
