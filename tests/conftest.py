@@ -237,7 +237,7 @@ def recording(
     setups.append(Setup(6, 7))
     recorder.set_up(Pipeline(first.sensor, setups[-1]))
     play(first, 1.0)
-    recorder.ended(now[0])
+    recorder.disconnected(now[0])
     written_out(recorder)
     now[0] += 0.8
     play(source(), 2.5)

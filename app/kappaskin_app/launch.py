@@ -16,7 +16,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin._processes import load_beside
+from kappaskin._processes import preload_library
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -45,7 +45,7 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
     says what is being loaded; a script that opens a window for some seconds needs neither.
     """
     with _all_stays():
-        load_beside()  # by the time it is wanted here, the engine's process has loaded its part
+        preload_library()  # by the time it is wanted here, the engine's process has loaded its part
         application = _application()
         splash = _splash(kept) if kept is not None else None
         # Beside: the engine's process starts while this one loads VTK.

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from kappaskin._lazy import lazy_names
 
 if TYPE_CHECKING:
-    from kappaskin._background import Beside as Beside
-    from kappaskin._processes import load_beside as load_beside
+    from kappaskin._processes import BackgroundProcess as BackgroundProcess
+    from kappaskin._processes import preload_library as preload_library
     from kappaskin.bases import EDGES as EDGES
     from kappaskin.bases import Basis as Basis
     from kappaskin.bases import CurvatureMap as CurvatureMap
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from kappaskin.bases import edges_of as edges_of
     from kappaskin.calibration import Calibration as Calibration
     from kappaskin.calibration import CalibrationReport as CalibrationReport
+    from kappaskin.calibration import ChannelLimits as ChannelLimits
     from kappaskin.calibration import Drift as Drift
-    from kappaskin.calibration import Limits as Limits
-    from kappaskin.calibration import Phase as Phase
+    from kappaskin.calibration import MapVerdict as MapVerdict
+    from kappaskin.calibration import PressPhase as PressPhase
     from kappaskin.calibration import PressTest as PressTest
     from kappaskin.calibration import Procedure as Procedure
     from kappaskin.calibration import Sweep as Sweep
     from kappaskin.calibration import Tare as Tare
-    from kappaskin.calibration import Tares as Tares
-    from kappaskin.calibration import Verdict as Verdict
+    from kappaskin.calibration import TareStore as TareStore
     from kappaskin.calibration import calibrate as calibrate
-    from kappaskin.calibration import data_folder as data_folder
     from kappaskin.calibration import elements_to_press as elements_to_press
     from kappaskin.calibration import load_calibration as load_calibration
     from kappaskin.calibration import save_calibration as save_calibration
+    from kappaskin.calibration import tare_folder as tare_folder
     from kappaskin.cli.system import examine as examine
     from kappaskin.contact import NO_OBJECT as NO_OBJECT
     from kappaskin.contact import ContactObject as ContactObject
@@ -104,7 +104,7 @@ if TYPE_CHECKING:
     from kappaskin.pipeline import Pipeline as Pipeline
     from kappaskin.pipeline import Quantities as Quantities
     from kappaskin.pipeline import Setup as Setup
-    from kappaskin.pipeline import of_form as of_form
+    from kappaskin.pipeline import curvature_invariant as curvature_invariant
     from kappaskin.publish import Latency as Latency
     from kappaskin.publish import Published as Published
     from kappaskin.publish import PublishNews as PublishNews
@@ -168,9 +168,8 @@ if TYPE_CHECKING:
     from kappaskin.skin import Patch as Patch
     from kappaskin.skin import Polygon as Polygon
     from kappaskin.skin import distances as distances
-    from kappaskin.skin import interpolated as interpolated
     from kappaskin.skin import snapped_to_rim as snapped_to_rim
-    from kappaskin.sources import LISTS as LISTS
+    from kappaskin.sources import SCAN_LISTS_PER_SECOND as SCAN_LISTS_PER_SECOND
     from kappaskin.sources import Port as Port
     from kappaskin.sources import serial_ports as serial_ports
     from kappaskin.studies import FIGURES as FIGURES
@@ -196,13 +195,12 @@ else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
-            "_background": "Beside",
-            "_processes": "load_beside",
+            "_processes": "BackgroundProcess preload_library",
             "bases": "Basis CurvatureMap EDGES SineBasis ValueMap basis_for edges_of",
             "calibration": (
-                "Calibration CalibrationReport Drift Limits Phase PressTest Procedure Sweep "
-                "Tare Tares Verdict calibrate data_folder elements_to_press load_calibration "
-                "save_calibration"
+                "Calibration CalibrationReport ChannelLimits Drift MapVerdict PressPhase "
+                "PressTest Procedure Sweep Tare TareStore calibrate elements_to_press "
+                "load_calibration save_calibration tare_folder"
             ),
             "cli.system": "examine",
             "contact": (
@@ -223,7 +221,7 @@ else:
                 "Compliance DiscLoad GaussianLoad LineLoad Load PlacedObject Plate PointLoad "
                 "RectangleLoad"
             ),
-            "pipeline": "ErrorBars Pipeline QUANTITIES Quantities Setup of_form",
+            "pipeline": "ErrorBars Pipeline QUANTITIES Quantities Setup curvature_invariant",
             "publish": "Latency PublishNews Published Receiver",
             "recording": (
                 "Exported Exporting Recording Repaired Repairing Replay Wanted Written "
@@ -244,7 +242,7 @@ else:
                 "Scan Sensor SensorLayout Transduction"
             ),
             "skin": "Disk Distances Patch Polygon distances interpolated snapped_to_rim",
-            "sources": "LISTS Port serial_ports",
+            "sources": "Port SCAN_LISTS_PER_SECOND serial_ports",
             "studies": (
                 "Check Cost CostMeasurement Design EffectCost EffectCosts FIGURES Prospect Refused "
                 "Setting cheapest check costs effect_costs frontier plan_updates prospect "

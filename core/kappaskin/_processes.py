@@ -1,31 +1,35 @@
-"""How processes beside this one are begun, and how one of them comes before others.
-
-Those of one thread each, with the library loaded.
-"""
+"""Background processes: how they are started, prioritised and ended, each with one thread."""
 
 import multiprocessing
 import os
 import signal
 import sys
 import threading
-from collections.abc import Generator
+import time
+from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, TypeAlias
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar, cast
+
+from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
-_AHEAD = 10  # of 40 steps of priority
+_RAISED = 10  # of 40 steps of priority
 
 Context: TypeAlias = "ForkServerContext | SpawnContext"
 
+_Item = TypeVar("_Item")
+_GRACE = 1.0  # s to clean up in once the parent has ended
+
 
 @contextmanager
-def beginning_processes() -> Generator[Context]:
-    """What begins processes that compute in one thread each.
+def process_context() -> Generator[Context]:
+    """A context that starts processes which compute in one thread each.
 
-    Where the system can, they come from a process that has loaded the library and does nothing
-    else: one begins in 0.1 s instead of 0.8. A plain fork would copy Qt's threads' locks.
+    Where the system can, they are forked from a process that has loaded the library and does
+    nothing else: one starts in 0.1 s instead of 0.8. A plain fork would copy Qt's threads' locks.
     """
     context: Context = multiprocessing.get_context("spawn")
     if "forkserver" in multiprocessing.get_all_start_methods():
@@ -37,7 +41,7 @@ def beginning_processes() -> Generator[Context]:
     os.environ.update(dict.fromkeys(names, "1"))
     try:
         if context.get_start_method() == "forkserver":
-            _begin_deaf()
+            _start_forkserver()
         yield context
     finally:
         for name, value in was.items():
@@ -47,19 +51,19 @@ def beginning_processes() -> Generator[Context]:
                 os.environ[name] = value
 
 
-def load_beside() -> None:
-    """Begin to load the library in a process beside; an `Engine` that waits for it begins sooner.
+def preload_library() -> None:
+    """Begin to load the library in a background process; an `Engine` started later starts sooner.
 
     Nothing where the system cannot fork from such a process.
     """
-    with beginning_processes():
+    with process_context():
         pass
 
 
-def _begin_deaf() -> None:
-    """Begin the process that the others come from, deaf to Ctrl+C, as they are then.
+def _start_forkserver() -> None:
+    """Start the process that the others are forked from; it ignores Ctrl+C, as they do then.
 
-    The signal goes to every process of a terminal, and would break that one off while it loads.
+    The signal goes to every process of a terminal, and would stop that one while it loads.
     """
     from multiprocessing import forkserver, resource_tracker
 
@@ -71,10 +75,10 @@ def _begin_deaf() -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, was)
 
 
-class Haste:
-    """Lets this process come before others that want a core, where the system allows it.
+class ProcessPriority:
+    """Raises the priority of this process where the system allows it.
 
-    Linux alone, and there for whom the limits (`nice` in limits.conf, or root) let ask for it.
+    On Linux alone, for root and those whose limits (`nice` in limits.conf) allow it.
     """
 
     def __init__(self) -> None:
@@ -82,11 +86,109 @@ class Haste:
         self._usual = os.getpriority(os.PRIO_PROCESS, 0) if self._linux else 0
 
     def __call__(self, on: bool) -> None:
-        """Come before others from now on, or no more."""
+        """Raise the priority, or set it back."""
         if not self._linux:
             return
         for thread in threading.enumerate():  # each has its own; those that follow inherit it
             with suppress(OSError):
                 os.setpriority(
-                    os.PRIO_PROCESS, thread.native_id or 0, self._usual - (_AHEAD if on else 0)
+                    os.PRIO_PROCESS, thread.native_id or 0, self._usual - (_RAISED if on else 0)
                 )
+
+
+def end_with_parent() -> None:
+    """End this process soon after the one that started it, whatever is being computed."""
+    threading.Thread(target=_watch_parent, name="parent-watcher", daemon=True).start()
+
+
+def _watch_parent() -> None:
+    if parent := multiprocessing.parent_process():
+        parent.join()
+        time.sleep(_GRACE)
+        os._exit(1)
+
+
+def _send_items(
+    pipe: "Connection[Any, None]", make: Callable[..., Iterable[Any]], about: tuple[Any, ...]
+) -> None:
+    """Send each item in a tuple, or a refusal, and None at the end; runs in the child process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
+    end_with_parent()
+    with suppress(OSError):  # the parent has ended
+        try:
+            for item in make(*about):
+                pipe.send((item,))
+            pipe.send(None)
+        except Refusal as refusal:
+            pipe.send(refusal)
+
+
+class BackgroundProcess(Generic[_Item]):
+    """Computes the items of `make(*about)` in a process, called `name`, of one thread.
+
+    No call here but `wait` waits. The process ends when it is done, when `close` is called, or
+    when the process that started it has ended.
+    """
+
+    def __init__(self, name: str, make: Callable[..., Iterable[_Item]], *about: object) -> None:
+        self.done, self._refused = False, cast("Refusal | None", None)
+        ours, theirs = multiprocessing.Pipe(duplex=False)
+        self._pipe = cast("Connection[None, tuple[_Item] | Refusal | None]", ours)
+        with process_context() as context:
+            self._process = context.Process(
+                target=_send_items, args=(theirs, make, about), name=name, daemon=True
+            )
+            self._process.start()
+        theirs.close()
+
+    def poll(self) -> list[_Item]:
+        """The items computed since the last call.
+
+        Raises the `Refusal` of the computation, or one where the process has died, once all items
+        before it were returned.
+        """
+        found: list[_Item] = []
+        while not self.done and self._pipe.poll():
+            try:
+                found += self._next()
+            except Refusal as refusal:
+                if not found:
+                    raise
+                self._refused, self.done = refusal, False  # the next call raises it
+                break
+        return found
+
+    def wait(self) -> Generator[_Item]:
+        """Each item as soon as it is computed, to the end."""
+        while not self.done:
+            yield from self._next()
+
+    def _next(self) -> list[_Item]:
+        """The next item, none at the end."""
+        if self._refused is not None:
+            self.done = True
+            raise self._refused
+        try:
+            received = self._pipe.recv()
+        except (EOFError, OSError):
+            self.done = True
+            raise Refusal("the background process ended unexpectedly; try again") from None
+        if isinstance(received, Refusal):
+            self.done = True
+            raise received
+        self.done = received is None
+        return [] if received is None else [received[0]]
+
+    def close(self) -> None:
+        """Stop and end the process."""
+        self.done = True
+        self._pipe.close()
+        self._process.kill()
+        self._process.join()
+        self._process.close()
+
+    def __enter__(self) -> "BackgroundProcess[_Item]":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,4 +1,4 @@
-"""What something remembers, as plain arrays by name, and back: safe to read from any file."""
+"""State of filters and operators as plain arrays by name: written into recordings and restored."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar, cast
@@ -8,45 +8,49 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
 
-Memory = dict[str, NDArray[np.float64]]
+StateArrays = dict[str, NDArray[np.float64]]
 
 
-class Remembering:
-    """Something whose past is in its attributes `REMEMBERED`: arrays, numbers, or such things."""
+class Stateful:
+    """Something whose answers depend on its past, which the attributes named in `STATE` hold.
+
+    Each is an array, a number, or another `Stateful`. Recordings hold their names: another name for
+    an attribute would leave the recordings of today without a beginning.
+    """
 
     __slots__ = ()
-    REMEMBERED: ClassVar[tuple[str, ...]] = ()
+    STATE: ClassVar[tuple[str, ...]] = ()
 
-    def remembered(self, before: str = "") -> Memory:
-        """All that it remembers; what it has none of yet is left out."""
-        found: Memory = {}
-        for name in self.REMEMBERED:
+    def state(self, prefix: str = "") -> StateArrays:
+        """The state by name, each behind `prefix`; without what has no value yet."""
+        found: StateArrays = {}
+        for name in self.STATE:
             value = getattr(self, name)
-            if isinstance(value, Remembering):
-                found |= value.remembered(f"{before}{name}.")
+            if isinstance(value, Stateful):
+                found |= value.state(f"{prefix}{name}.")
             elif value is not None:
-                found[before + name] = np.array(value, float)
+                found[prefix + name] = np.array(value, float)
         return found
 
-    def recall(self, memory: Mapping[str, NDArray[np.float64]], before: str = "") -> None:
-        """Go on from what another of the same kind and sizes `remembered`."""
-        for name in self.REMEMBERED:
+    def restore(self, state: Mapping[str, NDArray[np.float64]], prefix: str = "") -> None:
+        """Continue from the `state` of another of the same kind and sizes."""
+        for name in self.STATE:
             value = getattr(self, name)
-            if isinstance(value, Remembering):
-                value.recall(memory, f"{before}{name}.")
+            if isinstance(value, Stateful):
+                value.restore(state, f"{prefix}{name}.")
             elif value is not None:
-                setattr(self, name, _like(before + name, value, memory))
+                setattr(self, name, _like(prefix + name, value, state))
 
 
-def _like(name: str, value: Any, memory: Mapping[str, NDArray[np.float64]]) -> Any:
-    """What `memory` has under this name, if it is of the same shape as `value`."""
-    kept, shape = memory.get(name), np.shape(value)
-    if kept is None or kept.shape != shape:
+def _like(name: str, value: Any, state: Mapping[str, NDArray[np.float64]]) -> Any:
+    """What `state` has under this name, if it is of the same shape as `value`."""
+    saved, shape = state.get(name), np.shape(value)
+    if saved is None or saved.shape != shape:
         raise Refusal(
             f"expected {name} of shape {shape} to go on from, got "
-            + ("nothing" if kept is None else f"shape {kept.shape}")
+            + ("nothing" if saved is None else f"shape {saved.shape}")
         )
     if not isinstance(value, np.ndarray):
-        return float(kept)
+        return float(saved)
     # In the order in which products were taken of it, or they differ in the last bit.
-    return kept.astype(cast("Any", value.dtype), order="F")
+    return saved.astype(cast("Any", value.dtype), order="F")

@@ -1,4 +1,4 @@
-"""What a file says to the lines of TOML tables, as a person would write them."""
+"""TOML tables as text, laid out as a person would write them."""
 
 import json
 import textwrap
@@ -12,15 +12,15 @@ _INDENT = "    "
 
 
 def table(
-    header: str, said: Mapping[str, Any], units: Mapping[str, str] = MappingProxyType({})
+    header: str, values: Mapping[str, Any], units: Mapping[str, str] = MappingProxyType({})
 ) -> str:
     """The lines of a table below `header`, "[skin]" say, or of the top where that is empty.
 
-    It says texts, dates, numbers, switches, and lists or tables of them; `units`, by key, stand in
-    comments.
+    The values are texts, dates, numbers, booleans, and lists or tables of them; `units`, by key,
+    are written as comments.
     """
     lines = [header] if header else []
-    for key, value in said.items():
+    for key, value in values.items():
         unit = f"  # {units[key]}" if units.get(key) else ""
         lines.append(f"{key} = {_value(value)}{unit}")
     return "\n".join(lines) + "\n"

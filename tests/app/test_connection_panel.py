@@ -19,7 +19,7 @@ SKIN = Port("/dev/ttyACM0", "Fingertip of ten by ten elements", "Kappa Ltd", "SN
 BOARD = Port("/dev/ttyUSB0", "CP2102N", "Silicon Labs", "beef", (3, 4), opened=False)
 PERMISSION = (
     "/dev/ttyUSB0: no permission to open it. Join the port's group with "
-    "`sudo usermod -aG dialout $USER`, then log in again; it is tried again until it opens"
+    "`sudo usermod -aG dialout $USER`, then log in again; retrying"
 )
 
 

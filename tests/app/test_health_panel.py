@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from kappaskin import Finding, Health, Patch, Phase, SensorLayout, Status, load_scene
-from kappaskin.estimation import FAULTS
+from kappaskin import FAULTS, Finding, Health, Patch, SensorLayout, Status, load_scene
+from kappaskin.calibration import PressPhase
 from kappaskin_app.features.health.map_testing import MapTesting
 from kappaskin_app.features.health.panel import HealthPanel
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
@@ -119,7 +119,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert window.testing.running
     assert not window.session.running  # the load rests, until it is dragged
     until(lambda: window.membrane.asked.actor.visibility)
-    until(lambda: window.testing.test.phase is Phase.PRESS)
+    until(lambda: window.testing.test.phase is PressPhase.PRESS)
     assert "Press it now" in page.words.text()
     asked = window.testing.test.asked
     x, y = window.session.scene.layout.positions[asked]
@@ -150,7 +150,7 @@ def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(
     page.quick.click()
     while testing.running:
         testing.skip()
-    assert page.verdict.text().startswith("Nothing is told of the map; element 0")
+    assert page.verdict.text().startswith("No press shows anything of the map; element 0")
     page.quick.click()
     window.session.disconnect_from()
     until(lambda: not testing.running)

@@ -79,7 +79,7 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     until(lambda: window.display.badge.state == "LOST")
     alarm, message = window.membrane.alarm, window.connection.message
     assert alarm.text.startswith("LOST ")
-    assert "the line is gone" in window.statusBar().currentMessage()
+    assert "connection lost" in window.statusBar().currentMessage()
     assert not window.display.foot.object.isVisible()  # or the message would have no room
     assert colours_in(window, window.membrane) > 300
     heights = window.membrane.skin.height.copy()
@@ -96,7 +96,7 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     assert alarm.text == ""
     assert window.session.status.generation == generation
     assert kinds(window) == ["back", "gone", "met"]
-    until(lambda: "began anew once" in window.connection.losses.text())
+    until(lambda: "restarted once" in window.connection.losses.text())
 
     # Another device on the port is said, with both names.
     device.pull()

@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from kappaskin import Drift, Setup, Status, Tare, Tares, load_scene
+from kappaskin import Drift, Setup, Status, Tare, load_scene
+from kappaskin.calibration import TareStore
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live.tare_taking import TareNews
 from kappaskin_app.features.calibration.tare import TarePanel, drift_words, warmth
@@ -34,7 +35,7 @@ class Bench:
     def __init__(self, folder, **settings):
         self.asked, self.told = 0, []
         self.history = History(Settings(**settings))
-        self.tares = Tares(folder)
+        self.tares = TareStore(folder)
         self.engine = SimpleNamespace(tare=self.ask, source="/dev/ttyACM0")
         self.taring = Taring(self.history, cast(Any, self.engine), self.tares)
         self.taring.told.connect(self.told.append)

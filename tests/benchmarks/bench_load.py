@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin.sources import Decoder, encode_samples
+from kappaskin.sources import Decoder
+from kappaskin.sources.wire import encode_samples
 
 _LOADING = Path(__file__).with_name("loading.py")
 _MEMORY = 20.0  # MB that may be added

@@ -7,7 +7,8 @@ import numpy as np
 
 from kappaskin import Pipeline, Setup, load_scene
 from kappaskin.recording import Recorder, Recording, Written
-from kappaskin.sources import SimulatedSource, encode_samples
+from kappaskin.sources import SimulatedSource
+from kappaskin.sources.wire import encode_samples
 
 RATE = 1000.0  # frames/s
 FRAMES = 4000
@@ -43,7 +44,7 @@ def test_recording_takes_little_of_a_core(figure, ratio, tmp_path) -> None:
 
     sent = [encode_samples(f.sequence, f.device_time, f.channels, f.counts, 2) for f in frames]
     for kind, tell in (
-        ("a device", lambda recorder, n: recorder.came(frames[n].host_time, sent[n])),
+        ("a device", lambda recorder, n: recorder.received(frames[n].host_time, sent[n])),
         (
             "a simulation with its truth",
             lambda recorder, n: source._record(recorder, [frames[n]]),  # noqa: SLF001 - as `read`

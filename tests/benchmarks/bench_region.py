@@ -7,7 +7,7 @@ import numpy as np
 
 from kappaskin import SECOND_GENERATION, Pipeline, Region, Scanner, Setup, Simulator, load_scene
 from kappaskin.contact import ForceTorqueSensor, IntrinsicContact
-from kappaskin.pipeline.frame_assembly import Hold
+from kappaskin.pipeline.pipeline import FrameAssembly
 
 SCENE = replace(load_scene("centre"), transduction=SECOND_GENERATION, rate=160.0)
 SENSOR = SCENE.sensor()
@@ -21,7 +21,7 @@ def test_holding_what_was_left_out_adds_less_than_20_us_to_300_channels(
     scanner.follow(np.array([0.05, 0.05]))
     whole = simulator.frame(0, time.monotonic)
     part = simulator.scanned(scanner(), 1, 1e-3, time.monotonic)
-    hold, readings = Hold(300, 0.1), pipeline.curvature(part)
+    hold, readings = FrameAssembly(300, 0.1), pipeline.curvature(part)
     hold(whole, pipeline.curvature(whole))
 
     holding, of_part, of_whole = medians(

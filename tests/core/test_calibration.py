@@ -19,7 +19,6 @@ from kappaskin import (
     Engine,
     GaussianNoise,
     Hysteresis,
-    Limits,
     Patch,
     Pipeline,
     Plate,
@@ -36,8 +35,8 @@ from kappaskin import (
     schedule,
 )
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.calibration.lines import lines
-from kappaskin.calibration.loops import identify, thresholds
+from kappaskin.calibration.identification import fit_lines, identify_hysteresis, play_thresholds
+from kappaskin.calibration.report import ChannelLimits
 from kappaskin.live.ring import Ring
 from kappaskin.scenes.effects import ReadingEffect, Size
 
@@ -137,7 +136,7 @@ def plain():
 def test_the_line_is_numpys_with_its_standard_errors():
     rng = np.random.default_rng(2)
     x, y = rng.uniform(-80, 80, 30), rng.normal(size=(30, 4)) + np.arange(4)
-    found = lines(x, y)
+    found = fit_lines(x, y)
     for c in range(4):
         (gain, offset), covariance = np.polyfit(x, y[:, c], 1, cov=True)
         assert [found.gain[c], found.offset[c]] == pytest.approx([gain, offset])
@@ -153,7 +152,7 @@ def test_the_error_of_a_reading_left_out_is_that_of_leaving_each_out():
     for k in range(12):
         gain, offset = np.polyfit(np.delete(x, k), np.delete(y[:, 0], k), 1)
         left.append(y[k, 0] - offset - gain * x[k])
-    found = lines(x, y)
+    found = fit_lines(x, y)
     assert found.left_out[0] == pytest.approx(np.sqrt(np.mean(np.square(left))) / found.gain[0])
 
 
@@ -329,8 +328,8 @@ def test_the_identified_weights_are_those_of_a_sweep_they_explain():
     running = true.start((1,), np.random.default_rng(0))
     y = 2.0 + 1.1 * np.array([running(np.array([x]), 0.0) for x in path])
 
-    r, used = thresholds(path, 8), np.ones(len(path), bool)
-    found, loops = identify(path, y, used, r, lines(path, y), 1e-6)
+    r, used = play_thresholds(path, 8), np.ones(len(path), bool)
+    found, loops = identify_hysteresis(path, y, used, r, fit_lines(path, y), 1e-6)
 
     assert [found.gain[0], found.offset[0]] == pytest.approx([1.1, 2.0], abs=1e-6)
     assert loops.stretch[0] == pytest.approx(1.5, abs=1e-6)
@@ -349,7 +348,9 @@ def test_a_twist_gage_that_is_bent_half_as_far_knows_how_well_its_gain_is_told()
     y = np.array([gain * running(np.full(100, k), 0.0) for k in x])
     y += 0.01 * rng.normal(size=y.shape)
 
-    found, _ = identify(x, y, used, thresholds(x, 8), lines(x[used], y[used]), 1e-3)
+    found, _ = identify_hysteresis(
+        x, y, used, play_thresholds(x, 8), fit_lines(x[used], y[used]), 1e-3
+    )
 
     assert coverage(found.gain, found.gain_sd, gain) > 0.95 - 4 * math.sqrt(0.95 * 0.05 / 100)
     assert found.gain_sd.max() < 0.01
@@ -364,13 +365,13 @@ def test_the_error_of_a_reading_that_the_loops_had_not_seen_is_that_of_leaving_e
     left = []
     for k in range(len(x)):
         others = used & (np.arange(len(x)) != k)
-        straight = lines(x[others], y[others])
-        found, loops = identify(x, y, others, thresholds(x, 3), straight, 1e-3)
+        straight = fit_lines(x[others], y[others])
+        found, loops = identify_hysteresis(x, y, others, play_thresholds(x, 3), straight, 1e-3)
         plays = loops.start()
         told = [found.offset + found.gain * plays(np.array([v])) for v in x]
         left.append((y[k] - told[k])[0])
 
-    found, _ = identify(x, y, used, thresholds(x, 3), lines(x, y), 1e-3)
+    found, _ = identify_hysteresis(x, y, used, play_thresholds(x, 3), fit_lines(x, y), 1e-3)
 
     # The library keeps the stretch and most of the active weights, which all readings determine.
     assert found.left_out[0] == pytest.approx(np.sqrt(np.mean(np.square(left))), rel=0.2)
@@ -465,7 +466,7 @@ def test_a_channel_that_fails_says_why_and_reads_nothing_any_more(kind, reason):
 
 def test_loops_that_hide_small_changes_fail():
     report = report_of(
-        SECOND_GENERATION_LOOPS, TOLERANCE, NOISE, dwell=0.05, limits=Limits(linear=0.8055)
+        SECOND_GENERATION_LOOPS, TOLERANCE, NOISE, dwell=0.05, limits=ChannelLimits(linear=0.8055)
     )
     assert 0 < len(report.failed) < 48
     assert all("of a small change" in why for why in report.failed.values())
@@ -661,10 +662,10 @@ def test_a_pipeline_that_goes_on_from_another_remembers_what_that_one_saw(second
     part = replace(part, channels=part.channels[:100], counts=part.counts[:100])
 
     after = Pipeline(sensor, Setup(5, 5, calibration=second.calibration))
-    after.go_on_from(used)
-    other.go_on_from(used)  # its readings are not corrected: it has nothing to take over
+    after.continue_from(used)
+    other.continue_from(used)  # its readings are not corrected: it has nothing to take over
     stranger = pipeline_of(second.calibration)
-    stranger.go_on_from(used)  # of another sensor
+    stranger.continue_from(used)  # of another sensor
 
     went_on, alone = after(part).curvature, stranger(part).curvature
     assert np.isfinite(went_on).all()  # the others are held

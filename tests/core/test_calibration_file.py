@@ -22,9 +22,8 @@ from kappaskin import (
     load_scene,
     save_calibration,
 )
-from kappaskin.calibration import to_toml
-from kappaskin.calibration.calibration import fingerprint
-from kappaskin.calibration.file import from_toml
+from kappaskin.calibration import calibration_to_toml
+from kappaskin.calibration.calibration import fingerprint, read_calibration
 
 SENSOR = replace(
     load_scene("calibration").sensor(), layout=SensorLayout.regular(Patch(0.1, 0.1), 3, 2)
@@ -104,7 +103,7 @@ def test_a_calibration_of_lines_alone_comes_back(tmp_path):
 def test_any_name_and_any_time_zone_come_back(name, hours):
     date = DATE.astimezone(timezone(timedelta(hours=hours)))
     named = replace(CALIBRATION, name=name, serial_number=name, date=date)
-    said = tomllib.loads(to_toml(named))
+    said = tomllib.loads(calibration_to_toml(named))
     assert said["device"]["name"] == said["device"]["serial_number"] == name
     assert said["device"]["date"] == date
 
@@ -183,13 +182,13 @@ def test_bytes_that_are_no_text_are_refused(tmp_path):
 
 @given(st.data())
 def test_no_changed_character_goes_unnoticed(tmp_path_factory, data):
-    text = to_toml(CALIBRATION)
+    text = calibration_to_toml(CALIBRATION)
     at = data.draw(st.integers(0, len(text) - 1))
     new = data.draw(st.characters(exclude_categories=["Cs"]))
     path = tmp_path_factory.getbasetemp() / "changed.toml"
     path.write_text(text[:at] + new + text[at + 1 :], encoding="utf-8", newline="")
     try:
-        found = from_toml(path)
+        found = read_calibration(path)
     except Refusal:
         return
     assert found == CALIBRATION  # a space, a line end, another way to write the same number
@@ -215,7 +214,7 @@ def test_a_newer_format_is_refused_with_its_remedy(path):
 @pytest.mark.parametrize("version", ["0", "-1", "1.0", '"1"', "true"])
 def test_a_format_that_is_none_is_refused(path, version):
     edit(path, "format = 1", f"format = {version}")
-    refused(path, "says no format of calibration")
+    refused(path, "has no format of a calibration")
 
 
 @pytest.mark.parametrize("heading", ["device", "line", "failures"])

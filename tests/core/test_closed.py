@@ -16,8 +16,8 @@ import kappaskin_app
 import kappaskin_resources
 from kappaskin import load_scene
 from kappaskin.live import Engine
-from kappaskin.sources import Decoder, Kind, encode_information, encode_samples, information
-from kappaskin.sources.wire import LONGEST, encode
+from kappaskin.sources import Decoder, information
+from kappaskin.sources.wire import LONGEST, MessageKind, encode, encode_information, encode_samples
 
 pytestmark = pytest.mark.slow
 
@@ -125,12 +125,12 @@ def peak(decoder: Decoder, data: bytes) -> int:
 
 
 def test_a_length_that_is_only_said_takes_no_memory() -> None:
-    longest = encode(Kind.SAMPLES, 0, 0.0, bytes(LONGEST))
+    longest = encode(MessageKind.SAMPLES, 0, 0.0, bytes(LONGEST))
     assert peak(Decoder(), longest[:22]) < 10_000
 
 
 def test_a_length_beyond_the_longest_is_garbage_at_once() -> None:
-    header = bytearray(encode(Kind.SAMPLES, 0, 0.0, b"")[:20])
+    header = bytearray(encode(MessageKind.SAMPLES, 0, 0.0, b"")[:20])
     header[4:8] = (LONGEST + 1).to_bytes(4, "little")
     import binascii
 
@@ -142,7 +142,7 @@ def test_a_length_beyond_the_longest_is_garbage_at_once() -> None:
 
 def test_runs_of_channels_that_are_only_said_take_no_memory() -> None:
     runs = bytes([2, 255]) + b"\x00\x00\xff\xff" * 255
-    message = encode(Kind.SAMPLES, 0, 0.0, runs)
+    message = encode(MessageKind.SAMPLES, 0, 0.0, runs)
     decoder = Decoder()
     assert peak(decoder, message) < 100_000
     assert dict(decoder.accounting().discarded) == {"content": len(message)}
@@ -161,11 +161,11 @@ def test_lists_of_channels_that_are_remembered_are_few() -> None:
 
 
 def test_information_of_a_skin_without_end_takes_no_memory() -> None:
-    text = information.to_json(SENSOR).replace("[10,10]", "[65535,65535]")
+    text = information.sensor_to_json(SENSOR).replace("[10,10]", "[65535,65535]")
     assert "65535" in text
     tracemalloc.start()
     with pytest.raises(kappaskin.SourceError, match="at most 21845 elements"):
-        information.from_json(text)
+        information.sensor_from_json(text)
     assert tracemalloc.get_traced_memory()[1] < 1_000_000
     tracemalloc.stop()
     assert len(Decoder().feed(encode_information(0, 0.0, text))) == 1

@@ -520,7 +520,7 @@ def test_a_process_that_dies_is_told_of() -> None:
     with CostMeasurement(CENTRE, settings_to_try(CENTRE)) as measuring:
         (child,) = [p for p in multiprocessing.active_children() if p.name == "kappaskin-cost"]
         child.kill()
-        with pytest.raises(Refusal, match="ended unexpectedly; ask again"):
+        with pytest.raises(Refusal, match="ended unexpectedly; try again"):
             list(measuring.wait())
         assert measuring.done
 
@@ -532,7 +532,7 @@ def test_what_was_measured_before_a_process_died_is_told_first() -> None:
         child.join()
         (told,) = measuring.poll()
         assert told.setting == EIGHT
-        with pytest.raises(Refusal, match="ended unexpectedly; ask again"):
+        with pytest.raises(Refusal, match="ended unexpectedly; try again"):
             measuring.poll()
 
 

@@ -11,7 +11,8 @@ import pytest
 from kappaskin import load_scene
 from kappaskin.cli import main
 from kappaskin.cli.common import FAILED
-from kappaskin.sources import Accounting, diagnose, encode_information, information
+from kappaskin.sources import Accounting, diagnose, information
+from kappaskin.sources.wire import encode_information
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources import PseudoDevice
@@ -19,7 +20,7 @@ from kappaskin.sources import PseudoDevice
 fcntl, pty, tty = map(pytest.importorskip, ("fcntl", "pty", "tty"))
 
 SCENE = replace(load_scene("centre"), rate=100.0)
-TEXT = information.to_json(SCENE.sensor())
+TEXT = information.sensor_to_json(SCENE.sensor())
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +30,7 @@ def soon(monkeypatch):
 
 @pytest.fixture
 def hasty(monkeypatch):
-    monkeypatch.setattr("kappaskin.sources.serial_line._PATIENCE", 0.9)
+    monkeypatch.setattr("kappaskin.sources.serial_source._PATIENCE", 0.9)
     monkeypatch.setattr("kappaskin.sources.diagnosis._SEARCH", 1.2)
 
 
@@ -159,7 +160,7 @@ def test_losses_are_told_in_words():
     )
     told = "12 of 30,210 messages lost; 0.3 % of bytes discarded: checksum 120"
     assert many.words == told
-    assert replace(many, restarts=1).words == f"{told}; the device began anew once"
-    assert replace(many, restarts=2).words == f"{told}; the device began anew 2 times"
+    assert replace(many, restarts=1).words == f"{told}; the device restarted once"
+    assert replace(many, restarts=2).words == f"{told}; the device restarted 2 times"
     assert "100 % of bytes" in replace(many, bytes_in=120).words
     assert "under 0.001 % of bytes" in replace(many, bytes_in=10**9).words

@@ -14,8 +14,8 @@ pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 
 from kappaskin import Frame, SourceError, load_scene
 from kappaskin.cli import main
-from kappaskin.sources import BAUD_RATES, Information, Operation, Reply, Samples, information
-from kappaskin.sources.wire import Fault
+from kappaskin.sources import BAUD_RATES, information
+from kappaskin.sources.wire import Fault, Information, Operation, Reply, Samples
 from kappaskin.studies import drills_text, run_drills
 from kappaskin.studies.drills.line import DEVICE_DRILLS as OF_DEVICES
 from kappaskin.studies.drills.relay import (
@@ -232,9 +232,9 @@ def test_a_clock_that_is_ahead_is_so_in_pings_too() -> None:
 
 
 def test_another_number_is_said_in_information_only() -> None:
-    text = information.to_json(load_scene("centre").sensor())
+    text = information.sensor_to_json(load_scene("centre").sensor())
     [said] = InformationChange("serial_number", "other")(Information(0, 0.0, text))
-    assert information.from_json(said.text).serial_number == "other"
+    assert information.sensor_from_json(said.text).serial_number == "other"
     scan = Samples(1, 0.0, np.arange(3), np.zeros(3, np.int32))
     assert InformationChange("serial_number", "other")(scan) == without_information(scan) == [scan]
     assert without_information(said) == []

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kappaskin.scenes.effects.finite_slope import FiniteSlopeEffect
+from kappaskin.scenes.effects.gage_length import GageLength
 
 from kappaskin import (
     Disk,
@@ -24,8 +26,8 @@ from kappaskin import (
     basis_for,
 )
 from kappaskin.bases import curvature_at
-from kappaskin.scenes.effects import FiniteSlopeEffect, Fluid, Foam, GageLength, Tension
-from kappaskin.sources import from_json, to_json
+from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
+from kappaskin.sources import sensor_from_json, sensor_to_json
 
 SQUARE = Patch(0.1, 0.1)
 TENS = SensorLayout.regular(SQUARE, 10, 10)
@@ -206,18 +208,18 @@ def sensor(layout):
 
 
 def test_the_gage_length_travels_with_what_a_device_says():
-    said = json.loads(to_json(sensor(GageLength(6.1e-3).of(TENS))))
-    assert from_json(json.dumps(said)).layout.gage_length == 6.1e-3
+    said = json.loads(sensor_to_json(sensor(GageLength(6.1e-3).of(TENS))))
+    assert sensor_from_json(json.dumps(said)).layout.gage_length == 6.1e-3
 
     del said["gage_length"]
-    assert from_json(json.dumps(said)).layout.gage_length == 0
+    assert sensor_from_json(json.dumps(said)).layout.gage_length == 0
 
 
 @pytest.mark.parametrize("length", [-1e-3, 0.02, "6 mm", None, True, [0.006]])
 def test_a_gage_length_that_cannot_be_is_refused_of_a_device(length):
-    said = json.loads(to_json(sensor(TENS)))
+    said = json.loads(sensor_to_json(sensor(TENS)))
     with pytest.raises(SourceError, match=r"gage.length|rim"):
-        from_json(json.dumps({**said, "gage_length": length}))
+        sensor_from_json(json.dumps({**said, "gage_length": length}))
 
 
 # Slopes

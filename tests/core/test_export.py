@@ -87,7 +87,7 @@ def recorded(
                 setup = step
             made = Pipeline(source.sensor, setup)
             if pipeline is not None and pipeline.sensor is source.sensor:
-                made.go_on_from(pipeline)
+                made.continue_from(pipeline)
             pipeline = made
             recorder.set_up(pipeline)
             end = clock.now + seconds
@@ -604,7 +604,7 @@ def test_ctrl_c_while_it_begins_leaves_nothing(taps, tmp_path, monkeypatch) -> N
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("kappaskin._background.Beside.__init__", interrupted)
+    monkeypatch.setattr("kappaskin._processes.BackgroundProcess.__init__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         Exporting(Wanted(taps[0], tmp_path / "out.csv"))
     assert not list(tmp_path.iterdir())

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Frame, Pipeline, Refusal, Setup, Simulator, load_scene
-from kappaskin.pipeline.frame_assembly import Hold
+from kappaskin.pipeline.pipeline import FrameAssembly
 
 P = 4
 EVERY = np.arange(3 * P)
@@ -34,7 +34,7 @@ def taken(hold, time, channels, value):
 
 
 def test_a_channel_left_out_keeps_its_last_reading():
-    hold = Hold(3 * P, 0.1)
+    hold = FrameAssembly(3 * P, 0.1)
     taken(hold, 0.0, EVERY, 1.0)
     taken(hold, 0.01, [2, 3], 2.0)
 
@@ -45,7 +45,7 @@ def test_a_channel_left_out_keeps_its_last_reading():
 
 
 def test_a_reading_as_old_as_the_limit_is_missing():
-    hold = Hold(3 * P, 0.1)
+    hold = FrameAssembly(3 * P, 0.1)
     taken(hold, 1.0, EVERY, 1.0)
 
     young, _ = taken(hold, 1.0999, [0], 2.0)
@@ -57,14 +57,14 @@ def test_a_reading_as_old_as_the_limit_is_missing():
 
 
 def test_what_was_never_scanned_is_missing():
-    curvature, fresh = taken(Hold(3 * P, 0.1), 0.0, [5], 1.0)
+    curvature, fresh = taken(FrameAssembly(3 * P, 0.1), 0.0, [5], 1.0)
 
     assert np.flatnonzero(np.isfinite(curvature)).tolist() == [5]
     assert fresh.sum() == 1
 
 
 def test_a_limit_of_zero_holds_nothing_even_at_one_and_the_same_time():
-    hold = Hold(3 * P, 0.0)
+    hold = FrameAssembly(3 * P, 0.0)
     taken(hold, 0.0, EVERY, 1.0)
 
     curvature, _ = taken(hold, 0.0, [1], 2.0)
@@ -73,7 +73,7 @@ def test_a_limit_of_zero_holds_nothing_even_at_one_and_the_same_time():
 
 
 def test_a_reading_on_a_rail_is_not_covered_by_the_last_good_one():
-    hold = Hold(3 * P, 0.1)
+    hold = FrameAssembly(3 * P, 0.1)
     taken(hold, 0.0, EVERY, 1.0)
 
     railed, fresh = taken(hold, 0.01, [4, 5], np.nan)
@@ -85,7 +85,7 @@ def test_a_reading_on_a_rail_is_not_covered_by_the_last_good_one():
 
 
 def test_a_device_that_restarted_holds_nothing_from_before():
-    hold = Hold(3 * P, 0.1)
+    hold = FrameAssembly(3 * P, 0.1)
     taken(hold, 50.0, EVERY, 1.0)
 
     curvature, _ = taken(hold, 0.0, [1, 2], 2.0)
@@ -96,7 +96,7 @@ def test_a_device_that_restarted_holds_nothing_from_before():
 
 
 def test_what_is_from_before_a_restart_is_not_held_when_the_clock_comes_there_again():
-    hold = Hold(3 * P, 0.1)
+    hold = FrameAssembly(3 * P, 0.1)
     taken(hold, 50.0, EVERY, 1.0)
     for time in (0.0, 49.99, 50.01):
         curvature, _ = taken(hold, time, [1, 2], 2.0)
@@ -105,14 +105,14 @@ def test_what_is_from_before_a_restart_is_not_held_when_the_clock_comes_there_ag
 
 
 def test_a_channel_that_a_device_sends_twice_is_taken_once():
-    curvature, fresh = taken(Hold(3 * P, 0.1), 0.0, [5, 5, 6], 1.0)
+    curvature, fresh = taken(FrameAssembly(3 * P, 0.1), 0.0, [5, 5, 6], 1.0)
 
     assert np.flatnonzero(np.isfinite(curvature)).tolist() == [5, 6]
     assert fresh.sum() == 2
 
 
 def test_an_empty_frame_brings_nothing_and_shows_what_is_held():
-    hold = Hold(3 * P, 0.1)
+    hold = FrameAssembly(3 * P, 0.1)
     taken(hold, 0.0, EVERY, 1.0)
 
     curvature, fresh = taken(hold, 0.05, [], 0.0)
@@ -122,7 +122,7 @@ def test_an_empty_frame_brings_nothing_and_shows_what_is_held():
 
 
 def test_a_whole_frame_passes_unchanged_and_is_not_written_to_later():
-    hold = Hold(3 * P, 0.1)
+    hold = FrameAssembly(3 * P, 0.1)
     curvature, fresh = taken(hold, 0.0, EVERY, 1.0)
     taken(hold, 0.01, EVERY, 2.0)
 
@@ -138,7 +138,7 @@ def test_a_whole_frame_passes_unchanged_and_is_not_written_to_later():
     )
 )
 def test_every_value_is_the_last_one_scanned_and_younger_than_the_limit(steps):
-    hold, last, time = Hold(3 * P, 0.1), {}, 1.0
+    hold, last, time = FrameAssembly(3 * P, 0.1), {}, 1.0
     for value, (step, channels) in enumerate(steps):
         time += step
         curvature, fresh = taken(hold, time, sorted(channels), float(value))
@@ -153,7 +153,7 @@ def test_every_value_is_the_last_one_scanned_and_younger_than_the_limit(steps):
 @pytest.mark.parametrize("age", [-1e-3, math.nan, math.inf])
 def test_an_impossible_age_is_refused(age):
     with pytest.raises(Refusal, match=f"held for at least 0 s, got {age}"):
-        Hold(12, age)
+        FrameAssembly(12, age)
 
 
 # In the pipeline

@@ -22,8 +22,8 @@ from kappaskin import (
     SourceError,
     Transduction,
 )
-from kappaskin.sources import from_json, to_json
-from kappaskin.sources.information import UNSAID
+from kappaskin.sources import sensor_from_json, sensor_to_json
+from kappaskin.sources.information import DEFAULTS
 
 PATCH = Patch(0.1, 0.08)
 
@@ -71,7 +71,7 @@ def same(one: Sensor, other: Sensor) -> bool:
 
 def said(**changes: Any) -> dict[str, Any]:
     regular = SensorLayout.regular(PATCH, 3, 2)
-    return {**json.loads(to_json(sensor_on(regular))), **changes}
+    return {**json.loads(sensor_to_json(sensor_on(regular))), **changes}
 
 
 def scattered(positions: Any, **changes: Any) -> dict[str, Any]:
@@ -88,14 +88,14 @@ def test_all_that_holds_the_skin_survives() -> None:
     plate = Plate(patch, 0.0, 5.0, 1e4, fluid=True, poisson=0.4, axial_stiffness=300.0)
     sensor = sensor_on(SensorLayout.regular(patch, 3, 2), plate=plate)
 
-    assert same(from_json(to_json(sensor)), sensor)
+    assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
 
 
 def test_every_outline_and_edge_survives(held_skin) -> None:
     layout = SensorLayout.regular(held_skin.patch, 3, 1 if held_skin.patch.strip else 3)
     sensor = sensor_on(layout, edge=held_skin.edge)
 
-    found = from_json(to_json(sensor))
+    found = sensor_from_json(sensor_to_json(sensor))
 
     assert same(found, sensor)
     assert type(found.layout.patch) is type(held_skin.patch)
@@ -108,22 +108,22 @@ SIDES = st.floats(1e-3, 10, allow_subnormal=False)
 def test_a_regular_sensor_comes_back(a, b, m, n, data) -> None:
     dead = data.draw(st.sets(st.integers(0, m * n - 1)))
     sensor = sensor_on(SensorLayout.regular(Patch(a, b), m, n).without(dead))
-    assert same(from_json(to_json(sensor)), sensor)
+    assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
 
 
 @given(st.lists(st.tuples(st.floats(0, 0.1), st.floats(0, 0.08)), min_size=1, max_size=30))
 def test_a_scattered_sensor_comes_back_to_the_last_digit(positions) -> None:
     sensor = sensor_on(SensorLayout.scattered(PATCH, positions))
-    assert same(from_json(to_json(sensor)), sensor)
+    assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
 
 
 def test_a_channel_map_comes_back_and_none_stays_none() -> None:
     layout = SensorLayout.regular(PATCH, 3, 2)
     wired = np.roll(np.arange(18), 5)
-    back = from_json(to_json(sensor_on(layout, channel_map=wired)))
+    back = sensor_from_json(sensor_to_json(sensor_on(layout, channel_map=wired)))
     assert back.channel_map is not None
     assert np.array_equal(back.channel_map, wired)
-    assert from_json(to_json(sensor_on(layout))).channel_map is None
+    assert sensor_from_json(sensor_to_json(sensor_on(layout))).channel_map is None
 
 
 def test_a_single_dead_channel_comes_back() -> None:
@@ -132,35 +132,35 @@ def test_a_single_dead_channel_comes_back() -> None:
     live[1, 3] = False
     sensor = sensor_on(replace(layout, live=live))
 
-    assert json.loads(to_json(sensor))["dead_channels"] == [7]
-    assert same(from_json(to_json(sensor)), sensor)
+    assert json.loads(sensor_to_json(sensor))["dead_channels"] == [7]
+    assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
 
 
 def test_names_in_any_script_come_back() -> None:
     sensor = sensor_on(SensorLayout.regular(PATCH, 1, 1), name='Haut "№ 7" 皮膚', simulated=True)
-    assert same(from_json(to_json(sensor)), sensor)
+    assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
 
 
 def test_keys_of_later_firmware_are_passed_over() -> None:
-    assert from_json(json.dumps(said(colour="blue"))).name == "skin"
+    assert sensor_from_json(json.dumps(said(colour="blue"))).name == "skin"
 
 
 # Refusals
 
 
-@pytest.mark.parametrize("key", [key for key in said() if key not in ("grid", *UNSAID)])
+@pytest.mark.parametrize("key", [key for key in said() if key not in ("grid", *DEFAULTS)])
 def test_a_missing_key_is_named(key: str) -> None:
     found = said()
     del found[key]
     with pytest.raises(SourceError, match=f"lacks '{key}'.*firmware"):
-        from_json(json.dumps(found))
+        sensor_from_json(json.dumps(found))
 
 
 def test_neither_grid_nor_positions_is_refused() -> None:
     found = said()
     del found["grid"]
     with pytest.raises(SourceError, match="lacks 'positions'"):
-        from_json(json.dumps(found))
+        sensor_from_json(json.dumps(found))
 
 
 PARTS = ("bridge", "multiplexer", "amplifier", "converter")
@@ -172,7 +172,7 @@ def part(group: str, **changes: Any) -> dict[str, Any]:
 
 def test_the_default_electronics_come_back() -> None:
     sensor = sensor_on(SensorLayout.regular(PATCH, 2, 2), transduction=Transduction())
-    assert same(from_json(to_json(sensor)), sensor)
+    assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
 
 
 @pytest.mark.parametrize("value", [True, "5", None, [5], {}])
@@ -182,7 +182,7 @@ def test_no_part_of_the_electronics_is_anything_but_a_number(group: str, value: 
         if (key, value) == ("balance_voltage", None):
             continue  # two equal dummy resistors
         with pytest.raises(SourceError, match=rf"\.{key} to be a number, got "):
-            from_json(json.dumps(part(group, **{key: value})))
+            sensor_from_json(json.dumps(part(group, **{key: value})))
 
 
 @pytest.mark.parametrize("group", PARTS)
@@ -191,7 +191,7 @@ def test_a_missing_part_of_the_electronics_is_never_guessed(group: str) -> None:
         found = said()
         del found[group][key]
         with pytest.raises(SourceError, match=f"lacks '{key}'"):
-            from_json(json.dumps(found))
+            sensor_from_json(json.dumps(found))
 
 
 BAD = {
@@ -303,7 +303,7 @@ def test_what_cannot_be_a_device_is_refused_at_once(case: str) -> None:
     tracemalloc.start()
     try:
         with pytest.raises(SourceError, match=reason) as refusal:
-            from_json(text)
+            sensor_from_json(text)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -324,7 +324,7 @@ JSON = st.recursive(
 def test_any_value_of_any_key_is_understood_or_refused(key: str, value: Any) -> None:
     found = scattered([[0.01, 0.02]]) if key == "positions" else said()
     try:
-        sensor = from_json(json.dumps({**found, key: value}))
+        sensor = sensor_from_json(json.dumps({**found, key: value}))
     except SourceError:
         return
     assert sensor.layout.live.shape == (3, len(sensor.layout))
@@ -333,4 +333,4 @@ def test_any_value_of_any_key_is_understood_or_refused(key: str, value: Any) -> 
 @given(JSON)
 def test_any_json_is_refused(value: Any) -> None:
     with pytest.raises(SourceError):
-        from_json(json.dumps(value))
+        sensor_from_json(json.dumps(value))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from kappaskin import load_scene
-from kappaskin.sources import Information, Interpreter, Reply, Samples, to_json
+from kappaskin.sources import Interpreter, sensor_to_json
 from kappaskin.sources.clock import ClockMap
+from kappaskin.sources.wire import Information, Reply, Samples
 
 SENSOR = load_scene("centre").sensor()
-TEXT = to_json(SENSOR)
+TEXT = sensor_to_json(SENSOR)
 
 
 def samples(*channels: int) -> Samples:
@@ -47,7 +48,7 @@ def test_a_sensor_is_made_once_of_a_text_that_several_lines_share() -> None:
 def test_of_many_devices_only_the_last_few_are_remembered() -> None:
     made = {}
     for number in range(20):
-        text = to_json(replace(SENSOR, name=f"hand {number}"))
+        text = sensor_to_json(replace(SENSOR, name=f"hand {number}"))
         assert Interpreter("loop://", made).learn(text)
         assert text in made
         assert len(made) <= 8
@@ -70,17 +71,17 @@ def test_another_text_and_a_channel_that_is_not_there_are_of_another_device() ->
     means = taught()
     last = SENSOR.channels - 1
 
-    assert means.upsets(Information(0, 0.0, TEXT + " "))
-    assert not means.upsets(Information(0, 0.0, TEXT))
-    assert means.upsets(samples(0, last + 1, 2))
-    assert not means.upsets(samples(0, last, 2))
-    assert not means.upsets(samples())
-    assert not means.upsets(Reply(0, 0.0, 0, 8, 0, b""))
+    assert means.is_of_another(Information(0, 0.0, TEXT + " "))
+    assert not means.is_of_another(Information(0, 0.0, TEXT))
+    assert means.is_of_another(samples(0, last + 1, 2))
+    assert not means.is_of_another(samples(0, last, 2))
+    assert not means.is_of_another(samples())
+    assert not means.is_of_another(Reply(0, 0.0, 0, 8, 0, b""))
 
 
-def test_before_a_device_says_what_it_is_nothing_upsets_and_no_frame_comes() -> None:
+def test_before_a_device_says_what_it_is_nothing_is_of_another_and_no_frame_comes() -> None:
     means = Interpreter("loop://")
-    assert not means.upsets(samples(60_000))
+    assert not means.is_of_another(samples(60_000))
     assert means.frame(samples(0), 9.0) is None
 
 
@@ -95,7 +96,7 @@ def test_a_device_that_sends_what_it_says_it_has_not_gives_no_frame_any_more() -
 
 @pytest.mark.parametrize("wired", [None, np.roll(np.arange(SENSOR.channels), 5)])
 def test_a_frame_has_the_numbers_that_its_channels_are_wired_to(wired) -> None:
-    means = taught(to_json(replace(SENSOR, channel_map=wired)))
+    means = taught(sensor_to_json(replace(SENSOR, channel_map=wired)))
 
     frame = means.frame(samples(0, 5, 9), 9.0)
 

@@ -9,20 +9,13 @@ import pytest
 
 from kappaskin import SourceError, load_scene
 from kappaskin.cli import main
-from kappaskin.sources import (
-    Command,
-    Monitor,
-    encode_information,
-    encode_reply,
-    encode_samples,
-    information,
-)
-from kappaskin.sources.wire import Fault
+from kappaskin.sources import WireMonitor, information
+from kappaskin.sources.wire import Command, Fault, encode_information, encode_reply, encode_samples
 
 tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
 
 SENSOR = load_scene("centre").sensor()
-INFORMATION = encode_information(0, 0.5, information.to_json(SENSOR))
+INFORMATION = encode_information(0, 0.5, information.sensor_to_json(SENSOR))
 
 
 def scan(sequence: int) -> bytes:
@@ -38,7 +31,7 @@ class Device:
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self.port = os.ttyname(slave)
-        self.monitor = Monitor(self.port, lambda: self._now)
+        self.monitor = WireMonitor(self.port, lambda: self._now)
         os.close(slave)
 
     def says(self, data: bytes) -> str:
@@ -66,7 +59,7 @@ class Device:
     def unplugged(self) -> str:
         """What is told when it is gone."""
         self.unplug()
-        return self._text(lambda: self.monitor.gone)
+        return self._text(lambda: self.monitor.lost)
 
     def unplug(self) -> None:
         if self._master >= 0:
@@ -149,13 +142,13 @@ def test_a_line_that_is_gone_is_said_and_cut_messages_counted(device) -> None:
     device.says(scan(0)[:100])
     text = device.unplugged()
     assert "discarded    100 bytes: cut off" in text
-    assert text.count("the line is gone") == 1
-    assert device.monitor.gone
+    assert text.count("connection lost") == 1
+    assert device.monitor.lost
 
 
 def test_a_port_that_cannot_be_opened_says_why() -> None:
     with pytest.raises(SourceError, match="no such port"):
-        Monitor("/dev/there-is-none")
+        WireMonitor("/dev/there-is-none")
     assert main(["monitor", "/dev/there-is-none"]) == 2
 
 

@@ -16,7 +16,7 @@ from kappaskin import (
     elements_to_press,
     load_scene,
 )
-from kappaskin.calibration import Phase
+from kappaskin.calibration import PressPhase
 from kappaskin.sources import SimulatedSource
 
 pytestmark = pytest.mark.slow
@@ -106,7 +106,7 @@ def exchanged(a, b, axis):
         (GRID[::-1].ravel(), "rows are mirrored"),
         (GRID[:, ::-1].ravel(), "columns are mirrored"),
         (GRID[::-1, ::-1].ravel(), "columns are mirrored; rows are mirrored"),
-        (GRID.T.ravel(), "columns and rows are taken for each other"),
+        (GRID.T.ravel(), "columns and rows are exchanged"),
     ],
 )
 @pytest.mark.parametrize("quick", [True, False])
@@ -219,13 +219,13 @@ def test_noise_drift_and_a_finger_that_lies_on_already_are_no_press():
     test = PressTest(SENSOR, (45,))
     finger = Finger(test)
     assert finger.read(np.zeros(300), 20.0) is None
-    assert test.phase is Phase.PRESS
+    assert test.phase is PressPhase.PRESS
 
     held = PressTest(SENSOR, (45,))
     finger = Finger(held)
     finger.read(under_press_of(45), 1.0)
     assert finger.read(np.zeros(300), 0.3) is None
-    assert held.phase is Phase.REST
+    assert held.phase is PressPhase.REST
     assert finger.press(45).verdict == "ok"
 
 
@@ -250,7 +250,7 @@ def test_a_press_waits_for_rest():
     finger = Finger(test)
     for n in range(40):  # goes on moving
         finger.read(under_press_of(45) * (n % 7) / 7, 0.03)
-    assert test.phase is Phase.REST
+    assert test.phase is PressPhase.REST
 
 
 def test_back_asks_for_the_last_one_again():

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from kappaskin import _background as beside
-from kappaskin._processes import beginning_processes
+from kappaskin import _processes
+from kappaskin._processes import process_context
 
 pytestmark = [
     pytest.mark.slow,
@@ -23,7 +23,7 @@ def _blocked() -> set[signal.Signals]:
 def test_ctrl_c_reaches_this_process_alone_while_others_begin(monkeypatch) -> None:
     began: list[set[signal.Signals]] = []
     monkeypatch.setattr(forkserver, "ensure_running", lambda: began.append(_blocked()))
-    with beginning_processes():
+    with process_context():
         assert signal.SIGINT not in _blocked()
     assert [signal.SIGINT in mask for mask in began] == [True]
     assert signal.SIGINT not in _blocked()
@@ -32,12 +32,12 @@ def test_ctrl_c_reaches_this_process_alone_while_others_begin(monkeypatch) -> No
 def test_one_that_computes_for_long_ends_soon_after_who_asked(monkeypatch) -> None:
     ended: list[object] = []
     parent = SimpleNamespace(join=lambda: ended.append("who asked"))
-    monkeypatch.setattr(beside.multiprocessing, "parent_process", lambda: parent)
-    monkeypatch.setattr(beside.os, "_exit", lambda code: ended.append("it"))
-    monkeypatch.setattr(beside, "_GRACE", 0.0)
-    monkeypatch.setattr(beside.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(_processes.multiprocessing, "parent_process", lambda: parent)
+    monkeypatch.setattr(_processes.os, "_exit", lambda code: ended.append("it"))
+    monkeypatch.setattr(_processes, "_GRACE", 0.0)
+    monkeypatch.setattr(_processes.signal, "signal", lambda *_: None)
     told, asked = Pipe(duplex=False)
-    beside._tell(asked, _waiting_for(ended), ())  # noqa: SLF001
+    _processes._send_items(asked, _waiting_for(ended), ())  # noqa: SLF001
     asked.close()
     told.close()
     assert ended == ["who asked", "it"]

@@ -18,10 +18,18 @@ import pytest
 
 from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
 from kappaskin.live import LOST, STREAMING, Engine, Status
-from kappaskin.scenes import Orbit
-from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
-from kappaskin.sources import Decoder, Information, Operation, Reply, Samples, SerialSource
-from kappaskin.sources.wire import Fault, Message, encode_command, pack_runs
+from kappaskin.scenes import CorruptedFrames, DroppedFrames, Orbit
+from kappaskin.sources import Decoder, SerialSource
+from kappaskin.sources.wire import (
+    Fault,
+    Information,
+    Message,
+    Operation,
+    Reply,
+    Samples,
+    encode_command,
+    pack_runs,
+)
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources import PseudoDevice
@@ -194,7 +202,7 @@ def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost
 
 
 def test_at_its_end_it_sends_what_is_in_the_outbox_to_who_takes_it(monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.sources.device._PATIENCE", 30.0)
+    monkeypatch.setattr("kappaskin.sources.pseudo_device._PATIENCE", 30.0)
     clock = Clock()
     device = PseudoDevice(SCENE, clock)
     listener = Listener(device.port)
@@ -216,7 +224,7 @@ def test_at_its_end_it_sends_what_is_in_the_outbox_to_who_takes_it(monkeypatch) 
 
 
 def test_a_listener_that_is_late_has_all_of_it_before_the_port_is_closed(monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.sources.device._PATIENCE", 30.0)
+    monkeypatch.setattr("kappaskin.sources.pseudo_device._PATIENCE", 30.0)
     device = PseudoDevice(replace(SCENE, rate=20.0))
     listener = Listener(device.port)
     stop = threading.Event()
@@ -535,7 +543,7 @@ def test_a_killed_device_is_lost_within_a_second_and_another_can_take_over(devic
         status = wait_for(lambda: (found := engine.status()).state == LOST and found, within=3.0)
 
         assert time.monotonic() - killed < 1.0
-        assert "the line is gone" in status.message
+        assert "connection lost" in status.message
         assert status.accounting.accepted > 0
         other = Device("circle")
         engine.connect(other.port)

@@ -27,8 +27,8 @@ from kappaskin import (
     basis_for,
     load_scene,
     local_geometry,
-    of_form,
 )
+from kappaskin.pipeline.quantities import curvature_invariant
 
 FLAT, BENT = Patch(0.1, 0.06), Patch(0.04, 0.03, 12.9e-3)
 SETUP = Setup(6, 5, 25, 17)
@@ -65,7 +65,7 @@ def test_principal_curvatures_are_eigenvalues_and_the_others_their_mean_and_prod
     size = max(abs(xx), abs(yy), abs(xy))
     for name, value in expected.items():
         close = 1e-12 * (size**2 if name == "gaussian" else size)
-        assert of_form(name, form) == pytest.approx(value, abs=close)
+        assert curvature_invariant(name, form) == pytest.approx(value, abs=close)
 
 
 @pytest.mark.parametrize("scene", ["centre", "fingertip"])

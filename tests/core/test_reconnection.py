@@ -20,19 +20,9 @@ from kappaskin import Pipeline, Port, Setup, SourceError, load_scene
 from kappaskin.live.recorder import Keeping
 from kappaskin.recording import Recording
 from kappaskin.recording.recompute import Retrace
-from kappaskin.sources import (
-    BAUD_RATES,
-    Decoder,
-    Operation,
-    SerialSource,
-    encode_information,
-    encode_reply,
-    encode_samples,
-    information,
-    ports,
-    serial_line,
-)
+from kappaskin.sources import BAUD_RATES, Decoder, SerialSource, information, ports, serial_source
 from kappaskin.sources.decoder import FROM_HOST
+from kappaskin.sources.wire import Operation, encode_information, encode_reply, encode_samples
 
 pytestmark = pytest.mark.slow
 
@@ -41,7 +31,7 @@ termios, tty = map(pytest.importorskip, ("termios", "tty"))
 SPEEDS = {getattr(termios, f"B{rate}", None): rate for rate in BAUD_RATES}
 
 SENSOR = load_scene("centre").sensor()
-TEXT = information.to_json(SENSOR)
+TEXT = information.sensor_to_json(SENSOR)
 CHANNELS = np.arange(12)
 PERIOD = 0.002  # s from one scan to the next
 
@@ -99,7 +89,7 @@ class Device:
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch):
-    monkeypatch.setattr(serial_line, "_RETRY", 0.02)
+    monkeypatch.setattr(serial_source, "_RETRY", 0.02)
 
 
 @pytest.fixture
@@ -167,7 +157,7 @@ def pull(device, reader):
     before = reader.kinds().count("gone")
     device.pull()
     reader.until(lambda: reader.kinds().count("gone") > before)
-    assert "plug it in, and it goes on" in reader.source.trouble
+    assert "plug it in to continue" in reader.source.trouble
 
 
 def put_back(plug, reader, name="ttyACM0"):
@@ -209,7 +199,7 @@ def test_a_device_that_began_anew_while_away_is_not_said_to_have_lost_messages(s
     time.sleep(0.6)  # or its clock could as well have gone on
     put_back(plug, reader).say(encode_information(40, 0.0, TEXT) + scan(41, 0.001))
     reader.took(41)
-    assert reader.told("back").endswith(", from its beginning: 0 messages lost")
+    assert reader.told("back").endswith(", restarted: 0 messages lost")
     seen = reader.source.accounting()
     assert (seen.lost, seen.restarts, seen.balanced) == (0, 1, True)
 
@@ -278,7 +268,7 @@ def test_information_that_changes_on_the_line_is_said(streaming):
     device, reader = streaming
     device.say(encode_information(11, 0.022, text_of(dead_channels=[7])) + stream(12, 14))
     reader.took(13)
-    assert "says something else of itself" in reader.told("changed")
+    assert "another description of itself" in reader.told("changed")
 
 
 def test_a_device_that_says_much_of_itself_is_told_of_in_few_words(streaming):
@@ -293,7 +283,7 @@ def test_a_device_that_begins_anew_on_the_line_is_said_and_goes_on(streaming):
     reader.took(509)
     device.say(encode_information(0, 0.0, TEXT) + stream(1, 4))
     reader.took(3)
-    assert "started anew while it was connected" in reader.told("restarted")
+    assert "restarted while it was connected" in reader.told("restarted")
     assert reader.source.accounting().restarts == 1
     assert reader.source.accounting().balanced
 
@@ -373,7 +363,7 @@ def test_half_a_message_at_the_end_of_the_line_is_cut_off_and_no_part_of_the_nex
 
 def test_a_plug_is_found_by_its_serial_number_under_another_name(plug, opened, monkeypatch):
     here = []
-    for module in (ports, serial_line):
+    for module in (ports, serial_source):
         monkeypatch.setattr(module, "serial_ports", lambda: list(here))
     device = plug()
     here.append(Port(str(device.link), "Fingertip", "Kappa", "A-7", (1, 2)))
@@ -445,12 +435,12 @@ def test_the_baud_rate_is_searched_while_bytes_mean_nothing(plug, opened, rate):
     assert device.baud_rate() == rate
     told = [event.text for event in reader.events if event.kind == "rate"]
     usual = rate == BAUD_RATES[0]
-    assert told == ([] if usual else [f"the device speaks at {rate} baud"])
+    assert told == ([] if usual else [f"the device sends at {rate} baud"])
 
 
 def test_what_is_no_device_is_said_once_every_rate_was_tried(plug, opened, monkeypatch):
-    monkeypatch.setattr(serial_line, "_DWELL", 0.02)
-    monkeypatch.setattr(serial_line, "_PATIENCE", 0.1)
+    monkeypatch.setattr(serial_source, "_DWELL", 0.02)
+    monkeypatch.setattr(serial_source, "_PATIENCE", 0.1)
     device, tried = plug(), set()
     reader = Reader(opened(device))
 
@@ -524,7 +514,7 @@ def test_a_refusal_by_the_device_is_told_in_its_words(streaming):
 def test_a_port_taken_meanwhile_is_waited_for(streaming, plug, monkeypatch):
     device, reader = streaming
     pull(device, reader)
-    real, refused = serial_line.Line, []
+    real, refused = serial_source.SerialConnection, []
 
     def busy(url, clock):
         if len(refused) < 3:
@@ -532,9 +522,9 @@ def test_a_port_taken_meanwhile_is_waited_for(streaming, plug, monkeypatch):
             raise SourceError(f"{url}: busy, a program has it open; close that program")
         return real(url, clock)
 
-    monkeypatch.setattr(serial_line, "Line", busy)
+    monkeypatch.setattr(serial_source, "SerialConnection", busy)
     back = plug()
-    reader.until(lambda: "close that program; it is tried again" in reader.source.trouble)
+    reader.until(lambda: "close that program; retrying" in reader.source.trouble)
     reader.until(back.heard)
     back.say(encode_information(12, 0.024, TEXT) + scan(13))
     reader.took(13)

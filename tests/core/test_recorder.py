@@ -20,7 +20,7 @@ from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from kappaskin import Calibration, Refusal, Region, Setup, load_scene, setup_from, write_scene
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.calibration import Tare
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live import STREAMING, Engine, Status
@@ -46,7 +46,7 @@ def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
 
 def verdict_of(path: Path) -> Verdict:
     """As `kappaskin verify` finds it: in a process of one thread."""
-    with Beside[float | Verdict]("verify", verifying, path) as work:
+    with BackgroundProcess[float | Verdict]("verify", verifying, path) as work:
         *_, verdict = work.wait()
     assert isinstance(verdict, Verdict)
     return verdict

@@ -10,7 +10,8 @@ import pytest
 from kappaskin import Event, Frame, Refusal, SensorLayout, load_scene
 from kappaskin.recording import Recorder, Recording, ReplayedSource
 from kappaskin.recording import messages as m
-from kappaskin.sources import SimulatedSource, encode_information, encode_samples, to_json
+from kappaskin.sources import SimulatedSource, sensor_to_json
+from kappaskin.sources.wire import encode_information, encode_samples
 
 RATE, FRAMES, GAP = 500.0, 1000, 1.25
 FIRST, LAST = 0, FRAMES - 1
@@ -98,7 +99,7 @@ def test_a_word_about_the_clock_ends_no_gap(tmp_path, clock, written_out) -> Non
     path = tmp_path / "gap.mcap"
     recorder = Recorder(path, 0.0)
     for when in (0.0, 0.1, 0.8, 1.5, 2.2, 2.25, 2.5, 2.6, 3.5):
-        recorder.came(when, encode_information(0, 0.0, "{}"))
+        recorder.received(when, encode_information(0, 0.0, "{}"))
         written_out(recorder)
     recorder.close()
     with closing(ReplayedSource(path, clock, clock.sleep)) as source:
@@ -253,10 +254,10 @@ class Line:
 
     def says(self, data):
         self._time += 1e-3
-        self._recorder.came(self._time, data)
+        self._recorder.received(self._time, data)
 
     def ends(self):
-        self._recorder.ended(self._time)
+        self._recorder.disconnected(self._time)
 
     def scans(self, sensor, first, count):
         for n in range(first, first + count):
@@ -269,10 +270,10 @@ def test_a_device_that_gives_way_to_another_does_so_again(tmp_path, clock) -> No
     one_ = load_scene("centre").sensor()
     other = replace(one_, layout=SensorLayout.regular(one_.layout.patch, 4, 4))
     line = Line(path)
-    line.says(encode_information(0, 0.0, to_json(one_)))
+    line.says(encode_information(0, 0.0, sensor_to_json(one_)))
     line.scans(one_, 1, 20)
     line.says(b"nothing that means anything")
-    line.says(encode_information(21, 0.021, to_json(other)))
+    line.says(encode_information(21, 0.021, sensor_to_json(other)))
     line.scans(other, 22, 20)
     line.ends()
     line.says(encode_information(0, 0.0, json.dumps({"name": "of no use"})))

@@ -240,7 +240,7 @@ def test_a_skin_at_rest_is_no_frame_of_the_past():
 
 def test_a_past_of_other_elements_is_refused():
     with pytest.raises(Refusal, match=r"_history.frames of shape \(T, 7, 100\) to go on from"):
-        Robust(EIGHT, TENS).recall({"_history.frames": np.zeros((3, 7, 99))})
+        Robust(EIGHT, TENS).restore({"_history.frames": np.zeros((3, 7, 99))})
 
 
 def test_a_suspect_is_missing_from_what_the_fit_rests_on():

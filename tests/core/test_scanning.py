@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Region, Scanner, load_scene
-from kappaskin.sources import Operation, Reply
-from kappaskin.sources.scanning import Scanning, in_few_runs
-from kappaskin.sources.wire import MOST_RUNS, Fault, pack_runs, unpack_runs
+from kappaskin.sources.commands import ScanControl, in_few_runs
+from kappaskin.sources.wire import MOST_RUNS, Fault, Operation, Reply, pack_runs, unpack_runs
 
 SENSOR = load_scene("centre").sensor()
 BY_HAND = Region("elements", elements=(3, 4), share=0.0)
@@ -56,13 +55,13 @@ def rates(asked):
 
 
 def device(region=BY_HAND, sensor=SENSOR):
-    made = Device(Scanning(), sensor)
+    made = Device(ScanControl(), sensor)
     made.scanning.scan(Scanner(sensor, region))
     return made
 
 
 def test_a_device_of_which_nothing_is_asked_is_told_nothing():
-    quiet = Device(Scanning())
+    quiet = Device(ScanControl())
     assert quiet.run(0, 3) == []
     quiet.scanning.scan(None)
     assert quiet.run(3, 6) == []

@@ -90,7 +90,7 @@ def test_a_ready_scene_is_the_same_once_written_and_read(name):
 
     read = again(scene)
 
-    assert information.to_json(read.sensor()) == information.to_json(scene.sensor())
+    assert information.sensor_to_json(read.sensor()) == information.sensor_to_json(scene.sensor())
     assert plan(read).entries == plan(scene).entries
     np.testing.assert_array_equal(counts(read), counts(scene))
     assert (read.title, read.text, read.duration) == (scene.title, scene.text, scene.duration)

@@ -19,14 +19,8 @@ import pytest
 import serial
 
 from kappaskin import Frame, Sensor, SourceError, load_scene
-from kappaskin.sources import (
-    SerialSource,
-    encode_information,
-    encode_samples,
-    information,
-    open_source,
-)
-from kappaskin.sources import line as serial_line
+from kappaskin.sources import SerialSource, information, open_source, ports
+from kappaskin.sources.wire import encode_information, encode_samples
 
 pty = pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 grp, tty = map(pytest.importorskip, ("grp", "tty"))
@@ -35,7 +29,7 @@ lists_descriptors = pytest.mark.skipif(
 )
 
 SENSOR = load_scene("centre").sensor()
-TEXT = information.to_json(SENSOR)
+TEXT = information.sensor_to_json(SENSOR)
 
 
 def introduction(sequence: int = 0, text: str = TEXT) -> bytes:
@@ -93,8 +87,8 @@ def opened() -> Iterator[Callable[[str], SerialSource]]:
 
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kappaskin.sources.serial_line._PATIENCE", 0.15)
-    monkeypatch.setattr("kappaskin.sources.serial_line._DWELL", 60.0)  # at one baud rate
+    monkeypatch.setattr("kappaskin.sources.serial_source._PATIENCE", 0.15)
+    monkeypatch.setattr("kappaskin.sources.serial_source._DWELL", 60.0)  # at one baud rate
 
 
 def read(source: SerialSource, count: int, within: float = 15.0) -> list[Frame]:
@@ -135,7 +129,7 @@ def sequences(frames: list[Frame]) -> list[int]:
 
 
 def same(one: Sensor | None, other: Sensor) -> bool:
-    return one is not None and information.to_json(one) == information.to_json(other)
+    return one is not None and information.sensor_to_json(one) == information.sensor_to_json(other)
 
 
 # What arrives
@@ -177,7 +171,7 @@ def test_frames_before_the_information_wait_for_it(line, opened) -> None:
 def test_of_frames_that_wait_for_it_the_newest_are_kept_in_bounded_memory(
     line, opened, monkeypatch
 ) -> None:
-    monkeypatch.setattr("kappaskin.sources.serial_line._UNREAD", 10 * (300 + 64))
+    monkeypatch.setattr("kappaskin.sources.serial_source._UNREAD", 10 * (300 + 64))
     source = opened(line.port)
     line.write(stream(0, 40))
     assert read_all(source, stream(0, 40)) == []
@@ -188,8 +182,8 @@ def test_of_frames_that_wait_for_it_the_newest_are_kept_in_bounded_memory(
 def test_bytes_that_nobody_takes_are_thrown_away_beyond_a_bound_and_counted(
     line, opened, monkeypatch
 ) -> None:
-    monkeypatch.setattr("kappaskin.sources.line._BACKLOG", 20_000)
-    monkeypatch.setattr("kappaskin.sources.line._BLOCK", 4096)  # or one read may bring all of it
+    monkeypatch.setattr("kappaskin.sources.ports._BACKLOG", 20_000)
+    monkeypatch.setattr("kappaskin.sources.ports._BLOCK", 4096)  # or one read may bring all of it
     source = opened(line.port)
     sent = introduction(0) + stream(1, 101)
     line.write(sent)
@@ -223,7 +217,7 @@ def test_information_repeated_changes_nothing(line, opened) -> None:
 def test_frames_from_before_and_after_a_change_of_sensor_are_never_mixed(line, opened) -> None:
     small = replace(SENSOR, layout=SENSOR.layout.without([7]), name="repaired")
     source = opened(line.port)
-    line.write(introduction(0) + stream(1, 4) + introduction(4, information.to_json(small)))
+    line.write(introduction(0) + stream(1, 4) + introduction(4, information.sensor_to_json(small)))
     line.write(stream(5, 8))
     met: list[tuple[str, int]] = []
     end = time.monotonic() + 30
@@ -235,7 +229,9 @@ def test_frames_from_before_and_after_a_change_of_sensor_are_never_mixed(line, o
 def test_what_a_channel_reads_is_told_by_the_map_of_the_device(line, opened) -> None:
     wired = np.roll(np.arange(SENSOR.channels), 7)
     source = opened(line.port)
-    line.write(introduction(0, information.to_json(replace(SENSOR, channel_map=wired))) + scan(1))
+    line.write(
+        introduction(0, information.sensor_to_json(replace(SENSOR, channel_map=wired))) + scan(1)
+    )
     (frame,) = read(source, 1)
     assert frame.channels.tolist() == wired.tolist()
 
@@ -280,7 +276,7 @@ def test_what_came_before_a_socket_closed_is_not_lost(server, opened) -> None:
         device.sendall(introduction(0) + stream(1, 101))
     frames, why = read_to_trouble(source)
     assert sequences(frames) == list(range(1, 101))
-    assert "the line is gone" in why
+    assert "connection lost" in why
 
 
 def test_a_silent_socket_keeps_nobody_waiting(server, opened) -> None:
@@ -371,14 +367,14 @@ def test_a_channel_that_the_device_does_not_have_is_refused_after_the_frames_bef
 
 
 def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened, monkeypatch) -> None:
-    taken, arriving = bytearray(), serial_line._arriving  # noqa: SLF001
+    taken, arriving = bytearray(), ports._arriving  # noqa: SLF001
 
     def noted(port: serial.SerialBase) -> bytes:
         data = arriving(port)
         taken.extend(data)
         return data
 
-    monkeypatch.setattr(serial_line, "_arriving", noted)
+    monkeypatch.setattr(ports, "_arriving", noted)
     source = opened(line.port)
     line.write(sent := introduction(0) + stream(1, 6))
     end = time.monotonic() + 30.0
@@ -390,7 +386,7 @@ def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened, monke
     frames, why = read_to_trouble(source)
 
     assert sequences(frames) == [1, 2, 3, 4, 5]
-    assert "the line is gone: unplugged, or the device stopped; plug it in, and it" in why
+    assert "connection lost: the device was unplugged, or stopped; plug it in" in why
     assert source.read(0.0) == []
 
 

@@ -12,17 +12,8 @@ import pytest
 from kappaskin import Frame, load_scene
 from kappaskin.recording import Recorder, Recording, ReplayedSource
 from kappaskin.recording.recorded_frames import Reenactment
-from kappaskin.sources import (
-    Decoder,
-    Information,
-    Samples,
-    SerialSource,
-    SimulatedSource,
-    Source,
-    encode_information,
-    encode_samples,
-    to_json,
-)
+from kappaskin.sources import Decoder, SerialSource, SimulatedSource, Source, sensor_to_json
+from kappaskin.sources.wire import Information, Samples, encode_information, encode_samples
 
 SCENE = replace(load_scene("circle"), rate=100.0)
 SENSOR = SCENE.sensor()
@@ -42,8 +33,8 @@ class Clock:
         self.now += max(seconds, 1e-4)
 
 
-class Tape:
-    """Takes down what it is told, in order."""
+class CallLog:
+    """A recorder that notes its calls, in order."""
 
     def __init__(self) -> None:
         self.told: list[tuple[str, tuple[object, ...]]] = []
@@ -71,7 +62,7 @@ def on_a_line(request: pytest.FixtureRequest) -> Iterator[SerialSource]:
     tty.setraw(slave)
     source = SerialSource(os.ttyname(slave))
     os.close(slave)
-    os.write(master, encode_information(0, 0.0, to_json(SENSOR)))
+    os.write(master, encode_information(0, 0.0, sensor_to_json(SENSOR)))
     for n in range(1, FRAMES + 1):
         counts = np.full(SENSOR.channels, n, np.int32)
         os.write(master, encode_samples(n, n / 100, np.arange(SENSOR.channels), counts, 2))
@@ -130,22 +121,22 @@ def test_what_happened_is_told_once(source) -> None:
     assert source.events() == []
 
 
-def test_a_tape_gets_what_the_same_frames_are_made_of(source) -> None:
+def test_a_recorder_gets_what_the_same_frames_are_made_of(source) -> None:
     if isinstance(source, ReplayedSource):
         pytest.skip("what a recording brings is in its file")
-    tape = Tape()
-    source.record(tape)
+    recorder = CallLog()
+    source.record(recorder)
 
     frames = frames_of(source)
 
-    came = Decoder().feed(tape.bytes_that("came"))
+    came = Decoder().feed(recorder.bytes_that("received"))
     scans = {message.sequence: message for message in came if isinstance(message, Samples)}
-    met = [told[0] for name, told in tape.told if name == "met"]
+    met = [told[0] for name, told in recorder.told if name == "connected"]
     met += [message.text for message in came if isinstance(message, Information)]
-    assert to_json(SENSOR) in met
+    assert sensor_to_json(SENSOR) in met
     for frame in frames:
         np.testing.assert_array_equal(scans[frame.sequence].counts, frame.counts)
-    assert "mapped" in [name for name, _ in tape.told]
+    assert "clock" in [name for name, _ in recorder.told]
 
 
 def test_it_can_be_closed_twice(source) -> None:

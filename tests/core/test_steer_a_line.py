@@ -38,8 +38,8 @@ class Served(PseudoDevice):
 
     def become(self, scene):
         """Say that it is the sensor of another scene."""
-        self._information = information.to_json(scene.sensor())
-        self._introduce()
+        self._information = information.sensor_to_json(scene.sensor())
+        self._send_information()
 
     def unplug(self):
         self._stop.set()

@@ -24,7 +24,7 @@ from kappaskin import (
     Tolerance,
     load_scene,
 )
-from kappaskin.calibration import DriftWatch, Rest, Taring
+from kappaskin.calibration import DriftMonitor, Rest, TareMeasurement
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.contact import LoadDetector
 from kappaskin.scenes.effects import Temperature
@@ -56,7 +56,7 @@ def frames_of(scene, seconds=1.2, start=0.0):
 
 def taken(scene, pipeline=None, frames=None, seeker=None, temperature=math.nan):
     pipeline = pipeline or Pipeline(scene.sensor(), Setup())
-    taring = Taring(pipeline.sensor, -1.0)
+    taring = TareMeasurement(pipeline.sensor, -1.0)
     for frame in frames or frames_of(scene):
         if taring.done(0.0):
             break
@@ -167,7 +167,7 @@ def test_what_loops_still_hold_of_a_bend_is_not_in_it():
     course = np.concatenate([np.linspace(0, 34, 100), np.linspace(34, 0, 100), np.zeros(600)])
     shape = Simulator(load_scene("centre")).reading(SENSOR.scan(), 0.0)[1]
     shape /= np.abs(shape).max()
-    taring, frame = Taring(SENSOR, -1.0), frames_of(scene, 0.01)[0]
+    taring, frame = TareMeasurement(SENSOR, -1.0), frames_of(scene, 0.01)[0]
     rng = np.random.default_rng(1)
     for n, k in enumerate(course):
         read = plays(k * shape) + 0.5 + rng.normal(0, 0.2, C)
@@ -345,7 +345,7 @@ def test_a_frame_that_another_overtook_is_no_restart():
 
 
 def test_frames_of_before_it_was_asked_for_do_not_count():
-    taring = Taring(SENSOR, 10.0)
+    taring = TareMeasurement(SENSOR, 10.0)
     for n in range(600):
         taring.take(n / 500, 9.0, np.zeros((3, 100)))
 
@@ -402,8 +402,8 @@ def drift_after(scene, seconds=6.0, tare=None):
     for frame in frames_of(scene, seconds):
         pipeline(frame)
         if frame.sequence % 10 == 0:
-            pipeline.drift.tell()
-    return pipeline.drift.tell()
+            pipeline.drift.current()
+    return pipeline.drift.current()
 
 
 def test_drift_is_what_the_readings_wandered_by():
@@ -415,13 +415,13 @@ def test_drift_is_what_the_readings_wandered_by():
 
 
 def test_frames_that_others_overtook_do_not_keep_the_drift_from_being_told():
-    watch, off = DriftWatch(SEEKER), np.random.default_rng(0).normal(0, 0.5, (3, 100))
+    watch, off = DriftMonitor(SEEKER), np.random.default_rng(0).normal(0, 0.5, (3, 100))
     for n in range(300):
         late = 0.05 if n % 50 == 49 else 0.0
         watch.follow(0.02 * n - late, off, np.zeros((9, 9)), 0.2)
-        watch.tell()
+        watch.current()
 
-    assert watch.tell().curvature == pytest.approx(0.5, rel=0.1)
+    assert watch.current().curvature == pytest.approx(0.5, rel=0.1)
 
 
 def test_noise_is_no_drift():
@@ -452,7 +452,7 @@ def test_a_load_is_no_drift_and_what_was_told_before_it_stays():
             simulator.change(SCENE)
         pipeline(simulator.frame(n, lambda: 0.0))
         if n % 10 == 9:
-            told.append(pipeline.drift.tell())
+            told.append(pipeline.drift.current())
 
     loaded = [drift.loaded for drift in told]
     assert not any(loaded[:50])
@@ -471,7 +471,7 @@ def test_another_tare_does_not_forget_how_the_skin_was_bent():
     before = Pipeline(SENSOR, Setup(calibration=calibration))
     after = Pipeline(SENSOR, Setup(calibration=calibration, tare=tare_of(0.5)))
 
-    after.go_on_from(before)
+    after.continue_from(before)
 
     assert after.past.correct is before.past.correct
     assert after.past.hold is not before.past.hold

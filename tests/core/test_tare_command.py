@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from kappaskin import PointLoad, Scene, Tares, load_scene
+from kappaskin import PointLoad, Scene, load_scene
+from kappaskin.calibration import TareStore
 from kappaskin.cli import main
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
@@ -39,7 +40,7 @@ def device_of(scene) -> Iterator[str]:
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr("kappaskin.calibration.data_folder", lambda: tmp_path / "tares")
+    monkeypatch.setattr("kappaskin.calibration.tare_folder", lambda: tmp_path / "tares")
     return tmp_path / "tares"
 
 
@@ -49,15 +50,15 @@ def test_a_tare_is_told_and_kept_and_undone(folder, capsys):
         first = capsys.readouterr().out
         assert main(["tare", port]) == 0
         second = capsys.readouterr().out
-        kept = Tares(folder).load("KS/../7")
+        kept = TareStore(folder).load("KS/../7")
         assert main(["tare", port, "--undo"]) == 0
 
     assert "Simulated skin KS/../7: 300 of 300 channels tared, offsets of" in first
-    assert f"saved in {Tares(folder).path('KS/../7')}" in first
+    assert f"saved in {TareStore(folder).path('KS/../7')}" in first
     assert "1/m (RMS) from the tare of" in second
     assert len(kept.tares) == 2
     assert kept.used == kept.tares[-1]
-    assert Tares(folder).load("KS/../7").used is None
+    assert TareStore(folder).load("KS/../7").used is None
     assert "no tare is in use" in capsys.readouterr().out
 
 

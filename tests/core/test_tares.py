@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Refusal, Tare, Tares, data_folder, load_scene
+from kappaskin import Refusal, Tare, load_scene
+from kappaskin.calibration import TareStore, tare_folder
 from kappaskin.calibration.calibration import digest, fingerprint
-from kappaskin.calibration.tares import KEPT
+from kappaskin.calibration.tare_store import MOST_SAVED
 
 SENSOR = replace(load_scene("centre").sensor(), serial_number="KS-7", simulated=False)
 DATE = datetime(2026, 11, 22, 1, 2, 3, 400_000, tzinfo=timezone(timedelta(hours=2)))
@@ -27,8 +28,8 @@ def tare_of(level=1.5, **changes):
 
 
 @pytest.fixture
-def tares(tmp_path) -> Tares:
-    return Tares(tmp_path / "not" / "there yet")
+def tares(tmp_path) -> TareStore:
+    return TareStore(tmp_path / "not" / "there yet")
 
 
 def test_a_tare_comes_back_as_it_was(tares):
@@ -53,13 +54,13 @@ def test_nothing_is_kept_of_a_sensor_never_tared(tares):
 
 
 def test_the_last_ten_are_kept(tares):
-    for n in range(KEPT + 3):
+    for n in range(MOST_SAVED + 3):
         tares.add(tare_of(float(n + 1)))
 
     kept = tares.load("KS-7")
 
-    assert kept.tares == tuple(tare_of(float(n + 1)) for n in range(3, KEPT + 3))
-    assert kept.used == tare_of(float(KEPT + 3))
+    assert kept.tares == tuple(tare_of(float(n + 1)) for n in range(3, MOST_SAVED + 3))
+    assert kept.used == tare_of(float(MOST_SAVED + 3))
 
 
 def test_an_undone_tare_stays_undone(tares):
@@ -119,7 +120,7 @@ def test_any_serial_number_is_a_file_in_the_folder(tares, serial_number):
 
 @given(st.text(), st.text())
 def test_sensors_share_no_file(one, other):
-    tares = Tares(data_folder())
+    tares = TareStore(tare_folder())
     assert (tares.path(one) == tares.path(other)) == (one == other)
 
 
@@ -173,7 +174,7 @@ def test_a_file_edited_by_one_who_knows_its_hash_is_refused_too(tares):
 
 @given(st.integers(0, 2**32), st.binary(max_size=3))
 def test_bytes_that_changed_are_refused_or_change_nothing(tmp_path_factory, at, other):
-    tares = Tares(tmp_path_factory.mktemp("tares"))
+    tares = TareStore(tmp_path_factory.mktemp("tares"))
     tares.add(tare_of())
     path = tares.path("KS-7")
     data = path.read_bytes()

@@ -580,8 +580,8 @@ def test_another_surface_goes_on_tracking_and_another_basis_starts_anew():
     frame = simulator.frame(20, lambda: 0.0)
     finer, smaller, fresh = live(nx=17), live(Ni=7), live(Ni=7)
 
-    finer.go_on_from(before)
-    smaller.go_on_from(before)
+    finer.continue_from(before)
+    smaller.continue_from(before)
 
     assert finer.fit is before.fit
     np.testing.assert_array_equal(smaller(frame).coefficients, fresh(frame).coefficients)

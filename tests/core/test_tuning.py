@@ -1,10 +1,10 @@
 """Which baud rate is tried next."""
 
 from kappaskin.sources import BAUD_RATES
-from kappaskin.sources.tuning import Tuning
+from kappaskin.sources.ports import BaudRateSearch
 
 
-def tried(tuning: Tuning, rate: int, count: int) -> list[int]:
+def tried(tuning: BaudRateSearch, rate: int, count: int) -> list[int]:
     rates = []
     for _ in range(count):
         rate = tuning.next(rate)
@@ -13,13 +13,13 @@ def tried(tuning: Tuning, rate: int, count: int) -> list[int]:
 
 
 def test_every_rate_is_tried_round_and_round() -> None:
-    tuning = Tuning(BAUD_RATES[0])
+    tuning = BaudRateSearch(BAUD_RATES[0])
     assert tried(tuning, BAUD_RATES[0], 7) == [*BAUD_RATES[1:], BAUD_RATES[0]]
-    assert tuning.told == "at any baud rate from 115200 to 2000000:"
+    assert tuning.tried == "at any baud rate from 115200 to 2000000:"
 
 
 def test_a_rate_that_was_right_is_tried_again_after_each_other_one() -> None:
-    tuning = Tuning(BAUD_RATES[0])
+    tuning = BaudRateSearch(BAUD_RATES[0])
     assert tuning.good(500_000)
     assert not tuning.good(500_000)
     rates = tried(tuning, 500_000, 6)
@@ -28,6 +28,6 @@ def test_a_rate_that_was_right_is_tried_again_after_each_other_one() -> None:
 
 
 def test_a_right_rate_is_never_the_only_one_tried() -> None:
-    tuning = Tuning(BAUD_RATES[0])
+    tuning = BaudRateSearch(BAUD_RATES[0])
     tuning.good(BAUD_RATES[1])
     assert set(tried(tuning, BAUD_RATES[1], 40)) == set(BAUD_RATES)

@@ -11,22 +11,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin.errors import Refusal
-from kappaskin.sources import (
-    Accounting,
+from kappaskin.sources import Accounting, Decoder
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST, SequenceCounter
+from kappaskin.sources.wire import (
+    LONGEST,
     Command,
-    Decoder,
+    Fault,
     Information,
-    Kind,
+    Message,
+    MessageKind,
     Operation,
     Reply,
     Samples,
+    encode,
+    encode_command,
     encode_information,
     encode_reply,
     encode_samples,
 )
-from kappaskin.sources.accounting import Sequence
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
-from kappaskin.sources.wire import LONGEST, Fault, Message, encode, encode_command
 
 SEQUENCES = st.integers(0, 2**32 - 1)
 MICROSECONDS = st.integers(0, 2**53)
@@ -130,7 +132,7 @@ def test_more_runs_of_channels_than_a_byte_counts_are_refused() -> None:
 
 def test_a_payload_that_is_too_long_is_refused() -> None:
     with pytest.raises(Refusal, match="at most 262144 bytes, got 262145"):
-        encode(Kind.INFORMATION, 0, 0.0, bytes(LONGEST + 1))
+        encode(MessageKind.INFORMATION, 0, 0.0, bytes(LONGEST + 1))
 
 
 @given(SEQUENCES, st.sampled_from(Operation), st.binary(max_size=40))
@@ -401,8 +403,8 @@ def test_the_share_that_was_thrown_away_is_told_in_two_digits(thrown: int, share
 # Sequence numbers
 
 
-def taken(numbers: list[int]) -> tuple[Sequence, list[bool]]:
-    sequence, answers = Sequence(), []
+def taken(numbers: list[int]) -> tuple[SequenceCounter, list[bool]]:
+    sequence, answers = SequenceCounter(), []
     for number in numbers:
         answers.append(sequence.take(number % 2**32))
         assert sequence.good == sequence.accepted + sequence.duplicate

@@ -8,18 +8,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kappaskin.sources import (
+from kappaskin.sources import Decoder
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
+from kappaskin.sources.wire import (
     Command,
-    Decoder,
+    Fault,
     Information,
-    Kind,
+    Message,
+    MessageKind,
     Operation,
     Reply,
     Samples,
+    encode,
     encode_samples,
+    pack_runs,
 )
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
-from kappaskin.sources.wire import Fault, Message, encode, pack_runs
 
 VECTORS = json.loads((files("kappaskin_resources") / "wire" / "vectors.json").read_text("utf-8"))
 KINDS = {"device": FROM_DEVICE, "host": FROM_HOST}
@@ -31,7 +34,7 @@ def named(part: str) -> Any:
 
 
 def read(whole: bytes) -> Message:
-    (found,) = Decoder(frozenset(Kind)).feed(whole)
+    (found,) = Decoder(frozenset(MessageKind)).feed(whole)
     return found
 
 
@@ -41,7 +44,7 @@ def channels(runs: list[list[int]]) -> list[int]:
 
 @pytest.mark.parametrize(
     ("numbers", "named"),
-    [(Operation, "operation"), (Fault, "status"), (Kind, "kind")],
+    [(Operation, "operation"), (Fault, "status"), (MessageKind, "kind")],
     ids=["operations", "faults", "kinds"],
 )
 def test_numbers_mean_what_the_firmware_s_header_says(numbers, named: str) -> None:
@@ -90,7 +93,7 @@ def test_a_good_message_is_written_as_the_vector_says(vector: dict[str, Any]) ->
 
 @named("bad")
 def test_a_bad_message_is_refused_and_the_next_is_read(vector: dict[str, Any]) -> None:
-    decoder, fine = Decoder(frozenset(Kind)), bytes.fromhex(VECTORS["good"][0]["hex"])
+    decoder, fine = Decoder(frozenset(MessageKind)), bytes.fromhex(VECTORS["good"][0]["hex"])
 
     assert len(decoder.feed(bytes.fromhex(vector["hex"]) + fine)) == 1
 

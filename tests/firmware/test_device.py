@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin.sources import from_json
+from kappaskin.sources import sensor_from_json
 
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[1] / "resources" / "kappaskin_resources" / "firmware"
@@ -404,7 +404,7 @@ def test_a_setup_that_cannot_work_is_refused(driver: Path, setup, expected) -> N
 
 
 def test_the_reference_board_is_one_that_the_library_understands() -> None:
-    sensor = from_json((FIRMWARE / "device.json").read_text("utf-8"))
+    sensor = sensor_from_json((FIRMWARE / "device.json").read_text("utf-8"))
 
     assert sensor.channels == 300
     assert sensor.layout.shape == (10, 10)

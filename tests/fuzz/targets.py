@@ -26,30 +26,27 @@ from kappaskin import (
     Setup,
     load_scene,
 )
-from kappaskin.calibration import Tare, Tares, to_toml
-from kappaskin.calibration.calibration import digest, fingerprint
-from kappaskin.calibration.file import from_toml
+from kappaskin.calibration import Tare, TareStore, calibration_to_toml
+from kappaskin.calibration.calibration import digest, fingerprint, read_calibration
 from kappaskin.live.resume import adopted
 from kappaskin.mechanics import HeightMap, Mesh
 from kappaskin.publish.channels import CHANNELS
 from kappaskin.publish.client import Client
 from kappaskin.recording import Recorder, ReplayedSource, Verdict, repairing, verifying
 from kappaskin.recording.messages import TOPICS
-from kappaskin.scenes import read_scene
-from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
-from kappaskin.sources import (
+from kappaskin.scenes import SECOND_GENERATION_LOOPS, Creep, read_scene
+from kappaskin.sources import Decoder, SimulatedSource, information
+from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
+from kappaskin.sources.wire import (
     Command,
-    Decoder,
-    Kind,
+    MessageKind,
     Operation,
-    SimulatedSource,
+    encode,
+    encode_command,
     encode_information,
     encode_reply,
     encode_samples,
-    information,
 )
-from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
-from kappaskin.sources.wire import encode, encode_command
 from kappaskin_app.features.lessons.reading import READY, read_lesson
 
 Read = Callable[[bytes, Path], object]
@@ -137,7 +134,7 @@ def _wire(data: bytes, _: Path) -> None:
 
 def _content(data: bytes, _: Path) -> None:
     """As payloads of messages whose checks are right."""
-    for kind in (*Kind, 0, 77):
+    for kind in (*MessageKind, 0, 77):
         message = encode(kind, 1, 0.0, data)
         for kinds in (FROM_DEVICE, FROM_HOST):
             decoder = Decoder(kinds)
@@ -147,13 +144,13 @@ def _content(data: bytes, _: Path) -> None:
 
 
 def _information(data: bytes, _: Path) -> None:
-    sensor = information.from_json(data.decode(errors="replace"))
-    information.from_json(information.to_json(sensor))
+    sensor = information.sensor_from_json(data.decode(errors="replace"))
+    information.sensor_from_json(information.sensor_to_json(sensor))
 
 
 _SCAN = encode_samples(7, 0.1, np.arange(300), np.arange(300, dtype=np.int32), 2)
 _PIECES = (
-    encode_information(0, 0.0, information.to_json(SENSOR)),
+    encode_information(0, 0.0, information.sensor_to_json(SENSOR)),
     _SCAN,
     encode_samples(8, 0.2, np.array([5, 6, 7, 90]), np.array([1, -2, 3, 2**20], np.int32), 4),
     encode_reply(9, 0.3, Command(1, Operation.PING, b""), 0, bytes(10)),
@@ -188,11 +185,11 @@ def _resealed(data: bytes) -> bytes:
 def _calibration(data: bytes, folder: Path) -> None:
     path = folder / "a.toml"
     path.write_bytes(_resealed(data))
-    from_toml(path).check(SMALL)
+    read_calibration(path).check(SMALL)
 
 
 def _tares(data: bytes, folder: Path) -> None:
-    tares = Tares(folder)
+    tares = TareStore(folder)
     tares.path(SMALL.serial_number).write_bytes(_resealed(data))
     if (tare := tares.load(SMALL.serial_number).fit_for(SMALL)) is not None:
         str(datetime.now().astimezone() - tare.date)
@@ -224,7 +221,7 @@ def _npy(values: "np.ndarray") -> bytes:
 
 def _calibrated(channels: int) -> bytes:
     ones = np.ones(channels)
-    return to_toml(
+    return calibration_to_toml(
         Calibration(
             "skin", "1", "2", "layout", datetime(2026, 1, 1, tzinfo=UTC), ones, 0 * ones, 0 * ones,
             0 * ones, SECOND_GENERATION_LOOPS.operator(channels), Creep(0.03, 20.0).solid(channels),
@@ -237,7 +234,7 @@ def _tared() -> bytes:
     name, number, layout = SMALL.name, SMALL.serial_number, fingerprint(SMALL.layout)
     offset = np.linspace(-1.0, 1.0, SMALL.channels)
     with TemporaryDirectory() as folder:
-        tares = Tares(Path(folder))
+        tares = TareStore(Path(folder))
         for hour, temperature in ((1, None), (2, 21.5)):
             date = datetime(2026, 1, 1, hour, tzinfo=UTC)
             tares.add(Tare(name, number, layout, date, temperature, 50, 1.0, offset, offset**2))
@@ -316,7 +313,7 @@ def _recorded() -> tuple[bytes, bytes]:
         recorder.plays(scene)
         pipeline = Pipeline(source.sensor, Setup(Ni=3, Nj=3, nx=5, ny=5))
         recorder.set_up(pipeline)
-        recorder.remembered(pipeline.remembered())
+        recorder.remembered(pipeline.state())
         recorder.happened(Event(0.0, "note", "seed"))
         frames: list[Frame] = []
         while len(frames) < 4:

@@ -50,7 +50,7 @@ ROOMS = {
         "touch products contact_object evidence footing placing skins tare",
     ),
     "wire": (
-        "sources/wire sources/decoder sources/accounting sources/interpreter",
+        "sources/wire sources/decoder sources/interpreter",
         "wire wire_vectors diagnosis interpreter",
     ),
     "fit": (

@@ -4,7 +4,7 @@ from collections.abc import Generator
 from contextlib import suppress
 from typing import Any, TypeAlias
 
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import Scene
@@ -40,7 +40,7 @@ class Ahead:
     """
 
     def __init__(self) -> None:
-        self._work: Beside[_Answer] | None = None
+        self._work: BackgroundProcess[_Answer] | None = None
         self._slow: _Slow | None = None
         self._begun: set[_Slow] = set()
 
@@ -52,7 +52,7 @@ class Ahead:
             self.close()
         if self._work is None and slow is not None and slow not in self._begun:
             self._begun.add(slow)
-            self._slow, self._work = slow, Beside("kappaskin-scene", _answers, slow)
+            self._slow, self._work = slow, BackgroundProcess("kappaskin-scene", _answers, slow)
         return self._work is None
 
     @property

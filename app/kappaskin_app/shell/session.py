@@ -17,7 +17,7 @@ from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.scenes import CylinderStep, Presentation, Scene
 from kappaskin.sensing import Sensor
-from kappaskin.sources import LISTS
+from kappaskin.sources import SCAN_LISTS_PER_SECOND
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.scene_making import Ahead
@@ -65,7 +65,7 @@ def _turn(region: Region) -> float:
     """
     if region.around not in ("elements", "skin") or not region.share:
         return 0.0
-    return _LATE / (LISTS * region.share)
+    return _LATE / (SCAN_LISTS_PER_SECOND * region.share)
 
 
 class Session(QObject):

@@ -1,24 +1,44 @@
-"""What a calibration found, as what the pipeline applies to every frame of readings."""
+"""Calibration of one device: gains, offsets, hysteresis and creep; applied, saved and loaded."""
 
 import copy
 import hashlib
 import json
 import math
+import os
+import tomllib
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
-from kappaskin._state import Remembering
+from kappaskin._state import Stateful
+from kappaskin._toml import table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, SensorLayout, StandardLinearSolid
 
-_MOST_CHANNELS = 2**14  # whose numbers the engine can tell with every status
+_MOST_CHANNELS = 2**14  # whose numbers the engine can send with every status
 _STEPS = 200  # towards the reading of a straight skin; a quarter of the rest or more goes in each
 _REST = 1e-6  # 1/m, as near as it need be
+
+FORMAT = 1
+OLDEST = timedelta(days=180)
+"""Age beyond which a calibration is not trusted: glue and bonding go on changing."""
+
+_AHEAD = timedelta(days=1)  # that the clock of the machine that calibrated may have been ahead
+_LARGEST = 2**26  # bytes
+_KEYS = {
+    "device": {"name", "serial_number", "firmware", "layout", "date"},
+    "line": {"gain", "offset", "gain_sd", "offset_sd"},
+    "hysteresis": {"thresholds", "weights", "linear", "stretch"},
+    "creep": {"share", "time_constant"},
+}
+
+_OPTIONAL = {"hysteresis", "creep"}
+_AGAIN = "calibrate again, or restore the file from a copy"
 
 
 def fingerprint(layout: SensorLayout) -> str:
@@ -75,8 +95,8 @@ class Calibration:
 
     @property
     def content(self) -> dict[str, dict[str, Any]]:
-        """Everything it says, by heading and key, as text, dates, numbers and lists of numbers."""
-        said: dict[str, dict[str, Any]] = {
+        """Everything in it, by heading and key, as text, dates, numbers and lists of numbers."""
+        content: dict[str, dict[str, Any]] = {
             "device": {
                 "name": self.name,
                 "serial_number": self.serial_number,
@@ -92,13 +112,15 @@ class Calibration:
         }
         if self.hysteresis:
             names = ("thresholds", "weights", "linear", "stretch")
-            said["hysteresis"] = {name: getattr(self.hysteresis, name).tolist() for name in names}
+            content["hysteresis"] = {
+                name: getattr(self.hysteresis, name).tolist() for name in names
+            }
         if self.creep:
-            said["creep"] = {
+            content["creep"] = {
                 "share": self.creep.share.tolist(),
                 "time_constant": self.creep.time_constant,
             }
-        return said
+        return content
 
     @cached_property
     def digest(self) -> str:
@@ -125,20 +147,20 @@ class Calibration:
             )
 
     def start(self) -> "Corrector":
-        """The calibration at work on a skin that was at rest until now."""
+        """The correction of readings of a skin that was at rest until now."""
         return Corrector(self)
 
 
 def digest(content: dict[str, dict[str, Any]]) -> str:
     """SHA-256 of `content`, whatever the order of its keys."""
-    told = json.dumps(content, sort_keys=True, default=str)
-    return hashlib.sha256(told.encode()).hexdigest()
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
-class Corrector(Remembering):
-    """A calibration at work: each frame of readings to curvature, with a memory of those before."""
+class Corrector(Stateful):
+    """Readings to curvature, frame by frame, with the memory that hysteresis and creep have."""
 
-    REMEMBERED = ("_last", "_time", "_restore", "_straighten")
+    STATE = ("_last", "_time", "_restore", "_straighten")
 
     def __init__(self, calibration: Calibration) -> None:
         failed = np.isnan(calibration.gain)
@@ -179,17 +201,153 @@ class Corrector(Remembering):
         return k
 
     def remanence(self) -> Array:
-        """What creep and loops have left in the readings (C,) of a skin straight again, in 1/m.
+        """What creep and hysteresis have left in the readings (C,) of a straight skin, in 1/m.
 
-        The reading that would now be told as no curvature, without the offset.
+        The reading, without the offset, that would now be corrected to no curvature.
         """
         left = np.zeros_like(self._offset)
         if self._restore is None and self._straighten is None:
             return left
         for _ in range(_STEPS):
-            told = copy.deepcopy(self)(self._offset + left, self._time)
-            told = np.where(np.isfinite(told), told, 0.0)
-            if np.abs(told).max() < _REST:
+            corrected = copy.deepcopy(self)(self._offset + left, self._time)
+            corrected = np.where(np.isfinite(corrected), corrected, 0.0)
+            if np.abs(corrected).max() < _REST:
                 break
-            left = left - self._slope * told
+            left = left - self._slope * corrected
         return left
+
+
+def calibration_to_toml(calibration: Calibration) -> str:
+    """The text of the file."""
+    tables = [table("", {"format": FORMAT, "sha256": calibration.digest})]
+    tables += [table(f"[{heading}]", values) for heading, values in calibration.content.items()]
+    return "\n".join(tables)
+
+
+def check_writable(path: Path) -> None:
+    """Refuse a `path` that cannot be written to, before a person spends minutes on a sweep."""
+    place = path.parent
+    if path.is_dir() or not (place.is_dir() and os.access(place, os.W_OK)):
+        raise Refusal(
+            f"{path}: expected a file in a folder that exists and may be written to; choose "
+            "another place"
+        )
+
+
+def save_calibration(calibration: Calibration, path: Path) -> None:
+    """Write `path` whole or not at all."""
+    check_writable(path)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        with part.open("w", encoding="utf-8") as file:
+            file.write(calibration_to_toml(calibration))
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    except (OSError, UnicodeEncodeError) as error:
+        raise Refusal(f"{path}: cannot be written ({error}); choose another place") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _contents(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(_LARGEST + 1)
+    except FileNotFoundError as error:
+        raise Refusal(f"{path}: there is no such file; `kappaskin calibrate` makes one") from error
+    except OSError as error:
+        raise Refusal(f"{path}: cannot be read ({error}); check its permissions") from error
+
+
+def _parsed(path: Path, data: bytes) -> dict[str, Any]:
+    try:
+        if len(data) > _LARGEST:
+            raise ValueError(f"it has more than {_LARGEST} bytes")
+        return tomllib.loads(data.decode())
+    except (ValueError, RecursionError) as error:
+        raise Refusal(f"{path}: is no calibration file ({error!s:.120}); {_AGAIN}") from error
+
+
+def _checked(path: Path, content: dict[str, Any]) -> dict[str, Any]:
+    """The headings of a file of this format, complete and as it was written."""
+    version = content.pop("format", None)
+    if type(version) is not int or version < 1:
+        raise Refusal(f"{path}: has no format of a calibration, got {version!r:.40}; {_AGAIN}")
+    if version > FORMAT:
+        raise Refusal(
+            f"{path}: has format {version}, this program reads up to {FORMAT}; update kappaskin"
+        )
+    stated = content.pop("sha256", None)
+    expected = set(_KEYS) | {"failures"}
+    if unknown := set(content) - expected:
+        raise Refusal(f"{path}: has unknown headings {sorted(unknown)}; {_AGAIN}")
+    if missing := expected - _OPTIONAL - set(content):
+        raise Refusal(f"{path}: lacks the headings {sorted(missing)}; {_AGAIN}")
+    for heading, keys in _KEYS.items():
+        found: Any = content.get(heading, dict.fromkeys(keys))
+        if not isinstance(found, dict):
+            raise Refusal(f"{path}: {heading} is no heading; {_AGAIN}")
+        names = set(cast("dict[str, Any]", found))
+        if names != keys:
+            raise Refusal(
+                f"{path}: [{heading}] lacks {sorted(keys - names)} and has unknown "
+                f"{sorted(names - keys)}; {_AGAIN}"
+            )
+    if stated != digest(content):
+        raise Refusal(f"{path}: is damaged or was edited (its SHA-256 differs); {_AGAIN}")
+    return content
+
+
+def _array(values: Any) -> Array:
+    return np.array(values, float)
+
+
+def read_calibration(path: Path) -> Calibration:
+    """The calibration in `path`, of any sensor and however old."""
+    return calibration_from_toml(_contents(path), path)
+
+
+def calibration_from_toml(data: bytes, path: Path) -> Calibration:
+    """The calibration in the `data` of a file that refusals call `path`."""
+    content = _checked(path, _parsed(path, data))
+    device, hysteresis, creep = content["device"], content.get("hysteresis"), content.get("creep")
+    try:
+        if not all(isinstance(device[key], str) for key in _KEYS["device"] - {"date"}):
+            raise TypeError(f"expected texts for the device, got {device}")
+        return Calibration(
+            *(device[key] for key in ("name", "serial_number", "firmware", "layout", "date")),
+            *(_array(content["line"][key]) for key in ("gain", "offset", "gain_sd", "offset_sd")),
+            hysteresis=PrandtlIshlinskii(**{k: _array(v) for k, v in hysteresis.items()})
+            if hysteresis
+            else None,
+            creep=StandardLinearSolid(_array(creep["share"]), float(creep["time_constant"]))
+            if creep
+            else None,
+            failures=tuple((int(c), str(why)) for c, why in content["failures"].items()),
+        )
+    except (ValueError, TypeError, AttributeError, OverflowError) as error:
+        raise Refusal(f"{path}: cannot be used ({error}); {_AGAIN}") from error
+
+
+def load_calibration(
+    path: Path, sensor: Sensor, now: datetime, oldest: timedelta = OLDEST
+) -> Calibration:
+    """The calibration in `path`, if it is of this `sensor` and at `now` no older than `oldest`."""
+    calibration = read_calibration(path)
+    try:
+        calibration.check(sensor)
+    except Refusal as refusal:
+        raise Refusal(f"{path}: {refusal}") from refusal
+    age = now - calibration.date
+    if age > oldest:
+        raise Refusal(
+            f"{path}: is of {calibration.date:%Y-%m-%d}, {age.days} days old; expected at most "
+            f"{oldest.days} days; calibrate again"
+        )
+    if age < -_AHEAD:
+        raise Refusal(
+            f"{path}: is of {calibration.date:%Y-%m-%d %H:%M}, in the future of "
+            f"{now:%Y-%m-%d %H:%M}; set this machine's clock, or calibrate again"
+        )
+    return calibration

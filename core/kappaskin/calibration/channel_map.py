@@ -1,19 +1,24 @@
-"""Which element answered to which press, to the map of the channels, in words and as a list."""
+"""Channel map: which element answers to which press, and what is wrong with the map."""
 
 from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from kappaskin.bases import basis_for
-from kappaskin.calibration.press_judge import ELSEWHERE, OK, Pressed
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.mechanics import PointLoad
 from kappaskin.sensing import Sensor, SensorLayout
 
-Indices = NDArray[np.intp]
+OK, ELSEWHERE, NOTHING, UNCLEAR, SKIPPED = "ok", "elsewhere", "nothing", "unclear", "skipped"
 
+_BESIDE = 1.6  # distances of elements: no further apart are those beside each other
+_AS_GOOD = 0.75  # of the strongest answer: one beside it that answers so much was pressed too
+_ALSO = 0.8  # of the same: one elsewhere that answers so much leaves it unclear
+
+Indices = NDArray[np.intp]
 _CLEARLY = 0.5  # of the squares left: by so much another order of components explains more
 _FUNCTIONS = 15  # along each side, of the shape it makes
 _ORDERS = tuple(permutations(range(3)))
@@ -21,11 +26,63 @@ _NAMED = 6  # of them one by one
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
-    """Whether the map was `confirmed`, and what was found, in `words`.
+class PressResult:
+    """The result of pressing the element `asked` for; `verdict` is `OK`, `ELSEWHERE` and so on.
+
+    `element` responded most, None where none did. `answer` (3, P) in 1/m is the change of all.
+    """
+
+    asked: int
+    verdict: str
+    element: int | None
+    answer: Array
+    why: str = ""
+
+    def __str__(self) -> str:
+        if self.verdict == ELSEWHERE:
+            return f"element {self.element} answers in the place of element {self.asked}"
+        words = {
+            OK: "answers",
+            NOTHING: "does not answer, nor does any other",
+            SKIPPED: "was not pressed",
+        }
+        return f"element {self.asked} {words.get(self.verdict, f'is not clear: {self.why}')}"
+
+
+def judge_press(layout: SensorLayout, asked: int, answer: Array) -> PressResult:
+    """Which element was pressed, by the change `answer` (3, P) of all, and if it was `asked`.
+
+    Where a skin is pressed it bends most, whichever of its components is read as which: neither a
+    fit nor the map of other elements is needed.
+    """
+    # Where it bulges it was let go: under a finger that moved on from elsewhere.
+    strength = np.linalg.norm(np.where(layout.live, np.minimum(answer, 0.0), 0.0), axis=0)
+    peak = int(strength.argmax())
+    apart = np.linalg.norm(layout.positions - layout.positions[peak], axis=1)
+    near = apart <= _BESIDE * _pitch(layout)
+    also = np.where(near, 0.0, strength)
+    if also.max() > _ALSO * strength[peak]:
+        why = f"elements {peak} and {int(also.argmax())} answer alike"
+        return PressResult(asked, UNCLEAR, peak, answer, why)
+    if near[asked] and strength[asked] >= _AS_GOOD * strength[peak]:
+        peak = asked
+    return PressResult(asked, OK if peak == asked else ELSEWHERE, peak, answer)
+
+
+def _pitch(layout: SensorLayout) -> float:
+    """The median distance in m of an element to the nearest other one."""
+    if len(layout) < 2:
+        return 1.0
+    apart, _ = scipy.spatial.KDTree(layout.positions).query(layout.positions, 2)
+    return float(np.median(np.asarray(apart)[:, 1]))
+
+
+@dataclass(frozen=True, eq=False)
+class MapVerdict:
+    """Whether the map is `confirmed`, and what was found, as texts in `words`.
 
     `order` (3 P,) is the map that was found: `readings[order]` are those of the channels in their
-    right places. None where what was pressed does not tell one.
+    right places. None where the presses do not determine it.
     """
 
     confirmed: bool
@@ -36,29 +93,29 @@ class Verdict:
         return "; ".join(self.words)
 
 
-def verdict_of(sensor: Sensor, done: tuple[Pressed, ...]) -> Verdict:
-    """What pressing some elements tells of the channel map."""
+def map_verdict(sensor: Sensor, done: tuple[PressResult, ...]) -> MapVerdict:
+    """What pressing some elements shows of the channel map."""
     layout = sensor.layout
-    told = [pressed for pressed in done if pressed.verdict in (OK, ELSEWHERE)]
+    answered = [pressed for pressed in done if pressed.verdict in (OK, ELSEWHERE)]
     open_ = [str(pressed) for pressed in done if pressed.verdict not in (OK, ELSEWHERE)]
-    found = {p.asked: p.element for p in told if p.element is not None}
+    found = {p.asked: p.element for p in answered if p.element is not None}
     elements, words = _elements(layout, found)
     if elements is None:
-        return Verdict(False, (*words, *_some(open_)), None)
-    orders, more = _components(sensor, told, elements)
+        return MapVerdict(False, (*words, *_some(open_)), None)
+    orders, more = _components(sensor, answered, elements)
     words = [*words, *more]
     order = np.concatenate([orders[c] * len(layout) + elements for c in range(3)])
-    if not words and told and not open_:
-        return Verdict(True, (f"the map is right: {_counted(told)} where pressed",), order)
-    if not told:
-        words = ["nothing is told of the map"]
+    if not words and answered and not open_:
+        return MapVerdict(True, (f"the map is right: {_counted(answered)} where pressed",), order)
+    if not answered:
+        words = ["no press shows anything of the map"]
     elif not words:
-        words = [f"nothing wrong was found: {_counted(told)} where pressed"]
-    return Verdict(False, (*words, *_some(open_)), order if told else None)
+        words = [f"nothing wrong was found: {_counted(answered)} where pressed"]
+    return MapVerdict(False, (*words, *_some(open_)), order if answered else None)
 
 
-def _counted(told: list[Pressed]) -> str:
-    return "1 element answers" if len(told) == 1 else f"{len(told)} elements answer"
+def _counted(answered: list[PressResult]) -> str:
+    return "1 element answers" if len(answered) == 1 else f"{len(answered)} elements answer"
 
 
 def _some(words: list[str]) -> list[str]:
@@ -82,7 +139,7 @@ def _elements(layout: SensorLayout, found: dict[int, int]) -> tuple[Indices | No
         return by_lines
     if closed:
         return _permuted(every, wrong), _some(_fewest_words(wrong))
-    return None, [*_some(words), "no map is told by that: press every element"]
+    return None, [*_some(words), "that does not determine a map: press every element"]
 
 
 def _permuted(every: Indices, moved: dict[int, int]) -> Indices:
@@ -101,8 +158,8 @@ def _fewest_words(moved: dict[int, int], what: str = "element") -> list[str]:
         if len(cycle) == 2:
             words.append(f"{what}s {cycle[0]} and {cycle[1]} are swapped")
         elif len(cycle) > 2:
-            told = ", ".join(f"{p} reads as {moved[p]}" for p in cycle)
-            words.append(f"{what}s are exchanged: {told}")
+            text = ", ".join(f"{p} reads as {moved[p]}" for p in cycle)
+            words.append(f"{what}s are exchanged: {text}")
     return words
 
 
@@ -119,13 +176,13 @@ def _by_lines(layout: SensorLayout, found: dict[int, int]) -> tuple[Indices, lis
             continue
         p, q = np.arange(m * n) % m, np.arange(m * n) // m
         to = rows[q] + m * columns[p] if turned else columns[p] + m * rows[q]
-        words = ["columns and rows are taken for each other"] if turned else []
+        words = ["columns and rows are exchanged"] if turned else []
         return to, [*words, *_line_words("column", columns), *_line_words("row", rows)]
     return None
 
 
 def _line_map(asked: Indices, answered: Indices, count: int) -> Indices | None:
-    """Which of `count` lines answers for each (count,), None where they are not all told."""
+    """Which of `count` lines answers for each (count,), None where that is open."""
     to = np.full(count, -1)
     for line, other in zip(asked.tolist(), answered.tolist(), strict=True):
         if to[line] not in (-1, other):
@@ -144,24 +201,24 @@ def _line_words(what: str, to: Indices) -> list[str]:
 
 
 def _components(
-    sensor: Sensor, told: list[Pressed], elements: Indices
+    sensor: Sensor, answered: list[PressResult], elements: Indices
 ) -> tuple[NDArray[np.intp], list[str]]:
     """Which component reads xx, yy and xy of each element (3, P), and what is wrong in words."""
     P = len(sensor.layout)
     right = np.repeat(np.arange(3)[:, None], P, axis=1)
-    if sensor.layout.patch.strip or not told:
+    if sensor.layout.patch.strip or not answered:
         return right, []
-    read = np.array([pressed.answer[:, elements] for pressed in told])  # (N, 3, P)
-    due = _due(sensor, [pressed.asked for pressed in told])
+    read = np.array([pressed.answer[:, elements] for pressed in answered])  # (N, 3, P)
+    due = _expected(sensor, [pressed.asked for pressed in answered])
     live = sensor.layout.live & sensor.layout.live[:, elements]
     read, due = np.where(live, read, 0.0), np.where(live, due, 0.0)
-    cost = np.array([_left(read[:, list(order)], due) for order in _ORDERS])  # (6, P)
+    cost = np.array([_residual(read[:, list(order)], due) for order in _ORDERS])  # (6, P)
     best = int(cost.sum(axis=1).argmin())
     if cost[best].sum() < _CLEARLY * cost[0].sum():
         return np.repeat(np.array(_ORDERS[best])[:, None], P, axis=1), [_order_words(best)]
     each = cost.argmin(axis=0)
     wrong = cost.min(axis=0) < _CLEARLY * cost[0]
-    wrong &= np.isin(np.arange(P), [pressed.asked for pressed in told])
+    wrong &= np.isin(np.arange(P), [pressed.asked for pressed in answered])
     for p in np.flatnonzero(wrong):
         right[:, p] = _ORDERS[each[p]]
     words = [f"{_order_words(int(each[p]))} of element {p}" for p in np.flatnonzero(wrong)]
@@ -173,20 +230,20 @@ def _order_words(number: int) -> str:
     names = [COMPONENTS[c] for c in moved]
     if len(names) == 2:
         return f"{names[0]} and {names[1]} are swapped"
-    told = ", ".join(f"{COMPONENTS[a]} reads as {COMPONENTS[b]}" for a, b in moved.items())
-    return f"components are exchanged: {told}"
+    text = ", ".join(f"{COMPONENTS[a]} reads as {COMPONENTS[b]}" for a, b in moved.items())
+    return f"components are exchanged: {text}"
 
 
-def _left(read: Array, due: Array) -> Array:
-    """Squares (P,) that are left of N presses `read` (N, 3, P) when they were `due`, scaled."""
+def _residual(read: Array, due: Array) -> Array:
+    """Squared residuals (P,) of N presses `read` (N, 3, P) when `due` was expected, scaled."""
     share = np.sum(read * due, axis=(1, 2)) / np.sum(due**2, axis=(1, 2))
     scale = np.sum(read**2, axis=(1, 2))  # each press counts alike
     left = (read - share[:, None, None] * due) ** 2 / scale[:, None, None]
     return np.sum(left, axis=(0, 1))
 
 
-def _due(sensor: Sensor, pressed: list[int]) -> Array:
-    """What a press of each element does to all, (N, 3, P) in 1/m, but for its force."""
+def _expected(sensor: Sensor, pressed: list[int]) -> Array:
+    """The expected change of all by a press of each element, (N, 3, P) in 1/m for unit force."""
     layout, plate = sensor.layout, sensor.plate
     basis = basis_for(layout.patch, sensor.edge, _FUNCTIONS, _FUNCTIONS)
     compliance, M = plate.compliance(basis), layout.curvature_operator(basis)

@@ -1,4 +1,4 @@
-"""A sweep to a calibration and what it is worth: lines, loops, creep, and who passed."""
+"""Calibration report: a sweep to a calibration, how good it is, and which channels failed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -8,18 +8,103 @@ from typing import Any, TypeVar
 import numpy as np
 
 from kappaskin.calibration.calibration import Calibration, fingerprint
-from kappaskin.calibration.holds import identify_creep
-from kappaskin.calibration.judge import DEAD, Limits, failures_of
-from kappaskin.calibration.lines import Lines, lines
-from kappaskin.calibration.loops import identify, thresholds
-from kappaskin.calibration.procedure import Sweep
+from kappaskin.calibration.identification import (
+    LineFits,
+    fit_lines,
+    identify_creep,
+    identify_hysteresis,
+    play_thresholds,
+)
+from kappaskin.calibration.sweep import Sweep
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Mask
 from kappaskin.scenes import FACES, FEWEST_RADII, CylinderStep, check_strain, step_pairs
 from kappaskin.scenes.effects import RunningEffect
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, StandardLinearSolid
 
-_Part = TypeVar("_Part", Lines, PrandtlIshlinskii)
+DEAD = "dead, as the device itself says"
+
+_Part = TypeVar("_Part", LineFits, PrandtlIshlinskii)
+_WORST = 5  # channels that are named
+
+
+@dataclass(frozen=True)
+class ChannelLimits:
+    """What a channel must keep within to pass.
+
+    The gain relative to nominal; the offset, the error of a reading left out of the fit and the
+    noise of one frame as shares of the largest curvature applied; and how much of a small change
+    must show at once, the rest being hidden in the loops.
+    """
+
+    least_gain: float = 0.5
+    most_gain: float = 2.0
+    offset: float = 0.5
+    error: float = 0.05
+    noise: float = 0.1
+    linear: float = 0.25
+
+    def reason(
+        self, most: float, gain: float, offset: float, error: float, noise: float, linear: float
+    ) -> str | None:
+        """Why a channel fails that was bent up to `most` in 1/m; None when it passes."""
+        offset_limit, error_limit, noise_limit = (
+            share * most for share in (self.offset, self.error, self.noise)
+        )
+        # Not >, or NaN would pass.
+        judged = (
+            (
+                self.least_gain <= gain <= self.most_gain,
+                f"gain {gain:.3g}, expected {self.least_gain:g} to {self.most_gain:g}; is the gage "
+                "broken, wired in reverse, or were the faces swapped?",
+            ),
+            (
+                abs(offset) <= offset_limit,
+                f"offset {offset:.3g} 1/m, expected at most {offset_limit:.3g}; balance the bridge",
+            ),
+            (
+                error <= error_limit,
+                f"error {error:.3g} 1/m, expected at most {error_limit:.3g}; is the gage bonded, "
+                "and did the skin follow the cylinders?",
+            ),
+            (
+                noise <= noise_limit,
+                f"noise {noise:.3g} 1/m, expected at most {noise_limit:.3g}; look for a loose wire",
+            ),
+            (
+                linear >= self.linear,
+                f"shows {100 * linear:.0f} % of a small change, expected at least "
+                f"{100 * self.linear:.0f} %; the rest hides in its loops",
+            ),
+        )
+        return next((why for fine, why in judged if not fine), None)
+
+
+def failures_of(
+    sweep: Sweep,
+    sensor: Sensor,
+    limits: ChannelLimits,
+    fitted: LineFits,
+    noise: Array,
+    linear: Array,
+) -> dict[int, str]:
+    """Why each channel failed that did; `noise` in 1/m and `linear` are (C,)."""
+    most = np.repeat(np.abs(sweep.curvature).max(axis=0), sensor.channels // 3)
+    dead = ~sensor.layout.live.ravel()
+    found: dict[int, str] = {}
+    for c in range(sensor.channels):
+        missing = np.flatnonzero(np.isnan(sweep.readings[:, c]))
+        numbers = (most, fitted.gain, fitted.offset, fitted.left_out, noise, linear)
+        if dead[c]:
+            found[c] = DEAD
+        elif len(missing):
+            found[c] = (
+                f"on a rail or not read on {len(missing)} of {len(sweep.steps)} steps, first on "
+                f"step {missing[0] + 1}; lower the amplifier's gain"
+            )
+        elif why := limits.reason(*(float(values[c]) for values in numbers)):
+            found[c] = why
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +118,8 @@ class CalibrationReport:
     """
 
     calibration: Calibration
-    line: Lines
-    fitted: Lines
+    line: LineFits
+    fitted: LineFits
     gaps: Array
     gaps_left: Array
     noise: Array
@@ -49,7 +134,7 @@ class CalibrationReport:
         return {c: why for c, why in self.calibration.failures if why != DEAD}
 
     def to_json(self) -> dict[str, Any]:
-        """Everything it tells as JSON values, None for what is not a number."""
+        """Everything as JSON values, None for what is not a number."""
         calibration = self.calibration
         columns = {
             "gain": self.fitted.gain,
@@ -87,6 +172,38 @@ class CalibrationReport:
                 for c in range(3 * P)
             ],
         }
+
+    def summary(self) -> list[str]:
+        """The report as lines of text: passed channels, ranges, the worst, and why any failed."""
+        calibration, P = self.calibration, len(self.noise) // 3
+
+        def spread(values: Array) -> str:
+            return f"{values.min():.3g} to {values.max():.3g}"
+
+        lines = [
+            f"{calibration.name} {calibration.serial_number}: {int(self.passed.sum())} of "
+            f"{int(self.passed.sum()) + len(self.failed)} channels passed; curvature in 1/m",
+            f"{'':<11}{'gain':<18}{'offset':<18}{'widest loop (left)':<22}error (of a line alone)",
+        ]
+        for c, name in enumerate(COMPONENTS):
+            here = np.flatnonzero(self.passed[c * P : (c + 1) * P]) + c * P
+            if here.size:
+                loops = self.gaps[:, here].max(), self.gaps_left[:, here].max()
+                errors = self.fitted.left_out[here].max(), self.line.left_out[here].max()
+                lines.append(
+                    f"{name:<11}{spread(self.fitted.gain[here]):<18}"
+                    f"{spread(self.fitted.offset[here]):<18}"
+                    f"{'{:.2f} ({:.2f})'.format(*loops):<22}{errors[0]:.3f} ({errors[1]:.2f})"
+                )
+        if calibration.creep:
+            share = float(np.median(calibration.creep.share[self.passed]))
+            lines.append(
+                f"creep      {100 * share:.1f} % in {calibration.creep.time_constant:.3g} s"
+            )
+        worst = np.argsort(np.where(self.passed, -self.fitted.left_out, 0.0))[:_WORST]
+        named = (f"{_named(c, P)} {self.fitted.left_out[c]:.3f}" for c in worst)
+        lines.append(f"worst      {', '.join(named)}")
+        return lines + [f"failed     {_named(c, P)}: {why}" for c, why in self.failed.items()]
 
 
 def _known(value: float) -> float | None:
@@ -141,7 +258,7 @@ def _in_time(sweep: Sweep, run: RunningEffect) -> Array:
 
 
 def _creep(sweep: Sweep, least: float) -> tuple[StandardLinearSolid | None, Array]:
-    """The creep that the hold shows, if there was one, and the readings (S, C) without it."""
+    """The creep seen during the hold, if there was one, and the readings (S, C) without it."""
     if not len(sweep.moments):
         return None, sweep.readings
     if not sweep.steps[0].flat:
@@ -154,8 +271,8 @@ def _creep(sweep: Sweep, least: float) -> tuple[StandardLinearSolid | None, Arra
     return creep, _in_time(sweep, lambda reading, time: restore(reading - rest, time) + rest)
 
 
-def _telling(x: Array, flat: Mask) -> Mask:
-    """Which steps (S,) tell of the channels with curvature `x` (S,), some of them `flat` (S,).
+def _informative(x: Array, flat: Mask) -> Mask:
+    """The steps (S,) to fit channels of curvature `x` (S,) to; some of the steps are `flat` (S,).
 
     Those that do not bend them would blame on them what bending across them does. And before the
     skin was first bent as far as it ever was, its loops are those of an unknown past: then every
@@ -165,19 +282,21 @@ def _telling(x: Array, flat: Mask) -> Mask:
     return since & (flat | (x != 0))
 
 
-def _by_component(
+def _fitted_components(
     sweep: Sweep, readings: Array, least: float
-) -> tuple[Lines, Lines, PrandtlIshlinskii]:
+) -> tuple[LineFits, LineFits, PrandtlIshlinskii]:
     """Lines, fits and loops of all channels, fitted component by component."""
     flat = np.array([step.flat for step in sweep.steps])
     radii = len({step.radius for step in sweep.steps if not step.flat})
-    parts: list[tuple[Lines, Lines, PrandtlIshlinskii]] = []
+    parts: list[tuple[LineFits, LineFits, PrandtlIshlinskii]] = []
     for x, y in zip(sweep.curvature.T, np.split(readings, 3, axis=1), strict=True):
-        used = _telling(x, flat)
-        line = lines(x[used], y[used])
-        parts.append((line, *identify(x, y, used, thresholds(x, radii), line, least)))
+        used = _informative(x, flat)
+        line = fit_lines(x[used], y[used])
+        parts.append(
+            (line, *identify_hysteresis(x, y, used, play_thresholds(x, radii), line, least))
+        )
     of_lines, fitted, loops = zip(*parts, strict=True)
-    return _joined(Lines, of_lines), _joined(Lines, fitted), _joined(PrandtlIshlinskii, loops)
+    return _joined(LineFits, of_lines), _joined(LineFits, fitted), _joined(PrandtlIshlinskii, loops)
 
 
 def _joined(kind: type[_Part], parts: Sequence[_Part]) -> _Part:
@@ -207,9 +326,9 @@ def _needed(loops: PrandtlIshlinskii, passed: Mask) -> PrandtlIshlinskii | None:
 
 
 def calibrate(
-    sweep: Sweep, sensor: Sensor, date: datetime, limits: Limits | None = None
+    sweep: Sweep, sensor: Sensor, date: datetime, limits: ChannelLimits | None = None
 ) -> CalibrationReport:
-    """What a `sweep` of `sensor`, taken on `date`, says of every channel.
+    """The calibration that a `sweep` of `sensor`, taken on `date`, gives, and how good it is.
 
     Refused when it has fewer than three radii, one face only, no way back or strains beyond the
     elastic limit, or when no channel passes.
@@ -217,11 +336,11 @@ def calibrate(
     _check(sweep, sensor)
     least = sensor.transduction.resolution
     creep, readings = _creep(sweep, least)
-    line, fitted, loops = _by_component(sweep, readings, least)
+    line, fitted, loops = _fitted_components(sweep, readings, least)
     with np.errstate(divide="ignore", invalid="ignore"):  # a stuck channel, which fails
         noise = np.sqrt((sweep.noise**2).mean(axis=0)) / np.abs(fitted.gain)
         by_line = (sweep.readings - line.offset) / line.gain
-    failures = failures_of(sweep, sensor, limits or Limits(), fitted, noise, loops.linear)
+    failures = failures_of(sweep, sensor, limits or ChannelLimits(), fitted, noise, loops.linear)
     passed = np.ones(sensor.channels, bool)
     passed[list(failures)] = False
     if not passed.any():
@@ -249,3 +368,7 @@ def calibrate(
     return CalibrationReport(
         calibration, line, fitted, _gaps(sweep, by_line), _gaps(sweep, left), noise
     )
+
+
+def _named(channel: int, elements: int) -> str:
+    return f"{COMPONENTS[channel // elements]} of element {channel % elements}"

@@ -111,11 +111,11 @@ def _recorded(
 
 
 def _use_tare(engine: "Engine", sensor: "Sensor") -> None:
-    from kappaskin.calibration import Tares, data_folder
+    from kappaskin.calibration import TareStore, tare_folder
     from kappaskin.pipeline import Setup
 
     if not sensor.simulated:
-        tare = Tares(data_folder()).load(sensor.serial_number).fit_for(sensor)
+        tare = TareStore(tare_folder()).load(sensor.serial_number).fit_for(sensor)
         engine.set_up(replace(Setup(), tare=tare))
 
 
@@ -198,9 +198,9 @@ def _contents(recording: "Recording") -> dict[str, Any]:
 
 
 def _device(text: str) -> str:
-    from kappaskin.sources import from_json
+    from kappaskin.sources import sensor_from_json
 
-    sensor = from_json(text)
+    sensor = sensor_from_json(text)
     return f"{sensor.name} {sensor.serial_number}, {sensor.layout}, firmware {sensor.firmware}"
 
 
@@ -218,10 +218,10 @@ def verify(file: Path) -> int:
         The recording.
     """
     # As the engine does: products are summed in another order by more than one thread.
-    from kappaskin._background import Beside
+    from kappaskin._processes import BackgroundProcess
     from kappaskin.recording import Verdict, verifying
 
-    with Beside[float | Verdict]("verify", verifying, file) as work:
+    with BackgroundProcess[float | Verdict]("verify", verifying, file) as work:
         verdict = result_of(work.wait(), Verdict)
     print(f"{file}: {verdict.words}")
     return 0 if verdict.same else FAILED

@@ -10,11 +10,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from kappaskin.calibration import TareMeasurement
 from kappaskin.cli.common import FAILED, Switch, check_time, print_json, stops
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
-    from kappaskin.calibration import Rest, Tare, Taring
+    from kappaskin.calibration import Rest, Tare
     from kappaskin.sensing import Sensor
     from kappaskin.sources import Source
 
@@ -73,10 +74,10 @@ def calibrate(
         Print one JSON object with every channel instead of a summary.
     """
     from kappaskin.calibration import calibrate as calibrated
-    from kappaskin.calibration import check_place, save_calibration, summary, take_sweep
+    from kappaskin.calibration import check_writable, save_calibration, take_sweep
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
-    check_place(out)
+    check_writable(out)
     try:
         sensor, sweep = take_sweep(
             source,
@@ -95,7 +96,7 @@ def calibrate(
     if json:
         print_json(report.to_json())
     else:
-        print(*summary(report), sep="\n")
+        print(*report.summary(), sep="\n")
     return FAILED if report.failed else 0
 
 
@@ -118,12 +119,12 @@ def tare(source: str, *, undo: Switch = False) -> None:
         Stop using this sensor's tare instead of taking one.
     """
     # All of it before the source is opened: while modules load, readings wait.
-    from kappaskin.calibration import Tares, Taring, data_folder
+    from kappaskin.calibration import TareMeasurement, TareStore, tare_folder
     from kappaskin.contact import LoadDetector
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
     from kappaskin.sources import open_source
 
-    tares = Tares(data_folder())
+    tares = TareStore(tare_folder())
     with closing(open_source(source)) as opened:
         sensor = _answering(opened)
         if undo:
@@ -131,7 +132,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
             print(f"{sensor.name} {sensor.serial_number}: no tare is in use")
             return
         used = None if sensor.simulated else tares.load(sensor.serial_number).fit_for(sensor)
-        taring = Taring(sensor, time.monotonic())
+        taring = TareMeasurement(sensor, time.monotonic())
         _take_readings(opened, sensor, taring)
         now = datetime.now().astimezone()
         taken = taring.tare(LoadDetector(sensor), _rest(sensor, used), now, opened.temperature)
@@ -151,7 +152,7 @@ def _answering(source: "Source") -> "Sensor":
     return source.sensor
 
 
-def _take_readings(source: "Source", sensor: "Sensor", taring: "Taring") -> None:
+def _take_readings(source: "Source", sensor: "Sensor", taring: "TareMeasurement") -> None:
     while not taring.done(time.monotonic()):
         for frame in source.read(_READ):
             taring.take(frame.device_time, frame.host_time, sensor.nominal(frame))
@@ -257,21 +258,21 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
     reset
         Pulse DTR and RTS first, which resets many boards.
     """
-    from kappaskin.sources import Monitor
+    from kappaskin.sources import WireMonitor
 
     check_time(seconds, "listen")
     stopped = stops()
-    listening, end = Monitor(port), time.monotonic() + seconds
+    listening, end = WireMonitor(port), time.monotonic() + seconds
     try:
         if reset:
             listening.reset()
-        while not (stopped or listening.gone) and time.monotonic() < end:
+        while not (stopped or listening.lost) and time.monotonic() < end:
             for line in listening.read(_WAIT):
                 print(line, flush=True)
     finally:
         listening.close()
     print(listening.summary())
-    return FAILED if listening.gone or not listening.accounting().accepted else 0
+    return FAILED if listening.lost or not listening.accounting().accepted else 0
 
 
 def device(scene: str = "", *, rate: float | None = None, dwell: float | None = None) -> None:

@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import DTypeLike
 from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
-from kappaskin._state import Remembering
+from kappaskin._state import Stateful
 from kappaskin.frames import Array
 
 _BLOCK, _BLOCK_OF_READINGS = 16, 32  # columns that LAPACK reflects at once: the fastest, of 128
@@ -32,7 +32,7 @@ class KalmanUpdate:
         return (self.surprise / variance - self.spread) / 2
 
 
-class ModalKalmanFilter(Remembering):
+class ModalKalmanFilter(Stateful):
     """Amplitudes (F,) of modes and their rates: `mean` (2, F), covariance root' root (2 F, 2 F).
 
     Each mode is a stationary Gaussian process of Matern's class 3/2 with the rate
@@ -44,7 +44,7 @@ class ModalKalmanFilter(Remembering):
     triangle on top of what is added): no rounding can make a variance negative.
     """
 
-    REMEMBERED = ("mean", "root")
+    STATE = ("mean", "root")
 
     def __init__(self, wavenumbers: Array, dtype: DTypeLike) -> None:
         # Typed as float64: what holds for one holds for the other.
@@ -153,7 +153,7 @@ _RATIOS = np.exp(np.linspace(math.log(1e-4), math.log(1e14), 145))
 
 
 @dataclass(slots=True)
-class SignalLevel(Remembering):
+class SignalLevel(Stateful):
     """Running estimates of the noise and of the signal.
 
     `variance` of the noise of a reading, known as from `count` readings, infinite when it was
@@ -161,7 +161,7 @@ class SignalLevel(Remembering):
     move. `rounding` is the relative rounding error of a number.
     """
 
-    REMEMBERED = ("variance", "count", "rounding", "amplitude", "speed")
+    STATE = ("variance", "count", "rounding", "amplitude", "speed")
 
     variance: float
     count: float

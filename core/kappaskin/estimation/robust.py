@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from kappaskin._state import Memory, Remembering
+from kappaskin._state import StateArrays, Stateful
 from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import MarginalLikelihood, prior_root
@@ -72,7 +72,7 @@ class _OutlierResult:
 # how well, needs blocks of Q alone: K_E is off by Q_EE^-1 (Q K)_E, with covariance sigma^2 Q_EE^-1
 # (leaving one out, as in kriging: doi:10.1007/BF01033232). Leaving E out changes
 # Q to Q - Q_.E Q_EE^-1 Q_E. for the rest.
-class Robust(Estimator, Remembering):
+class Robust(Estimator, Stateful):
     """Least squares from the elements that agree with each other.
 
     An element is suspected when its three readings are further from the prediction by the others
@@ -84,7 +84,7 @@ class Robust(Estimator, Remembering):
     excluded and `Fit.converged` is false; without a `sigma` such faults may be estimated as noise.
     """
 
-    REMEMBERED = ("_history",)
+    STATE = ("_history",)
 
     def _set_up(self) -> None:
         basis, layout = self.basis, self.layout
@@ -275,26 +275,26 @@ def _element_blocks(left: Array, right: Array, P: int) -> Array:
     return np.matmul(left, right.swapaxes(1, 2))
 
 
-class _SuspectHistory(Remembering):
+class _SuspectHistory(Stateful):
     """The last frames of P elements, from which the fault of each suspect is identified."""
 
     def __init__(self, P: int) -> None:
         self._P = P
         self._frames: deque[tuple[Array, Mask, Array]] = deque(maxlen=_FRAMES)
 
-    def remembered(self, before: str = "") -> Memory:
+    def state(self, prefix: str = "") -> StateArrays:
         frames = [np.vstack(frame).astype(float) for frame in self._frames]
-        return {f"{before}frames": np.array(frames)} if frames else {}
+        return {f"{prefix}frames": np.array(frames)} if frames else {}
 
-    def recall(self, memory: Mapping[str, NDArray[np.float64]], before: str = "") -> None:
-        kept = memory.get(f"{before}frames", np.empty((0, 7, self._P)))
-        if kept.ndim != 3 or kept.shape[1:] != (7, self._P):
+    def restore(self, state: Mapping[str, NDArray[np.float64]], prefix: str = "") -> None:
+        saved = state.get(f"{prefix}frames", np.empty((0, 7, self._P)))
+        if saved.ndim != 3 or saved.shape[1:] != (7, self._P):
             raise Refusal(
-                f"expected {before}frames of shape (T, 7, {self._P}) to go on from, got "
-                f"shape {kept.shape}"
+                f"expected {prefix}frames of shape (T, 7, {self._P}) to go on from, got "
+                f"shape {saved.shape}"
             )
         self._frames.clear()
-        self._frames.extend((frame[:3], frame[3] > 0, frame[4:]) for frame in kept)
+        self._frames.extend((frame[:3], frame[3] > 0, frame[4:]) for frame in saved)
 
     def __call__(self, K: Array, suspects: Mask, off: Array) -> NDArray[np.uint8]:
         """Faults (P,) by number in `FAULTS`, for readings K (3, P) that are `off` (3, P) in 1/m."""

@@ -9,7 +9,7 @@ from typing import ClassVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kappaskin._state import Remembering
+from kappaskin._state import Stateful
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.bayes import prior_root
@@ -95,7 +95,7 @@ class TrackedUncertainty:
         return np.linalg.norm(rows @ self._half.T, axis=-1)
 
 
-class Tracking(Estimator, Remembering):
+class Tracking(Estimator, Stateful):
     """`fit = Tracking(basis, layout)`; `fit(curvature)` tracks the skin frame by frame.
 
     A Kalman filter of a plate under unknown loads (`prior_root`), whose modes move the faster the
@@ -110,7 +110,7 @@ class Tracking(Estimator, Remembering):
 
     remembers: ClassVar = True
     has_prior: ClassVar = True
-    REMEMBERED = ("_filter", "_level", "_now", "_left", "_read")
+    STATE = ("_filter", "_level", "_now", "_left", "_read")
 
     def _set_up(self) -> None:
         if not self.readable.any():
@@ -130,10 +130,10 @@ class Tracking(Estimator, Remembering):
         self._left = np.full(self._A.shape[0], np.nan)
         self._read = np.full(self._A.shape[0], -math.inf)
 
-    def recall(self, memory: Mapping[str, Array], before: str = "") -> None:
-        if f"{before}_level.variance" in memory and self._level is None:
+    def restore(self, state: Mapping[str, Array], prefix: str = "") -> None:
+        if f"{prefix}_level.variance" in state and self._level is None:
             self._level = SignalLevel(0.0, 0.0, 0.0)
-        super().recall(memory, before)
+        super().restore(state, prefix)
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
         """The fit to a skin at rest, without memory and without a trace in it."""

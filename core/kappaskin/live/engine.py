@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from kappaskin._processes import beginning_processes
+from kappaskin._processes import process_context
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
 from kappaskin.frames import Array, Estimate, Event
@@ -95,7 +95,7 @@ class Engine:
         names = self._ring.name, self._beside.name
         theirs, ours = multiprocessing.Pipe(duplex=False)
         self._requests = cast("Connection[Request, Request]", ours)
-        with beginning_processes() as context:
+        with process_context() as context:
             self._process = context.Process(
                 target=serve,
                 args=(theirs, names, self._orphans, self._patience),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kappaskin._processes import Haste
+from kappaskin._processes import ProcessPriority
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.estimation import Region
 from kappaskin.frames import Event, Frame
@@ -65,7 +65,7 @@ class Loop:
         self._compared = Compared(beside, self._builder, status.beside or Computed())
         self._taking = TareTaking(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
-        self._haste = Haste()
+        self._haste = ProcessPriority()
         self._arrivals, self._pace = Arrivals(), Pace()
         self._changing, self._again = False, math.inf
 
@@ -323,7 +323,7 @@ class Loop:
                 status,
                 accounting=source.accounting(),
                 temperature=source.temperature,
-                drift=watch.tell() if watch else None,
+                drift=watch.current() if watch else None,
                 rate=self._arrivals.rate(now),
                 reader_gap=self._arrivals.gap(now),
                 last_frame=self._arrivals.last,

@@ -92,7 +92,7 @@ class Side:
             self.told = replace(self.told, refusal=str(refusal))
             return
         if self.pipeline is not None:
-            pipeline.go_on_from(self.pipeline)
+            pipeline.continue_from(self.pipeline)
         self.pipeline, self.left = pipeline, None
         self.told = replace(
             self.told, setup=pipeline.setup, generation=pipeline.generation, slot=slot

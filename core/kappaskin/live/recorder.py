@@ -44,7 +44,7 @@ class Keeping:
         self.listen(source)
         if side.pipeline is not None:
             recorder.set_up(side.pipeline)
-            recorder.remembered(side.pipeline.remembered())
+            recorder.remembered(side.pipeline.state())
             if side.left is not None:
                 recorder.left_out(*side.left)
 
@@ -64,7 +64,7 @@ class Keeping:
     def ended(self) -> None:
         """The source brings nothing more."""
         if self._recorder is not None and self._live:
-            self._recorder.ended(time.monotonic())
+            self._recorder.disconnected(time.monotonic())
 
     def set_up(self, side: Side) -> None:
         """Another pipeline is in use."""

@@ -6,7 +6,7 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from datetime import datetime
 
-from kappaskin.calibration import Tare, Taring
+from kappaskin.calibration import Tare, TareMeasurement
 from kappaskin.contact import LoadDetector
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
@@ -41,7 +41,7 @@ class TareTaking:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._worker, self._clock = worker, clock
-        self._taring: Taring | None = None
+        self._taring: TareMeasurement | None = None
         self._found: Future[Tare] | None = None
         self.news = before
         if before.taking:
@@ -52,7 +52,7 @@ class TareTaking:
         if sensor is None:
             self._end("nothing streams: connect a sensor, then tare")
             return
-        self._taring, self._found = Taring(sensor, self._clock()), None
+        self._taring, self._found = TareMeasurement(sensor, self._clock()), None
         self.news = TareNews(True, self.news.ended)
 
     def receive(self, estimate: Estimate) -> None:

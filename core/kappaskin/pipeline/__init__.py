@@ -1,9 +1,9 @@
-"""Frame to estimate: all that a setup can precompute is computed once."""
+"""Pipeline: frames to estimates, and files of readings to files of shapes."""
 
 from kappaskin.pipeline.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline.pipeline import Setup as Setup
 from kappaskin.pipeline.quantities import QUANTITIES as QUANTITIES
 from kappaskin.pipeline.quantities import ErrorBars as ErrorBars
 from kappaskin.pipeline.quantities import Quantities as Quantities
-from kappaskin.pipeline.quantities import of_form as of_form
+from kappaskin.pipeline.quantities import curvature_invariant as curvature_invariant
 from kappaskin.pipeline.reconstruct import reconstruct as reconstruct

@@ -1,4 +1,4 @@
-"""A frame of counts to an estimate of shape and contact; everything it can is computed once."""
+"""Pipeline: a frame of counts to an estimate of shape and contact, factored once per setup."""
 
 import math
 import time
@@ -9,29 +9,69 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin._state import Memory, Remembering
+from kappaskin._state import StateArrays, Stateful
 from kappaskin.bases import Basis, ValueMap, basis_for
-from kappaskin.calibration import Calibration, Corrector, DriftWatch, Rest, Tare
+from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import NO_TOUCH, LoadDetector, PointContact, contact_geometry
-from kappaskin.errors import RankDeficient
+from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import METHODS, RIM_SD, Fit, estimator_for
-from kappaskin.frames import Array, Estimate, Frame, Truth
+from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
 from kappaskin.health import Exclusion, exclude
-from kappaskin.pipeline.frame_assembly import Hold
 from kappaskin.sensing import Sensor
 
-_LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undecided
+_LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undetermined
+
+
+class FrameAssembly(Stateful):
+    """Assembles partial scans: each channel keeps its last reading until that is `age` s old.
+
+    Ages are on the device's clock. A channel that was scanned is never filled in: on a rail it has
+    no reading, however recent the last one. A clock that went back, as of a device that restarted,
+    keeps nothing from before.
+    """
+
+    STATE = ("_values", "_times")
+
+    def __init__(self, channels: int, age: float) -> None:
+        if not (math.isfinite(age) and age >= 0):
+            raise Refusal(f"expected readings to be held for at least 0 s, got {age}")
+        self._age = age
+        self._values = np.full(channels, np.nan)
+        self._times = np.full(channels, -np.inf)
+        self._checked_list, self._list_is_whole = np.empty(0, np.intp), False
+
+    def is_whole(self, frame: Frame) -> bool:
+        """Whether every channel was read; counted once for the scans that share one list."""
+        if frame.channels is not self._checked_list:
+            counts = np.bincount(frame.channels, minlength=len(self._values))
+            self._checked_list, self._list_is_whole = frame.channels, bool((counts == 1).all())
+        return self._list_is_whole
+
+    def __call__(self, frame: Frame, curvature: Array) -> tuple[Array, Mask]:
+        """The `curvature` (3, P) of `frame` with earlier readings, and which are new (3, P)."""
+        flat = curvature.ravel()
+        if self.is_whole(frame):
+            np.copyto(self._values, flat)
+            self._times.fill(frame.device_time)
+            return curvature, np.isfinite(curvature)
+        self._times[self._times > frame.device_time + OVERTAKEN] = -np.inf
+        self._values[frame.channels] = flat[frame.channels]
+        self._times[frame.channels] = frame.device_time
+        age = frame.device_time - self._times
+        known = (age >= 0) & (age < self._age)
+        held = np.where(known, self._values, flat)
+        return held.reshape(curvature.shape), np.isfinite(curvature)
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What a person chooses of a pipeline: Ni x Nj functions, a surface of nx x ny points.
+    """Settings of a pipeline: Ni x Nj functions, a surface of nx x ny points.
 
     `edge` says which functions; empty, those for the edge that the sensor says it has. `method` is
-    one of `METHODS`. A channel
-    that a frame leaves out keeps its last reading until that is `hold` s old. Readings are taken
-    from the zero of the `tare` and corrected by the `calibration`, both of which must be the
-    sensor's own. A rim that gives is expected to move by `rim_sd` in m.
+    one of `METHODS`. A channel that a frame leaves out keeps its last reading until that is
+    `hold` s old. Readings are relative to the zero of the `tare` and corrected by the
+    `calibration`, both of which must be the sensor's own. A rim that gives is expected to move by
+    `rim_sd` in m.
     """
 
     Ni: int = 8
@@ -48,21 +88,21 @@ class Setup:
 
 @dataclass(frozen=True)
 class _Past:
-    """What a pipeline remembers of earlier frames: where the loops are, and readings it holds.
+    """The state that earlier frames left: of hysteresis and creep, and the last readings.
 
-    `passed` are frames passed over that are still to be held.
+    `passed` are frames passed over whose readings are not in it yet.
     """
 
     correct: Corrector | None
-    hold: Hold
+    hold: FrameAssembly
     passed: list[Frame] = field(default_factory=list[Frame])
 
 
 class Pipeline:
-    """Counts to curvature, coefficients, surface and contact; `pipeline(frame)` is the estimate.
+    """Counts to curvature, coefficients, surface and contact: `pipeline(frame)` is the estimate.
 
-    Raises `RankDeficient` when made for a basis that the sensor's readings do not decide. A frame
-    that lacks too many readings for it gives an estimate whose shape is NaN.
+    Raises `RankDeficient` when made for a basis that the sensor's readings do not determine. A
+    frame that lacks too many readings for it gives an estimate whose shape is NaN.
     """
 
     def __init__(
@@ -73,10 +113,12 @@ class Pipeline:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
-        self.past = _Past(self._corrector(setup.calibration), Hold(sensor.channels, setup.hold))
+        self.past = _Past(
+            self._corrector(setup.calibration), FrameAssembly(sensor.channels, setup.hold)
+        )
         self._zero = self._shift(setup.tare)
         edge = setup.edge or sensor.edge
-        self.drift = None if setup.tare is None else DriftWatch(LoadDetector(sensor, edge))
+        self.drift = None if setup.tare is None else DriftMonitor(LoadDetector(sensor, edge))
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
@@ -85,18 +127,18 @@ class Pipeline:
         self._whole = self.fit.at_rest()
         loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
         self._loosest = math.inf if self.fit.has_prior else loosest
-        self._judged, self._decided = self._whole.uncertainty, True
+        self._judged, self._determined = self._whole.uncertainty, True
         self._x, self._y = sensor.layout.patch.grid(setup.nx, setup.ny)
         points = np.stack(np.meshgrid(self._x, self._y), axis=-1).reshape(-1, 2)
         on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
-        self._touch = PointContact(sensor.plate, sensor.layout, edge)
+        self._contact = PointContact(sensor.plate, sensor.layout, edge)
         self.left_out = Exclusion.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
         self.fitted: Fit | None = None
-        """The fit that the last estimate rests on."""
+        """The fit of the last estimate."""
         self._truths: dict[tuple[object, ...], tuple[Basis, ValueMap]] = {}
 
     def _ideal(self) -> Fit:
@@ -116,7 +158,7 @@ class Pipeline:
         return calibration.start()
 
     def _shift(self, tare: Tare | None) -> Array | None:
-        """What is taken off the readings (C,) in 1/m, so that rest reads as it was calibrated."""
+        """What is subtracted from the readings (C,) in 1/m, so that rest reads as calibrated."""
         if tare is None:
             return None
         tare.check(self.sensor)
@@ -140,9 +182,9 @@ class Pipeline:
         return flat.reshape(3, -1)
 
     def rest(self) -> Rest:
-        """What a skin that lies straight now would read, as far as is known without a new tare.
+        """The expected readings of a skin that is straight now, without a new tare.
 
-        By the tare in use, or the calibration; what its loops still hold comes on top of that.
+        By the tare in use, or the calibration, and the remanence of hysteresis and creep.
         """
         correct, calibration, tare = self.past.correct, self.setup.calibration, self.setup.tare
         zero = np.zeros(self.sensor.channels)
@@ -169,7 +211,7 @@ class Pipeline:
     def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         try:
             fit = self._followed(frame, curvature, held)
-            if self._is_decided(fit):
+            if self._is_determined(fit):
                 return fit
         except RankDeficient:
             pass
@@ -178,12 +220,12 @@ class Pipeline:
             self.fit, unknown, self._no_shape, self._whole.uncertainty, 0, np.array(math.nan)
         )
 
-    def _is_decided(self, fit: Fit) -> bool:
+    def _is_determined(self, fit: Fit) -> bool:
         """Whether a shape's error bars are told; fits to the same channels mostly share them."""
         if fit.uncertainty is not self._judged:
             self._judged, norm = fit.uncertainty, np.linalg.norm(fit.unit_sd)
-            self._decided = bool(norm <= self._loosest)
-        return self._decided
+            self._determined = bool(norm <= self._loosest)
+        return self._determined
 
     def __call__(self, frame: Frame) -> Estimate:
         nominal = self.sensor.nominal(frame)
@@ -196,7 +238,7 @@ class Pipeline:
         fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
-        touch = self._touch(fit.curvature, fit) if math.isfinite(noise) else NO_TOUCH
+        touch = self._contact(fit.curvature, fit) if math.isfinite(noise) else NO_TOUCH
         if self.drift is not None:
             self.drift.follow(frame.device_time, curvature, surface, noise)
         return Estimate(
@@ -222,43 +264,43 @@ class Pipeline:
             *self._compared(surface, fit.coefficients, frame.truth),
         )
 
-    def go_on_from(self, before: "Pipeline") -> None:
-        """Take over what `before` remembers, if its readings are of the same sensor and kind."""
-        asked, was = self.setup, before.setup
-        if before.sensor is not self.sensor or asked.calibration != was.calibration:
+    def continue_from(self, before: "Pipeline") -> None:
+        """Continue from the state of `before`, if its readings are of the same sensor and kind."""
+        now, was = self.setup, before.setup
+        if before.sensor is not self.sensor or now.calibration != was.calibration:
             return
-        if (asked.tare, asked.hold) != (was.tare, was.hold):
+        if (now.tare, now.hold) != (was.tare, was.hold):
             # Another zero does not undo how the skin was bent.
             self.past = _Past(before.past.correct, self.past.hold)
             return
         self.past = before.past
-        if _estimating(self) == _estimating(before):
+        if _estimator_settings(self) == _estimator_settings(before):
             self.fit = before.fit
 
-    def remembered(self) -> Memory:
-        """What estimates depend on besides their frames, by name; also of frames passed over."""
+    def state(self) -> StateArrays:
+        """The state by name, on which estimates depend besides their frames."""
         for earlier in self.past.passed:
             self.past.hold(earlier, self.curvature(earlier))
         self.past.passed.clear()
-        found = self.past.hold.remembered("hold.")
+        found = self.past.hold.state("hold.")
         if self.past.correct is not None:
-            found |= self.past.correct.remembered("correct.")
-        if isinstance(self.fit, Remembering):
-            found |= self.fit.remembered("fit.")
+            found |= self.past.correct.state("correct.")
+        if isinstance(self.fit, Stateful):
+            found |= self.fit.state("fit.")
         return found
 
-    def recall(self, memory: Memory) -> None:
-        """Go on from what another of the same sensor and setup `remembered`."""
-        self.past.hold.recall(memory, "hold.")
+    def restore(self, state: StateArrays) -> None:
+        """Go on from the `state` of another of the same sensor and setup."""
+        self.past.hold.restore(state, "hold.")
         if self.past.correct is not None:
-            self.past.correct.recall(memory, "correct.")
-        if isinstance(self.fit, Remembering):
-            self.fit.recall(memory, "fit.")
+            self.past.correct.restore(state, "correct.")
+        if isinstance(self.fit, Stateful):
+            self.fit.restore(state, "fit.")
 
     def pass_over(self, frame: Frame) -> None:
-        """Remember the readings of a frame of which nobody waits for the estimate."""
+        """Take the readings of a frame without an estimate."""
         if self.past.correct is None and not self.fit.remembers:
-            # Of those, what a later scan of every channel replaces need never be worked out.
+            # Readings that a later scan of every channel replaces need never be computed.
             if self.past.hold.is_whole(frame):
                 self.past.passed.clear()
             self.past.passed.append(frame)
@@ -272,7 +314,7 @@ class Pipeline:
                 self._followed(frame, out(curvature), out(held))
 
     def _catch_up(self, frame: Frame) -> None:
-        """Remember the frames passed over, where `frame` does not replace all their readings."""
+        """Take the readings of frames passed over, unless `frame` replaces all of them."""
         passed = self.past.passed
         if passed and not self.past.hold.is_whole(frame):
             for earlier in passed:
@@ -298,7 +340,7 @@ class Pipeline:
         return true_surface, truth.contact, at_load, rms
 
 
-def _estimating(pipeline: Pipeline) -> tuple[object, ...]:
-    """What a setup says that the estimator depends on, besides the sensor."""
+def _estimator_settings(pipeline: Pipeline) -> tuple[object, ...]:
+    """The settings that the estimator depends on, besides the sensor."""
     setup = pipeline.setup
     return setup.method, pipeline.basis.shape, setup.edge or pipeline.sensor.edge, setup.rim_sd

@@ -1,4 +1,4 @@
-"""From an estimate to the numbers that colour a skin, point by point or element by element."""
+"""Quantities: an estimate to values at the points of its surface, or at the elements."""
 
 from functools import cached_property
 from typing import cast
@@ -31,7 +31,7 @@ _OF_FORM = ("first", "second", "mean", "gaussian")
 _AT_ONCE = 2**21  # values of functions that are worked out at once
 
 
-def of_form(name: str, form: Array) -> Array:
+def curvature_invariant(name: str, form: Array) -> Array:
     """A principal, the mean or the Gaussian curvature (...) of `form` (3, ...): xx, yy, xy."""
     xx, yy, xy = form
     if name == "gaussian":
@@ -44,10 +44,10 @@ def of_form(name: str, form: Array) -> Array:
 
 
 class ErrorBars:
-    """How far off the shape that an `estimator` finds from `curvature` (3, P) in 1/m may be.
+    """Standard deviations of the shape that an `estimator` finds from `curvature` (3, P) in 1/m.
 
-    On the surface of `x` (nx,), `y` (ny,) in m. They hold for every frame that rests on the same
-    readings, NaN among `curvature` where one is missing, for its own noise.
+    On the surface of `x` (nx,), `y` (ny,) in m. They hold for every frame with the same readings
+    missing, NaN among `curvature`, for its own noise.
     """
 
     def __init__(self, estimator: Estimator, curvature: Array, x: Array, y: Array) -> None:
@@ -62,7 +62,7 @@ class ErrorBars:
         self._shape = len(y), len(x)
 
     def _of(self, rows: Array) -> tuple[Array, Array]:
-        """Standard deviations (R,) of `rows` (R, N): for unit noise, and of what is undecided."""
+        """Standard deviations (R,) of `rows` (R, N): for unit noise, and undetermined."""
         return self._spread.sd_of(rows), np.linalg.norm(rows @ self._estimator.undecided, axis=1)
 
     def on_surface(self, noise: float) -> Array:
@@ -76,10 +76,10 @@ class ErrorBars:
 
 
 class Quantities:
-    """Numbers by their names in `QUANTITIES`, of estimates with a `basis` and one size of surface.
+    """Values of `QUANTITIES` for estimates with one `basis` and one size of surface.
 
-    What one of them takes is made when it is first asked for. `error_bars` has to be given for
-    those, which are NaN until then.
+    What a quantity needs is computed when it is first asked for. `error_bar` is NaN until
+    `error_bars` is set.
     """
 
     def __init__(self, layout: SensorLayout, basis: Basis, nx: int, ny: int) -> None:
@@ -93,7 +93,7 @@ class Quantities:
         return CurvatureFormMap(self.basis, *self.grid)
 
     @cached_property
-    def _at_elements(self) -> tuple[NDArray[np.intp], Array]:
+    def _interpolation(self) -> tuple[NDArray[np.intp], Array]:
         """For each element the corners (P, 4) of its square of the grid, and their weights."""
         x, y = self.grid
         cell = np.array([x[1] - x[0], y[1] - y[0]])
@@ -111,9 +111,11 @@ class Quantities:
         return corners, weights / weights.sum(axis=1, keepdims=True)
 
     def at_rest(self, name: str) -> float:
-        """What a skin at rest has, in SI units."""
+        """The value of a skin at rest, in SI units."""
         H = self.layout.patch.base_curvature
-        return float(of_form(name, np.array([H, 0.0, 0.0]))) if name in _OF_FORM else 0.0
+        return (
+            float(curvature_invariant(name, np.array([H, 0.0, 0.0]))) if name in _OF_FORM else 0.0
+        )
 
     def on_surface(self, name: str, estimate: Estimate) -> Array:
         """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
@@ -126,7 +128,7 @@ class Quantities:
             unknown = np.full(estimate.surface.shape, np.nan)
             return unknown if bars is None else bars.on_surface(estimate.noise)
         if name in _OF_FORM:
-            return of_form(name, self._form(estimate.coefficients))
+            return curvature_invariant(name, self._form(estimate.coefficients))
         if name not in COMPONENTS:
             raise Refusal(f"expected a quantity that a surface has, got {name!r}; ask of_elements")
         if name not in self._changes:
@@ -140,7 +142,9 @@ class Quantities:
         """
         xx, yy, xy = form = self._form(estimate.coefficients)
         angle = np.arctan2(xy, (xx - yy) / 2) / 2
-        return np.stack([of_form("first", form), of_form("second", form), angle])
+        return np.stack(
+            [curvature_invariant("first", form), curvature_invariant("second", form), angle]
+        )
 
     def of_elements(self, name: str, estimate: Estimate) -> Array:
         """The values (P,) in SI units: of curvature as each element reads it; NaN where missing."""
@@ -149,12 +153,12 @@ class Quantities:
         if name.startswith("residual_"):
             return estimate.residual[COMPONENTS.index(name.removeprefix("residual_"))]
         if name in _OF_FORM:
-            return of_form(name, self._read(estimate.curvature))
-        corners, weights = self._at_elements
+            return curvature_invariant(name, self._form_at_elements(estimate.curvature))
+        corners, weights = self._interpolation
         values = self.on_surface(name, estimate).ravel()[corners]
         return np.sum(np.where(weights > 0, values, 0.0) * weights, axis=1)
 
-    def _read(self, curvature: Array) -> Array:
+    def _form_at_elements(self, curvature: Array) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
         patch = self.layout.patch
         form = curvature + np.array([[patch.base_curvature], [0.0], [0.0]])

@@ -1,4 +1,4 @@
-"""A file of curvature readings to a file of shapes."""
+"""Reconstruction from a file of curvature readings to arrays of shapes."""
 
 import zipfile
 import zlib
@@ -186,18 +186,18 @@ def reconstruct(
             raise Refusal(f"expected one rigidity in N m, got shape {rigidity.shape}")
         plate = Plate(patch, 1.0 if rigidity is None else float(rigidity.item()))
         fitter = estimator_for(method, functions, layout)
-        touch_of = PointContact(plate, layout, edge)
+        contact_of = PointContact(plate, layout, edge)
         fits = [fitter(frame) for frame in curvature]
-        touches = [touch_of(one.curvature, one) for one in fits]
-        out |= _contacts(fits, touches, forces=rigidity is not None)
+        contacts = [contact_of(one.curvature, one) for one in fits]
+        out |= _contacts(fits, contacts, forces=rigidity is not None)
         if objects:
             find = ObjectFinder(plate, layout, edge)
             noises = [float(one.noise) for one in fits]
-            out |= _objects([find(*each) for each in zip(curvature, noises, touches, strict=True)])
+            out |= _objects([find(*each) for each in zip(curvature, noises, contacts, strict=True)])
     return out
 
 
-def _contacts(fits: list[Fit], touches: list[Touch], forces: bool) -> dict[str, NDArray[Any]]:
+def _contacts(fits: list[Fit], contacts: list[Touch], forces: bool) -> dict[str, NDArray[Any]]:
     """The contact of each frame and the skin's geometry there; NaN where there is none.
 
     `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m; `normal`
@@ -205,14 +205,14 @@ def _contacts(fits: list[Fit], touches: list[Touch], forces: bool) -> dict[str, 
     `forces` also `force` and `force_sd` (T,) in N. `single` and `near_rim` (T,) say whether to
     trust them (`Touch`). All readings weigh the same.
     """
-    there = [contact_geometry(one, touch) for one, touch in zip(fits, touches, strict=True)]
+    there = [contact_geometry(one, contact) for one, contact in zip(fits, contacts, strict=True)]
     names = ["displacement", "displacement_sd", "single", "near_rim"]
     names += ["force", "force_sd"] if forces else []
     out = {
-        "contact": np.stack([touch.position for touch in touches]),
-        "contact_sd": np.stack([touch.position_sd for touch in touches]),
+        "contact": np.stack([contact.position for contact in contacts]),
+        "contact_sd": np.stack([contact.position_sd for contact in contacts]),
     }
-    out |= {name: np.array([getattr(touch, name) for touch in touches]) for name in names}
+    out |= {name: np.array([getattr(contact, name) for contact in contacts]) for name in names}
     for name in ("normal", "curvature_form", "torsion_form", "principal"):
         out[name] = np.stack([getattr(geometry, name) for geometry in there])
     return out

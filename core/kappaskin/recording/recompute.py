@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
-from kappaskin._state import Memory
+from kappaskin._state import StateArrays
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Frame
 from kappaskin.pipeline import Pipeline, Setup
@@ -31,7 +31,7 @@ class Retrace:
         self._reenact = Reenactment(str(recording.path))
         self.sensor: Sensor | None = None
         self.pipeline: Pipeline | None = None
-        self._memory: Memory = {}
+        self._memory: StateArrays = {}
         self._made = 0
         self._waiting: deque[Frame] = deque()
         self._last: Estimate | None = None
@@ -93,13 +93,13 @@ class Retrace:
         self._pass_over(len(self._waiting))
         was, made = self.pipeline, Pipeline(self.sensor, setup, self._made)
         if was is not None:
-            made.go_on_from(was)
+            made.continue_from(was)
         self.pipeline, self._made = made, self._made + 1
 
     def _pass_over(self, count: int) -> None:
         """Let the first `count` of the frames that wait be remembered."""
         if self.pipeline is not None and self._memory:
-            self.pipeline.recall(self._memory)
+            self.pipeline.restore(self._memory)
             self._memory = {}
         for _ in range(count):
             frame = self._waiting.popleft()

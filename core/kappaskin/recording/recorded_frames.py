@@ -13,17 +13,7 @@ from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import Message
 from kappaskin.sensing import Sensor
-from kappaskin.sources import (
-    Accounting,
-    Command,
-    Decoder,
-    FromDevice,
-    Information,
-    Interpreter,
-    Known,
-    RecordedClock,
-    Samples,
-)
+from kappaskin.sources import Accounting, ClockState, Decoder, Interpreter, RecordedClock, wire
 
 _UNREAD = 2**16  # messages kept until the device says what they are of
 _FUNCTIONS = 128  # of a truth along one side, at most
@@ -40,7 +30,7 @@ class Reenactment:
         self._times = RecordedClock()
         self._means = Interpreter(name, made)
         self._means.begin(self._times)
-        self._pending: deque[tuple[float, FromDevice]] = deque(maxlen=_UNREAD)
+        self._pending: deque[tuple[float, wire.FromDevice]] = deque(maxlen=_UNREAD)
         self._truth: Truth | None = None
 
     @property
@@ -89,28 +79,28 @@ class Reenactment:
 
     def _map(self, said: dict[str, Any]) -> None:
         numbers = (said[name] for name in ("at", "offset", "half", "drift", "spread"))
-        known = Known((*numbers, bool(said["doubted"])), int(said["wraps"]), said["last"])
+        known = ClockState((*numbers, bool(said["doubted"])), int(said["wraps"]), said["last"])
         if math.isnan(said["since"]):
-            self._times.recall(known)
+            self._times.restore(known)
         else:
-            self._times.coming.append((said["since"], known))
+            self._times.changes.append((said["since"], known))
 
     def _came(self, now: float, data: bytes) -> Iterator[Frame]:
         messages = self._decoder.feed(data)
-        self._pending += [(now, got) for got in messages if not isinstance(got, Command)]
+        self._pending += [(now, got) for got in messages if not isinstance(got, wire.Command)]
         if not self._means.known and not self._introduced():
             return
         while self._pending:
             now, message = self._pending.popleft()
-            if isinstance(message, Information):
+            if isinstance(message, wire.Information):
                 self._means.learn(message.text)
-            elif isinstance(message, Samples) and (frame := self._means.frame(message, now)):
+            elif isinstance(message, wire.Samples) and (frame := self._means.frame(message, now)):
                 yield replace(frame, truth=self._truth)
 
     def _introduced(self) -> bool:
         """Whether the device is known, now that it has been looked for in what came."""
         for _, message in self._pending:
-            if isinstance(message, Information):
+            if isinstance(message, wire.Information):
                 self._means.learn(message.text)
                 break
         return self._means.known

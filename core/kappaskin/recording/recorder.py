@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kappaskin._state import Memory, Remembering
+from kappaskin._state import StateArrays, Stateful
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Event, Frame, Truth
 from kappaskin.pipeline import Pipeline
@@ -16,7 +16,7 @@ from kappaskin.recording.disk import Disk
 from kappaskin.recording.setup_text import said_of_setup
 from kappaskin.recording.writing import RecordingFile, Written
 from kappaskin.scenes import Scene, write_scene
-from kappaskin.sources import Known
+from kappaskin.sources import ClockState
 
 _CONTACTS = 1000.0  # a second at most
 _HEAVY = 50.0  # a second at most, of what is as large as a frame
@@ -60,10 +60,10 @@ class Recorder:
 
     # What the source tells.
 
-    def met(self, text: str) -> None:
-        self._file.put(m.DEVICE, self._now, encode(m.STRING, {"data": text}))
+    def connected(self, information: str) -> None:
+        self._file.put(m.DEVICE, self._now, encode(m.STRING, {"data": information}))
 
-    def came(self, host_time: float, data: bytes) -> None:
+    def received(self, host_time: float, data: bytes) -> None:
         self._now = host_time
         self._file.put(m.LINES, host_time, m.pack_line(host_time, False, data))
 
@@ -71,12 +71,12 @@ class Recorder:
         self._now = host_time
         self._file.put(m.LINES, host_time, m.pack_line(host_time, True, data))
 
-    def ended(self, host_time: float) -> None:
-        """No bytes at all came: the line is gone."""
-        self.came(host_time, b"")
+    def disconnected(self, host_time: float) -> None:
+        """Recorded as no bytes at all."""
+        self.received(host_time, b"")
 
-    def mapped(self, since: float, known: Known) -> None:
-        at, offset, half, drift, spread, doubted = known.map
+    def clock(self, since: float, state: ClockState) -> None:
+        at, offset, half, drift, spread, doubted = state.map
         said = {
             "since": since,
             "at": at,
@@ -85,8 +85,8 @@ class Recorder:
             "drift": drift,
             "spread": spread,
             "doubted": doubted,
-            "wraps": known.wraps,
-            "last": known.last,
+            "wraps": state.wraps,
+            "last": state.last,
         }
         self._file.put(m.CLOCKS, self._now, encode(m.CLOCK, said))
 
@@ -127,7 +127,7 @@ class Recorder:
         self._file.put(m.SETUP, self._now, encode(m.STRING, {"data": text}))
         self._views = _Views(pipeline)
 
-    def remembered(self, memory: Memory) -> None:
+    def remembered(self, memory: StateArrays) -> None:
         """The pipeline goes on from this."""
         for name, values in memory.items():
             said = {"name": name, "shape": values.shape, "values": values.ravel()}
@@ -213,7 +213,7 @@ class _Views:
         self._cloud = Layout(m.POINT_CLOUD, cloud)
         self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
         fit = pipeline.fit
-        self.every = isinstance(fit, Remembering) and not fit.remembers
+        self.every = isinstance(fit, Stateful) and not fit.remembers
         """Whether estimates depend on which others were made, and so all have to be told."""
         bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
         self.room = _Room(min(_HEAVY, _BYTES / bytes_each))

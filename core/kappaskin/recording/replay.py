@@ -16,7 +16,7 @@ from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import Message, Recording
 from kappaskin.recording.recorded_frames import Reenactment
 from kappaskin.sensing import Sensor
-from kappaskin.sources import Accounting, Tape, register_scheme
+from kappaskin.sources import Accounting, InputRecorder, register_scheme
 
 REPLAY = "replay:"
 FASTEST = 10.0
@@ -287,7 +287,7 @@ class ReplayedSource:
         told, self._events = self._events, []
         return told
 
-    def record(self, tape: Tape | None) -> None:
+    def record(self, recorder: InputRecorder | None) -> None:
         """Not recorded again: it is a recording."""
 
     def accounting(self) -> Accounting:

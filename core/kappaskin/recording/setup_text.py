@@ -7,7 +7,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
-from kappaskin.calibration import calibration_in, tare_in, tare_text, to_toml
+from kappaskin.calibration import (
+    calibration_from_toml,
+    calibration_to_toml,
+    tare_from_toml,
+    tare_to_toml,
+)
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS
 from kappaskin.pipeline import Setup
@@ -27,10 +32,10 @@ def said_of_setup(setup: Setup) -> tuple[str, dict[str, bytes]]:
     files: dict[str, bytes] = {}
     if setup.calibration is not None:
         said["calibration"] = f"calibration-{setup.calibration.digest[:16]}.toml"
-        files[said["calibration"]] = to_toml(setup.calibration).encode()
+        files[said["calibration"]] = calibration_to_toml(setup.calibration).encode()
     if setup.tare is not None:
         said["tare"] = f"tare-{setup.tare.digest[:16]}.toml"
-        files[said["tare"]] = tare_text(setup.tare).encode()
+        files[said["tare"]] = tare_to_toml(setup.tare).encode()
     return json.dumps(said), files
 
 
@@ -52,9 +57,9 @@ def setup_from(text: str, file: Callable[[str], bytes]) -> Setup:
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise Refusal(f"expected a setup as it was recorded: {error!s:.120}") from error
     if name := said.get("calibration"):
-        values["calibration"] = calibration_in(file(str(name)), Path(str(name)))
+        values["calibration"] = calibration_from_toml(file(str(name)), Path(str(name)))
     if name := said.get("tare"):
-        values["tare"] = tare_in(file(str(name)), str(name))
+        values["tare"] = tare_from_toml(file(str(name)), str(name))
     return Setup(**values)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin._state import Remembering
+from kappaskin._state import Stateful
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 
@@ -66,10 +66,10 @@ class PrandtlIshlinskii:
         return PlayFilter(self)
 
 
-class PlayFilter(Remembering):
+class PlayFilter(Stateful):
     """The positions of all plays; each call with a frame moves them."""
 
-    REMEMBERED = ("_w",)
+    STATE = ("_w",)
 
     def __init__(self, operator: PrandtlIshlinskii) -> None:
         self._r, self._p = operator.thresholds, operator.weights
@@ -135,10 +135,10 @@ class StandardLinearSolid:
         return InverseCreepFilter(self)
 
 
-class _CreepState(Remembering):
+class _CreepState(Stateful):
     """The slow part s and the curvature before, both (C,)."""
 
-    REMEMBERED = ("_s", "_x", "_time")
+    STATE = ("_s", "_x", "_time")
 
     def __init__(self, solid: StandardLinearSolid) -> None:
         self._share, self._tau = solid.share, solid.time_constant

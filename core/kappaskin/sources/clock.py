@@ -1,4 +1,4 @@
-"""Times on a device's clock to times on this machine's, with how far they may be out."""
+"""Clock map: times on a device's clock to times on this machine's, with error bounds."""
 
 import math
 from collections import deque
@@ -21,8 +21,8 @@ _WRAP = 2**32 * 1e-6  # s after which a counter of 32 bits in us begins again at
 _LONGEST = 2**64 * 1e-6  # s, what the wire can say
 
 
-class Known(NamedTuple):
-    """What is known of a clock: the `map` that `ClockMap` tells, and how its counter went on.
+class ClockState(NamedTuple):
+    """State of a clock map: the `map` itself, and how often the device's counter has wrapped.
 
     `map` is at, offset, half, drift, spread (see `ClockMap.bound`) and whether they are in doubt.
     """
@@ -33,7 +33,7 @@ class Known(NamedTuple):
 
 
 class ClockMap:
-    """Tells the host time of a device time, and within which bound.
+    """Maps device times to host times, each within a bound.
 
     Nothing arrives before it was sent: an exchange bounds host time minus device time from both
     sides, any other message from one. The clocks drift apart evenly, but for a few parts per
@@ -41,7 +41,7 @@ class ClockMap:
     however unequal they are, and one that was delayed only bounds less.
 
     `steps` counts how often the bounds contradicted each other twice running: the device restarted,
-    or one of the clocks was set or stood still. The map then begins anew. All times are in s.
+    or one of the clocks was set or stood still. The map then starts over. All times are in s.
     """
 
     def __init__(self) -> None:
@@ -98,10 +98,10 @@ class ClockMap:
         return self._spread * 1e6 if len(self._exchanges) > 1 else math.inf
 
     @property
-    def known(self) -> Known:
+    def state(self) -> ClockState:
         """All that `taken`, `sd` and `unwrap` depend on."""
-        told = self._at, self._offset, self._half, self._drift, self._spread, self._doubted > 0
-        return Known(told, self._wraps, self._last)
+        map_ = self._at, self._offset, self._half, self._drift, self._spread, self._doubted > 0
+        return ClockState(map_, self._wraps, self._last)
 
     # What comes.
 
@@ -161,7 +161,7 @@ class ClockMap:
             self._unanswered += 1
             if self._unanswered < _DOUBTS:
                 return
-            self._begin_anew()
+            self._start_over()
         self._unanswered = 0
         self._latest = max(self._latest, answered) if not first else answered
         self._keep(answered, low, high)
@@ -174,12 +174,12 @@ class ClockMap:
             self._doubted += 1
             if self._doubted < _DOUBTS:
                 return
-            self._begin_anew()
+            self._start_over()
         self._latest = device_time
         self._messages.append((device_time, host_time - device_time))
         self._fit()
 
-    def _begin_anew(self) -> None:
+    def _start_over(self) -> None:
         self.steps += 1
         self._latest = -math.inf
         self._forget()
@@ -202,7 +202,7 @@ class ClockMap:
         one_sided = math.isinf(self._half)
         self._delayed = self._delayed + 1 if one_sided and self._least > _DELAY else 0
         if self._delayed >= _DOUBTS:
-            self._begin_anew()
+            self._start_over()
             self._latest = time
         self._messages.append((time, host_time - time))
         self._fit()
@@ -227,7 +227,7 @@ class ClockMap:
         most = float(np.min(high + drift * ago + spread * np.abs(ago)))
         if spread < 0 or least > most:
             # Together they contradict each other, though no two in a row did: the drift changed.
-            self._begin_anew()
+            self._start_over()
             return
         half = (most - least) / 2
         self._know(self._latest, least + half, half, drift, spread + _WANDER)
@@ -238,27 +238,28 @@ def _possible(device_time: float, host_time: float) -> bool:
 
 
 class RecordedClock(ClockMap):
-    """The map that a recorded one was at each of its scans: `coming` says how it changes, and when.
+    """A clock map with the states that a recorded one had, each from one scan on.
 
-    Device times, as `unwrap` gives them, of the scans from which on it is another.
+    `changes` are those to come: the device time, as `unwrap` gives it, of the first scan, and the
+    state from then on.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.coming: deque[tuple[float, Known]] = deque(maxlen=_MESSAGES)
+        self.changes: deque[tuple[float, ClockState]] = deque(maxlen=_MESSAGES)
 
-    def recall(self, known: Known) -> None:
-        """Go on from what was known at one moment."""
-        self._wraps, self._last = known.wraps, known.last
-        self._go_over(known)
+    def restore(self, state: ClockState) -> None:
+        """Continue from a recorded state."""
+        self._wraps, self._last = state.wraps, state.last
+        self._set_map(state)
 
-    def _go_over(self, known: Known) -> None:
-        self._know(*known.map[:5])
-        self._doubted = int(known.map[5])
+    def _set_map(self, state: ClockState) -> None:
+        self._know(*state.map[:5])
+        self._doubted = int(state.map[5])
 
     def heard(self, device_time: float, host_time: float) -> None:
-        if any(since == device_time for since, _ in self.coming):
+        if any(since == device_time for since, _ in self.changes):
             since = math.nan
             while since != device_time:
-                since, known = self.coming.popleft()
-                self._go_over(known)
+                since, state = self.changes.popleft()
+                self._set_map(state)

@@ -1,13 +1,13 @@
-"""A stream of bytes, cut anywhere, to the messages in it; nothing is lost without being counted."""
+"""Decoder: the messages in a stream of bytes, and the accounting of every byte and message."""
 
 from binascii import crc32, crc_hqx
 from collections import Counter
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.sources.accounting import Accounting, Sequence
 from kappaskin.sources.wire import (
     CHECKED,
     CHECKSUM,
@@ -16,8 +16,8 @@ from kappaskin.sources.wire import (
     LONGEST,
     MAGIC,
     VERSION,
-    Kind,
     Message,
+    MessageKind,
     Samples,
     read_command,
     read_information,
@@ -25,17 +25,144 @@ from kappaskin.sources.wire import (
     unpack_runs,
 )
 
-FROM_DEVICE = frozenset((Kind.INFORMATION, Kind.SAMPLES, Kind.REPLY))
-FROM_HOST = frozenset((Kind.COMMAND,))
+SEQUENCES = 2**32
+"""Sequence numbers there are, before they begin again at 0."""
 
+_LATE = 64  # how far back a sequence number may be late rather than a restart of the device
+
+_SMALLEST_SHARE = 1e-5  # share below which its size is not told
+
+FROM_DEVICE = frozenset((MessageKind.INFORMATION, MessageKind.SAMPLES, MessageKind.REPLY))
+FROM_HOST = frozenset((MessageKind.COMMAND,))
 _WHOLE = 0x2144DF1C  # the CRC-32 of any bytes that their own CRC-32 follows
-_SAMPLES = int(Kind.SAMPLES)
+_SAMPLES_KIND = int(MessageKind.SAMPLES)
 _COUNTS = np.dtype(np.int32)
-_LISTS = 64  # scan lists that are remembered as arrays
+_LISTS = 64  # scan lists that are cached as arrays
 
 
-class _List(NamedTuple):
-    """The `head` of a samples payload, its channels and how counts are told; `size` of it all."""
+@dataclass(frozen=True, slots=True)
+class Accounting:
+    """Counts of every byte and every sequence number since a source was opened, by their fate.
+
+    bytes_in = bytes_good + sum of discarded + buffered; good = accepted + duplicate;
+    span = accepted + lost.
+    """
+
+    bytes_in: int = 0
+    bytes_good: int = 0
+    discarded: tuple[tuple[str, int], ...] = ()
+    buffered: int = 0
+    good: int = 0
+    accepted: int = 0
+    duplicate: int = 0
+    lost: int = 0
+    span: int = 0
+    restarts: int = 0
+    other_version: int | None = None
+
+    @property
+    def bytes_discarded(self) -> int:
+        return sum(n for _, n in self.discarded)
+
+    @property
+    def words(self) -> str:
+        """Losses as text, such as "12 of 30,210 messages lost; 0.3 % of bytes discarded"."""
+        parts = [f"{self.lost:,} of {self.span:,} messages lost"]
+        if thrown := self.bytes_discarded:
+            why = ", ".join(f"{reason} {n:,}" for reason, n in self.discarded if n)
+            parts.append(f"{_percent(thrown / self.bytes_in)} of bytes discarded: {why}")
+        if self.restarts:
+            times = "once" if self.restarts == 1 else f"{self.restarts} times"
+            parts.append(f"the device restarted {times}")
+        return "; ".join(parts)
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the three sums hold, as they always do."""
+        return (
+            self.bytes_in == self.bytes_good + self.bytes_discarded + self.buffered
+            and self.good == self.accepted + self.duplicate
+            and self.span == self.accepted + self.lost
+        )
+
+
+def _percent(share: float) -> str:
+    return (
+        f"under {100 * _SMALLEST_SHARE:g} %"
+        if share < _SMALLEST_SHARE
+        else f"{float(f'{100 * share:.2g}'):g} %"
+    )
+
+
+class SequenceCounter:
+    """Counts accepted, duplicate, late and lost sequence numbers, through wrap and restart."""
+
+    def __init__(self) -> None:
+        self.good = self.accepted = self.duplicate = self.lost = self.span = self.restarts = 0
+        self._next: int | None = None
+        # The number expected when the connection was lost, and the first one since.
+        self._before: int | None = None
+        self._first: int | None = None
+        self._missing: set[int] = set()
+
+    def take(self, sequence: int) -> bool:
+        """Count one good message; False when it came before."""
+        self.good += 1
+        if sequence == self._next and not self._missing:  # nearly all of them
+            self.span += 1
+            self.accepted += 1
+            self._next = (sequence + 1) % SEQUENCES
+            return True
+        if self._next is None:
+            self._first = sequence
+        expected = sequence if self._next is None else self._next
+        ahead = (sequence - expected) % SEQUENCES
+        if ahead < SEQUENCES // 2:
+            self._advance(sequence, ahead)
+        elif SEQUENCES - ahead > _LATE:
+            self.restarts += 1
+            self._missing.clear()
+            self._advance(sequence, 0)
+        elif sequence in self._missing:
+            self._missing.remove(sequence)
+            self.lost -= 1
+        else:
+            self.duplicate += 1
+            return False
+        self.accepted += 1
+        return True
+
+    def interrupt(self) -> None:
+        """The connection was lost; `resume` says later whether the numbers continue."""
+        if self._next is not None:
+            self._before = self._next
+        self._next = self._first = None
+        self._missing.clear()
+
+    def resume(self, same: bool) -> None:
+        """Say whether the numbers since are of the `same` run of the device, or it restarted."""
+        if self._before is None or self._first is None:
+            return
+        gap = (self._first - self._before) % SEQUENCES
+        if same and gap < SEQUENCES // 2:
+            self.lost += gap
+            self.span += gap
+        else:
+            self.restarts += 1
+        self._before = None
+
+    def _advance(self, sequence: int, gap: int) -> None:
+        self.lost += gap
+        self.span += gap + 1
+        self._next = (sequence + 1) % SEQUENCES
+        recent = min(gap, _LATE)
+        self._missing.update((sequence - q) % SEQUENCES for q in range(1, recent + 1))
+        if self._missing:
+            self._missing = {s for s in self._missing if (self._next - s) % SEQUENCES <= _LATE}
+
+
+class _ScanList(NamedTuple):
+    """The `head` of a samples payload, its channels and the type of counts; `size` of it all."""
 
     head: bytes
     size: int
@@ -43,21 +170,21 @@ class _List(NamedTuple):
     kind: "np.dtype[np.signedinteger]"
 
 
-_NO_LIST = _List(b"", -1, np.empty(0, np.intp), np.dtype("<i2"))
+_NO_LIST = _ScanList(b"", -1, np.empty(0, np.intp), np.dtype("<i2"))
 
 
 class Decoder:
-    """Takes bytes as they come and gives the messages of `kinds` in them; never raises."""
+    """Finds the messages of `kinds` in bytes as they arrive; never raises."""
 
-    def __init__(self, kinds: frozenset[Kind] = FROM_DEVICE) -> None:
-        self.sequence = Sequence()
+    def __init__(self, kinds: frozenset[MessageKind] = FROM_DEVICE) -> None:
+        self.sequence = SequenceCounter()
         self._kinds = kinds
         self._parts: list[bytes] = []  # joined once they may hold a message, not at every read
         self._held, self._needed = 0, HEAD
         self._bytes_in = self._bytes_good = 0
         self._discarded: Counter[str] = Counter()
         self._other_version: int | None = None
-        self._lists: dict[bytes, _List] = {}
+        self._lists: dict[bytes, _ScanList] = {}
         self._list = _NO_LIST  # of the last scan
 
     def feed(self, data: bytes) -> list[Message]:
@@ -86,7 +213,7 @@ class Decoder:
                 message = "version"
             elif kind not in self._kinds:
                 message = "unknown kind"
-            elif kind == _SAMPLES:
+            elif kind == _SAMPLES_KIND:
                 message = self._samples(sequence, time_us * 1e-6, stream, at + HEAD, last)
             else:
                 message = _read(kind, sequence, time_us * 1e-6, stream[at + HEAD : last])
@@ -103,7 +230,7 @@ class Decoder:
         return messages
 
     def _skip(self, stream: bytes, at: int, reason: str) -> int:
-        """Throw bytes away up to where the next message may begin; where that is."""
+        """Discard bytes up to where the next message may begin; where that is."""
         found = stream.find(MAGIC, at + 1)
         if found < 0:
             found = max(at + 1, len(stream) - stream.endswith(MAGIC[:1]))
@@ -122,7 +249,7 @@ class Decoder:
         return Samples(sequence, time, channels, counts)
 
     def _take_list(self, stream: bytes, at: int, stop: int) -> bool:
-        """Go over to the list of channels that a payload begins with; whether it is one."""
+        """Use the list of channels that a payload begins with; whether it is a valid one."""
         if stop - at < 2:
             return False
         head = stream[at : at + 2 + 4 * stream[at + 1]]
@@ -132,7 +259,7 @@ class Decoder:
         self._list = found
         return True
 
-    def _new_list(self, head: bytes) -> _List | None:
+    def _new_list(self, head: bytes) -> _ScanList | None:
         width, channels = head[0], unpack_runs(head[1:])
         if width not in (2, 4) or channels is None:
             return None
@@ -140,7 +267,7 @@ class Decoder:
         if len(self._lists) == _LISTS:
             self._lists.clear()
         size = len(head) + width * len(channels)
-        found = _List(head, size, channels, np.dtype(f"<i{width}"))
+        found = _ScanList(head, size, channels, np.dtype(f"<i{width}"))
         self._lists[head] = found
         return found
 
@@ -168,16 +295,16 @@ class Decoder:
         )
 
     def line_ended(self) -> None:
-        """Count what is buffered as cut off: the rest of it will not come."""
+        """Count what is buffered as cut off: the rest of it will not arrive."""
         if self._held:
             self._discarded["cut off"] += self._held
             self._parts, self._held, self._needed = [], 0, HEAD
 
 
 def _read(kind: int, sequence: int, time: float, payload: bytes) -> Message | str:
-    """What a payload says, or why it means nothing."""
-    if kind == Kind.INFORMATION:
+    """The message in a payload, or why there is none."""
+    if kind == MessageKind.INFORMATION:
         return read_information(sequence, time, payload) or "content"
-    if kind == Kind.REPLY:
+    if kind == MessageKind.REPLY:
         return read_reply(sequence, time, payload) or "content"
     return read_command(sequence, payload) or "content"

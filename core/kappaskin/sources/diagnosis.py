@@ -1,4 +1,4 @@
-"""One port to what is on it and how well it does, or why nothing can be read from it."""
+"""Diagnosis of a port: what is on it and how well it works, and a monitor of its messages."""
 
 import math
 import time
@@ -6,26 +6,37 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+import numpy as np
+
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
-from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.ports import port_called
-from kappaskin.sources.serial_line import SerialSource
+from kappaskin.sources import information
+from kappaskin.sources.clock import ClockMap
+from kappaskin.sources.commands import DeviceCommands, operation_name
+from kappaskin.sources.decoder import SEQUENCES, Accounting, Decoder
+from kappaskin.sources.ports import BaudRateSearch, SerialConnection, port_called
+from kappaskin.sources.serial_source import SerialSource
+from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
-_FEW = 3  # frames that tell no rate
+_FEWEST_FRAMES = 3  # frames that tell no rate
 _SOON = 0.02  # s that a read may wait
 _SEARCH = 10.0  # s in which every baud rate has been tried
-_LISTEN = 2.0  # s that a device which is known is listened to
+_LISTEN = 2.0  # s that a known device is read for
+
+_SHOWN = 0.1  # s between two samples that are shown: nobody reads 500 lines a second
+_SILENCE = 3.0  # s of silence, after which the usual causes are named
+_RATE_DWELL = 0.8  # s of unreadable bytes, after which another baud rate is tried
+_COUNTS_SHOWN = 6  # counts that are shown of a scan
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found on `port`, which its plug describes as `plug`; `why` is empty if all is well.
+    """What was found on `port`, described as `plug`; `why` is empty if all is well.
 
-    `device` says its name, serial number and firmware, empty where it did not say. `rate` in
-    frames/s is measured, `said_rate` what it says; `clock_sd` in s is how well the time of a
-    reading is known on this machine's clock, infinite where the device does not tell; NaN where
-    nothing was measured.
+    `device` is its name, serial number and firmware, empty where it did not send them. `rate` in
+    frames/s is measured, `said_rate` is from its information; `clock_sd` in s is the standard
+    deviation of the time of a reading on this machine's clock, infinite where the device does not
+    answer pings; NaN where nothing was measured.
     """
 
     port: str
@@ -49,19 +60,19 @@ class Diagnosis:
 
 
 def diagnose(url: str, clock: Callable[[], float] = time.monotonic) -> Diagnosis:
-    """What is on the port or URL, after looking for a few seconds."""
+    """What is on the port or URL, after reading it for a few seconds."""
     plug = port_called(url).words
     try:
         source = SerialSource(url, clock)
     except SourceError as error:
         return Diagnosis(url, plug, str(error))
     try:
-        return _looked_at(source, plug, clock)
+        return _diagnosed(source, plug, clock)
     finally:
         source.close()
 
 
-def _looked_at(source: SerialSource, plug: str, clock: Callable[[], float]) -> Diagnosis:
+def _diagnosed(source: SerialSource, plug: str, clock: Callable[[], float]) -> Diagnosis:
     end = clock() + _SEARCH
     while source.sensor is None and clock() < end and not _settled(source):
         source.read(_SOON)
@@ -69,12 +80,10 @@ def _looked_at(source: SerialSource, plug: str, clock: Callable[[], float]) -> D
     end = clock() + _LISTEN
     while sensor is not None and clock() < end and not source.trouble:
         frames += source.read(_SOON)
-    rate, clock_sd = _pace(frames)
+    rate, clock_sd = _frame_rate(frames)
     why = source.trouble
     if sensor is not None and not frames:
-        why = (
-            why or f"{source.url}: the device says what it is but sends no readings; start it anew"
-        )
+        why = why or f"{source.url}: the device says what it is but sends no readings; restart it"
     return Diagnosis(
         source.url,
         plug,
@@ -90,15 +99,179 @@ def _looked_at(source: SerialSource, plug: str, clock: Callable[[], float]) -> D
 
 
 def _settled(source: SerialSource) -> bool:
-    """Whether the trouble is one that no other baud rate can mend."""
+    """Whether the trouble is one that no other baud rate can solve."""
     seen = source.accounting()
     understood = seen.good > 0 or seen.other_version is not None
     return bool(source.trouble) and (understood or not seen.bytes_in)
 
 
-def _pace(frames: list[Frame]) -> tuple[float, float]:
-    """How many of `frames` came in a second, and how well the time of the last is known, in s."""
-    if len(frames) < _FEW:
+def _frame_rate(frames: list[Frame]) -> tuple[float, float]:
+    """Frames per second, and the standard deviation of the time of the last one in s."""
+    if len(frames) < _FEWEST_FRAMES:
         return math.nan, math.inf
     span = frames[-1].device_time - frames[0].device_time
     return (len(frames) - 1) / span if span > 0 else math.nan, frames[-1].taken_sd
+
+
+class WireMonitor:
+    """The messages on a port or URL as lines of text; greets the device, and pings it.
+
+    Opening raises a `SourceError` that says why it cannot be. `lost` once the connection broke.
+    """
+
+    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self.url, self._clock = url, clock
+        self._connection, self._decoder = SerialConnection(url, clock), Decoder()
+        self._rates = BaudRateSearch(self._connection.baud_rate)
+        self._commands = DeviceCommands(self._connection.write, ClockMap())
+        self._began = self._received_at = self._good_at = self._tuned_at = clock()
+        self._shown, self._unshown, self._samples = -math.inf, 0, 0
+        self._last: int | None = None
+        self._reported = Accounting()
+        self.lost = False
+        self._commands.greet(self._began)
+
+    def reset(self) -> None:
+        """Let DTR and RTS fall and rise again, at which many boards restart."""
+        self._connection.reset()
+
+    def read(self, timeout: float) -> list[str]:
+        """A line for each message and problem, after at most `timeout` s."""
+        lost, lines = self._connection.lost, list[str]()
+        for now, data in self._connection.take(timeout):
+            self._received_at = now
+            for message in self._decoder.feed(data):
+                self._good_at = now
+                self._rates.good(self._connection.baud_rate)
+                lines += self._gap(message.sequence)
+                lines += [] if isinstance(message, Command) else self._describe(message, now)
+            lines += self._problems(self.accounting())
+        self._commands.attend(self._clock())
+        lines += self._hints(self._clock())
+        if lost:
+            self.lost = True
+            self._decoder.line_ended()
+            lines += self._problems(self.accounting())
+            lines.append("connection lost: unplugged, or closed by the other end")
+        return [f"{self._clock() - self._began:9.3f} s  {_plain(line)}" for line in lines]
+
+    def _gap(self, sequence: int) -> list[str]:
+        last, self._last = self._last, sequence
+        step = 1 if last is None else (sequence - last) % SEQUENCES
+        if step == 1:
+            return []
+        if step < SEQUENCES // 2:
+            return [_line("gap", last, f"to #{sequence}: {step - 1} messages lost")]
+        return [_line("back", last, f"to #{sequence}: out of order, or the device restarted")]
+
+    def _describe(self, message: FromDevice, now: float) -> list[str]:
+        if isinstance(message, Information):
+            return [
+                _line("information", message.sequence, _device_text(message.text), message.time)
+            ]
+        if isinstance(message, Reply):
+            self._commands.take(message, now)
+            return [_line("reply", message.sequence, _reply_text(message), message.time)]
+        self._samples += 1
+        if now - self._shown < _SHOWN:
+            self._unshown += 1
+            return []
+        more = f"; {self._unshown} more before it" if self._unshown else ""
+        self._shown, self._unshown = now, 0
+        return [_line("samples", message.sequence, _samples_text(message) + more, message.time)]
+
+    def _problems(self, now: Accounting) -> list[str]:
+        """What went wrong since the last call."""
+        was, self._reported = self._reported, now
+        before = dict(was.discarded)
+        lines = [
+            f"discarded    {count - before.get(reason, 0)} bytes: {reason}"
+            for reason, count in now.discarded
+            if count > before.get(reason, 0)
+        ]
+        if now.duplicate > was.duplicate:
+            lines.append(f"duplicate    {now.duplicate - was.duplicate} messages came twice")
+        if now.restarts > was.restarts:
+            lines.append("restart      the device counts from another number")
+        if now.other_version is not None and was.other_version is None:
+            lines.append(f"version      the device speaks {now.other_version}, this is {VERSION}")
+        return lines
+
+    def _hints(self, now: float) -> list[str]:
+        since = max(self._good_at, self._tuned_at)
+        if self._received_at > since and now - since > _RATE_DWELL:
+            return [self._other_rate(now)]
+        if now - max(self._received_at, self._tuned_at) < _SILENCE:
+            return []
+        self._tuned_at = now
+        self._commands.greet(now)
+        return [
+            f"nothing came for {_SILENCE:g} s. Is the device powered, and its firmware started "
+            "(--reset pulses DTR and RTS)? On a UART: are TX and RX crossed, and ground joined?"
+        ]
+
+    def _other_rate(self, now: float) -> str:
+        self._connection.set_baud_rate(self._rates.next(self._connection.baud_rate))
+        self._tuned_at = now
+        self._commands.greet(now)
+        return (
+            f"bytes come, but no message of wire version {VERSION}: trying "
+            f"{self._connection.baud_rate} baud"
+        )
+
+    def accounting(self) -> Accounting:
+        return self._decoder.accounting(overrun=self._connection.overrun)
+
+    def summary(self) -> str:
+        """Totals in one line: messages, bytes, and the rate."""
+        seen, lasted = self.accounting(), max(self._clock() - self._began, 1e-9)
+        reasons = ", ".join(f"{count} {reason}" for reason, count in seen.discarded) or "none"
+        return (
+            f"{lasted:.1f} s at {self._connection.baud_rate} baud: {seen.bytes_in} bytes in, "
+            f"{seen.bytes_good} good, {seen.buffered} waiting, discarded: {reasons}; "
+            f"{seen.accepted} messages accepted, {seen.lost} lost, {seen.duplicate} twice, "
+            f"{seen.restarts} restarts; {self._samples / lasted:.1f} scans/s"
+        )
+
+    def close(self) -> None:
+        self._connection.close()
+
+
+def _plain(text: str) -> str:
+    """The text without what would steer a terminal: a device may send anything."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def _line(kind: str, sequence: int | None, words: str, device_time: float | None = None) -> str:
+    at = "" if device_time is None else f"at {device_time:.6f} s  "
+    return f"{kind:<13}#{sequence}  {at}{words}"
+
+
+def _device_text(text: str) -> str:
+    try:
+        sensor = information.sensor_from_json(text)
+    except SourceError as error:
+        return f"{len(text)} characters that cannot be used: {error}"
+    return (
+        f"{sensor.name}, serial number {sensor.serial_number}, firmware {sensor.firmware}, "
+        f"{sensor.layout}, {sensor.channels} channels, at most {sensor.rate:g} scans/s"
+        f"{', simulated' if sensor.simulated else ''}"
+    )
+
+
+def _reply_text(reply: Reply) -> str:
+    done = f"refused ({reply.fault}): {reply.reason}" if reply.fault else "done"
+    data = f", {reply.data.hex(' ')}" if reply.data and not reply.fault else ""
+    return f"to #{reply.command} {operation_name(reply.operation)}: {done}{data}"
+
+
+def _samples_text(samples: Samples) -> str:
+    counts, channels = samples.counts, samples.channels
+    if not len(counts):
+        return "no channels"
+    first = " ".join(str(count) for count in counts[:_COUNTS_SHOWN])
+    more = " ..." if len(counts) > _COUNTS_SHOWN else ""
+    return (
+        f"{len(counts)} channels from {channels[0]} to {channels[-1]}: {first}{more}, "
+        f"least {np.min(counts)}, most {np.max(counts)}"
+    )

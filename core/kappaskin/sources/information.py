@@ -1,9 +1,10 @@
-"""What a device says it is, as JSON on the wire and as a `Sensor` in the program."""
+"""Device information: a sensor's description as JSON on the wire, and back."""
 
 import json
 import math
-from dataclasses import asdict, fields, replace
-from operator import index
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields, replace
+from operator import attrgetter, index
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -26,70 +27,87 @@ from kappaskin.sensing import (
 from kappaskin.skin import Disk, Patch, Polygon
 
 
-def to_json(sensor: Sensor) -> str:
-    """The information text of `sensor`: SI units, channels counted component by component."""
-    layout, stiffness, wired = sensor.layout, sensor.plate.axial_stiffness, sensor.channel_map
-    where = {"grid": layout.shape} if layout.shape else {"positions": layout.positions.tolist()}
-    return json.dumps(
-        {
-            "name": sensor.name,
-            "serial_number": sensor.serial_number,
-            "firmware": sensor.firmware,
-            "simulated": sensor.simulated,
-            "rate": sensor.rate,
-            "rigidity": sensor.plate.rigidity,
-            "size": [layout.patch.a, layout.patch.b],
-            "base_curvature": layout.patch.base_curvature,
-            "strip": layout.patch.strip,
-            **_outline(layout.patch),
-            "edge": sensor.edge,
-            "fluid": sensor.plate.fluid,
-            **{name: getattr(sensor.plate, name) for name in _OF_THE_PLATE},
-            **({} if stiffness is None else {"axial_stiffness": stiffness}),
-            **where,
-            "gage_length": layout.gage_length,
-            "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
-            **({} if wired is None else {"channel_map": wired.tolist()}),
-            **asdict(sensor.transduction),
-        },
-        separators=(",", ":"),
-    )
+@dataclass(frozen=True)
+class _Key:
+    """One key of the information: the `kind` of its value, and the `value` that a sensor has.
+
+    A value of None is not written. A key that a device leaves out has the `default`; one without
+    is required, or optional where None is a value.
+    """
+
+    kind: str
+    value: Callable[[Sensor], Any]
+    default: Any = None
 
 
-def _outline(patch: Patch) -> dict[str, Any]:
-    """The outline as JSON has it: none for a rectangle, "disk", or the corners of a polygon."""
+def _outline(sensor: Sensor) -> Any:
+    """The corners of a polygon, or "disk"; None for a rectangle."""
+    patch = sensor.layout.patch
     if isinstance(patch, Disk):
-        return {"outline": "disk"}
-    return {"outline": patch.vertices} if isinstance(patch, Polygon) else {}
+        return "disk"
+    return patch.vertices if isinstance(patch, Polygon) else None
 
 
+def _positions(sensor: Sensor) -> list[Any] | None:
+    return None if sensor.layout.shape else sensor.layout.positions.tolist()
+
+
+def _wiring(sensor: Sensor) -> list[int] | None:
+    return None if sensor.channel_map is None else sensor.channel_map.tolist()
+
+
+_TEXT, _NUMBER, _LIST, _OBJECT = "a text", "a number", "a list", "an object"
+_SWITCH, _CHECKED_LATER = "true or false", ""
+_PYTHON: dict[str, Any] = {
+    _TEXT: str,
+    _NUMBER: (int, float),
+    _LIST: list,
+    _OBJECT: dict,
+    _SWITCH: bool,
+    _CHECKED_LATER: object,
+}
+# All keys, in the order in which they are written; SI units. The defaults are those of a flat
+# plate hinged along its edges.
+_KEYS = {
+    "name": _Key(_TEXT, attrgetter("name")),
+    "serial_number": _Key(_TEXT, attrgetter("serial_number")),
+    "firmware": _Key(_TEXT, attrgetter("firmware")),
+    "simulated": _Key(_SWITCH, attrgetter("simulated")),
+    "rate": _Key(_NUMBER, attrgetter("rate")),
+    "rigidity": _Key(_NUMBER, attrgetter("plate.rigidity")),
+    "size": _Key(_LIST, attrgetter("layout.patch.a", "layout.patch.b")),
+    "base_curvature": _Key(_NUMBER, attrgetter("layout.patch.base_curvature"), 0.0),
+    "strip": _Key(_SWITCH, attrgetter("layout.patch.strip"), False),
+    "outline": _Key(_CHECKED_LATER, _outline),
+    "edge": _Key(_TEXT, attrgetter("edge"), "hinged"),
+    "fluid": _Key(_SWITCH, attrgetter("plate.fluid"), False),
+    "tension": _Key(_NUMBER, attrgetter("plate.tension"), 0.0),
+    "foundation": _Key(_NUMBER, attrgetter("plate.foundation"), 0.0),
+    "poisson": _Key(_NUMBER, attrgetter("plate.poisson"), 0.3),
+    "rim_stiffness": _Key(_NUMBER, attrgetter("plate.rim_stiffness"), 2e3),
+    "axial_stiffness": _Key(_NUMBER, attrgetter("plate.axial_stiffness")),
+    "grid": _Key(_LIST, attrgetter("layout.shape")),
+    "positions": _Key(_LIST, _positions),
+    "gage_length": _Key(_NUMBER, attrgetter("layout.gage_length"), 0.0),
+    "dead_channels": _Key(_LIST, lambda s: np.flatnonzero(~s.layout.live.ravel()).tolist()),
+    "channel_map": _Key(_LIST, _wiring),
+    "bridge": _Key(_OBJECT, lambda s: asdict(s.transduction.bridge)),
+    "multiplexer": _Key(_OBJECT, lambda s: asdict(s.transduction.multiplexer)),
+    "amplifier": _Key(_OBJECT, lambda s: asdict(s.transduction.amplifier)),
+    "converter": _Key(_OBJECT, lambda s: asdict(s.transduction.converter)),
+}
+DEFAULTS = {name: key.default for name, key in _KEYS.items() if key.default is not None}
+_OF_THE_PLATE = ("tension", "foundation", "poisson", "rim_stiffness")
 _READS = Within(1e-3, 1e9, "1/m")
 
 _Part = TypeVar("_Part", HalfBridge, Multiplexer, Amplifier, Converter)
 
-_OF_THE_PLATE = ("tension", "foundation", "poisson", "rim_stiffness")
-# What a flat plate hinged along its edges need not say.
-UNSAID: dict[str, Any] = {
-    "base_curvature": 0.0,
-    "strip": False,
-    "edge": "hinged",
-    "tension": 0.0,
-    "foundation": 0.0,
-    "fluid": False,
-    "poisson": 0.3,
-    "rim_stiffness": 2e3,
-    "gage_length": 0.0,
-}
-_KINDS: dict[str, tuple[Any, tuple[str, ...]]] = {
-    "a text": (str, ("name", "serial_number", "firmware", "edge")),
-    "a number": (
-        (int, float),
-        ("rate", "rigidity", "base_curvature", "axial_stiffness", "gage_length", *_OF_THE_PLATE),
-    ),
-    "a list": (list, ("size", "grid", "positions", "dead_channels", "channel_map")),
-    "an object": (dict, ("bridge", "multiplexer", "amplifier", "converter")),
-    "true or false": (bool, ("simulated", "strip", "fluid")),
-}
+
+def sensor_to_json(sensor: Sensor) -> str:
+    """The information text of `sensor`: SI units, channels counted component by component."""
+    values = {name: key.value(sensor) for name, key in _KEYS.items()}
+    written = {name: value for name, value in values.items() if value is not None}
+    return json.dumps(written, separators=(",", ":"))
 
 
 def _number(text: str) -> float:
@@ -100,21 +118,21 @@ def _number(text: str) -> float:
 
 
 def _parsed(text: str) -> dict[str, Any]:
-    said = json.loads(text, parse_float=_number, parse_constant=_number)
-    if not isinstance(said, dict):
-        raise TypeError(f"expected an object with keys, got {said!r:.80}")
-    found = UNSAID | cast("dict[str, Any]", said)
-    for what, (kind, names) in _KINDS.items():
-        for name in names:
-            # Of Python's kinds, true and false are numbers too; of JSON's they are not.
-            wrong = isinstance(found.get(name), bool) and kind is not bool
-            if name in found and (wrong or not isinstance(found[name], kind)):
-                raise TypeError(f"expected {name} to be {what}, got {found[name]!r:.80}")
+    parsed = json.loads(text, parse_float=_number, parse_constant=_number)
+    if not isinstance(parsed, dict):
+        raise TypeError(f"expected an object with keys, got {parsed!r:.80}")
+    found = DEFAULTS | cast("dict[str, Any]", parsed)
+    for name, kind in ((name, key.kind) for name, key in _KEYS.items() if name in found):
+        value = found[name]
+        # Of Python's kinds, true and false are numbers too; of JSON's they are not.
+        switched = isinstance(value, bool) and kind not in (_SWITCH, _CHECKED_LATER)
+        if switched or not isinstance(value, _PYTHON[kind]):
+            raise TypeError(f"expected {name} to be {kind}, got {value!r:.80}")
     return found
 
 
-def _made(kind: type[_Part], said: dict[str, Any]) -> _Part:
-    values = {field.name: said[field.name] for field in fields(kind)}
+def _made(kind: type[_Part], part: dict[str, Any]) -> _Part:
+    values = {field.name: part[field.name] for field in fields(kind)}
     for name, value in values.items():
         unset = value is None and name == "balance_voltage"
         if not unset and (isinstance(value, bool) or not isinstance(value, int | float)):
@@ -122,60 +140,60 @@ def _made(kind: type[_Part], said: dict[str, Any]) -> _Part:
     return kind(**values)
 
 
-def _transduction(said: dict[str, Any]) -> Transduction:
+def _transduction(values: dict[str, Any]) -> Transduction:
     return Transduction(
-        _made(HalfBridge, said["bridge"]),
-        _made(Multiplexer, said["multiplexer"]),
-        _made(Amplifier, said["amplifier"]),
-        _made(Converter, said["converter"]),
+        _made(HalfBridge, values["bridge"]),
+        _made(Multiplexer, values["multiplexer"]),
+        _made(Amplifier, values["amplifier"]),
+        _made(Converter, values["converter"]),
     )
 
 
-def _patch(said: dict[str, Any]) -> Patch:
-    size, H = [float(side) for side in said["size"]], float(said["base_curvature"])
-    if "outline" not in said:
-        return Patch(*size, radius=1 / H if H else math.inf, strip=said["strip"])
-    outline, (a, _) = said["outline"], size
+def _patch(values: dict[str, Any]) -> Patch:
+    size, H = [float(side) for side in values["size"]], float(values["base_curvature"])
+    if "outline" not in values:
+        return Patch(*size, radius=1 / H if H else math.inf, strip=values["strip"])
+    outline, (a, _) = values["outline"], size
     if outline != "disk" and not isinstance(outline, list):
         raise Refusal(f"expected the outline 'disk' or a list of corners, got {outline!r:.80}")
-    patch = Disk(a / 2) if outline == "disk" else Polygon(said["outline"])
-    if H or said["strip"] or size != [patch.a, patch.b]:
+    patch = Disk(a / 2) if outline == "disk" else Polygon(values["outline"])
+    if H or values["strip"] or size != [patch.a, patch.b]:
         raise Refusal(
             f"expected a flat {patch.name}, of size {[patch.a, patch.b]}, got size {size}, base "
-            f"curvature {H:g} and strip {said['strip']}"
+            f"curvature {H:g} and strip {values['strip']}"
         )
     return patch
 
 
-def _layout(said: dict[str, Any]) -> SensorLayout:
-    patch = _patch(said)
-    if "grid" in said:
-        m, n = (index(count) for count in said["grid"])
+def _layout(values: dict[str, Any]) -> SensorLayout:
+    patch = _patch(values)
+    if "grid" in values:
+        m, n = (index(count) for count in values["grid"])
         if m * n > 2**16 // 3:
             raise Refusal(f"expected at most {2**16 // 3} elements, got {m} x {n}")
         layout = SensorLayout.regular(patch, m, n)
     else:
-        layout = SensorLayout.scattered(patch, said["positions"])
-    dead, channels = said["dead_channels"], range(3 * len(layout))
+        layout = SensorLayout.scattered(patch, values["positions"])
+    dead, channels = values["dead_channels"], range(3 * len(layout))
     if unknown := [channel for channel in dead if channel not in channels]:
         raise Refusal(
             f"expected dead channels from 0 to {channels[-1]}, got {unknown!s:.80}; count "
             "them component by component"
         )
     live = np.isin(channels, np.array(dead, np.intp), invert=True).reshape(3, -1)
-    return replace(layout, live=live, gage_length=float(said["gage_length"]))
+    return replace(layout, live=live, gage_length=float(values["gage_length"]))
 
 
-def _channel_map(said: dict[str, Any]) -> NDArray[np.intp] | None:
-    if "channel_map" not in said:
+def _channel_map(values: dict[str, Any]) -> NDArray[np.intp] | None:
+    if "channel_map" not in values:
         return None
-    return np.array([index(place) for place in said["channel_map"]], np.intp)
+    return np.array([index(place) for place in values["channel_map"]], np.intp)
 
 
-def _plate(patch: Patch, said: dict[str, Any]) -> Plate:
-    names = [*_OF_THE_PLATE, *({"axial_stiffness"} & said.keys())]
-    numbers = {name: float(said[name]) for name in names}
-    return Plate(patch, float(said["rigidity"]), fluid=said["fluid"], **numbers)
+def _plate(patch: Patch, values: dict[str, Any]) -> Plate:
+    names = [*_OF_THE_PLATE, *({"axial_stiffness"} & values.keys())]
+    numbers = {name: float(values[name]) for name in names}
+    return Plate(patch, float(values["rigidity"]), fluid=values["fluid"], **numbers)
 
 
 def _check_sizes(plate: Plate, transduction: Transduction) -> None:
@@ -192,26 +210,26 @@ def _check_sizes(plate: Plate, transduction: Transduction) -> None:
         )
 
 
-def from_json(text: str) -> Sensor:
-    """The sensor that `text` tells of; raises `SourceError` when it cannot be understood."""
+def sensor_from_json(text: str) -> Sensor:
+    """The sensor that `text` describes; a `SourceError` where it cannot be understood."""
     try:
-        said = _parsed(text)
-        layout = _layout(said)
-        edge = said["edge"]
+        values = _parsed(text)
+        layout = _layout(values)
+        edge = values["edge"]
         check_edge(layout.patch, edge)
-        transduction, plate = _transduction(said), _plate(layout.patch, said)
+        transduction, plate = _transduction(values), _plate(layout.patch, values)
         _check_sizes(plate, transduction)
         return Sensor(
             layout,
             transduction,
             plate,
             edge,
-            float(said["rate"]),
-            said["name"],
-            said["serial_number"],
-            said["firmware"],
-            said["simulated"],
-            _channel_map(said),
+            float(values["rate"]),
+            values["name"],
+            values["serial_number"],
+            values["firmware"],
+            values["simulated"],
+            _channel_map(values),
         )
     except KeyError as error:
         raise SourceError(

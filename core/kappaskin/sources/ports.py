@@ -1,15 +1,22 @@
-"""The serial ports there are, whose they are, and why one of them cannot be opened."""
+"""Serial ports: which there are, opening one, its baud rates, and a thread that reads it."""
 
 import errno
 import os
 import re
+import select
 import sys
+import threading
+import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import cast
 
 import serial
 from serial.tools import list_ports
+from serial.urlhandler import protocol_socket
 
 from kappaskin.errors import SourceError
 
@@ -17,12 +24,21 @@ BAUD_RATE = 2_000_000
 """What a UART must run at for 300 channels at 300 frames/s; USB ports ignore it."""
 
 _SENT = 0.05  # s that a command may wait for room
-_FEW = 3  # holders of a port that are named
+_HOLDERS_NAMED = 3
+
+BAUD_RATES = (BAUD_RATE, 1_000_000, 921_600, 500_000, 460_800, 230_400, 115_200)
+"""Rates that a device may speak at, the usual one first."""
+
+_BLOCK = 65536
+_BACKLOG = 2**24  # bytes that may wait to be taken; beyond it they are discarded, and counted
+_READ_OVERHEAD = 128  # bytes of memory that a read takes beside what came
+_PULSE = 0.1  # s that DTR and RTS are low to reset a board
+_BROKEN = (serial.SerialException, OSError, TypeError)  # TypeError: closed while reading
 
 
 @dataclass(frozen=True)
 class Port:
-    """A serial port: its name, what it is and who made it, as its plug says; empty if unknown.
+    """A serial port: its name, description, maker and serial number; empty if unknown.
 
     `usb` is the vendor and product number. `opened` is whether this user may open it.
     """
@@ -43,7 +59,7 @@ class Port:
         return "  ".join(part for part in parts if part)
 
     def same_plug(self, other: "Port") -> bool:
-        """Whether both are one plug: by its serial number where it has one, else by name."""
+        """Whether both are the same device: by its serial number if it has one, else by name."""
         if self.serial_number or other.serial_number:
             return (self.usb, self.serial_number) == (other.usb, other.serial_number)
         return self.port == other.port
@@ -65,7 +81,7 @@ def serial_ports() -> list[Port]:
 
 
 def port_called(url: str) -> Port:
-    """What is known of the port with this name; its name alone if that is all."""
+    """The port with this name, with its name alone if it is not among those found."""
     return next((port for port in serial_ports() if port.port == url), Port(url))
 
 
@@ -73,7 +89,7 @@ def open_port(url: str) -> serial.SerialBase:
     """The port or URL, open; raises a `SourceError` that says why it cannot be.
 
     DTR and RTS are left as the system sets them on opening, and stay so when the port is closed:
-    many boards start anew when DTR falls and rises.
+    many boards restart when DTR falls and rises.
     """
     try:
         port = serial.serial_for_url(
@@ -102,7 +118,7 @@ def _why_not(url: str, error: Exception) -> str:
     if code in (errno.EACCES, errno.EPERM):
         return f"{url}: no permission to open it. {permission_line(url)}"
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
-        return f"{url}: busy, {_holders_told(url)} has it open; close that program"
+        return f"{url}: busy, {_holders_text(url)} has it open; close that program"
     if code in (errno.ENOENT, errno.ENXIO, errno.ENODEV, errno.EIO):
         return (
             f"{url}: there is no such port; plug the sensor in, or choose one of the ports found "
@@ -117,7 +133,7 @@ def _why_not(url: str, error: Exception) -> str:
 
 
 def permission_line(url: str) -> str:
-    """What mends a missing permission."""
+    """How to get the permission to open a port."""
     return f"Join the port's group with `sudo usermod -aG {_group(url)} $USER`, then log in again"
 
 
@@ -131,7 +147,7 @@ def _group(url: str) -> str:
 
 
 def holders(url: str) -> list[str]:
-    """The other programs that have the port open, so far as this user may know."""
+    """The other programs that have the port open, as far as this user may see."""
     found: list[str] = []
     with suppress(OSError):
         device = os.stat(url).st_rdev
@@ -157,5 +173,148 @@ def _name_of(process: Path) -> str:
         return "a program"
 
 
-def _holders_told(url: str) -> str:
-    return ", ".join(holders(url)[:_FEW]) or "another program"
+def _holders_text(url: str) -> str:
+    return ", ".join(holders(url)[:_HOLDERS_NAMED]) or "another program"
+
+
+class BaudRateSearch:
+    """Which baud rate to try next; one that was right is tried again after each other one."""
+
+    def __init__(self, rate: int) -> None:
+        self._good: int | None = None
+        self._reported, self._place, self._tried = rate, BAUD_RATES.index(rate), {rate}
+
+    def good(self, rate: int) -> bool:
+        """Note that a message came at `rate`; whether that is another rate than before."""
+        self._good = rate
+        changed, self._reported = rate != self._reported, rate
+        return changed
+
+    def next(self, rate: int) -> int:
+        """The rate to try after this one."""
+        if self._good not in (None, rate):
+            return self._good
+        self._place = (self._place + 1) % len(BAUD_RATES)
+        if BAUD_RATES[self._place] == rate:
+            self._place = (self._place + 1) % len(BAUD_RATES)
+        self._tried.add(BAUD_RATES[self._place])
+        return BAUD_RATES[self._place]
+
+    @property
+    def tried(self) -> str:
+        """The rates tried so far, as part of a sentence."""
+        if len(self._tried) == len(BAUD_RATES):
+            return f"at any baud rate from {BAUD_RATES[-1]} to {BAUD_RATES[0]}:"
+        tried = ", ".join(str(rate) for rate in BAUD_RATES if rate in self._tried)
+        return f"at {tried} baud; as bytes come other rates are tried, or"
+
+
+class SerialConnection:
+    """An open port or URL that a thread of its own reads until `close`; `lost` once it broke.
+
+    `overrun` counts bytes that arrived while too many waited to be taken.
+    """
+
+    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self.url, self._clock = url, clock
+        self._port = open_port(url)
+        self.baud_rate = BAUD_RATE
+        self.overrun = 0
+        self._put = self._taken = (
+            0  # bytes: each counted by one thread only, so that none is locked
+        )
+        self._arrived: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
+        self._lost, self._closing = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._read, name="serial-reader", daemon=True)
+        self._thread.start()
+
+    @property
+    def lost(self) -> bool:
+        return self._lost.is_set()
+
+    def _read(self) -> None:
+        """Read bytes with the time they arrived, until the connection is lost."""
+        try:
+            while not self._closing.is_set():
+                data = _arriving(self._port)
+                if data and self._put - self._taken > _BACKLOG:
+                    self.overrun += len(data)
+                elif data:
+                    self._put += len(data) + _READ_OVERHEAD
+                    self._arrived.put((self._clock(), data))
+        except _BROKEN:
+            self._lost.set()
+
+    def take(self, timeout: float) -> list[tuple[float, bytes]]:
+        """What arrived and when, after at most `timeout` s."""
+        taken: list[tuple[float, bytes]] = []
+        with suppress(Empty):
+            taken.append(self._arrived.get(timeout=timeout))
+            while True:
+                taken.append(self._arrived.get_nowait())
+        self._taken += sum(len(data) + _READ_OVERHEAD for _, data in taken)
+        return taken
+
+    def write(self, data: bytes) -> bool:
+        """Send `data`; False where there is no room for it, or nobody any more."""
+        try:
+            return self._has_room() and self._port.write(data) == len(data)
+        except _BROKEN:
+            return False
+
+    def _has_room(self) -> bool:
+        if not isinstance(self._port, serial.Serial | protocol_socket.Serial):
+            return True
+        return bool(select.select([], [self._port], [], 0.0)[1])
+
+    def set_baud_rate(self, baud_rate: int) -> None:
+        """Continue at another rate, where the port has one."""
+        with suppress(*_BROKEN, ValueError):
+            self._port.baudrate = baud_rate
+            self.baud_rate = baud_rate
+
+    def reset(self) -> None:
+        """Let DTR and RTS fall and rise again, at which many boards restart."""
+        with suppress(*_BROKEN):
+            self._port.dtr = self._port.rts = False
+            time.sleep(_PULSE)
+            self._port.dtr = self._port.rts = True
+
+    def close(self) -> None:
+        self._closing.set()
+        if isinstance(self._port, serial.Serial):
+            with suppress(*_BROKEN):
+                self._port.cancel_read()
+        self._thread.join(timeout=1.0)
+        if isinstance(self._port, protocol_socket.Serial):
+            # pyserial forgets a socket that the other end has closed without closing it.
+            with suppress(*_BROKEN, AttributeError):
+                vars(self._port)["_socket"].close()
+        with suppress(*_BROKEN):
+            self._port.close()
+
+
+def _arriving(port: serial.SerialBase) -> bytes:
+    """What arrived, after waiting 0.1 s at most for a first byte."""
+    if isinstance(port, protocol_socket.Serial):
+        # pyserial does not say how much a socket holds, and a longer read throws away what it has
+        # when the other end closes: with no time-out it is a single `recv`.
+        port.timeout = 0
+        select.select([port], [], [], 0.1)
+        return port.read(_BLOCK)
+    if sys.platform != "win32" and isinstance(port, serial.Serial):
+        return _arriving_at(port)
+    return port.read(cast("serial.Serial", port).in_waiting or 1)
+
+
+def _arriving_at(port: serial.Serial) -> bytes:
+    """What arrived at a terminal, in two calls of the system where pyserial takes four.
+
+    At each another thread may take the interpreter, which is not to be had back at once.
+    """
+    fd, ended = cast("int", port.fd), cast("int", port.pipe_abort_read_r)
+    if fd not in select.select([fd, ended], [], [], 0.1)[0]:
+        return b""
+    if not (data := os.read(fd, _BLOCK)):
+        raise serial.SerialException("the connection ended")
+    return data

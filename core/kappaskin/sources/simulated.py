@@ -1,4 +1,4 @@
-"""A scene, played in real time as frames."""
+"""Simulated source: a scene, played in real time as frames."""
 
 import math
 import time
@@ -11,13 +11,13 @@ from kappaskin.contact import ForceTorqueSensor, Wrench
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
-from kappaskin.scenes import FROM_THE_BEGINNING, Playback, Scene, Simulator
+from kappaskin.scenes import FROM_THE_BEGINNING, Playback, Scene, Simulator, load_scene
 from kappaskin.sensing import Scan, Sensor
-from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.clock import Known
-from kappaskin.sources.information import from_json, to_json
-from kappaskin.sources.scanning import in_few_runs
-from kappaskin.sources.tape import Tape
+from kappaskin.sources.clock import ClockState
+from kappaskin.sources.commands import in_few_runs
+from kappaskin.sources.decoder import Accounting
+from kappaskin.sources.information import sensor_from_json, sensor_to_json
+from kappaskin.sources.source import SIMULATION, InputRecorder, register_scheme
 from kappaskin.sources.wire import MOST_RUNS, encode_scan, pack_runs
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
@@ -44,14 +44,14 @@ class SimulatedSource:
         self._base_noise = np.random.default_rng(scene.seed)
         self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
-        self._tape: Tape | None = None
+        self._recorder: InputRecorder | None = None
         self._listed, self._runs = np.empty(0, np.intp), b""
 
     def _become(self, scene: Scene, due: float, playing: Playback) -> None:
         """Be the device of `scene`, whose next frame is due at device time `due` in s."""
-        text = to_json(scene.sensor())
+        text = sensor_to_json(scene.sensor())
         # As anybody else would know it from what it says: in the last bit not what the scene has.
-        sensor = from_json(text)
+        sensor = sensor_from_json(text)
         self._simulator, self._text, self._sensor = Simulator(scene, playing), text, sensor
         # Since frame `_first`, due at device time `_since`, frames come at `_rate`.
         self._first, self._since = self._n, due
@@ -71,14 +71,14 @@ class SimulatedSource:
         return self._simulator.scene
 
     def play(self, scene: Scene) -> None:
-        """Go on with another scene, from the same moment; one that is refused changes nothing."""
-        if to_json(scene.sensor()) == self._text:
+        """Continue with another scene from the same moment; a refused one changes nothing."""
+        if sensor_to_json(scene.sensor()) == self._text:
             self._change(scene)
             return
         self._become(scene, self._due(), self.playing)
         # The next frame is due now: making what the skin needs took a while, but nothing is lost.
         self._start = self._clock() - self._since
-        self.record(self._tape)
+        self.record(self._recorder)
 
     def _change(self, scene: Scene) -> None:
         was = self.scene
@@ -88,21 +88,22 @@ class SimulatedSource:
             self._simulator.change(was)
             raise
 
-    def record(self, tape: Tape | None) -> None:
-        """Tell `tape` from now on what such a device would send; nobody without one."""
-        self._tape = tape
-        if tape is not None:
-            tape.met(self._text)
-            tape.mapped(math.nan, Known((0.0, self._start, 0.0, 0.0, 0.0, False), 0, math.nan))
+    def record(self, recorder: InputRecorder | None) -> None:
+        """Give `recorder` from now on what such a device would send; nobody without one."""
+        self._recorder = recorder
+        if recorder is not None:
+            state = ClockState((0.0, self._start, 0.0, 0.0, 0.0, False), 0, math.nan)
+            recorder.connected(self._text)
+            recorder.clock(math.nan, state)
 
-    def _record(self, tape: Tape, frames: list[Frame]) -> None:
+    def _record(self, recorder: InputRecorder, frames: list[Frame]) -> None:
         width = 2 if self._simulator.scene.transduction.converter.bits <= 16 else 4
         for frame in frames:
-            tape.simulated(frame)
+            recorder.simulated(frame)
             if frame.channels is not self._listed:  # scans of one list share it
                 self._listed, self._runs = frame.channels, pack_runs(frame.channels)
             sent = frame.sequence, frame.device_time, self._runs, frame.counts, width
-            tape.came(frame.host_time, encode_scan(*sent))
+            recorder.received(frame.host_time, encode_scan(*sent))
 
     @property
     def playing(self) -> Playback:
@@ -126,18 +127,18 @@ class SimulatedSource:
         """The next frame; its scan decides when the one after it begins."""
         due, scan, rate = self._due(), self._all, self._sensor.rate
         if self._scanner is not None:
-            scan = self._sayable(self._scanner())
+            scan = self._fitted_to_wire(self._scanner())
             rate = min(self._scanner.rate, scan.rate)
         if rate != self._rate:
             self._first, self._since, self._rate = self._n, due, rate
         self._n, self._taken = self._n + 1, due
         frame = self._simulator.scanned(scan, self._n - 1, due, self._clock)
-        # A device tells its time in whole us.
-        told = round(due * 1e6) * 1e-6
-        return replace(frame, device_time=told, taken=told + self._start, taken_sd=0.0)
+        # A device sends its time in whole us.
+        time = round(due * 1e6) * 1e-6
+        return replace(frame, device_time=time, taken=time + self._start, taken_sd=0.0)
 
-    def _sayable(self, scan: Scan) -> Scan:
-        """The scan, with as few more channels as let one list on the wire tell of it."""
+    def _fitted_to_wire(self, scan: Scan) -> Scan:
+        """The scan, with as few more channels as let it fit into one scan list on the wire."""
         if len(scan.channels) <= MOST_RUNS:
             return scan
         channels = in_few_runs(scan.channels)
@@ -161,8 +162,8 @@ class SimulatedSource:
         while (now - self._start - self._due()) * self._rate + _ROUNDING >= 0:
             frames.append(self._next())
         arrived = [frame for frame in frames if not self._simulator.failure(frame.sequence)]
-        if self._tape is not None:
-            self._record(self._tape, arrived)
+        if self._recorder is not None:
+            self._record(self._recorder, arrived)
         self._accepted += len(arrived)
         self._lost += len(frames) - len(arrived)
         return arrived
@@ -188,3 +189,6 @@ class SimulatedSource:
 
     def close(self) -> None:
         """Nothing is held open."""
+
+
+register_scheme(SIMULATION, lambda name: SimulatedSource(load_scene(name)))

@@ -1,30 +1,58 @@
-"""Sources of frames: a simulation in this process, bytes on a line, and registered schemes."""
+"""Sources of frames: what every source offers, who records it, and how one is opened by name."""
 
 from collections.abc import Callable
 from typing import Protocol
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
-from kappaskin.scenes import load_scene
 from kappaskin.sensing import Sensor
-from kappaskin.sources.accounting import Accounting
-from kappaskin.sources.serial_line import SerialSource as SerialSource
-from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
-from kappaskin.sources.tape import Tape
+from kappaskin.sources.clock import ClockState
+from kappaskin.sources.decoder import Accounting
 
 SIMULATION = "sim:"
 
 
+class InputRecorder(Protocol):
+    """Records all that a source's frames are made of, in order, before they are computed with."""
+
+    def connected(self, information: str) -> None:
+        """The device is the one that this information text describes."""
+        ...
+
+    def received(self, host_time: float, data: bytes) -> None:
+        """These bytes arrived at `host_time` in s."""
+        ...
+
+    def sent(self, host_time: float, data: bytes) -> None:
+        """These bytes were sent."""
+        ...
+
+    def disconnected(self, host_time: float) -> None:
+        """The connection was lost; the next bytes are of another one."""
+        ...
+
+    def clock(self, since: float, state: ClockState) -> None:
+        """From the scan of device time `since` in s on, the map of times has this `state`.
+
+        That scan is among the bytes recorded next; NaN for whichever comes next.
+        """
+        ...
+
+    def simulated(self, frame: Frame) -> None:
+        """The frame recorded next is simulated, and has a truth."""
+        ...
+
+
 class Source(Protocol):
-    """Yields frames; nothing after it can tell a simulated from a real one."""
+    """Where frames come from; nothing after it can tell a simulated device from a real one."""
 
     @property
     def sensor(self) -> Sensor | None:
-        """What the device says it is; None until it has said so."""
+        """The sensor that the device describes; None until it has sent its information."""
         ...
 
     def read(self, timeout: float) -> list[Frame]:
-        """The frames that came, after at most `timeout` s; a `Refusal` when there will be none."""
+        """The frames that arrived, after at most `timeout` s; a `Refusal` if none ever will."""
         ...
 
     @property
@@ -34,15 +62,15 @@ class Source(Protocol):
 
     @property
     def temperature(self) -> float:
-        """The device's temperature in degrees Celsius, as it told last; NaN if it does not."""
+        """The device's temperature in degrees Celsius, the last one reported; NaN without."""
         ...
 
-    def record(self, tape: Tape | None) -> None:
-        """Tell `tape` from now on all that frames come from; nobody without one."""
+    def record(self, recorder: InputRecorder | None) -> None:
+        """Give `recorder` from now on all that frames are made of; nobody without one."""
         ...
 
     def events(self) -> list[Event]:
-        """What happened since this was last asked."""
+        """The events since the last call."""
         ...
 
     def accounting(self) -> Accounting:
@@ -52,13 +80,14 @@ class Source(Protocol):
     def close(self) -> None: ...
 
 
-_schemes: dict[str, Callable[[str], Source]] = {
-    SIMULATION: lambda name: SimulatedSource(load_scene(name)),
-}
+_schemes: dict[str, Callable[[str], Source]] = {}
 
 
 def register_scheme(scheme: str, opened: Callable[[str], Source]) -> None:
-    """Open names that begin with `scheme`, such as `replay:`, by `opened` with what follows it."""
+    """Open names that begin with `scheme`, such as `replay:`, by `opened` with what follows it.
+
+    The empty scheme opens every other name.
+    """
     _schemes[scheme] = opened
 
 
@@ -67,11 +96,9 @@ def open_source(name: str) -> Source:
 
     `replay:` is registered by the room `recording`, as soon as that is imported.
     """
-    for scheme, opened in _schemes.items():
-        if name.startswith(scheme):
-            return opened(name.removeprefix(scheme))
     if not name.strip():
         raise SourceError(
             "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"
         )
-    return SerialSource(name)
+    scheme = max((scheme for scheme in _schemes if name.startswith(scheme)), key=len)
+    return _schemes[scheme](name.removeprefix(scheme))

@@ -1,4 +1,4 @@
-"""The wire format: messages to bytes, and the payload of a message to what it says.
+"""Wire format: messages to bytes, and payloads of messages to their contents.
 
 `wire.md` among the resources specifies it, with test vectors; `Decoder` finds messages in a stream.
 """
@@ -31,7 +31,7 @@ CHECKED = HEAD - 2
 CHECKSUM = struct.Struct("<I")
 
 RATE_UNIT = 1000
-"""Frames per so many seconds are what a rate on the wire counts."""
+"""Seconds in which the frames are counted that a rate on the wire gives."""
 
 UNKNOWN_TEMPERATURE = -(2**15)
 
@@ -40,7 +40,7 @@ MOST_RUNS = 255
 _LONGEST_REASON = 200  # bytes
 
 
-class Kind(IntEnum):
+class MessageKind(IntEnum):
     INFORMATION = 1
     SAMPLES = 2
     COMMAND = 3
@@ -48,7 +48,7 @@ class Kind(IntEnum):
 
 
 class Operation(IntEnum):
-    """What a host may ask of a device."""
+    """The commands that a host may send to a device."""
 
     HELLO = 1
     START = 2
@@ -61,7 +61,7 @@ class Operation(IntEnum):
 
 
 class Fault(IntEnum):
-    """Why a device did not do what it was asked for; `NONE` when it did."""
+    """Why a device did not carry out a command; `NONE` when it did."""
 
     NONE = 0
     UNKNOWN_OPERATION = 1
@@ -72,7 +72,7 @@ class Fault(IntEnum):
 
 
 class Information(NamedTuple):
-    """What the device says it is, as JSON text; it said so at device `time` in s."""
+    """The device's description of itself, as JSON text, sent at device `time` in s."""
 
     sequence: int
     time: float
@@ -89,7 +89,7 @@ class Samples(NamedTuple):
 
 
 class Command(NamedTuple):
-    """A host's wish; `operation` is one of `Operation`, or a number that nobody knows."""
+    """A command of a host; `operation` is one of `Operation`, or an unknown number."""
 
     sequence: int
     operation: int
@@ -97,7 +97,7 @@ class Command(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """What came of the `command` of that sequence number; `time` in s is when it was answered."""
+    """The reply to the `command` of that sequence number, sent at device `time` in s."""
 
     sequence: int
     time: float
@@ -108,7 +108,7 @@ class Reply(NamedTuple):
 
     @property
     def reason(self) -> str:
-        """Why it was not done, as the device says."""
+        """Why it was refused, in the device's words."""
         return self.data.decode(errors="replace")
 
 
@@ -120,15 +120,15 @@ def encode(kind: int, sequence: int, time: float, payload: bytes) -> bytes:
     """The bytes of a message made at `time` in s on the sender's clock."""
     if len(payload) > LONGEST:
         raise Refusal(f"expected a payload of at most {LONGEST} bytes, got {len(payload)}")
-    said = MAGIC, VERSION, kind, len(payload), sequence % 2**32, round(time * 1e6)
-    check = binascii.crc_hqx(HEADER.pack(*said, 0)[:CHECKED], 0)
-    body = HEADER.pack(*said, check) + payload
+    header = MAGIC, VERSION, kind, len(payload), sequence % 2**32, round(time * 1e6)
+    check = binascii.crc_hqx(HEADER.pack(*header, 0)[:CHECKED], 0)
+    body = HEADER.pack(*header, check) + payload
     return body + CHECKSUM.pack(binascii.crc32(body))
 
 
 def encode_information(sequence: int, time: float, text: str) -> bytes:
     """The bytes of an information message."""
-    return encode(Kind.INFORMATION, sequence, time, text.encode())
+    return encode(MessageKind.INFORMATION, sequence, time, text.encode())
 
 
 def encode_samples(
@@ -139,24 +139,24 @@ def encode_samples(
 
 
 def encode_scan(sequence: int, time: float, runs: bytes, counts: Counts, width: int) -> bytes:
-    """The bytes of a samples message of the channels that `pack_runs` made `runs` of."""
+    """The bytes of a samples message of the channels that `runs` holds, made by `pack_runs`."""
     payload = bytes([width]) + runs + counts.astype(f"<i{width}").tobytes()
-    return encode(Kind.SAMPLES, sequence, time, payload)
+    return encode(MessageKind.SAMPLES, sequence, time, payload)
 
 
 def encode_command(sequence: int, time: float, operation: int, arguments: bytes = b"") -> bytes:
     """The bytes of a command."""
-    return encode(Kind.COMMAND, sequence, time, bytes([operation]) + arguments)
+    return encode(MessageKind.COMMAND, sequence, time, bytes([operation]) + arguments)
 
 
 def encode_reply(
     sequence: int, time: float, to: Command, fault: int = Fault.NONE, data: bytes = b""
 ) -> bytes:
-    """The bytes of the reply to a command: done with `data`, or not done and the reason why."""
+    """The bytes of the reply to a command: its `data`, or the reason of a `fault`."""
     if fault:
         data = data[:_LONGEST_REASON]
     payload = _REPLY.pack(to.sequence, to.operation, fault) + data
-    return encode(Kind.REPLY, sequence, time, payload)
+    return encode(MessageKind.REPLY, sequence, time, payload)
 
 
 def pack_runs(channels: Sequence[int] | NDArray[np.intp]) -> bytes:
@@ -170,7 +170,7 @@ def pack_runs(channels: Sequence[int] | NDArray[np.intp]) -> bytes:
 
 
 def unpack_runs(data: bytes) -> NDArray[np.intp] | None:
-    """The channels of what `pack_runs` made; None if `data` is nothing of the kind."""
+    """The channels of what `pack_runs` made; None if `data` is not of that form."""
     if not data or len(data) != 1 + 4 * data[0]:
         return None
     starts, lengths = np.frombuffer(data, "<u2", offset=1).reshape(-1, 2).astype(np.intp).T

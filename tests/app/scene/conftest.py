@@ -77,7 +77,7 @@ def panel(window: MainWindow, until):
 
 def plays(window: MainWindow, name: str) -> bool:
     scene, sensor = window.session.scene, window.session.status.sensor
-    there = sensor is not None and information.to_json(sensor) == information.to_json(
+    there = sensor is not None and information.sensor_to_json(sensor) == information.sensor_to_json(
         scene.sensor()
     )
     return scene.name == name and there and window.session.estimate is not None

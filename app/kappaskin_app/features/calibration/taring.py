@@ -4,7 +4,7 @@ from datetime import datetime
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.calibration import Tare, Tares
+from kappaskin.calibration import Tare, TareStore
 from kappaskin.errors import Refusal
 from kappaskin.live import Engine, Status
 from kappaskin.sensing import Sensor
@@ -25,7 +25,7 @@ class Taring(QObject):
     told = Signal(str)
 
     def __init__(
-        self, history: History, engine: Engine, tares: Tares, parent: QObject | None = None
+        self, history: History, engine: Engine, tares: TareStore, parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
         self._history, self._engine, self._tares = history, engine, tares

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
@@ -96,8 +96,8 @@ class Designing(QObject):
         self.refusal = ""
         self._thread = ThreadPoolExecutor(1, "design")
         self._quick: Future[Prospect] | None = None
-        self._slow: Beside[Prospect] | None = None
-        self._checking: Beside[Check] | None = None
+        self._slow: BackgroundProcess[Prospect] | None = None
+        self._checking: BackgroundProcess[Check] | None = None
         self._asked: Settings | None = None
         self._watched = False
 
@@ -136,7 +136,7 @@ class Designing(QObject):
         if quick and settings.design_place in ("scene", "clustered"):
             self._quick = self._thread.submit(lambda: prospect(design_of(settings)))
         else:
-            self._slow = Beside("kappaskin-design", _prospects, settings)
+            self._slow = BackgroundProcess("kappaskin-design", _prospects, settings)
         self.changed.emit()
 
     def _take_up(self) -> None:
@@ -167,7 +167,9 @@ class Designing(QObject):
             self._end(self._checking)
         elif self._asked is not None and self.prospect is not None and not self.predicting:
             self.check = None
-            self._checking = Beside("kappaskin-check", _checks, self._asked, self.prospect)
+            self._checking = BackgroundProcess(
+                "kappaskin-check", _checks, self._asked, self.prospect
+            )
             self.changed.emit()
 
     def cancel(self) -> None:
@@ -188,7 +190,7 @@ class Designing(QObject):
             if work is not None:
                 self._end(work)
 
-    def _end(self, work: "Beside[Prospect] | Beside[Check]") -> None:
+    def _end(self, work: "BackgroundProcess[Prospect] | BackgroundProcess[Check]") -> None:
         work.close()
         if work is self._slow:
             self._slow = None

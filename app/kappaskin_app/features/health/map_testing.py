@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.calibration import Phase, PressTest, Verdict, elements_to_press
+from kappaskin.calibration import MapVerdict, PressPhase, PressTest, elements_to_press
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
@@ -25,9 +25,9 @@ class MapTesting(QObject):
         super().__init__(parent)
         self._status, self._meeting = Status(), 0
         self.test: PressTest | None = None
-        self.verdict: Verdict | None = None
+        self.verdict: MapVerdict | None = None
         self.message = ""
-        self._phase: Phase | None = None
+        self._phase: PressPhase | None = None
 
     @property
     def running(self) -> bool:

@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 
-from kappaskin.calibration import Phase, PressTest
+from kappaskin.calibration import PressPhase, PressTest
 from kappaskin.live import Status
 from kappaskin_app.features.health.map_testing import MapTesting
 from kappaskin_app.guard import guarded
@@ -15,9 +15,9 @@ _WHAT = (
 )
 _DRAG = " The simulated skin you press by dragging the red arrow there."
 _WAIT = {
-    Phase.REST: "Wait for rest: take your hand off, or hold still.",
-    Phase.PRESS: "Press it now.",
-    Phase.RELEASE: "Pressed. Let go, or hold still for a moment.",
+    PressPhase.REST: "Wait for rest: take your hand off, or hold still.",
+    PressPhase.PRESS: "Press it now.",
+    PressPhase.RELEASE: "Pressed. Let go, or hold still for a moment.",
 }
 
 

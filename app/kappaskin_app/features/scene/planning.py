@@ -4,7 +4,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin.scenes import Scene
@@ -27,7 +27,7 @@ class Planning(QObject):
         self.scene: Scene | None = None
         self.rows: list[dict[str, Any]] = []
         self.refusal = ""
-        self._measuring: Beside[list[dict[str, Any]]] | None = None
+        self._measuring: BackgroundProcess[list[dict[str, Any]]] | None = None
         self._watched = False
 
     @property
@@ -54,7 +54,7 @@ class Planning(QObject):
             self._take_up(self._measuring)
         elif self._session.inside and self._session.scene is not self.scene:
             self.scene, self.refusal = self._session.scene, ""
-            self._measuring = Beside("kappaskin-plan", plan_updates, self.scene)
+            self._measuring = BackgroundProcess("kappaskin-plan", plan_updates, self.scene)
             self.changed.emit()
 
     def cancel(self) -> None:
@@ -66,7 +66,7 @@ class Planning(QObject):
     def close(self) -> None:
         self.watch(False)
 
-    def _take_up(self, measuring: Beside[list[dict[str, Any]]]) -> None:
+    def _take_up(self, measuring: BackgroundProcess[list[dict[str, Any]]]) -> None:
         try:
             for rows in measuring.poll():
                 self.rows = rows
@@ -76,7 +76,7 @@ class Planning(QObject):
         if measuring.done:
             self._end(measuring)
 
-    def _end(self, measuring: Beside[list[dict[str, Any]]]) -> None:
+    def _end(self, measuring: BackgroundProcess[list[dict[str, Any]]]) -> None:
         measuring.close()
         self._measuring = None
         self.changed.emit()

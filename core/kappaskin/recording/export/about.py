@@ -18,7 +18,7 @@ from kappaskin.recording.messages import Topic
 from kappaskin.recording.reading import Recording
 from kappaskin.recording.setup_text import setup_from
 from kappaskin.sensing import Sensor
-from kappaskin.sources import from_json
+from kappaskin.sources import sensor_from_json
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def about(recording: Recording, wanted: Wanted) -> About:
     for device in devices[1:]:
         if device.text != devices[0].text:
             raise Refusal(f"{path}: {another(device.at)}")
-    sensor = from_json(devices[0].text)
+    sensor = sensor_from_json(devices[0].text)
     setups = [_setup_said(wanted.setup, sensor)] if wanted.setup else []
     if wanted.setup is None:
         for told in _in_force(recording, m.SETUP, wanted):

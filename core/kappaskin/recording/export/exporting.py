@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Generator
 from pathlib import Path
 
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.recording.export.wanted import Wanted
 from kappaskin.recording.export.writing import Exported, exported
@@ -26,7 +26,7 @@ class Exporting:
             raise _unwritable(wanted.to, error) from error
         self._room = Path(room)
         try:
-            self._beside = Beside[float | Exported](
+            self._beside = BackgroundProcess[float | Exported](
                 "kappaskin-export", exported, wanted, self._room
             )
         except BaseException:  # Ctrl+C, while it begins

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.recording.disk import is_written
 from kappaskin.recording.repair import Repaired, check_new, repairing
 from kappaskin.recording.writing import part_of
@@ -18,7 +18,7 @@ class Repairing:
     def __init__(self, path: Path, out: Path) -> None:
         check_new(out)
         self._part = part_of(out)
-        self._beside = Beside[float | Repaired]("kappaskin-repair", repairing, path, out)
+        self._beside = BackgroundProcess[float | Repaired]("kappaskin-repair", repairing, path, out)
 
     def poll(self) -> list[float | Repaired]:
         """The shares that are done since the last call, and in the end what was saved.

@@ -21,7 +21,7 @@ from kappaskin.recording.export.wanted import Wanted
 from kappaskin.recording.reading import Message, Recording
 from kappaskin.recording.recompute import Retrace
 from kappaskin.sensing import Sensor
-from kappaskin.sources import to_json
+from kappaskin.sources import sensor_to_json
 
 FORMATS: dict[str, type[Writer]] = {
     ".csv": CsvTable,
@@ -100,7 +100,7 @@ class _Work:
     def __init__(self, recording: Recording, wanted: Wanted, about: About, writer: Writer) -> None:
         self._recording, self._wanted, self._writer = recording, wanted, writer
         self._retrace = Retrace(recording, wanted.setup)
-        self._device, self._sensor = to_json(about.sensor), about.sensor
+        self._device, self._sensor = sensor_to_json(about.sensor), about.sensor
         self._due = wanted.first  # s since the recording began
         self._last = math.nan  # s, when the last frame that was looked at came
         self._written = self._unsettled = self._shapeless = 0
@@ -137,7 +137,7 @@ class _Work:
         """Refuse a frame of another device than the file is of."""
         if sensor is self._sensor or sensor is None:
             return
-        if to_json(sensor) != self._device:
+        if sensor_to_json(sensor) != self._device:
             raise Refusal(f"{self._recording.path}: {another(at)}")
         self._sensor = sensor
 

@@ -3,7 +3,7 @@
 from collections.abc import Generator, Iterable, Sequence
 from itertools import islice
 
-from kappaskin._background import Beside
+from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.scenes import Scene
 from kappaskin.studies.cost.bench import Bench, costs
@@ -46,7 +46,9 @@ class CostMeasurement:
     ) -> None:
         Bench(scene)  # or refused here
         self.effects: dict[Setting, EffectCosts] = {}
-        self._process = Beside("kappaskin-cost", _measured, scene, settings, effects_with)
+        self._process = BackgroundProcess(
+            "kappaskin-cost", _measured, scene, settings, effects_with
+        )
 
     @property
     def done(self) -> bool:

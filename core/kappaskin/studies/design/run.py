@@ -19,8 +19,7 @@ from importlib import import_module
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
-from kappaskin._background import end_with_parent
-from kappaskin._processes import Context, beginning_processes
+from kappaskin._processes import Context, end_with_parent, process_context
 from kappaskin.errors import Refusal, lacking
 from kappaskin.studies.design.results import (
     BlockMoments,
@@ -81,7 +80,7 @@ def processes(count: int) -> Generator[Workers]:
     """So many processes of this machine, one thread each."""
     if not 1 <= count <= _MOST:
         raise Refusal(f"expected 1 to {_MOST} workers, got {count}")
-    with beginning_processes() as context:
+    with process_context() as context:
         workers = _Processes(count, context)
         try:
             yield workers

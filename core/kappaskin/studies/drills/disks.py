@@ -103,11 +103,11 @@ class _FullDisk(Disk):
 class _Listener(Recorder):
     """A recorder that counts the bytes it receives."""
 
-    received = 0
+    total = 0
 
-    def came(self, host_time: float, data: bytes) -> None:
-        self.received += len(data)
-        super().came(host_time, data)
+    def received(self, host_time: float, data: bytes) -> None:
+        self.total += len(data)
+        super().received(host_time, data)
 
 
 def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> DrillOutcome:
@@ -120,7 +120,7 @@ def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> DrillOu
             slowest = stand.longest_read(10.0 if stand.long else 2.0)
             stand.recover(_WITHIN)
             stand.source.record(None)
-        claims = _claims(path, recorder.written, recorder.received, full)
+        claims = _claims(path, recorder.written, recorder.total, full)
     stand.drain()
     lost = stand.source.accounting().lost
     return stand.outcome(

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from kappaskin.sources import BAUD_RATES, FromDevice
+from kappaskin.sources import BAUD_RATES, wire
 from kappaskin.studies.drills.relay import (
     ClockShift,
     CutScans,
@@ -56,7 +56,7 @@ def _cuts(stand: Stand) -> DrillOutcome:
     stand.settle()
     cut = CutScans()
 
-    def many(message: FromDevice) -> list[FromDevice]:
+    def many(message: wire.FromDevice) -> list[wire.FromDevice]:
         return [message] * 4
 
     stand.relay.rewrite, stand.relay.spoil = many, cut

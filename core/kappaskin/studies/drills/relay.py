@@ -14,30 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.frames import Counts
-from kappaskin.sources import (
-    Command,
-    Decoder,
-    FromDevice,
-    Information,
-    Kind,
-    Line,
-    Operation,
-    Reply,
-    Samples,
-    encode_information,
-    encode_reply,
-    encode_samples,
-)
+from kappaskin.sources import Decoder, SerialConnection, wire
 
 _OUTBOX = 2**21  # bytes that wait; beyond it a message goes unsent, as from a device
 _BLOCK = 4096
 _KEPT = 16384  # scans that are remembered: more than wait anywhere
 
-Rewrite = Callable[[FromDevice], list[FromDevice]]
+Rewrite = Callable[[wire.FromDevice], list[wire.FromDevice]]
 Spoil = Callable[[bytes], bytes]
 
 
-def unchanged(message: FromDevice) -> list[FromDevice]:
+def unchanged(message: wire.FromDevice) -> list[wire.FromDevice]:
     return [message]
 
 
@@ -54,7 +41,7 @@ class Relay:
     called, and only then.
     """
 
-    def __init__(self, device: Line, folder: Path) -> None:
+    def __init__(self, device: SerialConnection, folder: Path) -> None:
         self._device, self._decoder = device, Decoder()
         self._link = folder / "port"
         self.port = str(self._link)
@@ -100,7 +87,7 @@ class Relay:
         """Pass on what has come."""
         for _, data in self._device.take(0.0):
             for message in self._decoder.feed(data):
-                if not isinstance(message, Command):
+                if not isinstance(message, wire.Command):
                     for made in self.rewrite(message):
                         self.send(made)
         if not self.held:
@@ -120,11 +107,11 @@ class Relay:
             while os.read(self._master, _BLOCK):
                 pass
 
-    def send(self, message: FromDevice) -> bytes:
+    def send(self, message: wire.FromDevice) -> bytes:
         """Send a message under the next number; its bytes before they are spoilt."""
         number, self.sequence = self.sequence, (self.sequence + 1) % 2**32
         self.spent += 1
-        if isinstance(message, Samples):
+        if isinstance(message, wire.Samples):
             self.sent[number] = message.counts
             if len(self.sent) > _KEPT:
                 del self.sent[next(iter(self.sent))]
@@ -153,14 +140,14 @@ class Relay:
                     self._outbox[0] = data[done:]
 
 
-def _bytes_of(message: FromDevice, number: int) -> bytes:
-    if isinstance(message, Information):
-        return encode_information(number, message.time, message.text)
-    if isinstance(message, Reply):
-        command = Command(message.command, message.operation, b"")
-        return encode_reply(number, message.time, command, message.fault, message.data)
+def _bytes_of(message: wire.FromDevice, number: int) -> bytes:
+    if isinstance(message, wire.Information):
+        return wire.encode_information(number, message.time, message.text)
+    if isinstance(message, wire.Reply):
+        command = wire.Command(message.command, message.operation, b"")
+        return wire.encode_reply(number, message.time, command, message.fault, message.data)
     narrow = abs(message.counts).max(initial=0) < 2**15
-    return encode_samples(
+    return wire.encode_samples(
         number, message.time, message.channels, message.counts, 2 if narrow else 4
     )
 
@@ -176,8 +163,12 @@ class ClockShift:
 
     ahead: float
 
-    def __call__(self, message: FromDevice) -> list[FromDevice]:
-        if isinstance(message, Reply) and message.operation == Operation.PING and not message.fault:
+    def __call__(self, message: wire.FromDevice) -> list[wire.FromDevice]:
+        if (
+            isinstance(message, wire.Reply)
+            and message.operation == wire.Operation.PING
+            and not message.fault
+        ):
             received_us, temperature = _ANSWER.unpack(message.data)
             received_us = max(0, received_us + round(self.ahead * 1e6))
             message = message._replace(data=_ANSWER.pack(received_us, temperature))
@@ -191,17 +182,17 @@ class InformationChange:
     key: str
     value: str
 
-    def __call__(self, message: FromDevice) -> list[FromDevice]:
-        if not isinstance(message, Information):
+    def __call__(self, message: wire.FromDevice) -> list[wire.FromDevice]:
+        if not isinstance(message, wire.Information):
             return [message]
         return [
             message._replace(text=json.dumps(json.loads(message.text) | {self.key: self.value}))
         ]
 
 
-def without_information(message: FromDevice) -> list[FromDevice]:
+def without_information(message: wire.FromDevice) -> list[wire.FromDevice]:
     """As from a device that does not describe itself."""
-    return [] if isinstance(message, Information) else [message]
+    return [] if isinstance(message, wire.Information) else [message]
 
 
 # Faults of bytes under way
@@ -252,7 +243,7 @@ class CutScans:
     whole: bool = True
 
     def __call__(self, data: bytes) -> bytes:
-        if data[_KIND] != Kind.SAMPLES:
+        if data[_KIND] != wire.MessageKind.SAMPLES:
             return data
         self.whole, self.length = not self.whole, len(data)
         if self.whole:

@@ -18,7 +18,7 @@ import numpy as np
 
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
-from kappaskin.sources import Line, SerialSource
+from kappaskin.sources import SerialConnection, SerialSource
 from kappaskin.studies.drills.relay import Relay, clean, unchanged
 
 _PAGE = 4096
@@ -104,7 +104,7 @@ _IDLE = 1000  # reads that bring nothing, after which nothing is under way
 class Device:
     """The device's line; `process` plays it, None for the user's own. `rng` spoils."""
 
-    line: Line
+    line: SerialConnection
     process: "subprocess.Popen[str] | None"
     rng: np.random.Generator
 
@@ -120,7 +120,7 @@ def opened(source: str | None, seed: int) -> Generator[Device]:
     """The device on a port; the simulated one where `source` is None."""
     rng = np.random.default_rng(seed)
     if source is not None:
-        line = Line(source)
+        line = SerialConnection(source)
         try:
             yield Device(line, None, rng)
         finally:
@@ -133,7 +133,7 @@ def opened(source: str | None, seed: int) -> Generator[Device]:
         text=True,
     )
     try:
-        line = Line(_port_of(process))
+        line = SerialConnection(_port_of(process))
         try:
             yield Device(line, process, rng)
         finally:

@@ -32,7 +32,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from kappaskin._processes import beginning_processes
+from kappaskin._processes import process_context
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator, Fit, merged_fits
 from kappaskin.frames import Array
@@ -200,7 +200,7 @@ def run_stability(
     """
     names, rows = [case.name for case in gallery(long)], list[dict[str, Any]]()
     with (
-        beginning_processes() as context,
+        process_context() as context,
         ProcessPoolExecutor(os.cpu_count(), context) as pool,
     ):
         found = pool.map(_rows_of_the, names, repeat(long))

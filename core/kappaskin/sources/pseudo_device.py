@@ -1,4 +1,4 @@
-"""The simulator behind the wire format on a pseudo-terminal: the other end of the line."""
+"""Simulated device: a scene that speaks the wire format on a pseudo-terminal."""
 
 import os
 import select
@@ -29,9 +29,9 @@ from kappaskin.sources.wire import (
 
 _OUTBOX = 2**19  # bytes held before a frame goes unsent: more than a second of a full scan
 _LINGER = 0.3  # s without anything unread before the port is closed
-_PATIENCE = 2.0  # s at most that what is unread is waited for
+_PATIENCE = 2.0  # s to wait at most for what is unread
 _AT_ONCE = 32  # frames that are due, as after standing still, before it listens again
-_INTRODUCTION = 0.5  # s between two information messages
+_INFORMATION_INTERVAL = 0.5  # s between two information messages
 
 
 class _Refused(Exception):
@@ -46,13 +46,13 @@ class PseudoDevice:
     """A scene that speaks the wire format on `port`; spends a sequence number on every message.
 
     It is quiet until someone opens the port, and again after they close it. `unsent` counts the
-    messages that found the outbox full or were in it at the end, `spent` all of them.
+    messages that found the outbox full or were in it at the end, `spent` counts all of them.
     """
 
     def __init__(self, scene: Scene, clock: Callable[[], float] = time.monotonic) -> None:
         self._scene, self._simulator, self._clock = scene, Simulator(scene), clock
         self._sensor = scene.sensor()
-        self._information = information.to_json(self._sensor)
+        self._information = information.sensor_to_json(self._sensor)
         if not hasattr(os, "openpty"):
             raise Refusal("expected a system with pseudo-terminals (Linux, macOS)")
         import tty  # there is none on Windows
@@ -73,7 +73,7 @@ class PseudoDevice:
         self.spent = self.unsent = self.samples = 0
 
     def serve(self, stopped: Callable[[], bool]) -> None:
-        """Send until `stopped()`; each listener gets a fresh clock and an introduction."""
+        """Send until `stopped()`; each listener gets a fresh clock and the information."""
         while not stopped():
             if self._hung_up():
                 time.sleep(0.02)
@@ -110,23 +110,23 @@ class PseudoDevice:
 
     def _stream(self, stopped: Callable[[], bool]) -> None:
         self._decoder = Decoder(FROM_HOST)  # or the next one's first commands pass for repeated
-        self._start, introduced = self._clock() - self._due(), -_INTRODUCTION
+        self._start, informed_at = self._clock() - self._due(), -_INFORMATION_INTERVAL
         while not (stopped() or self._hung_up()):
             now = self._now()
-            if now - introduced >= _INTRODUCTION:
-                introduced = now
-                self._introduce()
+            if now - informed_at >= _INFORMATION_INTERVAL:
+                informed_at = now
+                self._send_information()
             self._listen()
             for _ in range(_AT_ONCE):
                 if self._due() > now or not self._running:
                     break
                 self._send_samples()
             self._flush()
-            wait = self._due() - self._now() if self._running else _INTRODUCTION
+            wait = self._due() - self._now() if self._running else _INFORMATION_INTERVAL
             ready = [self._master] if self._outbox else []
             select.select([self._master], ready, [], max(0.0, min(wait, 0.05)))
 
-    def _introduce(self) -> None:
+    def _send_information(self) -> None:
         self._send(encode_information(self.spent, self._now(), self._information))
 
     def _send_samples(self) -> None:
@@ -151,7 +151,7 @@ class PseudoDevice:
         self.spent += 1  # last: of what is spent it is known whether it goes out
 
     def _flush(self) -> None:
-        with suppress(OSError):  # full, or nobody listens any more: what stays is told as unsent
+        with suppress(OSError):  # full, or nobody listens any more: what stays counts as unsent
             while self._outbox:
                 message = self._outbox[0]
                 sent = os.write(self._master, message[self._sent : self._sent + 4096])
@@ -169,7 +169,7 @@ class PseudoDevice:
             self._flush()
 
     def _listen(self) -> None:
-        """Do what the host asks for."""
+        """Carry out the commands of the host."""
         with suppress(OSError):  # nothing came, or nobody is there any more
             for command in self._decoder.feed(os.read(self._master, 4096)):
                 if isinstance(command, Command):
@@ -182,10 +182,10 @@ class PseudoDevice:
             data, fault = str(refused).encode(), refused.fault
         self._send(encode_reply(self.spent, self._now(), command, fault, data))
         if command.operation in (Operation.GAIN, Operation.IDENTIFY) and not fault:
-            self._introduce()
+            self._send_information()
 
     def _done(self, command: Command, received: float) -> bytes:
-        """What the reply to a command tells, once it is done."""
+        """The data of the reply to a command, once it is carried out."""
         arguments = command.arguments
         match command.operation:
             case Operation.HELLO:
@@ -212,12 +212,12 @@ class PseudoDevice:
 
     def _run(self, operation: int) -> None:
         if operation == Operation.START and not self._running:
-            self._pace(self.rate)
+            self._set_rate(self.rate)
             self._running = True
         elif operation == Operation.STOP:
             self._running = False
 
-    def _pace(self, rate: float) -> None:
+    def _set_rate(self, rate: float) -> None:
         """Send frames at `rate` from now on."""
         due = self._due() if self._running else self._now()
         self._first, self._since, self.rate = self.samples, due, rate
@@ -231,26 +231,26 @@ class PseudoDevice:
         except Refusal as refusal:
             raise _Refused(Fault.OUT_OF_RANGE, str(refusal)) from refusal
         if self._scan.rate < self.rate:
-            self._pace(self._scan.rate)
+            self._set_rate(self._scan.rate)
 
-    def _take_rate(self, asked: int) -> bytes:
-        rate, most = asked / RATE_UNIT, self._scan.rate
+    def _take_rate(self, requested: int) -> bytes:
+        rate, most = requested / RATE_UNIT, self._scan.rate
         if not 0 < rate <= most:
             raise _Refused(Fault.OUT_OF_RANGE, f"expected at most {most:.1f} frames/s, got {rate}")
-        self._pace(rate)
-        return struct.pack("<I", asked)
+        self._set_rate(rate)
+        return struct.pack("<I", requested)
 
-    def _take_gain(self, asked: int) -> bytes:
+    def _take_gain(self, requested: int) -> bytes:
         chain = self._scene.transduction
         try:
-            amplifier = replace(chain.amplifier, gain=asked / 1000)
+            amplifier = replace(chain.amplifier, gain=requested / 1000)
             scene = replace(self._scene, transduction=replace(chain, amplifier=amplifier))
             self._simulator.change(scene)
         except Refusal as refusal:
             raise _Refused(Fault.OUT_OF_RANGE, str(refusal)) from refusal
         self._scene, self._sensor = scene, scene.sensor()
-        self._information = information.to_json(self._sensor)
-        return struct.pack("<I", asked)
+        self._information = information.sensor_to_json(self._sensor)
+        return struct.pack("<I", requested)
 
     def close(self) -> None:
         """Close the port, once a listener has taken what it was sent, or will not."""

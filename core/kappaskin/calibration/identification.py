@@ -1,22 +1,67 @@
-"""Readings on known curvatures, there and back, to the hysteresis that explains them."""
+"""Identification of a channel's line, hysteresis and creep from readings of known curvatures."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.calibration.lines import Lines
+from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
-from kappaskin.sensing import PrandtlIshlinskii
+from kappaskin.sensing import PrandtlIshlinskii, StandardLinearSolid
 
 _PLAYS = 10  # at most, up to half of the range
-_STEPS = 12  # of Gauss-Newton at most, in log a
-_LONGEST = 0.3  # step in log a
+_MOST_STEPS = 12  # of Gauss-Newton at most, in log a
+_LONGEST_STEP = 0.3  # step in log a
 _CONVERGED = 1e-5  # step in log a
 _DECISIVE = 0.5  # share of a reading that the fit leaves to others, below which it decides alone
-_MOST = np.log(4.0)  # log a: loops of one side at most four times as wide as the other's
+_MOST_ASYMMETRY = np.log(4.0)  # log a: loops of one side at most four times as wide as the other's
+_MOST_SHARE = 0.9
+_SETTLING = 0.01  # share of a hold, after the skin was bent, that is left out
 
 
-def thresholds(x: Array, radii: int) -> Array:
+@dataclass(frozen=True, eq=False)
+class LineFits:
+    """Fits of reading = gain * curvature + offset for C channels, and how good they are.
+
+    `gain` has no unit (1 is nominal), `offset` is in 1/m of reading; `gain_sd` and `offset_sd` are
+    their standard errors. `rms` is the residual, and `left_out` that of a reading which was
+    left out of the fit, both as curvature in 1/m.
+    """
+
+    gain: Array
+    offset: Array
+    gain_sd: Array
+    offset_sd: Array
+    rms: Array
+    left_out: Array
+
+
+def fit_lines(x: Array, y: Array) -> LineFits:
+    """The least-squares line through readings `y` (S, C) on curvatures `x` (S,), both in 1/m.
+
+    The reading is fitted to the curvature and the line then read backwards: the cylinders are
+    known, the noise is in the reading, and least squares the other way would turn it into a gain
+    too small. What is left of an unseen reading is e_i / (1 - h_i), h_i its leverage.
+    """
+    n = len(x)
+    d = x - x.mean()
+    Sxx = float(d @ d) or np.nan  # never bent: no line
+    gain = d @ y / Sxx
+    offset = y.mean(axis=0) - gain * x.mean()
+    e = y - offset - np.outer(x, gain)
+    sigma = np.sqrt((e**2).sum(axis=0) / (n - 2))
+    h = 1 / n + d**2 / Sxx
+    scale = np.abs(np.where(gain == 0, np.nan, gain))  # a dead channel has no curvature to tell
+    return LineFits(
+        gain,
+        offset,
+        sigma / np.sqrt(Sxx),
+        sigma * np.sqrt(1 / n + x.mean() ** 2 / Sxx),
+        np.sqrt((e**2).mean(axis=0)) / scale,
+        np.sqrt(((e / (1 - h[:, None])) ** 2).mean(axis=0)) / scale,
+    )
+
+
+def play_thresholds(x: Array, radii: int) -> Array:
     """Thresholds (J,) in 1/m that a sweep of so many `radii` over curvatures `x` (S,) tells apart.
 
     A play reverses over twice its threshold, so the loops on one face tell those up to half of its
@@ -29,8 +74,8 @@ def thresholds(x: Array, radii: int) -> Array:
     return most * np.array([*np.arange(1, count + 1) / (2 * count), 0.6, 0.75, 0.9])
 
 
-def positions(u: Array, slope: Array, r: Array) -> tuple[Array, Array]:
-    """Where plays of thresholds `r` (J,) stand on the ways `u` (S, C) from rest, (S, J, C).
+def play_positions(u: Array, slope: Array, r: Array) -> tuple[Array, Array]:
+    """Positions (S, J, C) of plays of thresholds `r` (J,) along the paths `u` (S, C) from rest.
 
     And their derivatives, given those of u, `slope` (S, C): a play that is dragged moves with u.
     """
@@ -48,7 +93,7 @@ def positions(u: Array, slope: Array, r: Array) -> tuple[Array, Array]:
 def _columns(
     x: Array, y: Array, used: Mask, r: Array, log_a: Array, o: Array
 ) -> tuple[Array, Array]:
-    """What readings `y` (S, C) are linear in, and its derivative along log a, (U, J + 1, C).
+    """The regressors (U, J + 1, C) of readings `y` (S, C), and their derivative along log a.
 
     Of the U steps that are `used` (S,). reading = o + E(G_0 u + sum_j G_j w_j), u = E^-1(x). Since
     E(g z) = g E(z) for every gain g above zero, gain times weight is one number G_j; and the sign
@@ -58,7 +103,7 @@ def _columns(
     above = x[:, None] > 0
     u = np.where(above, x[:, None] / a, x[:, None])
     du = np.where(above, -u, 0.0)
-    w, dw = positions(u, du, r)
+    w, dw = play_positions(u, du, r)
     # A play that never moves is an offset, and its weight anything.
     moves = np.ptp(w[used], axis=0) > 0
     w, dw = w * moves, dw * moves
@@ -97,7 +142,7 @@ def _solved(A: Array, y: Array) -> tuple[Array, float]:
     return found[:-2], float(found[-2] - found[-1])
 
 
-def _fitted(A: Array, dA: Array, y: Array, log_a: float) -> _Fitted:
+def _fit_at(A: Array, dA: Array, y: Array, log_a: float) -> _Fitted:
     """The fit at one log a."""
     G, o = _solved(A, y)
     J = np.column_stack([A[:, G > 0], np.ones(len(y)), dA @ G])
@@ -109,16 +154,18 @@ def _fits(x: Array, y: Array, used: Mask, r: Array, offset: Array) -> list[_Fitt
     C = y.shape[1]
     log_a, o = np.zeros(C), offset.copy()
     best: list[_Fitted | None] = [None] * C
-    for _ in range(_STEPS if C else 0):
+    for _ in range(_MOST_STEPS if C else 0):
         A, dA = _columns(x, y, used, r, log_a, o)
         step = np.zeros(C)
         for c in range(C):
-            fit = _fitted(A[:, :, c], dA[:, :, c], y[used, c], float(log_a[c]))
+            fit = _fit_at(A[:, :, c], dA[:, :, c], y[used, c], float(log_a[c]))
             before = best[c]
             if before is None or fit.squares < before.squares:
                 best[c] = fit
             o[c], step[c] = fit.o, np.linalg.lstsq(fit.J, fit.e)[0][-1]
-        moved = np.clip(log_a + np.clip(step, -_LONGEST, _LONGEST), -_MOST, _MOST)
+        moved = np.clip(
+            log_a + np.clip(step, -_LONGEST_STEP, _LONGEST_STEP), -_MOST_ASYMMETRY, _MOST_ASYMMETRY
+        )
         if np.abs(moved - log_a).max() < _CONVERGED:
             break
         log_a = moved
@@ -126,7 +173,7 @@ def _fits(x: Array, y: Array, used: Mask, r: Array, offset: Array) -> list[_Fitt
 
 
 def _needed(fit: _Fitted, line_squares: float, least: float) -> bool:
-    """Whether the loops say more than a line, by the Bayesian information criterion."""
+    """Whether the loops explain more than a line, by the Bayesian information criterion."""
     n, k = fit.J.shape
     floor = n * least**2
 
@@ -138,7 +185,7 @@ def _needed(fit: _Fitted, line_squares: float, least: float) -> bool:
 
 
 def _left_out(fit: _Fitted, h: Array) -> Array:
-    """What the fit would leave (U,) of each reading that it had not seen, leverages `h` (U,).
+    """The residual (U,) of each reading if it had not been fitted, by the leverages `h` (U,).
 
     e / (1 - h) holds while the same G stay above zero; without a reading that decides one of them
     by itself others take its place, and the fit is done again.
@@ -166,7 +213,7 @@ def _errors(fit: _Fitted) -> tuple[float, float]:
 
 
 def _numbers(fit: _Fitted) -> tuple[float, ...]:
-    """The fields of `Lines` for one channel: its gain is that of a long way, the sum of G."""
+    """The fields of `LineFits` for one channel: its gain is that of a long way, the sum of G."""
     gain = float(fit.G.sum())
     leverage = (np.linalg.qr(fit.J)[0] ** 2).sum(axis=1)
     left = np.stack([fit.e, _left_out(fit, leverage)])
@@ -174,10 +221,10 @@ def _numbers(fit: _Fitted) -> tuple[float, ...]:
     return gain, fit.o, *_errors(fit), float(rms), float(left_out)
 
 
-def identify(
-    x: Array, y: Array, used: Mask, r: Array, line: Lines, least: float
-) -> tuple[Lines, PrandtlIshlinskii]:
-    """The loops in readings `y` (S, C) on curvatures `x` (S,) in 1/m, and what the fits are worth.
+def identify_hysteresis(
+    x: Array, y: Array, used: Mask, r: Array, line: LineFits, least: float
+) -> tuple[LineFits, PrandtlIshlinskii]:
+    """The hysteresis in readings `y` (S, C) on curvatures `x` (S,) in 1/m, and the quality of fit.
 
     The channels share nothing but the thresholds `r` (J,) in 1/m. Glue and bonding differ from gage
     to gage, which the paper blames for the loops and their asymmetry, and a sweep of n radii tells
@@ -197,4 +244,62 @@ def identify(
             numbers[:, c] = _numbers(fit)
             shares = fit.G / fit.G.sum()
             q[c], p[:, c], a[c] = shares[0], shares[1:], np.exp(fit.log_a)
-    return Lines(*numbers), PrandtlIshlinskii(np.tile(r[:, None], C), p, q, a)
+    return LineFits(*numbers), PrandtlIshlinskii(np.tile(r[:, None], C), p, q, a)
+
+
+def _bent_at(course: Array) -> int:
+    """The first moment at which the channels are together more than half as far as at the end."""
+    far = course @ np.sign(course[-1])
+    return int(np.argmax(far > far[-1] / 2))
+
+
+def identify_creep(moments: Array, course: Array, least: float) -> StandardLinearSolid | None:
+    """The creep in `course` (T, C) in 1/m, read at `moments` (T,) in s; None where there is none.
+
+    The skin was at rest, reading zero, until it was bent, early in the course, and then held. What
+    is read from then on is A + B e^(-t/tau), of which the share phi = B / (A + B) goes. The
+    channels share tau, a property of the one glue between them that a channel which hardly creeps
+    cannot tell; each has its own phi. Channels of NaN creep not at all. No reading is known better
+    than `least` in 1/m.
+    """
+    from scipy.optimize import minimize_scalar  # slow to import, and seldom needed
+
+    known = np.isfinite(course).all(axis=0)
+    if not known.any():
+        raise Refusal("every channel was on a rail during the hold; lower the amplifier's gain")
+    bent = _bent_at(course[:, known])
+    t = moments - moments[bent]
+    length = float(t[-1])
+    held = t > _SETTLING * length
+    t, y = t[held], course[held][:, known]
+    n, C = y.shape
+    if n < 10:
+        raise Refusal(
+            f"expected a hold spent mostly on the cylinder, got {n} readings after the skin was "
+            "bent; begin the hold, then bend it at once"
+        )
+
+    def solved(log_tau: float) -> tuple[Array, Array]:
+        """A and B (2, C), and the squares (C,) that they leave."""
+        gone = np.column_stack([np.ones(n), np.exp(-t / np.exp(log_tau))])
+        found: Array = np.linalg.lstsq(gone, y)[0].astype(float)
+        return found, ((y - gone @ found) ** 2).sum(axis=0)
+
+    bounds = float(np.log(length / 100)), float(np.log(length))
+    best = minimize_scalar(lambda v: solved(v)[1].sum(), bounds=bounds, method="bounded")
+    (A, B), squares = solved(float(best.x))
+    still = float(((y - y.mean(axis=0)) ** 2).sum())
+    floor = n * C * least**2
+    gained = n * C * np.log(max(still, floor) / max(float(squares.sum()), floor))
+    if gained < (C + 1) * np.log(n * C):
+        return None  # by the Bayesian information criterion no reading moved
+    tau = float(np.exp(best.x))
+    if tau > 0.95 * length:
+        raise Refusal(
+            f"the hold of {length:.3g} s is too short to tell the creep: its time constant is no "
+            "shorter; hold longer, or not at all"
+        )
+    share = np.zeros(course.shape[1])
+    at_once = np.where(A + B == 0, 1.0, A + B)
+    share[known] = np.clip(B / at_once, 0.0, _MOST_SHARE)
+    return StandardLinearSolid(share, tau)

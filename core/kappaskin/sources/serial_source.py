@@ -1,0 +1,471 @@
+"""Serial source: frames from a port, or any URL that pyserial opens; reconnects by itself."""
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+
+from kappaskin.errors import SourceError
+from kappaskin.estimation import Scanner
+from kappaskin.frames import Event, Frame
+from kappaskin.sensing import Sensor
+from kappaskin.sources.clock import ClockMap, ClockState
+from kappaskin.sources.commands import DeviceCommands, ScanControl
+from kappaskin.sources.decoder import Accounting, Decoder, SequenceCounter
+from kappaskin.sources.interpreter import Interpreter
+from kappaskin.sources.ports import (
+    BaudRateSearch,
+    SerialConnection,
+    holders,
+    port_called,
+    serial_ports,
+)
+from kappaskin.sources.source import InputRecorder, register_scheme
+from kappaskin.sources.wire import (
+    VERSION,
+    Command,
+    FromDevice,
+    Information,
+    Reply,
+    Samples,
+    encode_samples,
+)
+
+_PATIENCE = 3.0  # s without messages, or without the device's information, before that is reported
+_DWELL = 0.8  # s of unreadable bytes, after which another baud rate is tried
+_RETRY = 0.25  # s between two attempts to open a port that was lost
+_UNREAD = 2**22  # counts kept until the device has sent its information
+_MESSAGE_OVERHEAD = 64  # counts that take as much memory as a message beside its own
+_CLOCK_OFFSET, _CLOCK_DRIFT = 0.5, 0.01  # s, and share, by which two running clocks may differ
+_LONGEST_TEXT = 500  # characters: a device may send any name, and each status has 64 events
+_LOSS_INTERVAL = 1.0  # s of which lost messages are reported together
+
+
+class SerialSource:
+    """Frames from the device on a port; reconnects when it was unplugged, on whichever port it is.
+
+    Opening raises a `SourceError` where it cannot be; thereafter `trouble` says why no frames come.
+    A thread of its own reads, so that no byte waits for arithmetic.
+    """
+
+    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self.url, self._clock = url, clock
+        self._plug = port_called(url)
+        self._decoder = Decoder()
+        self._interpreter = Interpreter(url)
+        self._events = _EventLog(self._decoder.sequence, clock)
+        self._scan_control = ScanControl()
+        self._recording = _RecordingTap(self._interpreter)
+        self._pending: deque[tuple[float, FromDevice]] = deque()
+        self._last: tuple[float, float] | None = None  # device and host time of the last message
+        self._overrun = 0
+        self._disconnected = ""  # why there is no connection
+        self._lost_at: float | None = None  # when the connection was lost, until the device is back
+        self._next_try = 0.0
+        self._connection: SerialConnection | None = None
+        self._connect(SerialConnection(url, clock))
+
+    @property
+    def sensor(self) -> Sensor | None:
+        return self._interpreter.sensor
+
+    @property
+    def temperature(self) -> float:
+        """The device's, in degrees Celsius; NaN where it does not report it."""
+        return self._commands.temperature
+
+    # The connection: opened, lost, opened again.
+
+    def _connect(self, connection: SerialConnection) -> None:
+        """Read from `connection`, and ask the device for its information."""
+        now = self._clock()
+        self._connection = connection
+        self._opened = self._received_at = self._good_at = self._tuned_at = now
+        self._bytes_before = self._decoder.accounting().bytes_in
+        self._holders: list[str] = []
+        self._rates = BaudRateSearch(connection.baud_rate)
+        clock_map = ClockMap()
+        self._interpreter.begin(clock_map)
+        self._commands = DeviceCommands(self._send, clock_map)
+        self._commands.greet(now)
+        self._scan_control.begin()
+
+    def _disconnect(self, connection: SerialConnection) -> None:
+        """Close a connection that was lost; the device may come back."""
+        self._overrun += connection.overrun
+        connection.close()
+        self._connection = None
+        self._decoder.line_ended()
+        self._decoder.sequence.interrupt()
+        self._pending.clear()
+        self._lost_at = self._clock()
+        self._recording.disconnected(self._lost_at)
+        self._disconnected = (
+            f"{self.url}: connection lost: the device was unplugged, or stopped; plug it in to "
+            "continue"
+        )
+        self._events.add("gone", self._disconnected)
+
+    def _reconnect(self, timeout: float) -> None:
+        """Try to open the port, or the one where a plug of the same serial number is now."""
+        now = self._clock()
+        if now < self._next_try:
+            time.sleep(min(timeout, self._next_try - now))
+            return
+        self._next_try = now + _RETRY
+        try:
+            self._connect(SerialConnection(self._present_url(), self._clock))
+        except SourceError as error:
+            self._disconnected = f"{error}; retrying"
+
+    def _present_url(self) -> str:
+        known = self._plug.serial_number
+        here = (port.port for port in serial_ports() if port.same_plug(self._plug)) if known else ()
+        return next(iter(here), self.url)
+
+    def reset(self) -> None:
+        """Let the board restart, if DTR or RTS does that."""
+        if self._connection is not None:
+            self._connection.reset()
+
+    def close(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+
+    # From the device: bytes to messages to frames.
+
+    def read(self, timeout: float) -> list[Frame]:
+        """The frames that arrived, after at most `timeout` s."""
+        connection = self._connection
+        if connection is None:
+            self._reconnect(timeout)
+            return []
+        # Asked for first: what arrived before the connection was lost is still to be read.
+        lost = connection.lost
+        arrived = connection.take(0.0 if lost or self._has_usable() else timeout)
+        for now, data in arrived:
+            messages = self._decoder.feed(data)
+            self._received_at = now
+            self._pending += [(now, got) for got in messages if not isinstance(got, Command)]
+            if messages:
+                self._good_at = now
+                if self._rates.good(connection.baud_rate):
+                    self._events.add("rate", f"the device sends at {connection.baud_rate} baud")
+        if not self._interpreter.known:
+            self._find_information()
+        frames = self._frames()
+        self._recording.received(arrived)
+        if self._interpreter.known and self._events.restarted():
+            self._scan_control.begin()
+        self._events.losses()
+        if lost and not self._has_usable():
+            self._disconnect(connection)
+        else:
+            self._maintain(connection)
+        return frames
+
+    def _has_usable(self) -> bool:
+        """Whether messages wait that can be used before more bytes are read."""
+        return self._interpreter.known and bool(self._pending)
+
+    def _find_information(self) -> None:
+        """Learn which device it is; what it sent before that is kept until then."""
+        for place, (_, message) in enumerate(self._pending):
+            if isinstance(message, Information):
+                self._identify(message.text)
+                if not self._interpreter.known:
+                    self._drop(place + 1)
+                return
+        self._drop_beyond(_UNREAD)
+
+    def _drop_beyond(self, most: int) -> None:
+        """Keep the newest messages, of `most` counts together."""
+        counts = 0
+        for kept, (_, message) in enumerate(reversed(self._pending)):
+            counts += _MESSAGE_OVERHEAD
+            counts += len(message.counts) if isinstance(message, Samples) else 0
+            if counts > most:
+                self._drop(len(self._pending) - kept)
+                return
+
+    def _drop(self, count: int) -> None:
+        for _ in range(count):
+            self._pending.popleft()
+
+    def _identify(self, text: str) -> None:
+        """Take the device's information, and report what of it is new."""
+        before, text_before = self._interpreter.sensor, self._interpreter.text
+        if not self._interpreter.learn(text):
+            return
+        if text != text_before:
+            self._scan_control.scan(None)  # what was chosen is on the skin that was
+        sensor = self._interpreter.sensor
+        if sensor is not None:
+            if self._lost_at is not None:
+                self._resume(before, sensor, self._clock() - self._lost_at)
+            self._events.connected(before, sensor)
+
+    def _resume(self, before: Sensor | None, now: Sensor, away: float) -> None:
+        """Count what was lost while the connection was, for `away` s."""
+        self._lost_at = None
+        same = before is not None and before.serial_number == now.serial_number
+        sequence = self._decoder.sequence
+        lost_before = sequence.lost
+        sequence.resume(same and self._kept_running())
+        self._events.reconnected(now, away, same, sequence.lost - lost_before)
+
+    def _kept_running(self) -> bool:
+        """Whether the device's clock went on while there was no connection.
+
+        One that shows more than had passed here as the port was opened went on too: this machine
+        was asleep, or busy, then or since.
+        """
+        if self._last is None:
+            return False
+        device = self._pending[0][1].time - self._last[0]
+        host = self._opened - self._last[1]
+        return device > 0 and device - host > -_CLOCK_OFFSET - _CLOCK_DRIFT * host
+
+    def _frames(self) -> list[Frame]:
+        """The frames before the next message that changes the sensor, or cannot be used."""
+        frames: list[Frame] = []
+        while self._has_usable():
+            if frames and self._interpreter.is_of_another(self._pending[0][1]):
+                break
+            now, message = self._pending.popleft()
+            self._last = message.time, now
+            if isinstance(message, Reply):
+                self._take_reply(message, now)
+            elif isinstance(message, Information):
+                self._identify(message.text)
+            elif frame := self._interpreter.frame(message, now):
+                frames.append(frame)
+                self._recording.clock(frame.device_time)
+        return frames
+
+    # To the device: pings, scan lists, other baud rates.
+
+    def _send(self, data: bytes) -> None:
+        if self._connection is not None and self._connection.write(data):
+            self._recording.sent(self._clock(), data)
+
+    def scan(self, scanner: Scanner | None) -> None:
+        """Let the device scan what `scanner` chooses, a few times a second; all without one."""
+        self._scan_control.scan(scanner)
+
+    @property
+    def scan_refusal(self) -> str:
+        """Why the device does not scan what was requested; empty when it does."""
+        return self._scan_control.refusal
+
+    def _take_reply(self, reply: Reply, now: float) -> None:
+        before = self._commands.refusal
+        self._commands.take(reply, now)
+        self._scan_control.take(reply)
+        if self._commands.refusal != before:
+            self._events.add("refused", self._commands.refusal)
+
+    def _maintain(self, connection: SerialConnection) -> None:
+        """Send pings and scan lists; try other baud rates on unreadable bytes."""
+        now, known = self._clock(), self._interpreter.known
+        if known and self._interpreter.sensor is not None:
+            self._scan_control.attend(now, self._interpreter.sensor, self._commands.send)
+        if self._commands.attend(now) and not known:
+            self._commands.greet(now)
+        since = max(self._good_at, self._tuned_at)
+        patience = _PATIENCE if known and self._tuned_at < self._good_at else _DWELL
+        if self._received_at > since and now - since > patience:
+            connection.set_baud_rate(self._rates.next(connection.baud_rate))
+            self._tuned_at, self._holders = now, holders(self.url)
+            self._commands.greet(now)
+
+    # What is reported.
+
+    def record(self, recorder: InputRecorder | None) -> None:
+        """Give `recorder` from now on all that frames are made of; nobody without one."""
+        now = self._clock()
+        self._recording.begin(recorder, now, self._pending, self._decoder.held)
+        if self._connection is None:
+            self._recording.disconnected(now)
+
+    def events(self) -> list[Event]:
+        """The events since the last call."""
+        return self._events.take()
+
+    def accounting(self) -> Accounting:
+        overrun = self._overrun + (self._connection.overrun if self._connection else 0)
+        return self._decoder.accounting(overrun=overrun)
+
+    @property
+    def trouble(self) -> str:
+        """Why no frames come; empty when they do, or may be expected to."""
+        if self._connection is None:
+            return self._disconnected
+        now = self._clock()
+        if self._interpreter.unusable or now - self._opened < _PATIENCE:
+            return self._interpreter.unusable
+        if self._interpreter.known and now - self._good_at < _PATIENCE:
+            return ""
+        return self._why_none(now)
+
+    def _why_none(self, now: float) -> str:
+        seen, known = self._decoder.accounting(), self._interpreter.known
+        if self._commands.refusal and not known:
+            return f"{self.url}: {self._commands.refusal}"
+        if seen.other_version is not None and not known:
+            return (
+                f"{self.url}: the device speaks wire version {seen.other_version}, this program "
+                f"speaks {VERSION}; update the older of the two"
+            )
+        arrived = seen.bytes_in - self._bytes_before
+        if not arrived or (known and now - self._received_at >= _PATIENCE):
+            return (
+                f"{self.url}: silent for more than {_PATIENCE:g} s; is the device on, and is this "
+                "its port?"
+            )
+        if self._good_at > self._opened and not known:
+            return (
+                f"{self.url}: messages come, but for more than {_PATIENCE:g} s none said what the "
+                "device is; its firmware must send an information message every second"
+            )
+        others = ", ".join(self._holders)
+        return (
+            f"{self.url}: {arrived} bytes came but no message of wire version {VERSION} "
+            f"{self._rates.tried} it is another kind of device"
+            + (f", or {others} takes its bytes" if others else "")
+        )
+
+
+class _EventLog:
+    """Collects events until they are taken; those of lost messages by the counts of `sequence`."""
+
+    def __init__(self, sequence: SequenceCounter, clock: Callable[[], float]) -> None:
+        self._sequence, self._clock = sequence, clock
+        self._events: list[Event] = []
+        self._lost = self._restarts = 0  # that were reported
+        self._losses_at = 0.0
+
+    def add(self, kind: str, text: str) -> None:
+        self._events.append(Event(self._clock(), kind, text[:_LONGEST_TEXT]))
+
+    def take(self) -> list[Event]:
+        """The events since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    def connected(self, before: Sensor | None, now: Sensor) -> None:
+        """Report what is new of the device that is there `now`."""
+        name = _device_name(now)
+        if before is None:
+            self.add("met", f"{name}, firmware {now.firmware}")
+        elif before.serial_number != now.serial_number:
+            self.add("other", f"another device: {name} instead of {before.serial_number}")
+        elif now.firmware != before.firmware:
+            self.add("firmware", f"firmware {now.firmware} instead of {before.firmware}")
+        elif now is not before:
+            self.add("changed", f"{name} sent another description of itself than before")
+
+    def reconnected(self, sensor: Sensor, away: float, same: bool, lost: int) -> None:
+        """Report that the `same` device is back after `away` s, in which so many were `lost`."""
+        restarted = "" if self._sequence.restarts == self._restarts else ", restarted"
+        self._lost, self._restarts = self._lost + lost, self._sequence.restarts
+        if same:
+            text = f"{_device_name(sensor)} is back after {away:.1f} s{restarted}"
+            self.add("back", f"{text}: {lost} messages lost")
+
+    def restarted(self) -> bool:
+        """Whether the device restarted since the last call, which is reported."""
+        restarted = self._sequence.restarts > self._restarts
+        if restarted:
+            self._restarts = self._sequence.restarts
+            self.add("restarted", "the device restarted while it was connected")
+        return restarted
+
+    def losses(self) -> None:
+        """Report what was lost, at most once in a while."""
+        lost, now = self._sequence.lost - self._lost, self._clock()
+        if lost and now - self._losses_at >= _LOSS_INTERVAL:
+            if lost > 0:
+                self.add("gap", f"{lost} messages lost")
+            self._lost, self._losses_at = self._sequence.lost, now
+
+
+def _device_name(sensor: Sensor) -> str:
+    return f"{sensor.name} {sensor.serial_number}"
+
+
+class _RecordingTap:
+    """Passes all that frames are made of to a recorder while there is one."""
+
+    def __init__(self, interpreter: Interpreter) -> None:
+        self._interpreter = interpreter
+        self._recorder: InputRecorder | None = None
+        self._clock_state: ClockState | None = None  # as it was recorded last
+        self._clock_changes: list[tuple[float, ClockState]] = []
+        self._information = ""  # as it was recorded last
+
+    def begin(
+        self,
+        recorder: InputRecorder | None,
+        now: float,
+        waiting: Iterable[tuple[float, FromDevice]],
+        held: bytes,
+    ) -> None:
+        """Record by `recorder` from now on, or no more.
+
+        First the device, messages `waiting` to be read, and bytes `held` of the next.
+        """
+        self._recorder, self._clock_changes, self._information = recorder, [], ""
+        self._clock_state = None
+        if recorder is None:
+            return
+        if self._interpreter.sensor is not None:  # frames are of it, also of one disconnected
+            self._record_information(recorder)
+            if not self._interpreter.known:
+                recorder.disconnected(now)
+        for received, message in waiting:
+            if isinstance(message, Samples):
+                sequence, began, channels, counts = message
+                recorder.received(received, encode_samples(sequence, began, channels, counts, 4))
+        self._clock_state = self._interpreter.clock_map.state
+        recorder.clock(math.nan, self._clock_state)
+        if held:
+            recorder.received(now, held)
+
+    def sent(self, now: float, data: bytes) -> None:
+        if self._recorder is not None:
+            self._recorder.sent(now, data)
+
+    def disconnected(self, now: float) -> None:
+        if self._recorder is not None:
+            self._recorder.disconnected(now)
+
+    def clock(self, since: float) -> None:
+        """Note the state of the clock map from the scan at device time `since` on."""
+        if self._recorder is None:
+            return
+        state = self._interpreter.clock_map.state
+        if self._clock_state is None or state.map != self._clock_state.map:
+            self._clock_changes.append((since, state))
+            self._clock_state = state
+
+    def received(self, arrived: list[tuple[float, bytes]]) -> None:
+        """Record the bytes that were read, and before them how their times are mapped."""
+        if self._recorder is None:
+            return
+        for since, state in self._clock_changes:
+            self._recorder.clock(since, state)
+        self._clock_changes = []
+        for now, data in arrived:
+            self._recorder.received(now, data)
+        if self._interpreter.known:
+            # It is in those bytes; here it is for whoever begins to replay after them.
+            self._record_information(self._recorder)
+
+    def _record_information(self, recorder: InputRecorder) -> None:
+        if self._interpreter.text != self._information:
+            self._information = self._interpreter.text
+            recorder.connected(self._information)
+
+
+register_scheme("", SerialSource)
