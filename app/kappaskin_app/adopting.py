@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from kappaskin.errors import Refusal
-from kappaskin.live import Engine, Left, Status
+from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.history import History
 from kappaskin_app.settings import Settings
 from kappaskin_app.settings_text import settings_in, settings_text
@@ -25,7 +25,7 @@ class Entrusting:
             self._engine.entrust(settings_text(settings).encode())
 
 
-def settings_left(left: Left) -> Settings:
+def settings_left(left: ResumeInfo) -> Settings:
     """The settings of the window that is gone; those to begin with where they cannot be read."""
     setup = left.asked.setup
     try:
@@ -35,7 +35,7 @@ def settings_left(left: Left) -> Settings:
     return replace(settings, calibration=setup.calibration, tare=setup.tare)
 
 
-def words(left: Left, wanted: str) -> str:
+def words(left: ResumeInfo, wanted: str) -> str:
     """What a person should know of what was `left`, who `wanted` this source."""
     file, source = Path(left.asked.recording or "").name, left.asked.source
     told = f"The recording {file}{_of(source)} {left.lasted}."

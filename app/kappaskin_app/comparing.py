@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.frames import Estimate
-from kappaskin.live import Computed, Status
+from kappaskin.live import PipelineStatus, Status
 from kappaskin.pipeline import Setup
 from kappaskin_app.history import History
 from kappaskin_app.session import Session
@@ -160,5 +160,5 @@ class Comparing(QObject):
         return None if a is None or b is None else Pair(a, b)
 
     @property
-    def told(self) -> Computed | None:
+    def told(self) -> PipelineStatus | None:
         return self._session.status.beside if self._watched else None

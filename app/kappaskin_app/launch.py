@@ -128,9 +128,9 @@ def _stand_behind() -> None:
 
 def _connected(source: str) -> "Engine":
     """An engine that reads `source`, or one that a window left that is gone."""
-    from kappaskin.live import Engine, orphans_folder
+    from kappaskin.live import Engine, resume_folder
 
-    engine = Engine(orphans=orphans_folder())
+    engine = Engine(orphans=resume_folder())
     if engine.adopted is None:
         engine.connect(source)
     return engine

@@ -11,7 +11,7 @@ from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Bargain, Region, bargain
 from kappaskin.frames import Estimate
-from kappaskin.live import Engine, Left, Status
+from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.scenes import Presentation, Scene, Step
@@ -152,7 +152,7 @@ class Session(QObject):
             self._history.change("Simulated skin", -1, **named(self.source))
             self._play()
 
-    def go_on(self, left: Left) -> None:
+    def go_on(self, left: ResumeInfo) -> None:
         """Go on with what the engine was left with, whose settings are the history's."""
         self.source, self.running = left.asked.source or "", bool(left.asked.speed)
         self.engine.compare(None)

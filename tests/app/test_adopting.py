@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin import Engine, Left, Setup, Status, Written
+from kappaskin import Engine, Setup, Status
+from kappaskin.live import ResumeInfo
 from kappaskin.live.requests import Asked
+from kappaskin.recording import RecordingStatus
 from kappaskin_app.adopting import Entrusting, settings_left, words
 from kappaskin_app.history import History
 from kappaskin_app.settings import Settings
@@ -19,9 +21,9 @@ BEFORE = Settings(
 )
 
 
-def left(source: str | None, entrusted: bytes = b"") -> Left:
+def left(source: str | None, entrusted: bytes = b"") -> ResumeInfo:
     asked = Asked(source=source, recording=Path("press.mcap"), entrusted=entrusted)
-    return Left(asked, ("", ""), 1, 5.0)
+    return ResumeInfo(asked, ("", ""), 1, 5.0)
 
 
 @pytest.fixture
@@ -87,7 +89,7 @@ class Trusted:
 def test_settings_are_entrusted_once_each_and_only_while_it_records(qapp) -> None:
     history, engine = History(Settings()), Trusted()
     entrusting = Entrusting(history, engine)
-    recording = Status(recording=Written("x.mcap", active=True))
+    recording = Status(recording=RecordingStatus("x.mcap", active=True))
     entrusting.follow(Status())
     assert engine.data == []
     for status in (recording, recording, Status()):

@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Region, Setup, load_scene
-from kappaskin.live import Engine, Left
-from kappaskin.live.asker import Asker
+from kappaskin.live import Engine, ResumeInfo
 from kappaskin.live.requests import (
     Asked,
     Connect,
@@ -31,15 +30,21 @@ from kappaskin.live.requests import (
     Seek,
     Step,
 )
-from kappaskin.live.resume import Orphan, Waiting, _address, adopted
+from kappaskin.live.resume import (
+    RequestReceiver,
+    ResumedProcess,
+    ResumeListener,
+    _address,
+    resume_process,
+)
 from kappaskin.recording import Recording
 from kappaskin.recording import messages as m
-from kappaskin.recording.recorded_frames import Reenactment
+from kappaskin.recording.recompute import RecordedFrames
 from kappaskin.recording.writing import part_of
 
 pytestmark = pytest.mark.slow
 
-LEFT = Left(Asked(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
+LEFT = ResumeInfo(Asked(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
 
 
 def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
@@ -58,15 +63,15 @@ def folder() -> Iterator[Path]:
 
 
 @pytest.fixture
-def waiting(folder: Path) -> Iterator[Waiting]:
-    one = Waiting(folder, lambda: LEFT)
+def waiting(folder: Path) -> Iterator[ResumeListener]:
+    one = ResumeListener(folder, lambda: LEFT)
     yield one
     one.end()
     if one.line is not None:
         one.line.close()
 
 
-Line = tuple["Connection[Any, Any]", Asker]
+Line = tuple["Connection[Any, Any]", RequestReceiver]
 
 
 @pytest.fixture
@@ -77,10 +82,10 @@ def asked_by(folder: Path) -> Iterator[Callable[..., Line]]:
     def make(folder: Path | None = folder, patience: float = 20.0) -> Line:
         theirs, ours = multiprocessing.Pipe(duplex=False)
         lines.extend((theirs, ours))
-        return ours, Asker(theirs, ("ring", "beside"), folder, patience)
+        return ours, RequestReceiver(theirs, ("ring", "beside"), folder, patience)
 
     yield make
-    while (orphan := adopted(folder)) is not None:
+    while (orphan := resume_process(folder)) is not None:
         orphan.close()
         time.sleep(0.05)
     for line in lines:
@@ -124,7 +129,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
     assert wait_for(lambda: engine_alone.gone)
     assert not any(block.exists() for block in engine_alone.blocks)
 
-    reenact = Reenactment(str(file))
+    reenact = RecordedFrames(str(file))
     with Recording(file) as recording:
         assert recording.whole
         sequences = np.array([f.sequence for said in recording.messages() for f in reenact(said)])
@@ -224,7 +229,7 @@ def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
     asked_by, folder, monkeypatch
 ) -> None:
     clock, later = time.monotonic, [0.0]
-    monkeypatch.setattr("kappaskin.live.asker.time.monotonic", lambda: clock() + later[0])
+    monkeypatch.setattr("kappaskin.live.resume.time.monotonic", lambda: clock() + later[0])
     line, asker = asked_by()
     line.send(Setup(5, 4))
     line.send(Connect("sim:line"))
@@ -232,7 +237,7 @@ def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
     line.close()
     assert wait_for(lambda: not (asker.asked(0.0) or asker.adoptable) or asker.look(True))
 
-    orphan = adopted(folder)
+    orphan = resume_process(folder)
     assert orphan is not None
     assert orphan.left.asked == Asked(Setup(5, 4), source="sim:line", entrusted=b"mine")
     assert (orphan.left.rings, orphan.pid) == (("ring", "beside"), os.getpid())
@@ -261,7 +266,7 @@ def test_nobody_is_waited_for_when_the_recording_ends_by_itself(asked_by, folder
 
 def test_nobody_is_waited_for_longer_than_may_be(asked_by, folder, monkeypatch) -> None:
     clock, later = time.monotonic, [0.0]
-    monkeypatch.setattr("kappaskin.live.asker.time.monotonic", lambda: clock() + later[0])
+    monkeypatch.setattr("kappaskin.live.resume.time.monotonic", lambda: clock() + later[0])
     line, asker = asked_by(patience=600.0)
     line.close()
     asker.asked(1.0)
@@ -313,18 +318,18 @@ def test_what_was_asked_for_last_is_what_lasts(requests: list[Request], asked: A
 
 
 @pytest.mark.skipif(os.name != "posix", reason="the rights are of a POSIX system")
-def test_only_this_user_can_read_a_note(waiting: Waiting, folder: Path) -> None:
+def test_only_this_user_can_read_a_note(waiting: ResumeListener, folder: Path) -> None:
     (note,) = folder.glob("*.note")
     assert note.stat().st_mode & 0o777 == 0o600
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
-def test_of_two_who_come_at_once_one_gets_it(waiting: Waiting, folder: Path) -> None:
+def test_of_two_who_come_at_once_one_gets_it(waiting: ResumeListener, folder: Path) -> None:
     both = threading.Barrier(2)
 
-    def come(_: int) -> Orphan | None:
+    def come(_: int) -> ResumedProcess | None:
         both.wait()
-        return adopted(folder)
+        return resume_process(folder)
 
     with ThreadPoolExecutor(2) as pool:
         found = [orphan for orphan in pool.map(come, range(2)) if orphan]
@@ -334,7 +339,7 @@ def test_of_two_who_come_at_once_one_gets_it(waiting: Waiting, folder: Path) -> 
 
 
 def test_who_has_not_the_key_is_told_nothing_and_another_may_come(
-    waiting: Waiting, folder: Path
+    waiting: ResumeListener, folder: Path
 ) -> None:
     (note,) = folder.glob("*.note")
     with Client(_address(note)) as stranger:
@@ -347,19 +352,19 @@ def test_who_has_not_the_key_is_told_nothing_and_another_may_come(
             stranger.recv_bytes()
     version, key = note.read_text().split()
     note.write_text(f"{version} {bytes(32).hex()}")
-    assert adopted(folder) is None
+    assert resume_process(folder) is None
     assert waiting.line is None
     note.write_text(f"{version} {key}")
-    orphan = adopted(folder)
+    orphan = resume_process(folder)
     assert orphan is not None
     orphan.close()
 
 
-def test_another_version_leaves_it_to_its_own(waiting: Waiting, folder: Path) -> None:
+def test_another_version_leaves_it_to_its_own(waiting: ResumeListener, folder: Path) -> None:
     (note,) = folder.glob("*.note")
     _, key = note.read_text().split()
     note.write_text(f"0.0.0 {key}")
-    assert adopted(folder) is None
+    assert resume_process(folder) is None
     assert note.exists()
     assert waiting.line is None
 
@@ -370,18 +375,18 @@ def test_another_version_leaves_it_to_its_own(waiting: Waiting, folder: Path) ->
 def test_a_note_that_is_none_is_taken_away(folder: Path, text: bytes) -> None:
     folder.mkdir()
     (folder / "x.note").write_bytes(text)
-    assert adopted(folder) is None
+    assert resume_process(folder) is None
     assert not list(folder.iterdir())
 
 
 def test_a_note_of_one_that_died_is_taken_away_and_another_is_found(
-    waiting: Waiting, folder: Path
+    waiting: ResumeListener, folder: Path
 ) -> None:
     (note,) = folder.glob("*.note")
     stale = folder / "0.note"
     stale.write_text(note.read_text())
     stale.with_suffix(".sock").touch()
-    orphan = adopted(folder)
+    orphan = resume_process(folder)
     assert orphan is not None
     assert orphan.left == LEFT
     assert wait_for(lambda: not list(folder.iterdir()))
@@ -389,7 +394,7 @@ def test_a_note_of_one_that_died_is_taken_away_and_another_is_found(
 
 
 def test_where_nobody_left_a_note_nobody_is_found(folder: Path) -> None:
-    assert adopted(folder) is None
+    assert resume_process(folder) is None
 
 
 def test_how_long_it_went_on_is_told_in_minutes_and_seconds() -> None:

@@ -13,8 +13,8 @@ import pytest
 
 from kappaskin import METHODS, SCENES, Calibration, Pipeline, Setup, load_scene
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.live.recorder import Keeping
-from kappaskin.recording import Recorder, Recording, verifying
+from kappaskin.live.recorder import LiveRecorder
+from kappaskin.recording import Recorder, Recording, verify_steps
 from kappaskin.scenes import SECOND_GENERATION_LOOPS
 from kappaskin.scenes.effects.failures import StuckElements
 from kappaskin.sources import SimulatedSource
@@ -28,7 +28,7 @@ def recorders() -> int:
 
 
 def test_recordings_one_after_another_leave_only_the_newest_in_memory(tmp_path) -> None:
-    keeping = Keeping()
+    keeping = LiveRecorder()
     for number in range(5):
         keeping.begin(tmp_path / f"{number}.mcap", None, NO_SIDE)
     deadline = time.monotonic() + 20
@@ -44,7 +44,7 @@ def test_recordings_one_after_another_leave_only_the_newest_in_memory(tmp_path) 
 
 
 def test_what_was_written_last_is_told_when_nothing_is_recorded_any_more(tmp_path) -> None:
-    keeping = Keeping()
+    keeping = LiveRecorder()
     keeping.begin(tmp_path / "a.mcap", None, NO_SIDE)
     keeping.end(None)
     deadline = time.monotonic() + 20
@@ -60,7 +60,7 @@ def test_what_was_written_last_is_told_when_nothing_is_recorded_any_more(tmp_pat
 
 
 def test_that_another_recording_is_refused_is_told_while_the_last_one_still_ends(tmp_path) -> None:
-    keeping, taken = Keeping(), tmp_path / "b.mcap"
+    keeping, taken = LiveRecorder(), tmp_path / "b.mcap"
     taken.write_bytes(b"somebody's")
     keeping.begin(tmp_path / "a.mcap", None, NO_SIDE)
 
@@ -76,7 +76,7 @@ def test_that_another_recording_is_refused_is_told_while_the_last_one_still_ends
 def test_what_was_connected_twice_comes_to_the_same_again(tmp_path) -> None:
     now, path = [100.0], tmp_path / "a.mcap"
     scene = replace(load_scene("circle"), rate=100.0)
-    with closing(Keeping()) as keeping:
+    with closing(LiveRecorder()) as keeping:
         keeping.begin(path, None, NO_SIDE)
         for generation in (1, 2):
             source = SimulatedSource(scene, lambda: now[0])
@@ -89,7 +89,7 @@ def test_what_was_connected_twice_comes_to_the_same_again(tmp_path) -> None:
                     keeping.take(frame, pipeline(frame))
             keeping.ended()
 
-    *_, verdict = verifying(path)
+    *_, verdict = verify_steps(path)
 
     assert verdict.same, verdict.words
 
@@ -98,7 +98,7 @@ def test_what_another_device_remembered_is_not_taken_for_that_of_the_next(tmp_pa
     now, path = [100.0], tmp_path / "a.mcap"
     before = SimulatedSource(load_scene("circle"), lambda: now[0])
     source = SimulatedSource(load_scene("fingertip"), lambda: now[0])
-    with closing(Keeping()) as keeping:
+    with closing(LiveRecorder()) as keeping:
         gone = Pipeline(before.sensor, calibrated(before.sensor))
         keeping.begin(path, before, SimpleNamespace(pipeline=gone, left=None))
         keeping.ended()
@@ -109,7 +109,7 @@ def test_what_another_device_remembered_is_not_taken_for_that_of_the_next(tmp_pa
         for frame in source.read(0.0):
             keeping.take(frame, pipeline(frame))
 
-    *_, verdict = verifying(path)
+    *_, verdict = verify_steps(path)
 
     assert verdict.same, verdict.words
 
@@ -152,11 +152,11 @@ def test_what_is_recorded_from_the_middle_comes_to_the_same_again(method, tmp_pa
             for frame in source.read(0.0):
                 keeping.take(frame, pipeline(frame))
 
-    with closing(Keeping()) as keeping:
+    with closing(LiveRecorder()) as keeping:
         play(0.2)
         keeping.begin(path, source, SimpleNamespace(pipeline=pipeline, left=None))
         play(0.4)
 
-    *_, verdict = verifying(path)
+    *_, verdict = verify_steps(path)
 
     assert verdict.same, verdict.words

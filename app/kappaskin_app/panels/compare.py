@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.bases import edges_of
-from kappaskin.live import Computed, Status
+from kappaskin.live import PipelineStatus, Status
 from kappaskin.sensing import Sensor
 from kappaskin_app.columns import scrolled
 from kappaskin_app.comparing import Comparing, Pair
@@ -56,7 +56,7 @@ class OtherForm(Form):
         self.swap = button("Swap A and B", "swap", "Let what is in use and B change places.")
         self.body.addWidget(self.swap)
 
-    def show_told(self, told: Computed | None, sensor: Sensor | None) -> None:
+    def show_told(self, told: PipelineStatus | None, sensor: Sensor | None) -> None:
         if sensor is not None:
             self.offer("other_edge", ("", *edges_of(sensor.layout.patch)))
         if told is None:

@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QToolBar
 
-from kappaskin.recording import Written
+from kappaskin.recording import RecordingStatus
 from kappaskin_app.views.badge import Badge
 from kappaskin_app.views.readouts import Readouts
 from kappaskin_app.views.recording_mark import RecordingMark
@@ -21,7 +21,7 @@ class Header(QToolBar):
         self._shown.setVisible(False)
         self.addWidget(readouts)
 
-    def show_written(self, written: Written, ended: str) -> None:
+    def show_written(self, written: RecordingStatus, ended: str) -> None:
         """Show that something is recorded, or that it ended by itself."""
         self._shown.setVisible(written.active or bool(ended))
         self._mark.show_written(written, ended)

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from kappaskin.cli.common import progress
 from kappaskin.errors import Refusal
-from kappaskin.recording import Exported, Exporting, Wanted
+from kappaskin.recording import Exported, ExportRequest, ExportTask
 
 
 def export(
@@ -46,7 +46,7 @@ def export(
         Seconds since the recording began, of the one surface that is wanted.
     """
     try:
-        with Exporting(Wanted(recording, to, begin, until, every, at)) as exporting:
+        with ExportTask(ExportRequest(recording, to, begin, until, every, at)) as exporting:
             done = progress(exporting.wait(), Exported)
     except KeyboardInterrupt:
         raise Refusal("stopped before the end; nothing was written") from None

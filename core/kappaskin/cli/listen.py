@@ -4,7 +4,7 @@ import math
 import time
 
 from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
-from kappaskin.publish import Listener
+from kappaskin.publish import UdpListener
 
 _READ = 0.1  # s
 
@@ -28,7 +28,7 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
     """
     check_time(seconds, "listen")
     stopped = stops()
-    listener, end = Listener(udp), time.monotonic() + seconds
+    listener, end = UdpListener(udp), time.monotonic() + seconds
     try:
         while not stopped and time.monotonic() < end:
             for message in listener.read(_READ):

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from kappaskin.cli.common import FAILED, check_time, stops
 from kappaskin.errors import Refusal
 from kappaskin.live import Engine, Status
-from kappaskin.publish import Latency, Published, targets_of
+from kappaskin.publish import Latency, TargetStatus, targets_of
 from kappaskin.scenes import load_scene
 from kappaskin.sources import SIMULATION
 
@@ -86,7 +86,7 @@ def _line(status: Status) -> str:
     return "  ".join([*told, status.message])
 
 
-def _words(target: Published) -> str:
+def _words(target: TargetStatus) -> str:
     told = f"{target.target}: {target.sent} sent, {target.dropped} dropped"
     if target.target.startswith("foxglove"):
         return f"{told}, {len(target.receivers)} connected"

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from kappaskin.cli.common import FAILED, progress
-from kappaskin.recording import Repaired, repairing
+from kappaskin.recording import Repaired, repair_steps
 
 _NOTHING = 3
 
@@ -23,7 +23,7 @@ def repair(file: Path, *, out: Path) -> int:
     out
         The new one, which must not be there yet.
     """
-    done = progress(repairing(file, out), Repaired)
+    done = progress(repair_steps(file, out), Repaired)
     if not (done.total or done.attachments):
         print(f"{file}: {done.words}")
         return _NOTHING

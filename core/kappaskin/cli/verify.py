@@ -4,7 +4,7 @@ from pathlib import Path
 
 from kappaskin._background import Beside
 from kappaskin.cli.common import FAILED, progress
-from kappaskin.recording import Verdict, verifying
+from kappaskin.recording import Verification, verify_steps
 
 
 def verify(file: Path) -> int:
@@ -21,7 +21,7 @@ def verify(file: Path) -> int:
         The recording.
     """
     # As the engine does: products are summed in another order by more than one thread.
-    with Beside[float | Verdict]("verify", verifying, file) as work:
-        verdict = progress(work.wait(), Verdict)
+    with Beside[float | Verification]("verify", verify_steps, file) as work:
+        verdict = progress(work.wait(), Verification)
     print(f"{file}: {verdict.words}")
     return 0 if verdict.same else FAILED

@@ -16,6 +16,7 @@ from kappaskin._processes import beginning_processes
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
 from kappaskin.frames import Array, Estimate, Event
+from kappaskin.live.loop import serve
 from kappaskin.live.requests import (
     Asked,
     Compare,
@@ -31,9 +32,8 @@ from kappaskin.live.requests import (
     Step,
     TakeTare,
 )
-from kappaskin.live.resume import Left, Orphan, adopted
+from kappaskin.live.resume import ResumedProcess, ResumeInfo, resume_process
 from kappaskin.live.ring import Ring
-from kappaskin.live.serving import serve
 from kappaskin.live.status import LOST, Status
 from kappaskin.pipeline import Setup
 from kappaskin.publish import targets_of
@@ -75,17 +75,17 @@ class Engine:
         self._asked = Asked(setup or Setup())
         self._deaths: list[float] = []
         self._seen = Status()
-        self._process: BaseProcess | Orphan | None = None
+        self._process: BaseProcess | ResumedProcess | None = None
         self._requests: Connection[Request, Any] | None = None
-        self.adopted: Left | None = None
-        orphan = adopted(orphans) if orphans else None
+        self.adopted: ResumeInfo | None = None
+        orphan = resume_process(orphans) if orphans else None
         if orphan is None:
             self._ring, self._beside = Ring.create(), Ring.create()
             self._start(Status(setup=self._asked.setup))
         else:
             self._adopt(orphan)
 
-    def _adopt(self, orphan: Orphan) -> None:
+    def _adopt(self, orphan: ResumedProcess) -> None:
         self._process, self._requests = orphan, orphan.line
         self.adopted, self._asked = orphan.left, orphan.left.asked
         self._ring, self._beside = map(Ring.borrow, orphan.left.rings)

@@ -4,13 +4,13 @@ import numpy as np
 
 from kappaskin.frames import Array, Frame
 from kappaskin.health import Health, Monitor
-from kappaskin.live.pipelines import Side
+from kappaskin.live.pipelines import PipelineHost
 from kappaskin.pipeline import Pipeline
 from kappaskin.scenes import Scene
 from kappaskin.sensing import Sensor
 
 
-class Watching:
+class LiveHealthMonitor:
     """Looks after the channels of the sensor it met last; without one there is nothing to see."""
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class Watching:
         """Take in the next frame; whether other channels than before may not be well."""
         return self._monitor is not None and self._monitor(frame)
 
-    def leave_out(self, side: Side) -> bool:
+    def leave_out(self, side: PipelineHost) -> bool:
         """Let a side fit without those that are not well; whether they are others than before."""
         return self._monitor is not None and side.leave_out(self._monitor)
 

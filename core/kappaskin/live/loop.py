@@ -1,9 +1,17 @@
-"""Source to pipeline to ring, as the live process runs it: requests in, statuses out."""
+"""The engine's loop: reads a source, computes, records, publishes and reports."""
 
+import gc
 import math
+import multiprocessing
+import os
+import signal
+import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
 
 import numpy as np
 
@@ -11,13 +19,10 @@ from kappaskin._processes import Haste
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.estimation import Region
 from kappaskin.frames import Event, Frame
-from kappaskin.live.asker import Asker
-from kappaskin.live.compared import Compared
-from kappaskin.live.health_monitor import Watching
-from kappaskin.live.pipelines import Computed, Side
-from kappaskin.live.rate_limit import Pace
-from kappaskin.live.recorder import Keeping
-from kappaskin.live.region_tracking import Following, Steering, steered
+from kappaskin.live.health_monitor import LiveHealthMonitor
+from kappaskin.live.pipelines import ComparedPipeline, PipelineHost, PipelineStatus
+from kappaskin.live.recorder import LiveRecorder
+from kappaskin.live.region_tracking import SerialTracking, SimulatedTracking, track_region
 from kappaskin.live.requests import (
     Compare,
     Connect,
@@ -30,10 +35,11 @@ from kappaskin.live.requests import (
     Step,
     TakeTare,
 )
+from kappaskin.live.resume import RequestReceiver
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, STREAMING, WAITING, Status
-from kappaskin.live.tare_taking import TareTaking
-from kappaskin.live.timing import Arrivals
+from kappaskin.live.tare_taking import TareCapture
+from kappaskin.live.timing import ArrivalTimes, RateLimit
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.publish import Publishing
 from kappaskin.recording import ReplayedSource
@@ -47,26 +53,28 @@ _AGAIN = 0.5  # s between two tries to open a port
 _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
 
 
-class Loop:
+class EngineLoop:
     """The engine's own side: takes requests, reads, computes, writes, reports."""
 
-    def __init__(self, asker: Asker, ring: Ring, beside: Ring) -> None:
+    def __init__(self, asker: RequestReceiver, ring: Ring, beside: Ring) -> None:
         self._asker, self._ring = asker, ring
         self._source: Source | None = None
-        self._watching = Watching()
+        self._watching = LiveHealthMonitor()
         self._place = np.full(2, math.nan)  # of the last contact, in m
-        self._keeping = Keeping()
+        self._keeping = LiveRecorder()
         self._status: Status = ring.read_status() or Status()
-        self._steering: Steering | Following | None = None
+        self._steering: SimulatedTracking | SerialTracking | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
         status = self._status
-        self._side = Side(ring, self._builder, Computed(status.setup, status.generation))
-        self._compared = Compared(beside, self._builder, status.beside or Computed())
-        self._taking = TareTaking(self._builder, self._status.tare)
+        self._side = PipelineHost(
+            ring, self._builder, PipelineStatus(status.setup, status.generation)
+        )
+        self._compared = ComparedPipeline(beside, self._builder, status.beside or PipelineStatus())
+        self._taking = TareCapture(self._builder, self._status.tare)
         self._publishing, self._told = Publishing(), self._status.happened
         self._haste = Haste()
-        self._arrivals, self._pace = Arrivals(), Pace()
+        self._arrivals, self._pace = ArrivalTimes(), RateLimit()
         self._changing, self._again = False, math.inf
 
     def run(self) -> None:
@@ -176,7 +184,7 @@ class Loop:
         self._steering, refusal = None, ""
         if self._source is not None and self._status.sensor is not None:
             try:
-                self._steering = steered(self._source, self._status.region)
+                self._steering = track_region(self._source, self._status.region)
             except Refusal as reason:
                 refusal = str(reason)
         self._status = replace(self._status, region_refusal=refusal)
@@ -286,7 +294,7 @@ class Loop:
             self._leave_out(self._side)
             self._leave_out(self._compared.side)
 
-    def _leave_out(self, side: Side) -> None:
+    def _leave_out(self, side: PipelineHost) -> None:
         if self._watching.leave_out(side) and side is self._side:
             self._keeping.leave_out(side)
 
@@ -350,3 +358,51 @@ class Loop:
             beside=self._compared.told,
         )
         self._ring.write_status(self._status)
+
+
+_SWITCH = 2e-4  # s that one thread may keep the interpreter from another
+_GRACE = 0.5  # s for an orderly end once the parent is gone
+
+
+def serve(
+    requests: "Connection[Request, Request]",
+    names: tuple[str, str],
+    orphans: Path | None,
+    patience: float,
+) -> None:
+    """Do as the `requests` say, and write to the rings of these `names`, until that is over."""
+    # The thread that reads the line needs the interpreter three times for 4 KiB: with Python's 5 ms
+    # for each, a loop that always computes would starve it below the rate of the line.
+    sys.setswitchinterval(_SWITCH)
+    gc.freeze()  # what was imported is no garbage: to look through it takes 27 ms each time
+    # Ctrl+C and a terminal that closes are the parent's: it says goodbye, or is gone.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "SIGHUP"):
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    rings = Ring.attach(names[0]), Ring.attach(names[1])
+    try:
+        loop = EngineLoop(RequestReceiver(requests, names, orphans, patience), *rings)
+        watcher = threading.Thread(target=_end_with_parent, args=(loop,), name="parent-watcher")
+        watcher.daemon = True
+        watcher.start()
+        loop.run()
+    finally:
+        parent = multiprocessing.parent_process()
+        for ring in rings:
+            if parent and parent.is_alive():
+                ring.close()
+            else:
+                ring.destroy()
+
+
+def _end_with_parent(loop: EngineLoop) -> None:
+    """End this process soon after the one that started it, whatever is being computed.
+
+    What was recorded is ended first. What is being recorded, and may be adopted, goes on.
+    """
+    if parent := multiprocessing.parent_process():
+        parent.join()
+        time.sleep(_GRACE)
+        if not loop.may_be_adopted:
+            loop.end_recording()
+            os._exit(1)

@@ -1,12 +1,13 @@
-"""Setups that are asked for to pipelines that compute with them, made beside the running one."""
+"""Pipelines of the engine: built in the background, then swapped with the one in use."""
 
+import math
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array
+from kappaskin.frames import Array, Frame
 from kappaskin.health import Kinds, Monitor
 from kappaskin.live.ring import Ring, slot_type
 from kappaskin.pipeline import Pipeline, Setup
@@ -14,7 +15,7 @@ from kappaskin.sensing import Sensor
 
 
 @dataclass(frozen=True)
-class Computed:
+class PipelineStatus:
     """What is computed: with a `setup` of this `generation`, estimates that fill a `slot`.
 
     `refusal` says why the setup is not the one asked for last, `computing` that another is on its
@@ -28,7 +29,7 @@ class Computed:
     computing: bool = False
 
 
-class Side:
+class PipelineHost:
     """Computes with the setup asked for last, as far as a sensor can; one ring of estimates.
 
     `left` is what the pipeline in use leaves out: the kinds and badness of its channels.
@@ -37,7 +38,7 @@ class Side:
     by `builder`, and those that are overtaken meanwhile are dropped.
     """
 
-    def __init__(self, ring: Ring, builder: Executor, told: Computed) -> None:
+    def __init__(self, ring: Ring, builder: Executor, told: PipelineStatus) -> None:
         self.ring, self._builder, self.told = ring, builder, told
         self.pipeline: Pipeline | None = None
         self._sensor: Sensor | None = None
@@ -136,3 +137,48 @@ def _built(sensor: Sensor, asked: Setup, generation: int, smaller: bool) -> _Bui
                 "use fewer"
             )
     return _Built(sensor, asked, None, refusal)
+
+
+_SHOWN_EVERY = 1 / 60  # s between two frames that are computed
+
+
+class ComparedPipeline:
+    """A `side` that computes as often as it is looked at, and nothing while nobody compares."""
+
+    def __init__(self, ring: Ring, builder: Executor, told: PipelineStatus) -> None:
+        self.side = PipelineHost(ring, builder, told)
+        self._wanted, self._seen = False, -math.inf
+
+    @property
+    def told(self) -> PipelineStatus | None:
+        return self.side.told if self._wanted else None
+
+    def ask(self, setup: Setup | None, sensor: Sensor | None) -> None:
+        """Compute with this setup of what `sensor` brings; with None no more."""
+        self._wanted = setup is not None
+        if setup is None:
+            self.side.meet(None)
+            return
+        self.side.ask(setup)
+        if self.side.pipeline is None:
+            self.side.meet(sensor)
+
+    def meet(self, sensor: Sensor | None) -> None:
+        """Begin with another sensor."""
+        self.side.meet(sensor if self._wanted else None)
+
+    def pass_over(self, frame: Frame) -> None:
+        """Leave out a frame for which there is no time."""
+        if self.side.pipeline is not None:
+            self.side.pipeline.pass_over(frame)
+
+    def take(self, frame: Frame, stands: bool) -> None:
+        """Compute a frame, if the last that was is long ago or the source `stands` at this one."""
+        pipeline = self.side.pipeline
+        if pipeline is None:
+            return
+        if stands or frame.host_time - self._seen >= _SHOWN_EVERY:
+            self._seen = frame.host_time
+            self.side.ring.write(pipeline(frame))
+        else:
+            pipeline.pass_over(frame)

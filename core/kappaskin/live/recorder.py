@@ -6,12 +6,12 @@ from pathlib import Path
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Event, Frame
-from kappaskin.live.pipelines import Side
-from kappaskin.recording import Recorder, ReplayedSource, Written
+from kappaskin.live.pipelines import PipelineHost
+from kappaskin.recording import Recorder, RecordingStatus, ReplayedSource
 from kappaskin.sources import SimulatedSource, Source
 
 
-class Keeping:
+class LiveRecorder:
     """Keeps what a source brings and what one side makes of it; `written` tells how that does.
 
     Nothing is kept, and no call does anything, until `begin`. Only `close` waits for the disk.
@@ -22,13 +22,13 @@ class Keeping:
         self._newest: Recorder | None = None  # that `written` is of, until it has ended
         self._ending: list[Recorder] = []
         self._live = True  # what a recording brings is not recorded again
-        self.written = Written()
+        self.written = RecordingStatus()
 
     @property
     def active(self) -> bool:
         return self._recorder is not None
 
-    def begin(self, path: Path | None, source: Source | None, side: Side) -> None:
+    def begin(self, path: Path | None, source: Source | None, side: PipelineHost) -> None:
         """Record to `path` from now on, instead of to where it was; nowhere if None."""
         self.end(source)
         if path is None:
@@ -39,7 +39,7 @@ class Keeping:
                 raise Refusal("expected a live source to record, got a recording; copy its file")
             recorder = self._recorder = self._newest = Recorder(path, time.monotonic())
         except Refusal as refusal:
-            self.written = Written(str(path), trouble=str(refusal))
+            self.written = RecordingStatus(str(path), trouble=str(refusal))
             return
         self.listen(source)
         if side.pipeline is not None:
@@ -66,12 +66,12 @@ class Keeping:
         if self._recorder is not None and self._live:
             self._recorder.ended(time.monotonic())
 
-    def set_up(self, side: Side) -> None:
+    def set_up(self, side: PipelineHost) -> None:
         """Another pipeline is in use."""
         if self._recorder is not None and side.pipeline is not None and self._live:
             self._recorder.set_up(side.pipeline)
 
-    def leave_out(self, side: Side) -> None:
+    def leave_out(self, side: PipelineHost) -> None:
         """Other channels are left out."""
         if self._recorder is not None and side.left is not None and self._live:
             self._recorder.left_out(*side.left)

@@ -24,7 +24,7 @@ _NOT_ON_A_LINE = {
 }
 
 
-class Steering:
+class SimulatedTracking:
     """Lets `source` scan `region`.
 
     Called with each contact that the skin reports, and the estimator that told its shape.
@@ -49,10 +49,10 @@ class Steering:
             self._scanner.choose(estimator.choose(count, touch.position, self._ahead / 2))
 
 
-class Following:
+class SerialTracking:
     """Lets the device on a line scan `region`, and asks it for another list as a contact moves.
 
-    Called like `Steering`; `refusal` says why the device does not, once that is known.
+    Called like `SimulatedTracking`; `refusal` says why the device does not, once that is known.
     """
 
     def __init__(self, source: SerialSource, sensor: Sensor, region: Region) -> None:
@@ -69,7 +69,7 @@ class Following:
             self._scanner.follow(touch.position)
 
 
-def steered(source: Source, region: Region) -> Steering | Following | None:
+def track_region(source: Source, region: Region) -> SimulatedTracking | SerialTracking | None:
     """What makes `source` scan `region`; None when that is off and everything is scanned.
 
     Raises a `Refusal` when the source cannot or the region is not on its skin; it then goes on with
@@ -77,7 +77,7 @@ def steered(source: Source, region: Region) -> Steering | Following | None:
     """
     if isinstance(source, SimulatedSource):
         source.scan(None)
-        return None if region.around == OFF else Steering(source, region)
+        return None if region.around == OFF else SimulatedTracking(source, region)
     if not isinstance(source, SerialSource) or source.sensor is None:
         return None
     source.scan(None)
@@ -88,4 +88,4 @@ def steered(source: Source, region: Region) -> Steering | Following | None:
             f"expected a region around elements or skin, got {region.around}: "
             f"{_NOT_ON_A_LINE[region.around]}; choose another, or a simulated skin"
         )
-    return Following(source, source.sensor, region)
+    return SerialTracking(source, source.sensor, region)

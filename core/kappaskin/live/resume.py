@@ -1,7 +1,7 @@
-"""A live process that was left alone, and another process that comes for it.
+"""A recording engine that outlives its window, and the next window that resumes it.
 
-The one left alone listens where a note says, with a key that only this user can read. Nothing is
-unpickled before both sides have shown that they have it.
+The engine that was left alone listens where a note says, with a key that only this user can read.
+Nothing is unpickled before both sides have shown that they have it.
 """
 
 import os
@@ -9,6 +9,7 @@ import platform
 import secrets
 import signal
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ from typing import Any, cast
 
 import platformdirs
 
-from kappaskin.live.requests import Asked, Request
+from kappaskin.live.requests import Asked, Goodbye, Request, Seek
 
 _LARGEST = 4096  # bytes of a note
 _QUEUE = 16  # that may wait to be heard
@@ -39,7 +40,7 @@ _FOREIGN = (UnpicklingError, AttributeError, ImportError, IndexError, TypeError)
 
 
 @dataclass(frozen=True)
-class Left:
+class ResumeInfo:
     """What a process that was left alone tells whoever comes for it.
 
     What it was `asked` for, the `rings` that it writes to, its `pid`, and for how long in s it has
@@ -59,7 +60,7 @@ class Left:
         return f"went on for {lasted} after the last window ended"
 
 
-def orphans_folder() -> Path:
+def resume_folder() -> Path:
     """Where processes of this user and machine that were left alone leave a note."""
     state = platformdirs.user_state_path("kappaskin", appauthor=False)
     return state / "left-alone" / platform.node()
@@ -72,13 +73,13 @@ def _address(note: Path) -> str:
     return str(note.with_suffix(".sock"))
 
 
-class Waiting:
+class ResumeListener:
     """Waits until another process comes, and tells it what was `left`; `line` is the one to it.
 
     `told` is what it was told. An `OSError` where no note can be left in `folder`.
     """
 
-    def __init__(self, folder: Path, left: Callable[[], Left]) -> None:
+    def __init__(self, folder: Path, left: Callable[[], ResumeInfo]) -> None:
         self.line: Connection[Any, Any] | None = None
         self._left, self._over, key = left, threading.Event(), secrets.token_bytes(_KEY)
         self.told = left()
@@ -125,13 +126,13 @@ def _leave(note: Path, key: bytes) -> None:
     os.replace(part, note)
 
 
-class Orphan:
+class ResumedProcess:
     """A live process that another one began, in the care of this one; used as a child is.
 
     It lives as long as the `line` to it.
     """
 
-    def __init__(self, line: "Connection[Request, Left]", left: Left) -> None:
+    def __init__(self, line: "Connection[Request, ResumeInfo]", left: ResumeInfo) -> None:
         self.line, self.left, self.pid = line, left, left.pid
 
     def is_alive(self) -> bool:
@@ -155,7 +156,7 @@ class Orphan:
         self.line.close()
 
 
-def adopted(folder: Path) -> Orphan | None:
+def resume_process(folder: Path) -> ResumedProcess | None:
     """A process that left a note in `folder`, None where there is none.
 
     Notes of those that are gone are taken away.
@@ -164,13 +165,13 @@ def adopted(folder: Path) -> Orphan | None:
     return next((orphan for orphan in found if orphan is not None), None)
 
 
-def _reached(note: Path) -> Orphan | None:
+def _reached(note: Path) -> ResumedProcess | None:
     """The process that left a `note`; None where it is gone, another came first, or it is stuck."""
     try:
         version, key = _read(note)
         if version != metadata.version("kappaskin"):
             return None
-        line = cast("Connection[Request, Left]", Client(_address(note)))
+        line = cast("Connection[Request, ResumeInfo]", Client(_address(note)))
     except (OSError, ValueError):
         with suppress(OSError):
             note.unlink(missing_ok=True)
@@ -181,7 +182,7 @@ def _reached(note: Path) -> Orphan | None:
             answer_challenge(line, key)
             deliver_challenge(line, key)
             if line.poll(_ANSWER):
-                return Orphan(line, line.recv())
+                return ResumedProcess(line, line.recv())
     except (OSError, EOFError, AuthenticationError, *_FOREIGN):
         pass
     line.close()
@@ -193,3 +194,91 @@ def _read(note: Path) -> tuple[str, bytes]:
     with note.open("rb") as file:
         version, key = file.read(_LARGEST).decode().split()
     return version, bytes.fromhex(key)
+
+
+_ALONE = "the window ended unexpectedly while it recorded"
+
+
+class RequestReceiver:
+    """Takes requests from the `line` to whoever asks, until that is `over`.
+
+    It is over with a goodbye. Where a line ends without one, another process may take over that
+    finds a note in `folder`; without a folder, a recording or anybody within `patience` s it is
+    over too. Whoever comes gets all that was asked for, and the names of the `rings`.
+    """
+
+    def __init__(
+        self,
+        line: "Connection[Request, Request]",
+        rings: tuple[str, str],
+        folder: Path | None,
+        patience: float,
+    ) -> None:
+        self._line: Connection[Request, Request] | None = line
+        self._rings, self._folder, self._patience = rings, folder, patience
+        self._all, self._since = Asked(), 0.0
+        self._waiting: ResumeListener | None = None
+        self.over = False
+
+    @property
+    def adoptable(self) -> bool:
+        return self._folder is not None and not self.over
+
+    def asked(self, wait: float) -> list[Request]:
+        """What was asked for within `wait` s, without places in a source left for another."""
+        asked: list[Request] = []
+        if self._line is None:
+            time.sleep(wait)
+            return asked
+        try:
+            while not self.over and self._line.poll(wait):
+                request, wait = self._line.recv(), 0.0
+                self.over = isinstance(request, Goodbye)
+                if asked and _overtaken(asked[-1], request):
+                    asked.pop()
+                asked.append(request)
+        except (EOFError, OSError):  # the other where it ended in the middle of a request
+            self._line.close()
+            self._line = None
+        for request in asked:
+            self._all = self._all.after(request)
+        return asked
+
+    def look(self, recording: bool) -> str:
+        """What became of whoever asks since the last look, in words; nothing where nothing did."""
+        if self.over or self._line is not None:
+            return ""
+        if self._waiting is None:
+            return self._begin_to_wait() if recording else self._end()
+        if not recording or time.monotonic() - self._since > self._patience:
+            self._waiting.end()
+            if self._waiting.line is None:
+                return self._end()
+        if self._waiting.line is None:
+            return ""
+        self._line, told, self._waiting = self._waiting.line, self._waiting.told, None
+        return f"the recording {told.lasted}"
+
+    def _begin_to_wait(self) -> str:
+        self._since = time.monotonic()
+        try:
+            if self._folder is not None:
+                self._waiting = ResumeListener(self._folder, self._left)
+                return _ALONE
+        except OSError:  # no place for a note: nobody would ever come
+            pass
+        return self._end()
+
+    def _end(self) -> str:
+        self.over = True
+        return ""
+
+    def _left(self) -> ResumeInfo:
+        return ResumeInfo(self._all, self._rings, os.getpid(), time.monotonic() - self._since)
+
+
+def _overtaken(before: Request, request: Request) -> bool:
+    """Whether nobody would see what was asked `before`: another place in the source follows."""
+    if not (isinstance(before, Seek) and isinstance(request, Seek)) or request.at is None:
+        return False
+    return before.looped is None or request.looped is not None

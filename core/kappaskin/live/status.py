@@ -10,11 +10,11 @@ from kappaskin.calibration import Drift
 from kappaskin.estimation import Region
 from kappaskin.frames import Event
 from kappaskin.health import Health
-from kappaskin.live.pipelines import Computed
-from kappaskin.live.tare_taking import TareNews
+from kappaskin.live.pipelines import PipelineStatus
+from kappaskin.live.tare_taking import TareStatus
 from kappaskin.pipeline import Setup
-from kappaskin.publish import PublishNews, State
-from kappaskin.recording import Replay, Written
+from kappaskin.publish import PublishStatus, SourceState
+from kappaskin.recording import RecordingStatus, Replay
 from kappaskin.scenes import FROM_THE_BEGINNING, Playing
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting
@@ -64,13 +64,13 @@ class Status:
     events: tuple[Event, ...] = ()
     happened: int = 0
     temperature: float = math.nan
-    tare: TareNews = field(default_factory=TareNews)
+    tare: TareStatus = field(default_factory=TareStatus)
     drift: Drift | None = None
     health: Health = field(default_factory=Health)
-    publishing: PublishNews = field(default_factory=PublishNews)
-    recording: Written = field(default_factory=Written)
+    publishing: PublishStatus = field(default_factory=PublishStatus)
+    recording: RecordingStatus = field(default_factory=RecordingStatus)
     replay: Replay | None = None
-    beside: Computed | None = None
+    beside: PipelineStatus | None = None
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status once `events` happened."""
@@ -105,9 +105,9 @@ class Status:
             return "replay"
         return "sim" if self.sensor.simulated else "live"
 
-    def told_since(self, happened: int) -> State:
+    def told_since(self, happened: int) -> SourceState:
         """What receivers are told, with what came after so many had `happened`."""
         fresh = min(self.happened - happened, len(self.events))
         events = self.events[len(self.events) - fresh :]
         told = self.message, self.sensor, self.rate, self.last_frame
-        return State(self.state, self.kind, *told, events)
+        return SourceState(self.state, self.kind, *told, events)

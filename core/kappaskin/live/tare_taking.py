@@ -16,7 +16,7 @@ from kappaskin.sources import Source
 
 
 @dataclass(frozen=True)
-class TareNews:
+class TareStatus:
     """Whether one is being taken, how many ended, and how the last: with a `tare`, or why not.
 
     A `tare` that was taken is not in use before a setup has it.
@@ -28,7 +28,7 @@ class TareNews:
     refusal: str = ""
 
 
-class TareTaking:
+class TareCapture:
     """Takes one tare at a time; it is worked out by the `worker`, beside the frames.
 
     `news` goes on from what was told `before`, by an engine that may have died taking one.
@@ -37,7 +37,7 @@ class TareTaking:
     def __init__(
         self,
         worker: Executor,
-        before: TareNews,
+        before: TareStatus,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._worker, self._clock = worker, clock
@@ -53,7 +53,7 @@ class TareTaking:
             self._end("nothing streams: connect a sensor, then tare")
             return
         self._taring, self._found = Taring(sensor, self._clock()), None
-        self.news = TareNews(True, self.news.ended)
+        self.news = TareStatus(True, self.news.ended)
 
     def receive(self, estimate: Estimate) -> None:
         """Take in an estimate, while a tare is being taken."""
@@ -86,4 +86,4 @@ class TareTaking:
 
     def _end(self, refusal: str, tare: Tare | None = None) -> None:
         self._taring, self._found = None, None
-        self.news = TareNews(False, self.news.ended + 1, tare, refusal)
+        self.news = TareStatus(False, self.news.ended + 1, tare, refusal)

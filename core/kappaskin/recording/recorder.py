@@ -11,10 +11,10 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Event, Frame, Truth
 from kappaskin.pipeline import Pipeline
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import Layout, encode
-from kappaskin.recording.disk import Disk
-from kappaskin.recording.setup_text import said_of_setup
-from kappaskin.recording.writing import RecordingFile, Written
+from kappaskin.recording.cdr import MessageLayout, encode
+from kappaskin.recording.disk import ReservedFile
+from kappaskin.recording.setup_text import setup_to_text
+from kappaskin.recording.writing import RecordingFile, RecordingStatus
 from kappaskin.scenes import Scene, write_scene
 from kappaskin.sources import Known
 
@@ -34,7 +34,9 @@ class Recorder:
     A `Refusal` where no file can be made. No call waits for the disk.
     """
 
-    def __init__(self, path: Path, now: float, disk: Callable[[Path], Disk] = Disk) -> None:
+    def __init__(
+        self, path: Path, now: float, disk: Callable[[Path], ReservedFile] = ReservedFile
+    ) -> None:
         self._file = RecordingFile(path, disk)
         self._now = now  # host time in s of what came last
         self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)  # told last, and its layout
@@ -43,7 +45,7 @@ class Recorder:
         self._contacts = _Room(_CONTACTS)
 
     @property
-    def written(self) -> Written:
+    def written(self) -> RecordingStatus:
         return self._file.written
 
     def end(self) -> None:
@@ -120,7 +122,7 @@ class Recorder:
 
     def set_up(self, pipeline: Pipeline) -> None:
         """Frames go through `pipeline` from now on."""
-        text, files = said_of_setup(pipeline.setup)
+        text, files = setup_to_text(pipeline.setup)
         for name in files.keys() - self._attached:
             self._attached.add(name)
             self._file.attach(name, "application/toml", files[name])
@@ -163,8 +165,8 @@ class Recorder:
                 self._file.put(topic, time, data)
 
 
-def _truths_like(truth: Truth) -> Layout:
-    return Layout(m.TRUTH, {"edge": truth.edge, "coefficients": truth.coefficients.size})
+def _truths_like(truth: Truth) -> MessageLayout:
+    return MessageLayout(m.TRUTH, {"edge": truth.edge, "coefficients": truth.coefficients.size})
 
 
 def _same(a: Truth, b: Truth) -> bool:
@@ -197,12 +199,12 @@ class _Views:
         self._displacement = pipeline.basis.at(layout.positions)
         P, C, N = len(layout), pipeline.sensor.channels, pipeline.basis.shape
         head: dict[str, str | int] = {"header.frame_id": m.FRAME}
-        self._pose = Layout(m.POSE, head)
-        self._curvature = Layout(m.CURVATURE, head | {"curvature": 3 * P, "suspect": P})
-        self._shape = Layout(m.COEFFICIENTS, head | {"coefficients": math.prod(N)})
+        self._pose = MessageLayout(m.POSE, head)
+        self._curvature = MessageLayout(m.CURVATURE, head | {"curvature": 3 * P, "suspect": P})
+        self._shape = MessageLayout(m.COEFFICIENTS, head | {"coefficients": math.prod(N)})
         self._functions = N
         self._scanned = 0  # channels in the frame told last
-        self._counts = Layout(m.COUNTS, head | {"channels": 0, "counts": 0})
+        self._counts = MessageLayout(m.COUNTS, head | {"channels": 0, "counts": 0})
         step = 4 * len(_COLUMNS)
         cloud = head | {"fields": len(_COLUMNS), "data": P * step}
         for n, name in enumerate(_COLUMNS):
@@ -210,7 +212,7 @@ class _Views:
             cloud[f"fields.{n}.offset"] = 4 * n
             cloud[f"fields.{n}.datatype"] = _FLOAT32
             cloud[f"fields.{n}.count"] = 1
-        self._cloud = Layout(m.POINT_CLOUD, cloud)
+        self._cloud = MessageLayout(m.POINT_CLOUD, cloud)
         self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
         fit = pipeline.fit
         self.every = isinstance(fit, Remembering) and not fit.remembers
@@ -229,7 +231,7 @@ class _Views:
         C = len(frame.counts)
         if self._scanned != C:
             fixed = {"header.frame_id": m.FRAME, "channels": C, "counts": C}
-            self._scanned, self._counts = C, Layout(m.COUNTS, fixed)
+            self._scanned, self._counts = C, MessageLayout(m.COUNTS, fixed)
         counts = {**head, "channels": frame.channels, "counts": frame.counts} if C else head
         readings = {"curvature": curvature, "noise": estimate.noise, "suspect": estimate.suspect}
         shape = {"shape": self._functions, "coefficients": estimate.coefficients.ravel()}

@@ -13,8 +13,8 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Event, Frame
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
-from kappaskin.recording.reading import Message, Recording
-from kappaskin.recording.recorded_frames import Reenactment
+from kappaskin.recording.reading import RecordedMessage, Recording
+from kappaskin.recording.recompute import RecordedFrames
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting, Tape, register_scheme
 
@@ -110,7 +110,7 @@ class ReplayedSource:
                 events.append(self._event(message, self._place(message.stamp)))
         return tuple(gaps[:_TOLD]), tuple(events)
 
-    def _event(self, message: Message, when: float) -> Event:
+    def _event(self, message: RecordedMessage, when: float) -> Event:
         said = decode(m.LOG, message.data)
         return Event(when, said["name"][:_LONGEST], said["msg"][:_LONGEST])
 
@@ -132,7 +132,7 @@ class ReplayedSource:
     def _go_to(self, at: float) -> None:
         """Go on from `at` s."""
         self._from, self._since = at, self._clock()
-        self._reenact = Reenactment(str(self._recording.path), self._made)
+        self._reenact = RecordedFrames(str(self._recording.path), self._made)
         self._ready: deque[_Ready] = deque()
         stamp = self._first + round(at * 1e9)
         # From the chunk before, so that no message is begun in its middle.
@@ -141,8 +141,8 @@ class ReplayedSource:
         for topic in (m.DEVICE, m.CLOCKS):
             if message := self._recording.last_before(topic, stamp):
                 self._reenact.begin_with(message)
-        self._messages: Iterator[Message] = self._recording.messages(max(later - 1, 0))
-        self._next: Message | None = next(self._messages, None)
+        self._messages: Iterator[RecordedMessage] = self._recording.messages(max(later - 1, 0))
+        self._next: RecordedMessage | None = next(self._messages, None)
         while self._next is not None and self._next.stamp < stamp:
             self._take(self._next)
         self._ready.clear()
@@ -207,7 +207,7 @@ class ReplayedSource:
 
     # What comes.
 
-    def _take(self, message: Message) -> None:
+    def _take(self, message: RecordedMessage) -> None:
         """Let one message be the last that came."""
         for n, frame in enumerate(self._reenact(message)):
             self._ready.append(_Ready((message.stamp, n), frame, self._reenact.sensor))
@@ -222,7 +222,7 @@ class ReplayedSource:
             self._take(self._next)
         return bool(self._ready) and self._place(self._ready[0].mark[0]) <= until
 
-    def _tell(self, message: Message) -> None:
+    def _tell(self, message: RecordedMessage) -> None:
         if message.topic == m.EVENTS.name:
             self._events.append(self._event(message, self._clock()))
 

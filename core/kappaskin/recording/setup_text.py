@@ -21,7 +21,7 @@ _LONGEST = 2**16
 _SETUPS = 500  # of a recording, the first of more
 
 
-def said_of_setup(setup: Setup) -> tuple[str, dict[str, bytes]]:
+def setup_to_text(setup: Setup) -> tuple[str, dict[str, bytes]]:
     """The text, and by name the files that it names."""
     said: dict[str, Any] = {name: getattr(setup, name) for name in (*_WHOLE, *_REAL, *_TEXT)}
     files: dict[str, bytes] = {}
@@ -34,7 +34,7 @@ def said_of_setup(setup: Setup) -> tuple[str, dict[str, bytes]]:
     return json.dumps(said), files
 
 
-def setup_from(text: str, file: Callable[[str], bytes]) -> Setup:
+def setup_from_text(text: str, file: Callable[[str], bytes]) -> Setup:
     """The setup that `text` tells of, `file` giving what a name stands for.
 
     A `Refusal` when it is none.
@@ -58,7 +58,7 @@ def setup_from(text: str, file: Callable[[str], bytes]) -> Setup:
     return Setup(**values)
 
 
-def setups_of(recording: Recording) -> list[tuple[float, Setup]]:
+def recorded_setups(recording: Recording) -> list[tuple[float, Setup]]:
     """The setups in a recording, each with the time in s from its beginning on which it was used.
 
     A `Refusal` where one is none.
@@ -67,7 +67,7 @@ def setups_of(recording: Recording) -> list[tuple[float, Setup]]:
     return [
         (
             (message.stamp - recording.first) * 1e-9,
-            setup_from(decode(m.STRING, message.data)["data"], recording.attachment),
+            setup_from_text(decode(m.STRING, message.data)["data"], recording.attachment),
         )
         for message in islice(told, _SETUPS)
     ]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from kappaskin.frames import Estimate
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
-from kappaskin.recording.reading import Message, Recording
-from kappaskin.recording.recompute import Retrace
+from kappaskin.recording.reading import RecordedMessage, Recording
+from kappaskin.recording.recompute import Recomputation
 
 _COMPARED = {
     m.CONTACTS.name: m.CONTACT,
@@ -43,7 +43,7 @@ _NAMED_AS: dict[str, Callable[[Estimate], Any]] = {
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verification:
     """What came of it: contacts, curvatures and shapes `compared`, of `frames`; `different` ones.
 
     `first` tells the first difference, `largest` is the largest one as a share of the largest
@@ -76,7 +76,7 @@ class Verdict:
         return "; ".join(parts)
 
 
-def verifying(path: Path) -> Generator[float | Verdict]:
+def verify_steps(path: Path) -> Generator[float | Verification]:
     """Work out everything that was recorded in `path` once more, and compare.
 
     Now and then the share that is done, and the verdict at the end. To be run where the engine's
@@ -97,11 +97,11 @@ class _Worker:
     """Takes the messages as they were written."""
 
     def __init__(self, recording: Recording) -> None:
-        self._retrace = Retrace(recording)
+        self._retrace = Recomputation(recording)
         self._frames = self._compared = self._missing = self._different = 0
         self._first, self._largest = "", 0.0
 
-    def __call__(self, message: Message) -> None:
+    def __call__(self, message: RecordedMessage) -> None:
         if kind := _COMPARED.get(message.topic):
             self._compare(decode(kind, message.data))
             return
@@ -135,8 +135,8 @@ class _Worker:
             f"{_told(was)}, and is {_told(now)} now"
         )
 
-    def verdict(self) -> Verdict:
-        return Verdict(
+    def verdict(self) -> Verification:
+        return Verification(
             self._frames,
             self._compared,
             self._missing,

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kappaskin.errors import Refusal
-from kappaskin.recording import Disk, Recorder, Recording, Written
+from kappaskin.recording import Recorder, Recording, RecordingStatus, ReservedFile
 from kappaskin.recording import messages as m
 from kappaskin.studies.drills.drill import Drill
 from kappaskin.studies.drills.outcome import Outcome
@@ -22,7 +22,7 @@ _SLOW = 0.5  # s that one write takes
 _ROOM = 2**16  # bytes of a file, until the disk is full but for what is kept in reserve
 
 
-class _SlowDisk(Disk):
+class _SlowDisk(ReservedFile):
     """One on which every write takes its time."""
 
     def put(self, data: bytes) -> None:
@@ -30,7 +30,7 @@ class _SlowDisk(Disk):
         super().put(data)
 
 
-class _FullDisk(Disk):
+class _FullDisk(ReservedFile):
     """One with little room beside what is kept in reserve."""
 
     def put(self, data: bytes) -> None:
@@ -51,7 +51,7 @@ class _Listener(Recorder):
         super().came(host_time, data)
 
 
-def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> Outcome:
+def _recorded(disk: Callable[[Path], ReservedFile], full: bool, stand: Stand) -> Outcome:
     """Record for a while to a bad disk: reads go on, the file is whole, and it is told."""
     stand.settle()
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
@@ -71,7 +71,7 @@ def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> Outcome
     )
 
 
-def _claims(path: Path, written: Written, told: int, full: bool) -> list[tuple[bool, str]]:
+def _claims(path: Path, written: RecordingStatus, told: int, full: bool) -> list[tuple[bool, str]]:
     """Whether the file is what it should be, of so many bytes that the recorder was told of."""
     try:
         with Recording(path) as recording:

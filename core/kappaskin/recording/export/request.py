@@ -1,0 +1,261 @@
+"""What is to be exported, and what every exported file says of its recording."""
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from kappaskin.calibration import Calibration, Tare
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate, Frame
+from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import decode
+from kappaskin.recording.disk import is_there
+from kappaskin.recording.messages import Topic
+from kappaskin.recording.reading import Recording
+from kappaskin.recording.setup_text import setup_from_text
+from kappaskin.sensing import Sensor
+from kappaskin.sources import from_json
+
+TABLES = (".csv", ".npz", ".h5")
+"""Suffixes of files with a row for each frame."""
+
+SURFACES = (".vtp", ".stl", ".pvd")
+"""Suffixes of files of the skin's surface."""
+
+
+@dataclass(frozen=True)
+class ExportRequest:
+    """The file `to` of a `recording`, in the format that its suffix names.
+
+    Times are in s since the recording began: from `begin` until `end`, one frame each `every` s, or
+    all where that is 0; or the first frame from `at` on alone. Frames are worked out with the
+    settings that were recorded, or with `setup`. A `Refusal` where that makes no file.
+    """
+
+    recording: Path
+    to: Path
+    begin: float = 0.0
+    end: float = math.inf
+    every: float = 0.0
+    at: float | None = None
+    setup: Setup | None = None
+
+    def __post_init__(self) -> None:
+        self._check_times()
+        self._check_format()
+        self._check_place()
+
+    @property
+    def format(self) -> str:
+        return self.to.suffix.lower()
+
+    @property
+    def folder(self) -> Path | None:
+        """Where the files of a series are; None for one file."""
+        series = self.format == ".pvd" or (self.format == ".stl" and self.at is None)
+        return self.to.with_suffix("") if series else None
+
+    @property
+    def beside(self) -> Path | None:
+        """The file that tells of an STL file what that cannot tell itself."""
+        return self.to.with_suffix(".json") if self.format == ".stl" else None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that is made: files, and the folder of a series."""
+        alone = self.format == ".stl" and self.folder is not None
+        places = (None if alone else self.to, self.folder, self.beside)
+        return tuple(place for place in places if place is not None)
+
+    @property
+    def first(self) -> float:
+        """From when on frames are taken, in s since the beginning."""
+        return self.begin if self.at is None else self.at
+
+    def _check_times(self) -> None:
+        at = self.first
+        if not (math.isfinite(at) and self.end >= at >= 0 and 0 <= self.every < math.inf):
+            raise Refusal(
+                f"expected times in s from 0 on, in order, got from {at:g} until {self.end:g}, "
+                f"every {self.every:g}"
+            )
+        if self.at is not None and (self.begin, self.end, self.every) != (0.0, math.inf, 0.0):
+            raise Refusal("expected one moment, or a span, got both; leave one of them out")
+
+    def _check_format(self) -> None:
+        if self.format not in TABLES + SURFACES:
+            raise Refusal(
+                f"{self.to}: expected a file that ends in one of {', '.join(TABLES + SURFACES)}"
+            )
+        if self.format in TABLES and self.at is not None:
+            raise Refusal(
+                f"a {self.format} has a row for each frame: give from when until when instead of "
+                "a moment"
+            )
+        if self.format == ".vtp" and self.at is None:
+            raise Refusal(
+                "a .vtp is the skin at one moment: give it, or export a series to a .pvd, with "
+                "the time between two surfaces"
+            )
+        if self.format == ".pvd" and not self.every:
+            raise Refusal("a .pvd is a series: give the time between two surfaces")
+        if self.format == ".stl" and self.at is None and not self.every:
+            raise Refusal(
+                "an .stl is the skin at one moment, or a series: give the moment, or the time "
+                "between two surfaces"
+            )
+
+    def _check_place(self) -> None:
+        for place in self.files:
+            if is_there(place):
+                raise Refusal(f"{place}: is there already; choose another name")
+
+
+@dataclass(frozen=True)
+class RecordingInfo:
+    """What the frames are of: a `sensor`, and at most so many `functions` along x and y.
+
+    `said` tells it all in words and numbers that JSON has.
+    """
+
+    said: dict[str, Any]
+    sensor: Sensor
+    functions: tuple[int, int]
+
+    @property
+    def program(self) -> str:
+        return self.said["program"]
+
+    def json(self, **more: object) -> str:
+        """All of it, and `more`, as JSON."""
+        return json.dumps(self.said | more)
+
+
+class _Told(NamedTuple):
+    """The `number`th text on its topic, `at` s after the beginning."""
+
+    number: int
+    at: float
+    text: str
+
+
+def recording_info(recording: Recording, wanted: ExportRequest) -> RecordingInfo:
+    """What files of the span that is `wanted` say; a `Refusal` where there were two devices."""
+    path = recording.path
+    devices = list(_in_force(recording, m.DEVICE, wanted))
+    if not devices:
+        raise Refusal(f"{path}: expected a device from {wanted.first:g} s on, got none")
+    for device in devices[1:]:
+        if device.text != devices[0].text:
+            raise Refusal(f"{path}: {another(device.at)}")
+    sensor = from_json(devices[0].text)
+    setups = [_setup_said(wanted.setup, sensor)] if wanted.setup else []
+    if wanted.setup is None:
+        for told in _in_force(recording, m.SETUP, wanted):
+            setup = setup_from_text(told.text, recording.attachment)
+            number = {"number": told.number, "since": max(told.at, 0.0)}
+            setups.append(number | _setup_said(setup, sensor))
+    if not setups:
+        raise Refusal(
+            f"{path}: was recorded without settings until {wanted.end:g} s, so that no frame was "
+            "worked out; export a later span"
+        )
+    functions = (max(setup[name] for setup in setups) for name in ("Ni", "Nj"))
+    return RecordingInfo(_said(recording, devices[0].text, sensor, setups), sensor, (*functions,))
+
+
+def another(at: float) -> str:
+    """What is said of a device that came `at` s after the beginning, as another one."""
+    before, after = math.ceil(1e3 * at - 1) / 1e3, math.floor(1e3 * at + 1) / 1e3
+    return (
+        f"another device, or another skin, came at {at:.6g} s, and a file is of one: export the "
+        f"time until {before:.3f} s (--until), or from {after:.3f} s on (--from)"
+    )
+
+
+def _in_force(recording: Recording, topic: Topic, wanted: ExportRequest) -> Iterator[_Told]:
+    """What was told on a topic, as far as it held at some time of the span."""
+    told = [
+        _Told(
+            number, (message.stamp - recording.first) * 1e-9, decode(m.STRING, message.data)["data"]
+        )
+        for number, message in enumerate(recording.messages_on(topic))
+    ]
+    last = None
+    for one in told:
+        if one.at > wanted.end:
+            break
+        if last is not None and one.at > wanted.first:
+            yield last
+        last = one
+    if last is not None:
+        yield last
+
+
+def _setup_said(setup: Setup, sensor: Sensor) -> dict[str, Any]:
+    said = {field.name: getattr(setup, field.name) for field in fields(setup)}
+    said["Nj"] = 1 if sensor.layout.patch.strip else setup.Nj
+    said["edge"] = setup.edge or sensor.edge
+    return said | {"calibration": _dated(setup.calibration), "tare": _dated(setup.tare)}
+
+
+def _dated(kept: Calibration | Tare | None) -> dict[str, str] | None:
+    if kept is None:
+        return None
+    return {
+        "name": kept.name,
+        "serial_number": kept.serial_number,
+        "date": kept.date.isoformat(),
+        "digest": kept.digest,
+    }
+
+
+def _said(
+    recording: Recording, device: str, sensor: Sensor, setups: list[dict[str, Any]]
+) -> dict[str, Any]:
+    began = datetime.fromtimestamp(recording.first * 1e-9, UTC)
+    return {
+        "program": f"kappaskin {metadata.version('kappaskin')}",
+        "recording": recording.path.name,
+        "recorded_by": recording.library,
+        "began": began.isoformat(timespec="milliseconds"),
+        "ended_properly": recording.whole,
+        "device": json.loads(device),
+        "skin": sensor.layout.patch.name,
+        "positions": sensor.layout.positions.tolist(),
+        "settings": setups,
+        "units": "SI: m, s, N, 1/m; curvature components xx, yy, xy",
+    }
+
+
+class ExportedFrame(NamedTuple):
+    """A `frame`, that came `at` s after the recording began, and what `pipeline` made of it."""
+
+    at: float
+    frame: Frame
+    estimate: Estimate
+    pipeline: Pipeline
+
+
+class ExportWriter(Protocol):
+    """Writes what is `wanted` into the folder `room`; an `OSError` where there is no room."""
+
+    def __init__(self, room: Path, wanted: ExportRequest, about: RecordingInfo) -> None: ...
+
+    def take(self, moment: ExportedFrame) -> bool:
+        """Write one moment; whether there was anything to write."""
+        ...
+
+    def finish(self) -> None:
+        """Write what is still to be written."""
+        ...
+
+    def close(self) -> None:
+        """Hold no file open any more."""
+        ...
