@@ -103,7 +103,7 @@ class Session(QObject):
             engine.set_up(self.asked)
             engine.scan(region_of(history.settings))
         else:
-            self.asked = engine.adopted.asked.setup
+            self.asked = engine.adopted.requested.setup
         self._laid: Step | None = None
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0
@@ -154,7 +154,7 @@ class Session(QObject):
 
     def go_on(self, left: ResumeInfo) -> None:
         """Go on with what the engine was left with, whose settings are the history's."""
-        self.source, self.running = left.asked.source or "", bool(left.asked.speed)
+        self.source, self.running = left.requested.source or "", bool(left.requested.speed)
         self.engine.compare(None)
         if self.inside:
             self._play()

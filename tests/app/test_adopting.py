@@ -8,7 +8,7 @@ import pytest
 
 from kappaskin import Engine, Setup, Status
 from kappaskin.live import ResumeInfo
-from kappaskin.live.requests import Asked
+from kappaskin.live.requests import Requested
 from kappaskin.recording import RecordingStatus
 from kappaskin_app.adopting import Entrusting, settings_left, words
 from kappaskin_app.history import History
@@ -22,7 +22,7 @@ BEFORE = Settings(
 
 
 def left(source: str | None, entrusted: bytes = b"") -> ResumeInfo:
-    asked = Asked(source=source, recording=Path("press.mcap"), entrusted=entrusted)
+    asked = Requested(source=source, recording=Path("press.mcap"), entrusted=entrusted)
     return ResumeInfo(asked, ("", ""), 1, 5.0)
 
 

@@ -15,21 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kappaskin import Region, Setup, load_scene
+from kappaskin import Setup
 from kappaskin.live import Engine, ResumeInfo
-from kappaskin.live.requests import (
-    Asked,
-    Connect,
-    Disconnect,
-    Entrust,
-    Goodbye,
-    Note,
-    Publish,
-    Record,
-    Request,
-    Seek,
-    Step,
-)
+from kappaskin.live.requests import Note, Requested, RequestSender
 from kappaskin.live.resume import (
     RequestReceiver,
     ResumedProcess,
@@ -44,7 +32,7 @@ from kappaskin.recording.writing import part_of
 
 pytestmark = pytest.mark.slow
 
-LEFT = ResumeInfo(Asked(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
+LEFT = ResumeInfo(Requested(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
 
 
 def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
@@ -71,18 +59,20 @@ def waiting(folder: Path) -> Iterator[ResumeListener]:
         one.line.close()
 
 
-Line = tuple["Connection[Any, Any]", RequestReceiver]
+Sides = tuple[RequestSender, RequestReceiver]
 
 
 @pytest.fixture
-def asked_by(folder: Path) -> Iterator[Callable[..., Line]]:
-    """Makes who takes requests, and the line by which they come."""
+def asked_by(folder: Path) -> Iterator[Callable[..., Sides]]:
+    """Makes the two sides of a line of requests."""
     lines: list[Connection[Any, Any]] = []
 
-    def make(folder: Path | None = folder, patience: float = 20.0) -> Line:
+    def make(folder: Path | None = folder, patience: float = 20.0) -> Sides:
         theirs, ours = multiprocessing.Pipe(duplex=False)
         lines.extend((theirs, ours))
-        return ours, RequestReceiver(theirs, ("ring", "beside"), folder, patience)
+        sender = RequestSender(Requested())
+        sender.connect(ours)
+        return sender, RequestReceiver(theirs, ("ring", "beside"), folder, patience)
 
     yield make
     while (orphan := resume_process(folder)) is not None:
@@ -110,7 +100,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
         assert engine.adopted is not None
         assert engine.pid == engine_alone.pid
         assert engine.adopted.alone > 0.6
-        assert (engine.source, engine.adopted.asked.setup) == ("sim:centre", Setup(6, 7))
+        assert (engine.source, engine.adopted.requested.setup) == ("sim:centre", Setup(6, 7))
         assert not list(folder.iterdir())
         status = wait_for(lambda: (s := engine.status()).events and len(s.events) == 2 and s)
         first = wait_for(lambda: engine.latest(engine.status()))
@@ -193,12 +183,12 @@ def test_closed_in_order_it_ends_its_recording_at_once(folder, tmp_path) -> None
 
 
 def test_a_goodbye_is_the_end_after_all_that_was_asked_for_before(asked_by) -> None:
-    line, asker = asked_by()
-    line.send(Note("last"))
-    line.send(Goodbye())
-    line.close()
-    assert asker.asked(1.0) == [Note("last"), Goodbye()]
-    assert asker.look(recording=True) == ""
+    sender, asker = asked_by()
+    sender.act(Note("last"))
+    sender.say_goodbye()
+    sender.disconnect()
+    assert asker.receive(1.0) == [Note("last")]
+    assert asker.check(recording=True) == ""
     assert asker.over
 
 
@@ -207,21 +197,22 @@ def test_a_goodbye_is_the_end_after_all_that_was_asked_for_before(asked_by) -> N
 def test_a_line_that_breaks_is_the_end_but_of_a_recording_that_may_be_adopted(
     asked_by, folder, known: bool, recording: bool
 ) -> None:
-    line, asker = asked_by(folder if known else None)
-    line.send(Note("last"))
-    line.close()
-    assert asker.asked(1.0) == [Note("last")]
-    assert bool(asker.look(recording)) == (known and recording)
+    sender, asker = asked_by(folder if known else None)
+    sender.act(Note("last"))
+    sender.disconnect()
+    assert asker.receive(1.0) == [Note("last")]
+    assert bool(asker.check(recording)) == (known and recording)
     assert asker.over == (not (known and recording))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="writes half a message as POSIX systems do")
-def test_a_request_that_breaks_off_is_no_request(asked_by) -> None:
-    line, asker = asked_by()
-    os.write(line.fileno(), b"\0\0\1\0half")
-    line.close()
-    assert asker.asked(1.0) == []
-    asker.look(recording=False)
+def test_a_request_that_breaks_off_is_no_request() -> None:
+    theirs, ours = multiprocessing.Pipe(duplex=False)
+    asker = RequestReceiver(theirs, ("ring", "beside"), None, 20.0)
+    os.write(ours.fileno(), b"\0\0\1\0half")
+    ours.close()
+    assert asker.receive(1.0) == []
+    asker.check(recording=False)
     assert asker.over
 
 
@@ -230,36 +221,38 @@ def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
 ) -> None:
     clock, later = time.monotonic, [0.0]
     monkeypatch.setattr("kappaskin.live.resume.time.monotonic", lambda: clock() + later[0])
-    line, asker = asked_by()
-    line.send(Setup(5, 4))
-    line.send(Connect("sim:line"))
-    line.send(Entrust(b"mine"))
-    line.close()
-    assert wait_for(lambda: not (asker.asked(0.0) or asker.adoptable) or asker.look(True))
+    sender, asker = asked_by()
+    sender.change(setup=Setup(5, 4))
+    sender.change(source="sim:line")
+    sender.change(entrusted=b"mine")
+    sender.disconnect()
+    assert wait_for(lambda: not (asker.receive(0.0) or asker.resumable) or asker.check(True))
 
     orphan = resume_process(folder)
     assert orphan is not None
-    assert orphan.left.asked == Asked(Setup(5, 4), source="sim:line", entrusted=b"mine")
-    assert (orphan.left.rings, orphan.pid) == (("ring", "beside"), os.getpid())
+    assert orphan.info.requested == sender.requested
+    assert (orphan.info.rings, orphan.pid) == (("ring", "beside"), os.getpid())
     later[0] = 100.0  # as where this process was put to sleep meanwhile
-    told = wait_for(lambda: asker.look(recording=True))
-    assert told == f"the recording {orphan.left.lasted}"
-    assert orphan.left.alone < 100.0
-    orphan.line.send(Note("here"))
-    assert asker.asked(1.0) == [Note("here")]
+    told = wait_for(lambda: asker.check(recording=True))
+    assert told == f"the recording {orphan.info.lasted}"
+    assert orphan.info.alone < 100.0
+    next_sender = RequestSender(orphan.info.requested)
+    next_sender.connect(orphan.line, known=orphan.info.requested.number)
+    next_sender.act(Note("here"))
+    assert asker.receive(1.0) == [Note("here")]
     orphan.close()
-    asker.asked(1.0)
-    assert asker.look(recording=True) != ""  # and it waits for another
+    asker.receive(1.0)
+    assert asker.check(recording=True) != ""  # and it waits for another
     assert not asker.over
 
 
 def test_nobody_is_waited_for_when_the_recording_ends_by_itself(asked_by, folder) -> None:
-    line, asker = asked_by()
-    line.close()
-    asker.asked(1.0)
-    asker.look(recording=True)
+    sender, asker = asked_by()
+    sender.disconnect()
+    asker.receive(1.0)
+    asker.check(recording=True)
     assert list(folder.iterdir())
-    asker.look(recording=False)
+    asker.check(recording=False)
     assert asker.over
     assert not list(folder.iterdir())
 
@@ -267,51 +260,26 @@ def test_nobody_is_waited_for_when_the_recording_ends_by_itself(asked_by, folder
 def test_nobody_is_waited_for_longer_than_may_be(asked_by, folder, monkeypatch) -> None:
     clock, later = time.monotonic, [0.0]
     monkeypatch.setattr("kappaskin.live.resume.time.monotonic", lambda: clock() + later[0])
-    line, asker = asked_by(patience=600.0)
-    line.close()
-    asker.asked(1.0)
-    asker.look(recording=True)
+    sender, asker = asked_by(patience=600.0)
+    sender.disconnect()
+    asker.receive(1.0)
+    asker.check(recording=True)
     later[0] = 550.0
-    asker.look(recording=True)
+    asker.check(recording=True)
     assert not asker.over
     later[0] = 600.1
-    asker.look(recording=True)
+    asker.check(recording=True)
     assert asker.over
     assert not list(folder.iterdir())
 
 
 def test_where_no_note_can_be_left_it_is_the_end(asked_by, tmp_path) -> None:
     (tmp_path / "file").write_text("no folder")
-    line, asker = asked_by(tmp_path / "file")
-    line.close()
-    asker.asked(1.0)
-    assert asker.look(recording=True) == ""
+    sender, asker = asked_by(tmp_path / "file")
+    sender.disconnect()
+    asker.receive(1.0)
+    assert asker.check(recording=True) == ""
     assert asker.over
-
-
-SCENE = load_scene("line")
-
-
-@pytest.mark.parametrize(
-    ("requests", "asked"),
-    [
-        ([Setup(3, 3)], Asked(Setup(3, 3))),
-        ([Region("skin")], Asked(region=Region("skin"))),
-        ([Publish(("udp://a:1",))], Asked(targets=("udp://a:1",))),
-        ([Connect("sim:"), SCENE], Asked(source="sim:", scene=SCENE)),
-        ([Seek(1.0, 0.5)], Asked(speed=0.5)),
-        ([Step(2)], Asked(speed=0.0)),
-        ([SCENE, Seek(None, 0.0), Connect("x")], Asked(source="x")),
-        ([Connect("x"), Disconnect()], Asked()),
-        ([Record(Path("a")), Record(None)], Asked()),
-        ([Note("n"), Goodbye()], Asked()),
-    ],
-)
-def test_what_was_asked_for_last_is_what_lasts(requests: list[Request], asked: Asked) -> None:
-    was = Asked()
-    for request in requests:
-        was = was.after(request)
-    assert was == asked
 
 
 # Notes, and who finds them.
@@ -333,7 +301,7 @@ def test_of_two_who_come_at_once_one_gets_it(waiting: ResumeListener, folder: Pa
 
     with ThreadPoolExecutor(2) as pool:
         found = [orphan for orphan in pool.map(come, range(2)) if orphan]
-    assert [orphan.left for orphan in found] == [LEFT]
+    assert [orphan.info for orphan in found] == [LEFT]
     assert not list(folder.iterdir())
     found[0].close()
 
@@ -388,7 +356,7 @@ def test_a_note_of_one_that_died_is_taken_away_and_another_is_found(
     stale.with_suffix(".sock").touch()
     orphan = resume_process(folder)
     assert orphan is not None
-    assert orphan.left == LEFT
+    assert orphan.info == LEFT
     assert wait_for(lambda: not list(folder.iterdir()))
     orphan.close()
 

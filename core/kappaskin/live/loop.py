@@ -17,30 +17,18 @@ import numpy as np
 
 from kappaskin._processes import Haste
 from kappaskin.errors import Refusal, SourceError
-from kappaskin.estimation import Region
 from kappaskin.frames import Event, Frame
 from kappaskin.live.health_monitor import LiveHealthMonitor
 from kappaskin.live.pipelines import ComparedPipeline, PipelineHost, PipelineStatus
 from kappaskin.live.recorder import LiveRecorder
 from kappaskin.live.region_tracking import SerialTracking, SimulatedTracking, track_region
-from kappaskin.live.requests import (
-    Compare,
-    Connect,
-    Disconnect,
-    Note,
-    Publish,
-    Record,
-    Request,
-    Seek,
-    Step,
-    TakeTare,
-)
+from kappaskin.live.requests import Action, Note, Seek, StepFrames, TakeTare, Update
 from kappaskin.live.resume import RequestReceiver
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, STREAMING, WAITING, Status
 from kappaskin.live.tare_taking import TareCapture
 from kappaskin.live.timing import ArrivalTimes, RateLimit
-from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.pipeline import Pipeline
 from kappaskin.publish import Publishing
 from kappaskin.recording import ReplayedSource
 from kappaskin.scenes import FROM_THE_BEGINNING, Scene
@@ -56,8 +44,8 @@ _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the
 class EngineLoop:
     """The engine's own side: takes requests, reads, computes, writes, reports."""
 
-    def __init__(self, asker: RequestReceiver, ring: Ring, beside: Ring) -> None:
-        self._asker, self._ring = asker, ring
+    def __init__(self, requests: RequestReceiver, ring: Ring, beside: Ring) -> None:
+        self._requests, self._ring = requests, ring
         self._source: Source | None = None
         self._watching = LiveHealthMonitor()
         self._place = np.full(2, math.nan)  # of the last contact, in m
@@ -78,10 +66,10 @@ class EngineLoop:
         self._changing, self._again = False, math.inf
 
     def run(self) -> None:
-        """Serve until whoever asks says goodbye, or is gone and nobody comes in its place."""
+        """Serve until the window says goodbye, or is gone and none resumes this engine."""
         while True:
-            for request in self._asker.asked(0.05 if self._source is None else 0.0):
-                self._take(request)
+            for request in self._requests.receive(0.05 if self._source is None else 0.0):
+                self._carry_out(request)
             if not self._goes_on():
                 break
             if self._source is not None:
@@ -99,44 +87,54 @@ class EngineLoop:
         self._builder.shutdown(wait=False, cancel_futures=True)
 
     def _goes_on(self) -> bool:
-        """Whether somebody asks, or may come yet for what is recorded."""
-        if news := self._asker.look(self._keeping.active):
+        """Whether there is a window, or one may come yet for what is recorded."""
+        if news := self._requests.check(self._keeping.active):
             self._happen(Event(time.monotonic(), "engine", news))
             self._report()
-        return not self._asker.over
+        return not self._requests.over
 
     @property
-    def may_be_adopted(self) -> bool:
-        """Whether it goes on where whoever asks is gone."""
-        return self._asker.adoptable and self._keeping.active
+    def may_be_resumed(self) -> bool:
+        """Whether it goes on where the window is gone."""
+        return self._requests.resumable and self._keeping.active
 
-    def _take(self, request: Request) -> None:
-        if isinstance(request, Setup):
-            self._side.ask(request)
-        elif isinstance(request, Compare):
-            self._compared.ask(request.setup, self._status.sensor)
-        elif isinstance(request, Scene):
-            self._play(request)
-        elif isinstance(request, Seek | Step):
-            self._move(request)
-        elif isinstance(request, Region):
-            self._status = replace(self._status, region=request)
-            self._steer()
-        elif isinstance(request, TakeTare):
-            self._taking.begin(self._status.sensor if self._status.state == STREAMING else None)
-        elif isinstance(request, Record):
-            self._keeping.begin(request.path, self._source, self._side)
-        elif isinstance(request, Note):
-            self._happen(Event(time.monotonic(), "note", request.text))
-        elif isinstance(request, Publish):
-            self._publishing.ask(request.targets)
-            self._haste(self._publishing.active)
-        elif isinstance(request, Connect | Disconnect):
-            self._close()
-            self._status = self._status.without_source()
-            if isinstance(request, Connect):
-                self._open(request.source)
+    def _carry_out(self, request: str | Action) -> None:
+        """Go over to the setting of `Requested` of this name, or do what is to be done once."""
+        requested = self._requests.requested
+        match request:
+            case "setup":
+                self._side.ask(requested.setup)
+            case "compared":
+                self._compared.ask(requested.compared, self._status.sensor)
+            case "region":
+                self._status = replace(self._status, region=requested.region)
+                self._steer()
+            case "targets":
+                self._publishing.ask(requested.targets)
+                self._haste(self._publishing.active)
+            case "source":
+                self._go_to(requested.source)
+            case "scene":
+                self._play(requested.scene)
+            case "recording":
+                self._keeping.begin(requested.recording, self._source, self._side)
+            case Seek() | StepFrames():
+                self._move(request)
+            case TakeTare():
+                streams = self._status.state == STREAMING
+                self._taking.begin(self._status.sensor if streams else None)
+            case Note():
+                self._happen(Event(time.monotonic(), "note", request.text))
+            case _:
+                return
         self._report()
+
+    def _go_to(self, source: str | None) -> None:
+        """Close the source, and open another one."""
+        self._close()
+        self._status = self._status.without_source()
+        if source is not None:
+            self._open(source)
 
     def _open(self, name: str) -> None:
         """Open the source, or say why not; a port that cannot be is tried again now and then."""
@@ -151,11 +149,11 @@ class EngineLoop:
         except Refusal as refusal:
             self._status = replace(self._status, state=LOST, source=name, message=str(refusal))
 
-    def _move(self, request: Seek | Step) -> None:
+    def _move(self, request: Seek | StepFrames) -> None:
         """Go on from another place of the source."""
         source = self._source
         try:
-            if isinstance(request, Step):
+            if isinstance(request, StepFrames):
                 if isinstance(source, ReplayedSource):
                     source.step(request.frames)
             elif isinstance(source, ReplayedSource):
@@ -165,8 +163,8 @@ class EngineLoop:
         except Refusal as refusal:  # a file that is damaged there, or gone
             self._lose(str(refusal))
 
-    def _play(self, scene: Scene) -> None:
-        if not isinstance(self._source, SimulatedSource):
+    def _play(self, scene: Scene | None) -> None:
+        if scene is None or not isinstance(self._source, SimulatedSource):
             return
         message, self._changing = "", True
         self._report()  # another skin may take a while
@@ -356,6 +354,7 @@ class EngineLoop:
             publishing=self._publishing.news,
             recording=self._keeping.written,
             beside=self._compared.told,
+            requested=self._requests.requested.number,
         )
         self._ring.write_status(self._status)
 
@@ -365,7 +364,7 @@ _GRACE = 0.5  # s for an orderly end once the parent is gone
 
 
 def serve(
-    requests: "Connection[Request, Request]",
+    requests: "Connection[Update, Update]",
     names: tuple[str, str],
     orphans: Path | None,
     patience: float,
@@ -403,6 +402,6 @@ def _end_with_parent(loop: EngineLoop) -> None:
     if parent := multiprocessing.parent_process():
         parent.join()
         time.sleep(_GRACE)
-        if not loop.may_be_adopted:
+        if not loop.may_be_resumed:
             loop.end_recording()
             os._exit(1)

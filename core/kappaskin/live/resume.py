@@ -28,7 +28,7 @@ from typing import Any, cast
 
 import platformdirs
 
-from kappaskin.live.requests import Asked, Goodbye, Request, Seek
+from kappaskin.live.requests import Action, Requested, Update
 
 _LARGEST = 4096  # bytes of a note
 _QUEUE = 16  # that may wait to be heard
@@ -41,27 +41,27 @@ _FOREIGN = (UnpicklingError, AttributeError, ImportError, IndexError, TypeError)
 
 @dataclass(frozen=True)
 class ResumeInfo:
-    """What a process that was left alone tells whoever comes for it.
+    """What an engine that was left alone reports to the window that resumes it.
 
-    What it was `asked` for, the `rings` that it writes to, its `pid`, and for how long in s it has
-    been `alone`.
+    What was `requested` of it, the names of the `rings` that it writes to, its `pid`, and for how
+    long in s it has been `alone`.
     """
 
-    asked: Asked
+    requested: Requested
     rings: tuple[str, str]
     pid: int
     alone: float
 
     @property
     def lasted(self) -> str:
-        """How long it went on, in words."""
+        """How long it went on, as text."""
         minutes, seconds = divmod(round(self.alone), 60)
         lasted = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
         return f"went on for {lasted} after the last window ended"
 
 
 def resume_folder() -> Path:
-    """Where processes of this user and machine that were left alone leave a note."""
+    """Folder where engines of this user and machine that were left alone leave a note."""
     state = platformdirs.user_state_path("kappaskin", appauthor=False)
     return state / "left-alone" / platform.node()
 
@@ -74,15 +74,15 @@ def _address(note: Path) -> str:
 
 
 class ResumeListener:
-    """Waits until another process comes, and tells it what was `left`; `line` is the one to it.
+    """Waits until another process connects, and sends it `info`; `line` is the one to it.
 
-    `told` is what it was told. An `OSError` where no note can be left in `folder`.
+    `sent` is what it was sent. An `OSError` where no note can be left in `folder`.
     """
 
-    def __init__(self, folder: Path, left: Callable[[], ResumeInfo]) -> None:
+    def __init__(self, folder: Path, info: Callable[[], ResumeInfo]) -> None:
         self.line: Connection[Any, Any] | None = None
-        self._left, self._over, key = left, threading.Event(), secrets.token_bytes(_KEY)
-        self.told = left()
+        self._info, self._over, key = info, threading.Event(), secrets.token_bytes(_KEY)
+        self.sent = info()
         folder.mkdir(0o700, parents=True, exist_ok=True)
         self._note = folder / f"{secrets.token_hex(8)}.note"
         self._listener = Listener(_address(self._note), backlog=_QUEUE, authkey=key)
@@ -105,13 +105,13 @@ class ResumeListener:
             self._note.unlink(missing_ok=True)
             self._listener.close()
         if line is not None:
-            self.told = self._left()
+            self.sent = self._info()
             with suppress(OSError):  # it is gone again: whoever reads from it finds out
-                line.send(self.told)
+                line.send(self.sent)
             self.line = line
 
     def end(self) -> None:
-        """Let nobody come any more."""
+        """Stop listening."""
         self._over.set()
         with suppress(OSError):
             Client(_address(self._note)).close()  # to wake who listens
@@ -127,13 +127,13 @@ def _leave(note: Path, key: bytes) -> None:
 
 
 class ResumedProcess:
-    """A live process that another one began, in the care of this one; used as a child is.
+    """An engine that another window began, used like a child process of this one.
 
     It lives as long as the `line` to it.
     """
 
-    def __init__(self, line: "Connection[Request, ResumeInfo]", left: ResumeInfo) -> None:
-        self.line, self.left, self.pid = line, left, left.pid
+    def __init__(self, line: "Connection[Update, ResumeInfo]", info: ResumeInfo) -> None:
+        self.line, self.info, self.pid = line, info, info.pid
 
     def is_alive(self) -> bool:
         return not self._over(0.0)
@@ -171,7 +171,7 @@ def _reached(note: Path) -> ResumedProcess | None:
         version, key = _read(note)
         if version != metadata.version("kappaskin"):
             return None
-        line = cast("Connection[Request, ResumeInfo]", Client(_address(note)))
+        line = cast("Connection[Update, ResumeInfo]", Client(_address(note)))
     except (OSError, ValueError):
         with suppress(OSError):
             note.unlink(missing_ok=True)
@@ -200,70 +200,66 @@ _ALONE = "the window ended unexpectedly while it recorded"
 
 
 class RequestReceiver:
-    """Takes requests from the `line` to whoever asks, until that is `over`.
+    """The engine's side: holds what is `requested`, by the `line` to a window, until it is `over`.
 
-    It is over with a goodbye. Where a line ends without one, another process may take over that
-    finds a note in `folder`; without a folder, a recording or anybody within `patience` s it is
-    over too. Whoever comes gets all that was asked for, and the names of the `rings`.
+    It is over where the window says so. Where the line ends without that, another window may
+    resume the engine that finds a note in `folder`; without a folder, a recording or anybody within
+    `patience` s it is over too. That window gets all that is requested, and the names of the
+    `rings`.
     """
 
     def __init__(
         self,
-        line: "Connection[Request, Request]",
+        line: "Connection[Update, Update]",
         rings: tuple[str, str],
         folder: Path | None,
         patience: float,
     ) -> None:
-        self._line: Connection[Request, Request] | None = line
+        self._line: Connection[Update, Update] | None = line
         self._rings, self._folder, self._patience = rings, folder, patience
-        self._all, self._since = Asked(), 0.0
-        self._waiting: ResumeListener | None = None
+        self.requested, self._since = Requested(), 0.0
+        self._listener: ResumeListener | None = None
         self.over = False
 
     @property
-    def adoptable(self) -> bool:
+    def resumable(self) -> bool:
         return self._folder is not None and not self.over
 
-    def asked(self, wait: float) -> list[Request]:
-        """What was asked for within `wait` s, without places in a source left for another."""
-        asked: list[Request] = []
+    def receive(self, wait: float) -> list[str | Action]:
+        """Settings, by name, and actions newly requested within `wait` s."""
         if self._line is None:
             time.sleep(wait)
-            return asked
+            return []
+        before = self.requested.number
         try:
             while not self.over and self._line.poll(wait):
-                request, wait = self._line.recv(), 0.0
-                self.over = isinstance(request, Goodbye)
-                if asked and _overtaken(asked[-1], request):
-                    asked.pop()
-                asked.append(request)
-        except (EOFError, OSError):  # the other where it ended in the middle of a request
+                self.requested, wait = self.requested.updated(self._line.recv()), 0.0
+                self.over = self.requested.over
+        except (EOFError, OSError):  # the window ended in the middle of a message
             self._line.close()
             self._line = None
-        for request in asked:
-            self._all = self._all.after(request)
-        return asked
+        return self.requested.since(before)
 
-    def look(self, recording: bool) -> str:
-        """What became of whoever asks since the last look, in words; nothing where nothing did."""
+    def check(self, recording: bool) -> str:
+        """What became of the window since the last check, as text; empty where nothing did."""
         if self.over or self._line is not None:
             return ""
-        if self._waiting is None:
-            return self._begin_to_wait() if recording else self._end()
+        if self._listener is None:
+            return self._listen() if recording else self._end()
         if not recording or time.monotonic() - self._since > self._patience:
-            self._waiting.end()
-            if self._waiting.line is None:
+            self._listener.end()
+            if self._listener.line is None:
                 return self._end()
-        if self._waiting.line is None:
+        if self._listener.line is None:
             return ""
-        self._line, told, self._waiting = self._waiting.line, self._waiting.told, None
-        return f"the recording {told.lasted}"
+        self._line, sent, self._listener = self._listener.line, self._listener.sent, None
+        return f"the recording {sent.lasted}"
 
-    def _begin_to_wait(self) -> str:
+    def _listen(self) -> str:
         self._since = time.monotonic()
         try:
             if self._folder is not None:
-                self._waiting = ResumeListener(self._folder, self._left)
+                self._listener = ResumeListener(self._folder, self._info)
                 return _ALONE
         except OSError:  # no place for a note: nobody would ever come
             pass
@@ -273,12 +269,6 @@ class RequestReceiver:
         self.over = True
         return ""
 
-    def _left(self) -> ResumeInfo:
-        return ResumeInfo(self._all, self._rings, os.getpid(), time.monotonic() - self._since)
-
-
-def _overtaken(before: Request, request: Request) -> bool:
-    """Whether nobody would see what was asked `before`: another place in the source follows."""
-    if not (isinstance(before, Seek) and isinstance(request, Seek)) or request.at is None:
-        return False
-    return before.looped is None or request.looped is not None
+    def _info(self) -> ResumeInfo:
+        alone = time.monotonic() - self._since
+        return ResumeInfo(self.requested, self._rings, os.getpid(), alone)
