@@ -26,12 +26,13 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.contact import surface_geometry
+from kappaskin.pipeline.reported import UNKNOWN
 from kappaskin.publish import SourceState, foxglove, message, publishing
 from kappaskin.publish import foxglove as client
 from kappaskin.publish import foxglove_channels as channels
 from kappaskin.publish import foxglove_channels as cloud
 from kappaskin.publish import publishing as target
-from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SWITCHES, UNKNOWN, text_of
+from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SWITCHES, text_of
 
 GUIDE = (files("kappaskin_resources") / "publishing" / "messages.md").read_text("utf-8")
 PRESSED = load_scene("off-centre")
@@ -235,7 +236,7 @@ def test_the_state_of_the_source_is_json_with_every_number_promised() -> None:
 def test_the_guide_names_every_key_with_the_words_of_the_code() -> None:
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", GUIDE, re.MULTILINE))
     assert rows.pop("source").startswith("`live`, `sim`")
-    assert rows == SWITCHES | {field.key: field.words for field in CONTACT}
+    assert rows == SWITCHES | {field.key: field.text for field in CONTACT}
     for key in (*message.STATUS_NUMBERS, "coefficients_sd_m", "functions_x", "edge", "state"):
         assert f"`{key}`" in GUIDE
 

@@ -66,7 +66,7 @@ _CONTACT = _object(
     **_KIND,
     source=_TEXT,
     **{key: {"type": "boolean", "description": words} for key, words in SWITCHES.items()},
-    **{f.key: {"type": "number", "description": f.words} for f in CONTACT_NUMBERS},
+    **{f.key: {"type": "number", "description": f.text} for f in CONTACT_NUMBERS},
 )
 _SHAPE = _object(
     **_KIND,

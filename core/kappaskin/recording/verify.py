@@ -1,7 +1,7 @@
 """A recording to a verdict: whether its bytes come to the same estimates again, bit for bit."""
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.frames import Estimate
+from kappaskin.pipeline import Getter, Reported, getters
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import RecordedMessage, Recording
@@ -21,25 +22,13 @@ _COMPARED = {
     m.SHAPES.name: m.COEFFICIENTS,
 }
 _TOLD = 1000  # messages between two times that the share is told
-_NAMED_AS: dict[str, Callable[[Estimate], Any]] = {
-    "present": lambda e: e.touch.present,
-    "single": lambda e: e.touch.single,
-    "near_rim": lambda e: e.touch.near_rim,
-    "spare": lambda e: e.touch.spare,
-    "position": lambda e: e.touch.position,
-    "position_sd": lambda e: e.touch.position_sd,
-    "force": lambda e: e.touch.force,
-    "force_sd": lambda e: e.touch.force_sd,
-    "displacement": lambda e: e.touch.displacement,
-    "displacement_sd": lambda e: e.touch.displacement_sd,
-    "point": lambda e: e.geometry.position,
-    "frame": lambda e: e.geometry.frame,
-    "metric": lambda e: e.geometry.metric,
-    "curvature_form": lambda e: e.geometry.curvature_form,
-    "torsion_form": lambda e: e.geometry.torsion_form,
-    "covariance": lambda e: e.geometry.covariance,
-    "shape": lambda e: np.array(e.coefficients.shape),
-}
+
+
+def _functions(reported: Reported) -> tuple[int, ...]:
+    return reported.estimate.coefficients.shape
+
+
+_GETTERS: dict[str, Getter] = {**getters(), "shape": _functions}
 
 
 @dataclass(frozen=True)
@@ -122,7 +111,9 @@ class _Worker:
 
     def _difference(self, name: str, value: Any, estimate: Estimate) -> str:
         """In which way one number, or list of numbers, is another now; nothing if it is not."""
-        again = _NAMED_AS[name](estimate) if name in _NAMED_AS else getattr(estimate, name)
+        again = (
+            estimate.coefficients.shape if name == "shape" else _GETTERS[name](Reported(estimate))
+        )
         was, now = np.asarray(value).ravel(), np.asarray(again).ravel()
         real = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape
         if was.tobytes() == now.tobytes() if real else np.array_equal(was, now):

@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
+from functools import cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Frame
-from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.pipeline import Pipeline, Reported, Setup
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.disk import is_there
@@ -234,13 +235,19 @@ def _said(
     }
 
 
-class ExportedFrame(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class ExportedFrame:
     """A `frame`, that came `at` s after the recording began, and what `pipeline` made of it."""
 
     at: float
     frame: Frame
     estimate: Estimate
     pipeline: Pipeline
+
+    @cached_property
+    def reported(self) -> Reported:
+        """What the table of quantities is computed of."""
+        return Reported(self.estimate, self.pipeline.fitted)
 
 
 class ExportWriter(Protocol):
