@@ -1,6 +1,7 @@
 """One table of what an estimate reports: what is in it is in every file and message."""
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 
 from kappaskin import COMPONENTS, load_scene
 from kappaskin.pipeline import REPORTED
-from kappaskin.pipeline.reported import getters
+from kappaskin.pipeline.reported import getters, readouts
 from kappaskin.publish.foxglove_channels import CHANNELS
 from kappaskin.publish.message import CONTACT, SWITCHES
 from kappaskin.recording import messages as m
@@ -228,3 +229,16 @@ def test_a_quantity_added_to_the_table_is_in_every_file_and_message(
     found = json.loads(done.stdout)
     assert found.pop("unit") == "N"
     assert found == dict.fromkeys(("npz", "hdf5", "csv", "udp", "foxglove"), True)
+
+
+def test_readouts_are_the_estimate_in_units_of_the_screen(messages_of) -> None:
+    (made,) = messages_of(load_scene("off-centre"))
+    touch, geometry = made.estimate.touch, made.estimate.geometry
+    found = {each.label: each for each in readouts(made.estimate)}
+    assert list(found)[:4] == ["Contact x", "Contact y", "Force", "Depth"]
+    assert found["Contact y"].value == 1e3 * touch.position[1]
+    assert found["Contact y"].half_width == 1e3 * touch.position_95[1]
+    assert (found["Force"].value, found["Force"].unit) == (1e3 * touch.force, "mN")
+    assert found["Depth"].sd == 1e3 * touch.displacement_sd
+    assert found["Smaller \N{GREEK SMALL LETTER KAPPA}"].sd == geometry.principal_sd[1]
+    assert math.isnan(found["Noise of a reading"].sd)

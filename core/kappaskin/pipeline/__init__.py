@@ -17,3 +17,4 @@ from kappaskin.pipeline.reported import Reported as Reported
 from kappaskin.pipeline.reported import ReportedQuantity as ReportedQuantity
 from kappaskin.pipeline.reported import getters as getters
 from kappaskin.pipeline.reported import numbers_of as numbers_of
+from kappaskin.pipeline.reported import readouts as readouts

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -138,6 +138,9 @@ class ReportedQuantity:
     bars follow it, or each its number if they are `interleaved`. Without `keys` these are made of
     name, parts and unit; with none in it, as for an array of every element, it is not published.
     `quick` gets all that is published of it as a list, in less time than `value` and `sd`.
+
+    On the screen its numbers are called as in `labels_shown`, and each is `shown` in a unit, as so
+    many times the value, with so many digits; without labels it is no readout.
     """
 
     name: str
@@ -157,6 +160,8 @@ class ReportedQuantity:
     form: str = "%.6g"
     quick: Getter | None = None
     interleaved: bool = False
+    labels_shown: tuple[str, ...] = ()
+    shown: tuple[str, float, int] = ("", 1.0, 3)
 
     @property
     def forms(self) -> tuple[tuple[str, str, Getter], ...]:
@@ -365,6 +370,8 @@ _FIT = (
         group="fit",
         keys=(("noise_per_m", "standard deviation of one reading"),),
         form="%.3g",
+        labels_shown=("Noise of a reading",),
+        shown=("1/m", 1.0, 3),
     ),
     ReportedQuantity(
         "converged",
@@ -423,6 +430,8 @@ _CONTACT = (
         sd=lambda r: r.touch.position_sd,
         half_width=lambda r: r.touch.position_95,
         quick=lambda r: [*r.touch.position.tolist(), *r.touch.position_sd.tolist()],
+        labels_shown=("Contact x", "Contact y"),
+        shown=("mm", 1e3, 2),
         keys=(
             ("x_m", "where the contact is, along the skin"),
             ("y_m", "where the contact is, across the skin"),
@@ -438,6 +447,8 @@ _CONTACT = (
         sd=lambda r: r.touch.force_sd,
         half_width=lambda r: r.touch.force_95,
         keys=(("force_N", "of the contact, above zero where it presses"),),
+        labels_shown=("Force",),
+        shown=("mN", 1e3, 1),
     ),
     ReportedQuantity(
         "displacement",
@@ -449,6 +460,8 @@ _CONTACT = (
         half_width=lambda r: r.touch.displacement_95,
         columns=("", "_sd"),
         keys=(("displacement_m", f"{_OF_SKIN}, above zero inward"),),
+        labels_shown=("Depth",),
+        shown=("mm", 1e3, 3),
     ),
 )
 _GEOMETRY = (
@@ -543,6 +556,11 @@ _GEOMETRY = (
         ),
         quick=lambda r: r.principal()[0],
         interleaved=True,
+        labels_shown=(
+            "Larger \N{GREEK SMALL LETTER KAPPA}",
+            "Smaller \N{GREEK SMALL LETTER KAPPA}",
+        ),
+        shown=("1/m", 1.0, 2),
     ),
     ReportedQuantity(
         "direction",
@@ -589,3 +607,30 @@ def getters() -> dict[str, Getter]:
         for quantity in REPORTED
         for suffix, _, getter in quantity.forms
     }
+
+
+class Readout(NamedTuple):
+    """A number on the screen: in a `unit`, with so many `digits`; NaN where one is not known."""
+
+    label: str
+    value: float
+    sd: float
+    half_width: float
+    unit: str
+    digits: int
+
+
+def readouts(estimate: Estimate) -> list[Readout]:
+    """What the screen shows of an estimate: first of the contact, then of the fit."""
+    reported = Reported(estimate)
+    found: list[Readout] = []
+    for quantity in sorted(REPORTED, key=lambda each: each.group != "contact"):
+        unit, scale, digits = quantity.shown
+        numbers = [
+            np.ravel(math.nan if get is None else get(reported))
+            for get in (quantity.value, quantity.sd, quantity.half_width)
+        ]
+        for part, label in enumerate(quantity.labels_shown):
+            value, sd, half_width = (scale * float(each[part % len(each)]) for each in numbers)
+            found.append(Readout(label, value, sd, half_width, unit, digits))
+    return found
