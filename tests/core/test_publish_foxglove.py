@@ -162,7 +162,7 @@ def test_every_channel_holds_what_its_schema_says(client, server, message) -> No
     def all_of_it() -> bool:
         # Again where one was dropped: the server's own thread sends the skin meanwhile.
         server.send(copy(message))
-        server.tell(STATE)
+        server.report(STATE)
         with suppress(TimeoutError):
             while len(told) < len(TOPICS):
                 number, when, content = parsed(one.recv(0.5))

@@ -110,7 +110,7 @@ def test_targets_are_given_once_and_not_without_end() -> None:
 def test_a_receiver_gets_contact_and_shape_as_they_are(receiver, message: EstimateMessage) -> None:
     sender = to(receiver)
     sender.send(message)
-    sender.tell(STATE)
+    sender.report(STATE)
     assert receiver.recv(9999) == message.contact
     assert receiver.recv(9999) == message.shape
     assert json.loads(receiver.recv(9999))["kind"] == "status"
@@ -209,8 +209,8 @@ def test_a_host_that_does_not_resolve_is_refused(host: str) -> None:
 
 def settled(publishing: Publishing) -> None:
     end = time.monotonic() + 30
-    while any(target.opening for target in publishing.news.targets) and time.monotonic() < end:
-        publishing.tell(STATE)
+    while any(target.opening for target in publishing.status.targets) and time.monotonic() < end:
+        publishing.report(STATE)
         time.sleep(0.005)
 
 
@@ -232,13 +232,13 @@ def test_a_look_for_a_host_that_takes_long_holds_nothing_up_and_ends_in_a_refusa
     slow, now = Slow(), [0.0]
     publishing = Publishing(slow, lambda: now[0])
     began = time.monotonic()
-    publishing.ask(["udp://slow:1"])
-    publishing.tell(STATE)
+    publishing.request(["udp://slow:1"])
+    publishing.report(STATE)
     assert time.monotonic() - began < 5.0  # where the look takes 10 s
-    assert publishing.news.targets[0].opening
+    assert publishing.status.targets[0].opening
     now[0] = 6.0
-    publishing.tell(STATE)
-    (told,) = publishing.news.targets
+    publishing.report(STATE)
+    (told,) = publishing.status.targets
     assert "not found out within 5 s" in told.refusal
     slow.go.set()
     assert slow.closed.wait(30)  # come too late
@@ -248,8 +248,8 @@ def test_a_look_for_a_host_that_takes_long_holds_nothing_up_and_ends_in_a_refusa
 def test_what_is_not_wanted_any_more_when_it_opens_is_closed() -> None:
     slow = Slow()
     publishing = Publishing(slow)
-    publishing.ask(["udp://slow:1"])
-    publishing.ask([])
+    publishing.request(["udp://slow:1"])
+    publishing.request([])
     slow.go.set()
     assert slow.closed.wait(30)
 
@@ -267,20 +267,20 @@ def test_a_target_that_stays_is_not_opened_again_and_a_refused_one_is(
     monkeypatch.setattr(socket, "getaddrinfo", found)
     name = f"udp://127.0.0.1:{receiver.getsockname()[1]}"
     publishing = Publishing()
-    publishing.ask([name, "udp://nowhere.invalid:1"])
+    publishing.request([name, "udp://nowhere.invalid:1"])
     settled(publishing)
-    publishing.tell(STATE)
-    stays, refused = publishing.news.targets
+    publishing.report(STATE)
+    stays, refused = publishing.status.targets
     assert (stays.target, stays.refusal) == (name, "")
     assert stays.sent > 0
     assert "not known" in refused.refusal
-    publishing.ask(["udp://nowhere.invalid:1", name])
-    again, same = publishing.news.targets
+    publishing.request(["udp://nowhere.invalid:1", name])
+    again, same = publishing.status.targets
     assert again.opening
     assert same.sent >= stays.sent
     settled(publishing)
     publishing.close()
-    assert publishing.news.targets == ()
+    assert publishing.status.targets == ()
 
 
 # Who listens

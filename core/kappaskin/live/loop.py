@@ -42,27 +42,27 @@ _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the
 
 
 class EngineLoop:
-    """The engine's own side: takes requests, reads, computes, writes, reports."""
+    """The engine at work: takes requests, reads, computes, records, publishes and reports."""
 
     def __init__(self, requests: RequestReceiver, ring: Ring, beside: Ring) -> None:
         self._requests, self._ring = requests, ring
         self._source: Source | None = None
-        self._watching = LiveHealthMonitor()
+        self._health = LiveHealthMonitor()
         self._place = np.full(2, math.nan)  # of the last contact, in m
-        self._keeping = LiveRecorder()
+        self._recorder = LiveRecorder()
         self._status: Status = ring.read_status() or Status()
-        self._steering: SimulatedTracking | SerialTracking | None = None
+        self._tracking: SimulatedTracking | SerialTracking | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")
         status = self._status
-        self._side = PipelineHost(
+        self._main = PipelineHost(
             ring, self._builder, PipelineStatus(status.setup, status.generation)
         )
         self._compared = ComparedPipeline(beside, self._builder, status.beside or PipelineStatus())
-        self._taking = TareCapture(self._builder, self._status.tare)
-        self._publishing, self._told = Publishing(), self._status.happened
+        self._tare = TareCapture(self._builder, self._status.tare)
+        self._publishing, self._reported_events = Publishing(), self._status.happened
         self._haste = Haste()
-        self._arrivals, self._pace = ArrivalTimes(), RateLimit()
+        self._arrivals, self._rate_limit = ArrivalTimes(), RateLimit()
         self._changing, self._again = False, math.inf
 
     def run(self) -> None:
@@ -77,8 +77,8 @@ class EngineLoop:
             elif time.monotonic() >= self._again:
                 self._open(self._status.source)
             self._swap()
-            if self._side.pipeline is not None and self._source is not None:
-                self._taking.go_on(self._side.pipeline, self._source)
+            if self._main.pipeline is not None and self._source is not None:
+                self._tare.update(self._main.pipeline, self._source)
             if time.monotonic() - self._status.reported >= _REPORT:
                 self._report()
         self._close()
@@ -88,43 +88,43 @@ class EngineLoop:
 
     def _goes_on(self) -> bool:
         """Whether there is a window, or one may come yet for what is recorded."""
-        if news := self._requests.check(self._keeping.active):
-            self._happen(Event(time.monotonic(), "engine", news))
+        if change := self._requests.check(self._recorder.active):
+            self._add_event(Event(time.monotonic(), "engine", change))
             self._report()
         return not self._requests.over
 
     @property
     def may_be_resumed(self) -> bool:
         """Whether it goes on where the window is gone."""
-        return self._requests.resumable and self._keeping.active
+        return self._requests.resumable and self._recorder.active
 
     def _carry_out(self, request: str | Action) -> None:
         """Go over to the setting of `Requested` of this name, or do what is to be done once."""
         requested = self._requests.requested
         match request:
             case "setup":
-                self._side.ask(requested.setup)
+                self._main.request(requested.setup)
             case "compared":
-                self._compared.ask(requested.compared, self._status.sensor)
+                self._compared.request(requested.compared, self._status.sensor)
             case "region":
                 self._status = replace(self._status, region=requested.region)
-                self._steer()
+                self._track_region()
             case "targets":
-                self._publishing.ask(requested.targets)
+                self._publishing.request(requested.targets)
                 self._haste(self._publishing.active)
             case "source":
                 self._go_to(requested.source)
             case "scene":
                 self._play(requested.scene)
             case "recording":
-                self._keeping.begin(requested.recording, self._source, self._side)
+                self._recorder.begin(requested.recording, self._source, self._main)
             case Seek() | StepFrames():
                 self._move(request)
             case TakeTare():
                 streams = self._status.state == STREAMING
-                self._taking.begin(self._status.sensor if streams else None)
+                self._tare.begin(self._status.sensor if streams else None)
             case Note():
-                self._happen(Event(time.monotonic(), "note", request.text))
+                self._add_event(Event(time.monotonic(), "note", request.text))
             case _:
                 return
         self._report()
@@ -137,11 +137,11 @@ class EngineLoop:
             self._open(source)
 
     def _open(self, name: str) -> None:
-        """Open the source, or say why not; a port that cannot be is tried again now and then."""
+        """Open the source; `status` says why it cannot be, and a port is then retried."""
         self._again = math.inf
         try:
             self._source = open_source(name)
-            self._keeping.listen(self._source)
+            self._recorder.connect(self._source)
             self._status = replace(self._status, state=WAITING, source=name, message="")
         except SourceError as error:
             self._again = time.monotonic() + _AGAIN
@@ -150,7 +150,7 @@ class EngineLoop:
             self._status = replace(self._status, state=LOST, source=name, message=str(refusal))
 
     def _move(self, request: Seek | StepFrames) -> None:
-        """Go on from another place of the source."""
+        """Move to another position in the source."""
         source = self._source
         try:
             if isinstance(request, StepFrames):
@@ -170,52 +170,52 @@ class EngineLoop:
         self._report()  # another skin may take a while
         try:
             self._source.play(scene)
-            self._watching.spoil(scene)
-            self._keeping.plays(self._source)
+            self._health.follow_scene(scene)
+            self._recorder.add_scene(self._source)
         except Refusal as refusal:
             message = str(refusal)
         self._changing = False
         self._status = replace(self._status, message=message)
 
-    def _steer(self) -> None:
-        """Let the source scan the region asked for, or say why it does not."""
-        self._steering, refusal = None, ""
+    def _track_region(self) -> None:
+        """Let the source scan the requested region; `status` says why it does not."""
+        self._tracking, refusal = None, ""
         if self._source is not None and self._status.sensor is not None:
             try:
-                self._steering = track_region(self._source, self._status.region)
+                self._tracking = track_region(self._source, self._status.region)
             except Refusal as reason:
                 refusal = str(reason)
         self._status = replace(self._status, region_refusal=refusal)
 
     def _close(self) -> None:
-        self._taking.give_up("the connection ended; connect again, then tare")
+        self._tare.cancel("the connection ended; connect again, then tare")
         if self._source is not None:
             self._source.close()
-            self._keeping.ended()
+            self._recorder.source_ended()
         self._source = None
-        for side in (self._side, self._compared.side):
-            side.forget()
-        self._steering = None
-        self._watching.meet(None)
+        for host in (self._main, self._compared.host):
+            host.disconnect()
+        self._tracking = None
+        self._health.connect(None)
         self._arrivals.clear()
         self._again = math.inf
 
     def _swap(self) -> None:
-        """Go over to what has been built."""
-        was = self._side.pipeline
-        if self._side.swap():
-            if self._side.pipeline is not was:
-                self._keeping.set_up(self._side)
-                self._leave_out(self._side)
+        """Use the pipelines that have been built."""
+        was = self._main.pipeline
+        if self._main.swap():
+            if self._main.pipeline is not was:
+                self._recorder.set_up(self._main)
+                self._exclude(self._main)
             self._show_again()
             self._report()
-        if self._compared.side.swap():
-            self._leave_out(self._compared.side)
+        if self._compared.host.swap():
+            self._exclude(self._compared.host)
             self._show_again()
             self._report()
 
     def _show_again(self) -> None:
-        """Let what a recording shows that stands be seen with another setup too."""
+        """Compute the frame at which a recording is paused once more, with another setup."""
         if isinstance(self._source, ReplayedSource):
             self._source.again()
 
@@ -227,11 +227,11 @@ class EngineLoop:
             return
         self._follow(source)
         self._arrivals.read(frames)
-        if self._side.pipeline is not None:
-            self._compute(frames, self._side.pipeline)
+        if self._main.pipeline is not None:
+            self._compute(frames, self._main.pipeline)
         # Afterwards: what is left out is left out from the next frame that is read.
         for frame in frames:
-            self._watch(frame)
+            self._check_health(frame)
 
     def _lose(self, message: str) -> None:
         """Let go of a source of which nothing more comes."""
@@ -242,12 +242,12 @@ class EngineLoop:
         self._report()
 
     def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:
-        """Work out the newest frames, as many as there is time for."""
+        """Compute the newest frames, as many as there is time for."""
         within = (_FRESH,) if self._publishing.active else ()
         source = self._source
-        stands = isinstance(source, ReplayedSource) and source.stands
-        least = min(len(frames), int(stands))  # or nobody would see what was asked for
-        late = len(frames) - max(self._pace.affordable(len(frames), *within), least)
+        paused = isinstance(source, ReplayedSource) and source.stands
+        least = min(len(frames), int(paused))  # or nobody would see what was requested
+        late = len(frames) - max(self._rate_limit.affordable(len(frames), *within), least)
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
         for frame in frames[:late]:
@@ -259,72 +259,72 @@ class EngineLoop:
             begun = time.monotonic()
             estimate = pipeline(frame)
             self._publishing.send(estimate, pipeline, begun)
-            self._side.ring.write(estimate)
-            self._taking.receive(estimate)
+            self._main.ring.write(estimate)
+            self._tare.take(estimate)
             self._arrivals.used(frame)
             self._place = estimate.touch.position
-            if self._steering is not None:
-                self._steering(estimate.touch, pipeline.fit)
-            self._keeping.take(frame, estimate)
-            self._compared.take(frame, stands)
-        self._pace.spend(len(frames) - late, time.monotonic() - began)
+            if self._tracking is not None:
+                self._tracking(estimate.touch, pipeline.fit)
+            self._recorder.take(frame, estimate)
+            self._compared.take(frame, paused)
+        self._rate_limit.spend(len(frames) - late, time.monotonic() - began)
 
     def _follow(self, source: Source) -> None:
-        """Say how the source is doing, and who is on it."""
+        """Update the status of the source and of the device on it."""
         trouble, was = source.trouble, self._status
         if source.sensor is not was.sensor:
-            self._meet(source.sensor)
+            self._connected(source.sensor)
         state = LOST if trouble else WAITING if source.sensor is None else STREAMING
         if state != was.state or ((trouble or was.state == LOST) and trouble != was.message):
             self._status = replace(self._status, state=state, message=trouble)
         events = source.events()
         self._status = self._status.after(events)
-        self._keeping.brought(events)
-        told = self._steering is None or self._steering.refusal == was.region_refusal
-        if self._steering is not None and not told:
-            self._status = replace(self._status, region_refusal=self._steering.refusal)
-        if state != was.state or events or not told:
+        self._recorder.add_events(events)
+        same = self._tracking is None or self._tracking.refusal == was.region_refusal
+        if self._tracking is not None and not same:
+            self._status = replace(self._status, region_refusal=self._tracking.refusal)
+        if state != was.state or events or not same:
             self._report()
 
-    def _watch(self, frame: Frame) -> None:
-        """Look after the health of the channels, and leave out of the fit which are not well."""
-        if self._watching(frame):
-            self._leave_out(self._side)
-            self._leave_out(self._compared.side)
+    def _check_health(self, frame: Frame) -> None:
+        """Check the health of the channels, and exclude faulty ones from the fit."""
+        if self._health(frame):
+            self._exclude(self._main)
+            self._exclude(self._compared.host)
 
-    def _leave_out(self, side: PipelineHost) -> None:
-        if self._watching.leave_out(side) and side is self._side:
-            self._keeping.leave_out(side)
+    def _exclude(self, host: PipelineHost) -> None:
+        if self._health.exclude(host) and host is self._main:
+            self._recorder.exclude(host)
 
-    def _happen(self, event: Event) -> None:
-        """Tell of something that happened."""
+    def _add_event(self, event: Event) -> None:
+        """Report and record an event."""
         self._status = self._status.after([event])
-        self._keeping.happened(event)
+        self._recorder.add_event(event)
 
     def end_recording(self) -> None:
         """End the file, if one is recorded to, and wait until it is on the disk."""
-        self._keeping.close()
+        self._recorder.close()
 
-    def _meet(self, sensor: Sensor | None) -> None:
-        """A device said what it is: make the pipelines for it."""
-        self._taking.give_up("another device answered, or the same one anew; tare again")
-        self._watching.meet(sensor)
+    def _connected(self, sensor: Sensor | None) -> None:
+        """A device is connected, or none any more: build the pipelines for it."""
+        self._tare.cancel("another device answered, or the same one anew; tare again")
+        self._health.connect(sensor)
         self._status = replace(
             self._status,
             sensor=sensor,
             meetings=self._status.meetings + (sensor is not None),
         )
-        self._side.meet(sensor)
-        self._compared.meet(sensor)
+        self._main.connect(sensor)
+        self._compared.connect(sensor)
         if sensor is not None:
-            self._steer()
+            self._track_region()
 
     def _report(self) -> None:
-        if trouble := self._keeping.look(self._source):
-            self._happen(Event(time.monotonic(), "recording", trouble))
+        if trouble := self._recorder.check(self._source):
+            self._add_event(Event(time.monotonic(), "recording", trouble))
         now, source, status = time.monotonic(), self._source, self._status
         if source is not None:
-            watch = self._side.pipeline.drift if self._side.pipeline else None
+            watch = self._main.pipeline.drift if self._main.pipeline else None
             status = replace(
                 status,
                 accounting=source.accounting(),
@@ -336,24 +336,24 @@ class EngineLoop:
                 playing=source.playing
                 if isinstance(source, SimulatedSource)
                 else FROM_THE_BEGINNING,
-                health=self._watching.health(self._side.pipeline, self._place),
+                health=self._health.health(self._main.pipeline, self._place),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
             )
-        self._publishing.tell(status.told_since(self._told))
-        self._told = status.happened
-        told = self._side.told
+        self._publishing.report(status.source_status(self._reported_events))
+        self._reported_events = status.happened
+        computed = self._main.status
         self._status = replace(
             status,
             reported=now,
-            tare=self._taking.news,
-            setup=told.setup,
-            generation=told.generation,
-            slot=told.slot,
-            refusal=told.refusal,
-            computing=told.computing or self._changing,
-            publishing=self._publishing.news,
-            recording=self._keeping.written,
-            beside=self._compared.told,
+            tare=self._tare.status,
+            setup=computed.setup,
+            generation=computed.generation,
+            slot=computed.slot,
+            refusal=computed.refusal,
+            computing=computed.computing or self._changing,
+            publishing=self._publishing.status,
+            recording=self._recorder.status,
+            beside=self._compared.status,
             requested=self._requests.requested.number,
         )
         self._ring.write_status(self._status)
@@ -369,7 +369,7 @@ def serve(
     orphans: Path | None,
     patience: float,
 ) -> None:
-    """Do as the `requests` say, and write to the rings of these `names`, until that is over."""
+    """Run the engine by the `requests`, with the rings of these `names`, until it is to end."""
     # The thread that reads the line needs the interpreter three times for 4 KiB: with Python's 5 ms
     # for each, a loop that always computes would starve it below the rate of the line.
     sys.setswitchinterval(_SWITCH)

@@ -1,4 +1,4 @@
-"""A region of interest to a source that scans it: each contact moves what is scanned next."""
+"""Region tracking: each contact moves the region that the source scans next."""
 
 from kappaskin.contact import IntrinsicContact
 from kappaskin.errors import Refusal
@@ -50,7 +50,7 @@ class SimulatedTracking:
 
 
 class SerialTracking:
-    """Lets the device on a line scan `region`, and asks it for another list as a contact moves.
+    """Lets the device on a line scan `region`, and requests another list as a contact moves.
 
     Called like `SimulatedTracking`; `refusal` says why the device does not, once that is known.
     """
@@ -70,7 +70,7 @@ class SerialTracking:
 
 
 def track_region(source: Source, region: Region) -> SimulatedTracking | SerialTracking | None:
-    """What makes `source` scan `region`; None when that is off and everything is scanned.
+    """The tracking that lets `source` scan `region`; None where that is off.
 
     Raises a `Refusal` when the source cannot or the region is not on its skin; it then goes on with
     everything.

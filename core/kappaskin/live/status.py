@@ -1,4 +1,4 @@
-"""How the live process is doing, as it tells the one that shows."""
+"""Status of the engine, as it reports it to the window."""
 
 import math
 from collections.abc import Sequence
@@ -29,8 +29,8 @@ class Status:
     """How the engine is doing.
 
     `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
-    `message` says why. `setup` is the one in use, `refusal` says why it is not the one asked for
-    last, and `computing` that another is on its way. `region` is scanned unless `region_refusal`
+    `message` says why. `setup` is the one in use, `refusal` says why it is not the one requested
+    last, `computing` that another is being prepared. `region` is scanned unless `region_refusal`
     says why not. `meetings` counts the devices that said what they are, `skipped` the frames that
     came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
     of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
@@ -100,16 +100,16 @@ class Status:
 
     @property
     def kind(self) -> str:
-        """Where readings come from, as receivers are told; nothing without a sensor."""
+        """Where readings come from, as receivers read it; empty without a sensor."""
         if self.sensor is None:
             return ""
         if self.replay is not None:
             return "replay"
         return "sim" if self.sensor.simulated else "live"
 
-    def told_since(self, happened: int) -> SourceState:
-        """What receivers are told, with what came after so many had `happened`."""
+    def source_status(self, happened: int) -> SourceState:
+        """What receivers get, with the events after so many had `happened`."""
         fresh = min(self.happened - happened, len(self.events))
         events = self.events[len(self.events) - fresh :]
-        told = self.message, self.sensor, self.rate, self.last_frame
-        return SourceState(self.state, self.kind, *told, events)
+        rest = self.message, self.sensor, self.rate, self.last_frame
+        return SourceState(self.state, self.kind, *rest, events)

@@ -19,7 +19,7 @@ _WHILE = 0.5  # s over which it is judged how many come
 
 
 class RateLimit:
-    """Computes every frame where there is time for it, or else spends a share of it on the newest.
+    """Lets every frame be computed where there is time, else the newest, in a share of the time.
 
     A frame that is not computed costs a hundredth of one that is.
     """
@@ -48,7 +48,7 @@ class RateLimit:
         return min(waiting, soon, max(int(allowed / self._cost), least))
 
     def spend(self, count: int, seconds: float) -> None:
-        """Take note that `count` frames were computed in so many s."""
+        """`count` frames were computed in so many s."""
         if not count:
             return
         each = seconds / count
@@ -77,14 +77,14 @@ class ArrivalTimes:
         self._last, self._gap, self._next = math.inf, math.nan, -math.inf
 
     def read(self, frames: list[Frame]) -> None:
-        """So many have come."""
+        """Frames have arrived."""
         for frame in frames:
             if frame.host_time > self._last:
                 self._gaps.append(frame.host_time - self._last)
             self._last = frame.host_time
 
     def used(self, frame: Frame) -> None:
-        """It has been worked out, or passed over."""
+        """A frame has been computed, or passed over."""
         self._times.append(frame.host_time)
         self.last = frame.host_time
 

@@ -1,7 +1,7 @@
 """Foxglove transport: a WebSocket server for Foxglove and others that speak its protocol.
 
 The protocol is foxglove.websocket.v1, and foxglove.sdk.v1, its name since 2025. The thread that
-computes writes a message straight into the socket of each client that asked for it; what a client
+computes writes a message straight into the socket of each client that request for it; what a client
 leaves no room for is dropped. Another thread accepts clients, reads what they send, and computes
 the skin as a cloud of points, when one of them shows it.
 """
@@ -70,7 +70,7 @@ _MOST_IDS = 2**32
 class FoxgloveClient:
     """A connection; `offer` is called by one thread, everything else by another.
 
-    `subscribed` are the channels that it asked for, with the numbers it gave them.
+    `subscribed` are the channels that it request for, with the numbers it gave them.
     """
 
     def __init__(self, made: socket.socket, name: str) -> None:
@@ -91,7 +91,7 @@ class FoxgloveClient:
         self._second, self._heard = now, 0
 
     @property
-    def told(self) -> Receiver:
+    def receiver(self) -> Receiver:
         return Receiver(self.name, self.sent, self.dropped, "too slow" if self._rest else "")
 
     def offer(self, channel: Channel, when: float, data: bytes) -> None:
@@ -182,30 +182,30 @@ class FoxgloveClient:
                 return  # what came right behind it was wrong
             self._protocol.send_response(self._protocol.accept(event))
             if self._protocol.state is State.OPEN:
-                self._say(_SERVER_INFO)
-                self._say(_ADVERTISED)
+                self._reply(_SERVER_INFO)
+                self._reply(_ADVERTISED)
         elif isinstance(event, Frame) and event.opcode in (Opcode.TEXT, Opcode.BINARY):
-            if event.opcode is Opcode.TEXT and event.fin and self._obey(bytes(event.data)):
+            if event.opcode is Opcode.TEXT and event.fin and self._handle(bytes(event.data)):
                 return
             words = "expected a JSON object with op subscribe or unsubscribe and their lists"
-            self._say({"op": "status", "level": _WARNING, "message": words})
+            self._reply({"op": "status", "level": _WARNING, "message": words})
 
-    def _say(self, answer: _Answer) -> None:
+    def _reply(self, answer: _Answer) -> None:
         with suppress(WebSocketException):  # it is closing
             self._protocol.send_text(json.dumps(answer).encode())
 
-    def _obey(self, text: bytes) -> bool:
+    def _handle(self, text: bytes) -> bool:
         """Do what a message asks for; whether it could be understood."""
         try:
-            asked = cast("_Answer", json.loads(text))
-            if asked["op"] == "subscribe":
+            request = cast("_Answer", json.loads(text))
+            if request["op"] == "subscribe":
                 pairs = [
                     (each["id"], _BY_NUMBER.get(each["channelId"]))
-                    for each in asked["subscriptions"]
+                    for each in request["subscriptions"]
                 ]
                 self._subscribe(pairs)
-            elif asked["op"] == "unsubscribe":
-                gone = set(asked["subscriptionIds"])
+            elif request["op"] == "unsubscribe":
+                gone = set(request["subscriptionIds"])
                 self.subscribed = {c: n for c, n in self.subscribed.items() if n not in gone}
             else:
                 return False
@@ -296,7 +296,7 @@ class Foxglove:
 
     @property
     def receivers(self) -> tuple[Receiver, ...]:
-        return tuple(client.told for client in self._clients)
+        return tuple(client.receiver for client in self._clients)
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -308,15 +308,15 @@ class Foxglove:
     def send(self, message: EstimateMessage) -> None:
         self._latest = message
         for client in self._clients:
-            wanted = client.subscribed
-            if CONTACT in wanted:
+            subscribed = client.subscribed
+            if CONTACT in subscribed:
                 client.offer(CONTACT, message.timestamp, message.contact)
-            if POSE in wanted and message.estimate.touch.present:
+            if POSE in subscribed and message.estimate.touch.present:
                 client.offer(POSE, message.timestamp, pose(message))
-            if SHAPE in wanted and message.mark.with_shape:
+            if SHAPE in subscribed and message.mark.with_shape:
                 client.offer(SHAPE, message.timestamp, message.shape)
 
-    def tell(self, state: SourceState) -> None:
+    def report(self, state: SourceState) -> None:
         now, encoded = time.time(), state.encoded()
         lines: list[tuple[float, bytes]] = []
         for event in state.events:

@@ -219,7 +219,7 @@ class SourceState:
             round(age, 6) if math.isfinite(age) else None,
             *((patch.a, patch.b, patch.base_curvature) if patch else (None, None, None)),
         )
-        told = {
+        fields = {
             "kind": "status",
             "version": VERSION,
             "timestamp": round(time.time(), 6),
@@ -229,4 +229,4 @@ class SourceState:
             "sensor": sensor.name[:_LONGEST] if sensor else "",
             **dict(zip(STATUS_NUMBERS, numbers, strict=True)),
         }
-        return json.dumps(told, allow_nan=False).encode()
+        return json.dumps(fields, allow_nan=False).encode()

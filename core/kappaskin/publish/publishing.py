@@ -47,7 +47,7 @@ class Publisher(Protocol):
         """Send what one frame says."""
         ...
 
-    def tell(self, state: SourceState) -> None:
+    def report(self, state: SourceState) -> None:
         """Send how the source is doing; called several times a second."""
         ...
 
@@ -173,7 +173,7 @@ class PublishStatus:
     latency: Latency = field(default_factory=Latency)
 
 
-class _Place:
+class _OpenTarget:
     """A target and what sends there, once it is open."""
 
     def __init__(self, target: Target, how: Opened, clock: Callable[[], float]) -> None:
@@ -186,7 +186,7 @@ class _Place:
             target=_open, args=(self._opening, how, target), name="target-opener", daemon=True
         ).start()
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Take over what was opened, or why it cannot be."""
         if self.publisher is not None or self.refusal:
             return
@@ -201,7 +201,7 @@ class _Place:
                 "its address instead of its name"
             )
 
-    def news(self) -> TargetStatus:
+    def status(self) -> TargetStatus:
         name, sender = str(self.target), self.publisher
         if sender is None:
             return TargetStatus(name, not self.refusal, self.refusal)
@@ -231,24 +231,26 @@ class Publishing:
 
     def __init__(self, how: Opened = opened, clock: Callable[[], float] = time.monotonic) -> None:
         self._how, self._clock = how, clock
-        self._places: list[_Place] = []
+        self._places: list[_OpenTarget] = []
         self._source, self._epoch = "", epoch()
         self._number, self._next_shape = 0, -math.inf
         self._parts: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
-        self._latency, self._next_look = Latency(), -math.inf
+        self._latency, self._next_check = Latency(), -math.inf
 
-    def ask(self, texts: Sequence[str]) -> None:
+    def request(self, texts: Sequence[str]) -> None:
         """Publish to these targets; those that are open stay so, what was refused is tried anew."""
-        wanted = targets_of(texts)
-        kept = {p.target: p for p in self._places if p.target in wanted and not p.refusal}
+        targets = targets_of(texts)
+        open_already = {p.target: p for p in self._places if p.target in targets and not p.refusal}
         for place in self._places:
-            if place.target not in kept:
+            if place.target not in open_already:
                 place.close()
         self._places = [
-            kept[target] if target in kept else _Place(target, self._how, self._clock)
-            for target in wanted
+            open_already[target]
+            if target in open_already
+            else _OpenTarget(target, self._how, self._clock)
+            for target in targets
         ]
-        if not wanted:
+        if not targets:
             self._parts.clear()
             self._latency = Latency()
 
@@ -274,23 +276,23 @@ class Publishing:
         ready = estimate.ready_time
         self._parts.append((began - estimate.host_time, ready - began, self._clock() - ready))
 
-    def tell(self, state: SourceState) -> None:
+    def report(self, state: SourceState) -> None:
         """Say how the source is doing, and see which targets have been opened."""
         self._source, self._epoch = state.source, epoch()
         for place in self._places:
-            place.look()
+            place.check()
             if place.publisher is not None:
-                place.publisher.tell(state)
+                place.publisher.report(state)
 
     @property
-    def news(self) -> PublishStatus:
+    def status(self) -> PublishStatus:
         now = self._clock()
-        if self._parts and now >= self._next_look:
-            self._next_look = now + _EVERY
+        if self._parts and now >= self._next_check:
+            self._next_check = now + _EVERY
             parts = np.array(self._parts)
             whole = np.percentile(parts.sum(axis=1), 99)
             self._latency = Latency(float(whole), *np.percentile(parts, 99, axis=0).tolist())
-        return PublishStatus(tuple(place.news() for place in self._places), self._latency)
+        return PublishStatus(tuple(place.status() for place in self._places), self._latency)
 
     def close(self) -> None:
-        self.ask(())
+        self.request(())

@@ -74,7 +74,7 @@ class Udp:
         if message.shape_follows:
             self._put(message.shape)
 
-    def tell(self, state: SourceState) -> None:
+    def report(self, state: SourceState) -> None:
         self._put(state.encoded())
 
     def _put(self, data: bytes) -> None:
@@ -94,7 +94,7 @@ class Udp:
         try:
             self._socket.send(data)
         except ConnectionRefusedError:
-            # Told of the last one, which nobody received, in the place of sending this one.
+            # JsonMessage of the last one, which nobody received, in the place of sending this one.
             self._sent -= 1
             self._drop("nobody receives there")
             self._socket.send(data)
@@ -121,7 +121,7 @@ _LARGEST = 65536
 _ENDLESS = 1e300  # no quantity of ours
 _AT_ONCE = 1000  # datagrams read without a look at anything else
 
-Told = dict[str, Any]
+JsonMessage = dict[str, Any]
 
 
 class UdpListener:
@@ -137,10 +137,10 @@ class UdpListener:
         self._sender: object = None
         self.contacts = self.lost = self.foreign = 0
 
-    def read(self, timeout: float) -> list[Told]:
+    def read(self, timeout: float) -> list[JsonMessage]:
         """The messages that came, after at most `timeout` s."""
         self._socket.settimeout(timeout)
-        came: list[Told] = []
+        came: list[JsonMessage] = []
         with suppress(TimeoutError, BlockingIOError):
             for _ in range(_AT_ONCE):
                 data, sender = self._socket.recvfrom(_LARGEST)
@@ -155,21 +155,21 @@ class UdpListener:
                 came.append(message)
         return came
 
-    def lines(self, message: Told) -> list[str]:
+    def lines(self, message: JsonMessage) -> list[str]:
         """What a message says, and what is missing before it; often nothing that is news."""
-        said: list[str] = []
+        lines: list[str] = []
         if message["kind"] == "contact":
-            said += self._gap(message.get("number"))
+            lines += self._gap(message.get("number"))
             now = self._clock()
             if now - self._shown >= _SHOWN:
                 self._shown = now
-                said.append(_words(message))
+                lines.append(_words(message))
         elif message["kind"] == "status":
             state = f"{message.get('state')}  {message.get('sensor')}  {message.get('message')}"
             if state != self._state:
-                said.append(f"status    {state}")
+                lines.append(f"status    {state}")
             self._state = state
-        return [f"{self._clock() - self._began:9.3f} s  {_plain(line)}" for line in said]
+        return [f"{self._clock() - self._began:9.3f} s  {_plain(line)}" for line in lines]
 
     def _gap(self, number: object) -> list[str]:
         last, self._number = self._number, number if isinstance(number, int) else None
@@ -206,7 +206,7 @@ def _bound(port: int) -> socket.socket:
     return made
 
 
-def _understood(data: bytes) -> Told | None:
+def _understood(data: bytes) -> JsonMessage | None:
     """The message in a datagram, if it is one of ours that is known here."""
     try:
         message = json.loads(data)
@@ -214,9 +214,10 @@ def _understood(data: bytes) -> Told | None:
         return None
     if not isinstance(message, dict):
         return None
-    told = cast("Told", message)
-    known = told.get("kind") in ("contact", "shape", "status") and told.get("version") == VERSION
-    return told if known else None
+    message = cast("JsonMessage", message)
+    kind, version = message.get("kind"), message.get("version")
+    known = kind in ("contact", "shape", "status") and version == VERSION
+    return message if known else None
 
 
 def _plain(line: str) -> str:
@@ -224,14 +225,14 @@ def _plain(line: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in line)
 
 
-def _figure(message: Told, key: str, scale: float, how: str) -> str:
+def _figure(message: JsonMessage, key: str, scale: float, how: str) -> str:
     value = message.get(key)
     if not isinstance(value, int | float) or not abs(value) < _ENDLESS:
         return "?"
     return f"{scale * value:{how}}"
 
 
-def _words(message: Told) -> str:
+def _words(message: JsonMessage) -> str:
     head = f"contact   #{_figure(message, 'sequence', 1, '.0f')}"
     tail = f"age {_figure(message, 'age_s', 1e3, '.1f')} ms"
     if not message.get("present"):
