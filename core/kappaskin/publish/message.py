@@ -119,7 +119,7 @@ def _yes(value: bool) -> str:
 
 @dataclass(frozen=True)
 class MessageHeader:
-    """What a message has from who sends it, besides the estimate.
+    """What the sender adds to a message about an estimate.
 
     `source` is where the readings come from, live, sim or replay; `epoch` in s since 1970 when this
     machine's monotonic clock began; `number` counts messages. The coefficients go with it if it is
@@ -133,7 +133,7 @@ class MessageHeader:
 
 
 class EstimateMessage:
-    """What one frame has to say, encoded once for all who send it, when the first one asks.
+    """The messages of one frame, encoded once for all transports, when the first one needs them.
 
     The `pipeline` made the `estimate` just now, from this `fit`.
     """
@@ -196,7 +196,7 @@ class EstimateMessage:
 
 @dataclass(frozen=True)
 class SourceState:
-    """How the source is doing, and the `events` since that was last told.
+    """How the source is doing, and the `events` since that was last reported.
 
     `source` is live, sim or replay, empty while there is no sensor; `last_frame` in s on the
     monotonic clock, `rate` in frames/s.

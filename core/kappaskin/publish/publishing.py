@@ -21,7 +21,7 @@ from kappaskin.publish.message import EstimateMessage, MessageHeader, SourceStat
 
 @dataclass(frozen=True)
 class Receiver:
-    """Who is sent to: messages `sent` and `dropped`, and why the last of these was."""
+    """A receiver of messages: how many were `sent` and `dropped`, and why the last of these was."""
 
     name: str
     sent: int = 0
@@ -30,7 +30,7 @@ class Receiver:
 
 
 class Publisher(Protocol):
-    """Sends what is estimated to those who receive it.
+    """Transport of messages to receivers.
 
     No call waits for a receiver: what one does not take at once is dropped and counted.
     """
@@ -114,12 +114,12 @@ def targets_of(texts: Sequence[str]) -> tuple[Target, ...]:
 
 
 def reason(error: OSError | UnicodeError) -> str:
-    """What the system said, without its number."""
+    """The message of a system error, without its number."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def opened(target: Target) -> Publisher:
-    """What sends to `target`; a `Refusal` says why nothing can. This may take a while."""
+    """The transport to `target`; a `Refusal` where there can be none. This may take a while."""
     try:  # by name: a transport is imported when somebody asks for it
         module = importlib.import_module(f"kappaskin.publish.{target.scheme}")
     except ImportError as error:
@@ -174,7 +174,7 @@ class PublishStatus:
 
 
 class _OpenTarget:
-    """A target and what sends there, once it is open."""
+    """A target and its transport, once that is open."""
 
     def __init__(self, target: Target, how: Opened, clock: Callable[[], float]) -> None:
         self.target, self._clock = target, clock
@@ -227,7 +227,7 @@ def _open(opening: "Future[Publisher]", how: Opened, target: Target) -> None:
 
 
 class Publishing:
-    """Publishes to the targets that were asked for last; at first there are none."""
+    """Publishes to the requested targets; at first there are none."""
 
     def __init__(self, how: Opened = opened, clock: Callable[[], float] = time.monotonic) -> None:
         self._how, self._clock = how, clock
@@ -238,7 +238,7 @@ class Publishing:
         self._latency, self._next_check = Latency(), -math.inf
 
     def request(self, texts: Sequence[str]) -> None:
-        """Publish to these targets; those that are open stay so, what was refused is tried anew."""
+        """Publish to these targets; open ones stay open, refused ones are retried."""
         targets = targets_of(texts)
         open_already = {p.target: p for p in self._places if p.target in targets and not p.refusal}
         for place in self._places:

@@ -40,7 +40,7 @@ def opened(target: Target) -> "Udp":
 
 
 def _connected(family: int, address: object) -> socket.socket:
-    """A socket that never waits; connected, it is told when nobody receives."""
+    """A socket that never waits; connected, it learns when nobody receives."""
     made = socket.socket(family, socket.SOCK_DGRAM)
     try:
         made.setblocking(False)
@@ -125,7 +125,7 @@ JsonMessage = dict[str, Any]
 
 
 class UdpListener:
-    """What comes to a UDP `port`, told line by line; what was lost is told by gaps in `number`."""
+    """What comes to a UDP `port`, as lines of text; gaps in `number` show what was lost."""
 
     def __init__(self, port: int, clock: Callable[[], float] = time.monotonic) -> None:
         if not 0 < port < 65536:

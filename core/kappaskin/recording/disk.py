@@ -1,4 +1,4 @@
-"""A file on a disk that may fill: whatever is written to it stands there whole, or not at all."""
+"""Files on a disk that may fill up: a write succeeds whole, or changes nothing."""
 
 import os
 import sys

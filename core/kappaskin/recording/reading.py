@@ -430,6 +430,6 @@ class Recording:
         self.close()
 
 
-def _format(said: dict[str, str]) -> int:
-    text = said.get("format", "")
+def _format(metadata: dict[str, str]) -> int:
+    text = metadata.get("format", "")
     return int(text[:_DIGITS]) if text.isascii() and text.isdigit() else FORMAT

@@ -90,13 +90,13 @@ class RecordedFrames:
         self._times, self._truth = RecordedClock(), None
         self._means.begin(self._times)
 
-    def _map(self, said: dict[str, Any]) -> None:
-        numbers = (said[name] for name in ("at", "offset", "half", "drift", "spread"))
-        known = Known((*numbers, bool(said["doubted"])), int(said["wraps"]), said["last"])
-        if math.isnan(said["since"]):
+    def _map(self, fields: dict[str, Any]) -> None:
+        numbers = (fields[name] for name in ("at", "offset", "half", "drift", "spread"))
+        known = Known((*numbers, bool(fields["doubted"])), int(fields["wraps"]), fields["last"])
+        if math.isnan(fields["since"]):
             self._times.recall(known)
         else:
-            self._times.coming.append((said["since"], known))
+            self._times.coming.append((fields["since"], known))
 
     def _came(self, now: float, data: bytes) -> Iterator[Frame]:
         messages = self._decoder.feed(data)
@@ -119,15 +119,15 @@ class RecordedFrames:
         return self._means.known
 
 
-def _truth(said: dict[str, Any], sensor: Sensor | None) -> Truth | None:
+def _truth(fields: dict[str, Any], sensor: Sensor | None) -> Truth | None:
     """The truth of the frames that follow; None where there is none."""
-    shape, coefficients = tuple(said["shape"].tolist()), said["coefficients"]
+    shape, coefficients = tuple(fields["shape"].tolist()), fields["coefficients"]
     if sensor is None or not coefficients.size:
         return None
-    check_edge(sensor.layout.patch, said["edge"])
+    check_edge(sensor.layout.patch, fields["edge"])
     if math.prod(shape) != coefficients.size or max(shape) > _FUNCTIONS:
         raise Refusal(f"expected a truth of shape {shape}, got {coefficients.size} numbers")
-    return Truth(coefficients.reshape(shape), said["contact"], said["edge"])
+    return Truth(coefficients.reshape(shape), fields["contact"], fields["edge"])
 
 
 _WAITING = 2**14  # frames that wait until one is asked for, at most
@@ -143,7 +143,7 @@ class Recomputation:
 
     def __init__(self, recording: Recording, setup: Setup | None = None) -> None:
         self._recording, self._setup = recording, setup
-        self._reenact = RecordedFrames(str(recording.path))
+        self._frames = RecordedFrames(str(recording.path))
         self.sensor: Sensor | None = None
         self.pipeline: Pipeline | None = None
         self._memory: Memory = {}
@@ -156,19 +156,19 @@ class Recomputation:
 
         A `Refusal` when it is none of its topic.
         """
-        for frame in self._reenact(message):
-            self._meet()
+        for frame in self._frames(message):
+            self._follow_device()
             if len(self._waiting) == _WAITING:
                 self._pass_over(1)
             self._waiting.append(frame)
             yield frame
-        self._meet()
+        self._follow_device()
         self._take(message)
 
     def _take(self, message: RecordedMessage) -> None:
         if message.topic == m.DEVICE.name:
             self.sensor = None  # another source, if of the same device: it begins at rest
-            self._meet()
+            self._follow_device()
         elif message.topic == m.LEFT_OUTS.name:
             self._leave_out(decode(m.LEFT_OUT, message.data))
         elif self._setup is not None:
@@ -177,23 +177,23 @@ class Recomputation:
             text = decode(m.STRING, message.data)["data"]
             self._set_up(setup_from_text(text, self._recording.attachment))
         elif message.topic == m.MEMORIES.name:
-            said = decode(m.MEMORY, message.data)
-            self._memory[said["name"]] = _shaped(said)
+            fields = decode(m.MEMORY, message.data)
+            self._memory[fields["name"]] = _shaped(fields)
 
-    def _leave_out(self, said: dict[str, Any]) -> None:
+    def _leave_out(self, fields: dict[str, Any]) -> None:
         self._pass_over(len(self._waiting))
         if self.pipeline is None:
             return
-        C, sizes = self.pipeline.sensor.channels, {said["kinds"].size, said["badness"].size}
+        C, sizes = self.pipeline.sensor.channels, {fields["kinds"].size, fields["badness"].size}
         if sizes != {C}:
             raise Refusal(f"expected {C} channels of which some are left out, got {sizes}")
-        self.pipeline.leave_out(said["kinds"], said["badness"])
+        self.pipeline.leave_out(fields["kinds"], fields["badness"])
 
-    def _meet(self) -> None:
+    def _follow_device(self) -> None:
         """Another device, if that is what the next frame is of, has no pipeline yet."""
-        if self._reenact.sensor is self.sensor:
+        if self._frames.sensor is self.sensor:
             return
-        self.sensor, self.pipeline, self._last = self._reenact.sensor, None, None
+        self.sensor, self.pipeline, self._last = self._frames.sensor, None, None
         self._waiting.clear()
         self._memory.clear()
         if self._setup is not None and self.sensor is not None:
@@ -240,8 +240,8 @@ class Recomputation:
         return self._last
 
 
-def _shaped(said: dict[str, Any]) -> Array:
+def _shaped(fields: dict[str, Any]) -> Array:
     try:
-        return said["values"].reshape(said["shape"])
+        return fields["values"].reshape(fields["shape"])
     except ValueError as error:
         raise Refusal(f"expected what was remembered in its shape: {error!s:.80}") from error

@@ -288,17 +288,17 @@ class RepairTask:
     def __init__(self, path: Path, out: Path) -> None:
         check_new(out)
         self._part = part_of(out)
-        self._beside = Beside[float | Repaired]("kappaskin-repair", repair_steps, path, out)
+        self._task = Beside[float | Repaired]("kappaskin-repair", repair_steps, path, out)
 
     def poll(self) -> list[float | Repaired]:
         """The shares that are done since the last call, and in the end what was saved.
 
         A `Refusal` where nothing could be.
         """
-        return self._beside.poll()
+        return self._task.poll()
 
     def close(self) -> None:
         """End it, done or not."""
-        self._beside.close()
+        self._task.close()
         if not is_written(self._part):  # by another that began it meanwhile
             self._part.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""A recording to a verdict: whether its bytes come to the same estimates again, bit for bit."""
+"""Verification of a recording: whether its bytes give the same estimates again, bit for bit."""
 
 import math
 from collections.abc import Generator
@@ -53,10 +53,10 @@ class Verification:
     @property
     def words(self) -> str:
         """The verdict as a sentence or two."""
-        told = f"{self.compared:,} recorded results of {self.frames:,} frames"
+        counts = f"{self.compared:,} recorded results of {self.frames:,} frames"
         if not self.compared:
-            return f"{told}: there is nothing to compare"
-        parts = [f"{told}: {'the same bit for bit' if self.same else 'not the same'}"]
+            return f"{counts}: there is nothing to compare"
+        parts = [f"{counts}: {'the same bit for bit' if self.same else 'not the same'}"]
         if self.different:
             parts.append(f"{self.different:,} differ, by {self.largest:.1g} of the largest number")
             parts.append(f"first {self.first}")
@@ -86,7 +86,7 @@ class _Worker:
     """Takes the messages as they were written."""
 
     def __init__(self, recording: Recording) -> None:
-        self._retrace = Recomputation(recording)
+        self._recomputation = Recomputation(recording)
         self._frames = self._compared = self._missing = self._different = 0
         self._first, self._largest = "", 0.0
 
@@ -94,18 +94,20 @@ class _Worker:
         if kind := _COMPARED.get(message.topic):
             self._compare(decode(kind, message.data))
             return
-        for _ in self._retrace(message):
+        for _ in self._recomputation(message):
             self._frames += 1
 
-    def _compare(self, said: dict[str, Any]) -> None:
+    def _compare(self, recorded: dict[str, Any]) -> None:
         """Work out the frame that a recorded estimate is of, and hold the two together."""
-        estimate = self._retrace.estimate(said["sequence"])
+        estimate = self._recomputation.estimate(recorded["sequence"])
         if estimate is None:
             self._missing += 1
             return
         self._compared += 1
-        names = (name for name in said if not name.startswith("header."))
-        differences = [d for name in names if (d := self._difference(name, said[name], estimate))]
+        names = (name for name in recorded if not name.startswith("header."))
+        differences = [
+            d for name in names if (d := self._difference(name, recorded[name], estimate))
+        ]
         self._different += bool(differences)
         self._first = self._first or "; ".join(differences[:1])
 
@@ -123,7 +125,7 @@ class _Worker:
         self._largest = max(self._largest, share if share == share else math.inf)
         return (
             f"frame {estimate.sequence} at {estimate.device_time:.6f} s: {name} was "
-            f"{_told(was)}, and is {_told(now)} now"
+            f"{_short(was)}, and is {_short(now)} now"
         )
 
     def verdict(self) -> Verification:
@@ -137,5 +139,5 @@ class _Worker:
         )
 
 
-def _told(values: "NDArray[Any]") -> str:
+def _short(values: "NDArray[Any]") -> str:
     return ", ".join(f"{value!r}" for value in values[:4].tolist()) + ", ..." * (len(values) > 4)

@@ -1,4 +1,4 @@
-"""Messages to an MCAP file, by a thread of its own: nothing that is live waits for a disk."""
+"""MCAP writer in a thread of its own: nothing live waits for the disk."""
 
 import itertools
 import threading

@@ -63,15 +63,15 @@ class ExportRequest:
         return self.to.with_suffix("") if series else None
 
     @property
-    def beside(self) -> Path | None:
-        """The file that tells of an STL file what that cannot tell itself."""
+    def metadata_file(self) -> Path | None:
+        """The file beside an STL file, with what that cannot hold itself."""
         return self.to.with_suffix(".json") if self.format == ".stl" else None
 
     @property
     def files(self) -> tuple[Path, ...]:
         """All that is made: files, and the folder of a series."""
         alone = self.format == ".stl" and self.folder is not None
-        places = (None if alone else self.to, self.folder, self.beside)
+        places = (None if alone else self.to, self.folder, self.metadata_file)
         return tuple(place for place in places if place is not None)
 
     @property
@@ -122,23 +122,23 @@ class ExportRequest:
 class RecordingInfo:
     """What the frames are of: a `sensor`, and at most so many `functions` along x and y.
 
-    `said` tells it all in words and numbers that JSON has.
+    `facts` has all of it as JSON values.
     """
 
-    said: dict[str, Any]
+    facts: dict[str, Any]
     sensor: Sensor
     functions: tuple[int, int]
 
     @property
     def program(self) -> str:
-        return self.said["program"]
+        return self.facts["program"]
 
     def json(self, **more: object) -> str:
         """All of it, and `more`, as JSON."""
-        return json.dumps(self.said | more)
+        return json.dumps(self.facts | more)
 
 
-class _Told(NamedTuple):
+class _StampedText(NamedTuple):
     """The `number`th text on its topic, `at` s after the beginning."""
 
     number: int
@@ -146,33 +146,33 @@ class _Told(NamedTuple):
     text: str
 
 
-def recording_info(recording: Recording, wanted: ExportRequest) -> RecordingInfo:
-    """What files of the span that is `wanted` say; a `Refusal` where there were two devices."""
+def recording_info(recording: Recording, request: ExportRequest) -> RecordingInfo:
+    """What files of the requested span say; a `Refusal` where there were two devices."""
     path = recording.path
-    devices = list(_in_force(recording, m.DEVICE, wanted))
+    devices = list(_in_force(recording, m.DEVICE, request))
     if not devices:
-        raise Refusal(f"{path}: expected a device from {wanted.first:g} s on, got none")
+        raise Refusal(f"{path}: expected a device from {request.first:g} s on, got none")
     for device in devices[1:]:
         if device.text != devices[0].text:
             raise Refusal(f"{path}: {another(device.at)}")
     sensor = from_json(devices[0].text)
-    setups = [_setup_said(wanted.setup, sensor)] if wanted.setup else []
-    if wanted.setup is None:
-        for told in _in_force(recording, m.SETUP, wanted):
-            setup = setup_from_text(told.text, recording.attachment)
-            number = {"number": told.number, "since": max(told.at, 0.0)}
-            setups.append(number | _setup_said(setup, sensor))
+    setups = [_setup_facts(request.setup, sensor)] if request.setup else []
+    if request.setup is None:
+        for each in _in_force(recording, m.SETUP, request):
+            setup = setup_from_text(each.text, recording.attachment)
+            number = {"number": each.number, "since": max(each.at, 0.0)}
+            setups.append(number | _setup_facts(setup, sensor))
     if not setups:
         raise Refusal(
-            f"{path}: was recorded without settings until {wanted.end:g} s, so that no frame was "
+            f"{path}: was recorded without settings until {request.end:g} s, so that no frame was "
             "worked out; export a later span"
         )
     functions = (max(setup[name] for setup in setups) for name in ("Ni", "Nj"))
-    return RecordingInfo(_said(recording, devices[0].text, sensor, setups), sensor, (*functions,))
+    return RecordingInfo(_facts(recording, devices[0].text, sensor, setups), sensor, (*functions,))
 
 
 def another(at: float) -> str:
-    """What is said of a device that came `at` s after the beginning, as another one."""
+    """The message about a device that came `at` s after the beginning, as another one."""
     before, after = math.ceil(1e3 * at - 1) / 1e3, math.floor(1e3 * at + 1) / 1e3
     return (
         f"another device, or another skin, came at {at:.6g} s, and a file is of one: export the "
@@ -180,44 +180,44 @@ def another(at: float) -> str:
     )
 
 
-def _in_force(recording: Recording, topic: Topic, wanted: ExportRequest) -> Iterator[_Told]:
-    """What was told on a topic, as far as it held at some time of the span."""
-    told = [
-        _Told(
+def _in_force(recording: Recording, topic: Topic, request: ExportRequest) -> Iterator[_StampedText]:
+    """The texts on a topic that held at some time of the span."""
+    texts = [
+        _StampedText(
             number, (message.stamp - recording.first) * 1e-9, decode(m.STRING, message.data)["data"]
         )
         for number, message in enumerate(recording.messages_on(topic))
     ]
     last = None
-    for one in told:
-        if one.at > wanted.end:
+    for one in texts:
+        if one.at > request.end:
             break
-        if last is not None and one.at > wanted.first:
+        if last is not None and one.at > request.first:
             yield last
         last = one
     if last is not None:
         yield last
 
 
-def _setup_said(setup: Setup, sensor: Sensor) -> dict[str, Any]:
-    said = {field.name: getattr(setup, field.name) for field in fields(setup)}
-    said["Nj"] = 1 if sensor.layout.patch.strip else setup.Nj
-    said["edge"] = setup.edge or sensor.edge
-    return said | {"calibration": _dated(setup.calibration), "tare": _dated(setup.tare)}
+def _setup_facts(setup: Setup, sensor: Sensor) -> dict[str, Any]:
+    facts = {field.name: getattr(setup, field.name) for field in fields(setup)}
+    facts["Nj"] = 1 if sensor.layout.patch.strip else setup.Nj
+    facts["edge"] = setup.edge or sensor.edge
+    return facts | {"calibration": _dated(setup.calibration), "tare": _dated(setup.tare)}
 
 
-def _dated(kept: Calibration | Tare | None) -> dict[str, str] | None:
-    if kept is None:
+def _dated(made: Calibration | Tare | None) -> dict[str, str] | None:
+    if made is None:
         return None
     return {
-        "name": kept.name,
-        "serial_number": kept.serial_number,
-        "date": kept.date.isoformat(),
-        "digest": kept.digest,
+        "name": made.name,
+        "serial_number": made.serial_number,
+        "date": made.date.isoformat(),
+        "digest": made.digest,
     }
 
 
-def _said(
+def _facts(
     recording: Recording, device: str, sensor: Sensor, setups: list[dict[str, Any]]
 ) -> dict[str, Any]:
     began = datetime.fromtimestamp(recording.first * 1e-9, UTC)
@@ -251,12 +251,12 @@ class ExportedFrame:
 
 
 class ExportWriter(Protocol):
-    """Writes what is `wanted` into the folder `room`; an `OSError` where there is no room."""
+    """Writes what is requested into the folder `scratch`; an `OSError` where the disk is full."""
 
-    def __init__(self, room: Path, wanted: ExportRequest, about: RecordingInfo) -> None: ...
+    def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None: ...
 
-    def take(self, moment: ExportedFrame) -> bool:
-        """Write one moment; whether there was anything to write."""
+    def take(self, frame: ExportedFrame) -> bool:
+        """Write one frame; whether there was anything to write."""
         ...
 
     def finish(self) -> None:

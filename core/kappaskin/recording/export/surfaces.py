@@ -88,27 +88,27 @@ class SurfaceWriter(ABC):
 
     suffix: str
 
-    def __init__(self, room: Path, wanted: ExportRequest, about: RecordingInfo) -> None:
-        self.room, self.wanted, self.about = room, wanted, about
+    def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
+        self.scratch, self.request, self.info = scratch, request, info
         self.times: dict[str, float] = {}
         """Of the surfaces that were written, in s, by the file's place beside the others."""
         self._made: tuple[Pipeline, SkinMesh] | None = None
-        if wanted.folder is not None:
-            (room / wanted.folder.name).mkdir()
+        if request.folder is not None:
+            (scratch / request.folder.name).mkdir()
 
-    def take(self, moment: ExportedFrame) -> bool:
-        coefficients = moment.estimate.coefficients
+    def take(self, frame: ExportedFrame) -> bool:
+        coefficients = frame.estimate.coefficients
         if not np.isfinite(coefficients).all():
-            if self.wanted.at is not None:
+            if self.request.at is not None:
                 raise Refusal(
-                    f"the readings at {moment.at:.6g} s decide no shape; choose another moment"
+                    f"the readings at {frame.at:.6g} s decide no shape; choose another moment"
                 )
             return False
-        name = self.wanted.to.name
-        if self.wanted.folder is not None:
-            name = f"{self.wanted.folder.name}/{len(self.times):06d}{self.suffix}"
-        self.write(self.room / name, moment, self._skin(moment.pipeline)(coefficients))
-        self.times[name] = moment.at
+        name = self.request.to.name
+        if self.request.folder is not None:
+            name = f"{self.request.folder.name}/{len(self.times):06d}{self.suffix}"
+        self.write(self.scratch / name, frame, self._skin(frame.pipeline)(coefficients))
+        self.times[name] = frame.at
         return True
 
     def _skin(self, pipeline: Pipeline) -> SkinMesh:
@@ -117,15 +117,15 @@ class SurfaceWriter(ABC):
             self._made = pipeline, SkinMesh(pipeline.basis, setup.nx, setup.ny)
         return self._made[1]
 
-    def said(self, moment: ExportedFrame) -> str:
-        """What a file says of the surface at one moment."""
-        estimate = moment.estimate
-        numbers = {"time": moment.at, "sequence": estimate.sequence, "setup": estimate.generation}
+    def description(self, frame: ExportedFrame) -> str:
+        """What a file says of the surface of one frame, as JSON."""
+        estimate = frame.estimate
+        numbers = {"time": frame.at, "sequence": estimate.sequence, "setup": estimate.generation}
         force = estimate.touch.force
-        return self.about.json(**numbers, force=force if math.isfinite(force) else None)
+        return self.info.json(**numbers, force=force if math.isfinite(force) else None)
 
     @abstractmethod
-    def write(self, path: Path, moment: ExportedFrame, surface: SkinSurface) -> None: ...
+    def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None: ...
 
     @abstractmethod
     def finish(self) -> None: ...
@@ -140,23 +140,23 @@ class StlSurfaces(SurfaceWriter):
 
     suffix = ".stl"
 
-    def write(self, path: Path, moment: ExportedFrame, surface: SkinSurface) -> None:
+    def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
         facets = np.zeros(len(surface.triangles), _FACET)
         facets["corners"] = corners = surface.points[surface.triangles]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normals, axis=-1, keepdims=True)
         facets["normal"] = normals / np.where(length > 0, length, 1.0)
-        head = f"{self.about.program}, {self.about.sensor.name}, {moment.at:.6f} s, in m"
+        head = f"{self.info.program}, {self.info.sensor.name}, {frame.at:.6f} s, in m"
         # Shorter than 80 bytes it is filled with zeros.
         with path.open("wb") as file:
             file.write(np.array(head.encode("ascii", "replace")[:80], "S80").tobytes())
             file.write(np.array(len(facets), "<u4").tobytes() + facets.tobytes())
 
     def finish(self) -> None:
-        beside = self.wanted.beside
-        if beside is not None:
-            told = self.about.json(times=self.times, lengths="m", time="s")
-            (self.room / beside.name).write_text(told, encoding="utf-8")
+        file = self.request.metadata_file
+        if file is not None:
+            text = self.info.json(times=self.times, lengths="m", time="s")
+            (self.scratch / file.name).write_text(text, encoding="utf-8")
 
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
@@ -167,16 +167,16 @@ class VtpSurfaces(SurfaceWriter):
 
     suffix = ".vtp"
 
-    def write(self, path: Path, moment: ExportedFrame, surface: SkinSurface) -> None:
+    def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
         count, n = len(surface.points), len(surface.triangles)
-        told = "".join(f"{byte} " for byte in self.said(moment).encode() + b"\0")
+        about = "".join(f"{byte} " for byte in self.description(frame).encode() + b"\0")
         names = "".join(f'ComponentName{n}="{c}" ' for n, c in enumerate(COMPONENTS))
         path.write_text(
             _HEAD.format("PolyData", "1.0")
             + "<PolyData><FieldData>"
-            + _array("TimeValue", np.array([moment.at]), 'NumberOfTuples="1"')
+            + _array("TimeValue", np.array([frame.at]), 'NumberOfTuples="1"')
             + '<Array type="String" Name="about" NumberOfTuples="1" format="ascii">'
-            + f"{told}</Array></FieldData>"
+            + f"{about}</Array></FieldData>"
             + f'<Piece NumberOfPoints="{count}" NumberOfVerts="0" NumberOfLines="0" '
             + f'NumberOfStrips="0" NumberOfPolys="{n}">'
             + '<PointData Scalars="displacement [m]" Normals="normals">'
@@ -193,13 +193,13 @@ class VtpSurfaces(SurfaceWriter):
         )
 
     def finish(self) -> None:
-        if self.wanted.folder is None:
+        if self.request.folder is None:
             return
         sets = "".join(
             f'<DataSet timestep="{at!r}" part="0" file={quoteattr(name)}/>\n'
             for name, at in self.times.items()
         )
-        (self.room / self.wanted.to.name).write_text(
+        (self.scratch / self.request.to.name).write_text(
             _HEAD.format("Collection", "0.1") + f"<Collection>\n{sets}</Collection></VTKFile>\n",
             encoding="utf-8",
         )
@@ -215,8 +215,8 @@ def _array(name: str, values: "NDArray[Any]", more: str = "") -> str:
     kind, little = ("Int64", "<i8") if values.dtype.kind == "i" else ("Float64", "<f8")
     width = values.shape[1] if values.ndim > 1 else 1
     data = values.astype(little).tobytes()
-    told = base64.b64encode(np.array(len(data), "<u8").tobytes() + data).decode()
+    text = base64.b64encode(np.array(len(data), "<u8").tobytes() + data).decode()
     return (
         f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{width}" {more} '
-        f'format="binary">{told}</DataArray>\n'
+        f'format="binary">{text}</DataArray>\n'
     )

@@ -47,10 +47,10 @@ class Column(NamedTuple):
         return found.reshape(self.shape)
 
 
-def columns(about: RecordingInfo) -> tuple[Column, ...]:
+def columns(info: RecordingInfo) -> tuple[Column, ...]:
     """All of them, for P elements and Ni x Nj functions: of the frame, then of its estimate."""
-    P = len(about.sensor.layout)
-    lengths = {ELEMENT: P, ALONG: about.functions[0], ACROSS: about.functions[1]}
+    P = len(info.sensor.layout)
+    lengths = {ELEMENT: P, ALONG: info.functions[0], ACROSS: info.functions[1]}
     axes = {axis: tuple(map(str, range(length))) for axis, length in lengths.items()}
 
     def counts(exported: ExportedFrame) -> "NDArray[np.float64]":
@@ -103,21 +103,21 @@ _BLOCK = 2**22  # bytes of rows that are written at once, about
 class TableWriter(ABC):
     """A table, of which a kind of file need only say how some rows (n, ...) are written."""
 
-    def __init__(self, room: Path, wanted: ExportRequest, about: RecordingInfo) -> None:
-        self.path, self.about, self.columns = room / wanted.to.name, about, columns(about)
+    def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
+        self.path, self.info, self.columns = scratch / request.to.name, info, columns(info)
         sizes = (np.dtype(c.kind).itemsize * int(np.prod(c.shape)) for c in self.columns)
         self.rows_at_once = max(_BLOCK // sum(sizes), 1)
         self._rows: list[list[NDArray[Any]]] = []
-        self.begin(room)
+        self.begin(scratch)
 
     @abstractmethod
-    def begin(self, room: Path) -> None: ...
+    def begin(self, scratch: Path) -> None: ...
 
     @abstractmethod
     def write(self, block: Block) -> None: ...
 
-    def take(self, moment: ExportedFrame) -> bool:
-        self._rows.append([column.row(moment) for column in self.columns])
+    def take(self, frame: ExportedFrame) -> bool:
+        self._rows.append([column.row(frame) for column in self.columns])
         if len(self._rows) == self.rows_at_once:
             self._flush()
         return True
@@ -142,20 +142,22 @@ class TableWriter(ABC):
 class CsvTable(TableWriter):
     """Numbers as short as they come back bit for bit; 0 or 1 for what is so or not."""
 
-    def begin(self, room: Path) -> None:
+    def begin(self, scratch: Path) -> None:
         self._file = self.path.open("w", encoding="utf-8", newline="\n")
-        said = self.about.said | {"columns": {c.name: c.text for c in self.columns}}
-        for name, value in said.items():
+        facts = self.info.facts | {"columns": {c.name: c.text for c in self.columns}}
+        for name, value in facts.items():
             self._file.write(f"# {name}: {json.dumps(value)}\n")
         heads = [head for column in self.columns for head in column.heads()]
         self._file.write(",".join(heads) + "\n")
 
     def write(self, block: Block) -> None:
         flat = [values.reshape(len(values), -1) for values in block.values()]
-        told = [cast("list[list[float]]", (v + 0 if v.dtype == bool else v).tolist()) for v in flat]
+        parts = [
+            cast("list[list[float]]", (v + 0 if v.dtype == bool else v).tolist()) for v in flat
+        ]
         for n in range(len(flat[0])):
             row: list[float] = []
-            for part in told:
+            for part in parts:
                 row += part[n]
             # A list's own text, in a third of the time that joining the numbers' takes.
             self._file.write(repr(row)[1:-1].replace(" ", "") + "\n")
@@ -168,7 +170,7 @@ class CsvTable(TableWriter):
 
 
 class _File(io.FileIO):
-    """A new file that takes what there is no room for, or HDF5 would crash; `check` tells."""
+    """A new file that accepts what a full disk does not, or HDF5 would crash; `check` raises."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "x+")
@@ -198,7 +200,7 @@ class _File(io.FileIO):
 class Hdf5Table(TableWriter):
     """Data sets that grow with the rows."""
 
-    def begin(self, room: Path) -> None:
+    def begin(self, scratch: Path) -> None:
         try:
             h5py: Any = importlib.import_module("h5py")
         except ImportError as error:
@@ -206,7 +208,7 @@ class Hdf5Table(TableWriter):
         self._disk = _File(self.path)
         # Attributes of older versions end at 64 KiB.
         self._file: Any = h5py.File(self._disk, "w", libver=("v108", "v108"))
-        for name, value in self.about.said.items():
+        for name, value in self.info.facts.items():
             self._file.attrs[name] = value if isinstance(value, str) else json.dumps(value)
         for column in self.columns:
             made = self._file.create_dataset(
@@ -220,9 +222,9 @@ class Hdf5Table(TableWriter):
 
     def write(self, block: Block) -> None:
         for name, values in block.items():
-            kept = self._file[name]
-            kept.resize(len(kept) + len(values), axis=0)
-            kept[-len(values) :] = values
+            data = self._file[name]
+            data.resize(len(data) + len(values), axis=0)
+            data[-len(values) :] = values
         self._disk.check()
 
     def end(self) -> None:
@@ -237,10 +239,10 @@ class Hdf5Table(TableWriter):
 class NpzTable(TableWriter):
     """Columns wait in files of their own, since one archive takes one array after the other."""
 
-    def begin(self, room: Path) -> None:
+    def begin(self, scratch: Path) -> None:
         self._length = 0
         self._waiting: dict[str, IO[bytes]] = {}
-        self._folder = room / "columns"
+        self._folder = scratch / "columns"
         self._folder.mkdir()
         for column in self.columns:
             self._waiting[column.name] = (self._folder / column.name).open("w+b")
@@ -265,8 +267,8 @@ class NpzTable(TableWriter):
                     shutil.copyfileobj(waiting, member, 2**20)
                 waiting.truncate(0)
             with archive.open("about.npy", "w") as member:
-                told = {column.name: [column.unit, column.text] for column in self.columns}
-                np.lib.format.write_array(member, np.array(self.about.json(columns=told)))
+                texts = {column.name: [column.unit, column.text] for column in self.columns}
+                np.lib.format.write_array(member, np.array(self.info.json(columns=texts)))
 
     def close(self) -> None:
         for file in self._waiting.values():
