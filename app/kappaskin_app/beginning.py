@@ -32,7 +32,7 @@ class Beginning(QObject):
     def begin(self) -> None:
         """Offer them where a person wants it, and has not begun with something already."""
         window, session = self._window, self._window.session
-        begun = window.presenting.on or not session.inside or session.engine.adopted is not None
+        begun = window.presenting.on or not session.inside or session.engine.resumed is not None
         if window.history.settings.show_start and not begun:
             self.offer()
 

@@ -133,10 +133,10 @@ class Comparing(QObject):
     def _read(self, status: Status) -> Pair | None:
         """The newest frame that was computed with both."""
         engine = self._session.engine
-        b = engine.beside(status)
+        b = engine.compared(status)
         a = None if b is None else engine.latest(status, b.sequence)
         return None if a is None or b is None else Pair(a, b)
 
     @property
     def told(self) -> PipelineStatus | None:
-        return self._session.status.beside if self._watched else None
+        return self._session.status.compared if self._watched else None

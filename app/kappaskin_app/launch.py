@@ -130,8 +130,8 @@ def _connected(source: str) -> "Engine":
     """An engine that reads `source`, or one that a window left that is gone."""
     from kappaskin.live import Engine, resume_folder
 
-    engine = Engine(orphans=resume_folder())
-    if engine.adopted is None:
+    engine = Engine(resume_from=resume_folder())
+    if engine.resumed is None:
         engine.connect(source)
     return engine
 
@@ -156,7 +156,7 @@ def launch(
     # What a script opens for some seconds is the same whatever was before.
     application, window = opened(source, _kept_file() if seconds is None else None)
     recovering = _recovering(window)
-    if presenting and not window.session.engine.adopted:
+    if presenting and not window.session.engine.resumed:
         window.presenting.enter()
     if seconds is None:
         window.beginning.begin()

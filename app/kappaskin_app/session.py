@@ -98,12 +98,12 @@ class Session(QObject):
         self._sought_at = 0.0
         self._ahead = Ahead()
         self.base: Setup | None = None
-        if engine.adopted is None:
+        if engine.resumed is None:
             self.asked = _setup_of(history.settings)
             engine.set_up(self.asked)
             engine.scan(region_of(history.settings))
         else:
-            self.asked = engine.adopted.requested.setup
+            self.asked = engine.resumed.requested.setup
         self._laid: Step | None = None
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0

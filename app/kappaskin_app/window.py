@@ -86,9 +86,9 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
-        handed = engine.adopted if engine else None
+        handed = engine.resumed if engine else None
         if handed and source == "sim:":  # nothing else was asked for
-            source = handed.asked.source or source
+            source = handed.requested.source or source
         begun = settings_left(handed) if handed else settings_for(source)
         self.history = History(begun, self)
         self.session = Session(self.history, engine or Engine(), self)

@@ -38,7 +38,7 @@ def test_the_next_window_goes_on_as_the_last_one_was(
     monkeypatch.setattr("kappaskin.live.resume._ANSWER", 30.0)  # s, or a busy one passes for stuck
     alone = abandoned(folder, tmp_path / "press.mcap", entrusted=settings_text(BEFORE).encode())
     until(lambda: bool(list(folder.glob("*.note"))))
-    window: MainWindow = opened("/dev/ttyABSENT7", Engine(orphans=folder))
+    window: MainWindow = opened("/dev/ttyABSENT7", Engine(resume_from=folder))
     until(lambda: window.badge.state == "SIM" and window.taping.recording)
     status = window.session.status
     assert (status.generation, status.setup) == (alone.generation, Setup(6, 7))

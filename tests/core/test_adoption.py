@@ -96,11 +96,11 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
     time.sleep(0.7)  # longer than an engine outlives its parent that nobody may adopt
     assert wait_for(lambda: part.stat().st_size > was + 2**18)
 
-    with Engine(orphans=folder) as engine:
-        assert engine.adopted is not None
+    with Engine(resume_from=folder) as engine:
+        assert engine.resumed is not None
         assert engine.pid == engine_alone.pid
-        assert engine.adopted.alone > 0.6
-        assert (engine.source, engine.adopted.requested.setup) == ("sim:centre", Setup(6, 7))
+        assert engine.resumed.alone > 0.6
+        assert (engine.source, engine.resumed.requested.setup) == ("sim:centre", Setup(6, 7))
         assert not list(folder.iterdir())
         status = wait_for(lambda: (s := engine.status()).events and len(s.events) == 2 and s)
         first = wait_for(lambda: engine.latest(engine.status()))
@@ -108,7 +108,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
         assert (status.generation, status.meetings) == (engine_alone.generation, 1)
         assert [event.text for event in status.events] == [
             "the window ended unexpectedly while it recorded",
-            f"the recording {engine.adopted.lasted}",
+            f"the recording {engine.resumed.lasted}",
         ]
         assert wait_for(lambda: engine.latest(engine.status()).sequence > first.sequence + 50)
         lost = engine.status().accounting.lost
@@ -136,7 +136,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
 def test_adopted_it_is_revived_as_any_other_when_it_dies(abandoned, folder, tmp_path) -> None:
     engine_alone = abandoned(folder, tmp_path / "x.mcap")
     assert wait_for(lambda: list(folder.glob("*.note")))
-    with Engine(orphans=folder) as engine:
+    with Engine(resume_from=folder) as engine:
         os.kill(engine_alone.pid, signal.SIGKILL)
         assert wait_for(lambda: not engine.alive)
 
@@ -171,8 +171,8 @@ def test_one_that_does_not_record_ends_with_its_parent(abandoned, folder) -> Non
 
 
 def test_closed_in_order_it_ends_its_recording_at_once(folder, tmp_path) -> None:
-    with Engine(orphans=folder) as engine:
-        assert engine.adopted is None
+    with Engine(resume_from=folder) as engine:
+        assert engine.resumed is None
         engine.record(tmp_path / "x.mcap")
         assert wait_for(lambda: engine.status().recording.active)
     assert (tmp_path / "x.mcap").exists()

@@ -173,12 +173,12 @@ def test_another_setup_is_seen_of_a_recording_that_stands(engine: Engine) -> Non
 
     def shown() -> bool:
         status = engine.status()
-        a, b = engine.latest(status), engine.beside(status)
+        a, b = engine.latest(status), engine.compared(status)
         return a is not None and b is not None and a.coefficients.shape == (5, 4)
 
     until(shown)
     status = engine.status()
-    a, b = engine.latest(status), engine.beside(status)
+    a, b = engine.latest(status), engine.compared(status)
     assert a is not None
     assert b is not None
     assert a.sequence == b.sequence == sequence

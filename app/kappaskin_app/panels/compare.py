@@ -117,10 +117,10 @@ class ComparePanel(QWidget):
         self._status = status
         if not self.isVisible():
             return
-        self.form.show_told(status.beside, status.sensor)
+        self.form.show_told(status.compared, status.sensor)
         for view in self.maps.values():
             view.map.show_faded(old)
-        if status.slot is None or status.beside is None or status.beside.slot is None:
+        if status.slot is None or status.compared is None or status.compared.slot is None:
             self._empty()
 
     def _empty(self) -> None:
@@ -159,7 +159,7 @@ class ComparePanel(QWidget):
         self._show_figures(pair)
 
     def _show_words(self, pair: Pair) -> None:
-        beside = self._status.beside
+        beside = self._status.compared
         setups = {"a": self._status.setup, "b": beside.setup if beside else None}
         for name, setup in setups.items():
             if setup is not None:

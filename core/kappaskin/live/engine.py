@@ -53,26 +53,26 @@ class Engine:
     """The engine process, seen from the window; no call here waits for it.
 
     What is requested here is one value, `Requested`, which the engine gets and follows. It ends
-    when `close` is called, or within a second when this process is gone. With a folder for
-    `orphans` one that records goes on for `patience` s instead, until another `Engine` with that
-    folder resumes it instead of beginning one: `adopted` tells what it was left with.
+    when `close` is called, or within a second when this process is gone. With a folder to
+    `resume_from` one that records goes on for `patience` s instead, until another `Engine` with
+    that folder resumes it instead of beginning one: `resumed` tells what it goes on with.
     """
 
     def __init__(
         self,
         setup: Setup | None = None,
-        orphans: Path | None = None,
+        resume_from: Path | None = None,
         patience: float = _PATIENCE,
     ) -> None:
-        self._orphans, self._patience = orphans, patience
+        self._resume_from, self._patience = resume_from, patience
         self._deaths: list[float] = []
         self._seen = Status()
         self._process: BaseProcess | ResumedProcess | None = None
-        self.adopted: ResumeInfo | None = None
-        process = resume_process(orphans) if orphans else None
+        self.resumed: ResumeInfo | None = None
+        process = resume_process(resume_from) if resume_from else None
         if process is None:
             self._requests = RequestSender(Requested().changing(setup=setup or Setup()))
-            self._ring, self._beside = Ring.create(), Ring.create()
+            self._ring, self._compared_ring = Ring.create(), Ring.create()
             self._start(Status(setup=self._requested.setup))
         else:
             self._requests = RequestSender(process.info.requested)
@@ -83,18 +83,18 @@ class Engine:
         return self._requests.requested
 
     def _resume(self, process: ResumedProcess) -> None:
-        self._process, self.adopted = process, process.info
-        self._ring, self._beside = map(Ring.borrow, process.info.rings)
+        self._process, self.resumed = process, process.info
+        self._ring, self._compared_ring = map(Ring.borrow, process.info.rings)
         self._requests.connect(process.line, known=process.info.requested.number)
 
     def _start(self, status: Status) -> None:
         self._ring.write_status(status)
-        names = self._ring.name, self._beside.name
+        names = self._ring.name, self._compared_ring.name
         theirs, ours = multiprocessing.Pipe(duplex=False)
         with beginning_processes() as context:
             self._process = context.Process(
                 target=serve,
-                args=(theirs, names, self._orphans, self._patience),
+                args=(theirs, names, self._resume_from, self._patience),
                 name="kappaskin-engine",
                 daemon=True,
             )
@@ -107,9 +107,9 @@ class Engine:
         self._reap()
         # One killed while it wrote left no status that can be read.
         was = self._ring.read_status() or self._seen
-        if self.adopted is not None:
+        if self.resumed is not None:
             self._give_memory_back()
-            self._ring, self._beside, self.adopted = Ring.create(), Ring.create(), None
+            self._ring, self._compared_ring, self.resumed = Ring.create(), Ring.create(), None
         setup, source = self._requested.setup, self._requested.source
         fresh = Status(setup=setup, generation=was.generation, meetings=was.meetings, tare=was.tare)
         if events and source is not None:
@@ -256,11 +256,11 @@ class Engine:
             return np.empty(0), np.empty((0, 3, 0)), 0
         return self._ring.recent(status.generation, status.slot, after)
 
-    def beside(self, status: Status) -> Estimate | None:
+    def compared(self, status: Status) -> Estimate | None:
         """The newest estimate with the setup that is compared with."""
-        if status.beside is None or status.beside.slot is None:
+        if status.compared is None or status.compared.slot is None:
             return None
-        return self._beside.read(status.beside.generation, status.beside.slot)
+        return self._compared_ring.read(status.compared.generation, status.compared.slot)
 
     def __enter__(self) -> "Engine":
         return self
@@ -280,8 +280,8 @@ class Engine:
         self._process = None
 
     def _give_memory_back(self) -> None:
-        for ring in (self._ring, self._beside):
-            if self.adopted is None:
+        for ring in (self._ring, self._compared_ring):
+            if self.resumed is None:
                 ring.destroy()
             else:
                 ring.close()  # the process that was resumed gives it back

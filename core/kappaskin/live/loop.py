@@ -44,7 +44,7 @@ _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the
 class EngineLoop:
     """The engine at work: takes requests, reads, computes, records, publishes and reports."""
 
-    def __init__(self, requests: RequestReceiver, ring: Ring, beside: Ring) -> None:
+    def __init__(self, requests: RequestReceiver, ring: Ring, compared: Ring) -> None:
         self._requests, self._ring = requests, ring
         self._source: Source | None = None
         self._health = LiveHealthMonitor()
@@ -58,7 +58,9 @@ class EngineLoop:
         self._main = PipelineHost(
             ring, self._builder, PipelineStatus(status.setup, status.generation)
         )
-        self._compared = ComparedPipeline(beside, self._builder, status.beside or PipelineStatus())
+        self._compared = ComparedPipeline(
+            compared, self._builder, status.compared or PipelineStatus()
+        )
         self._tare = TareCapture(self._builder, self._status.tare)
         self._publishing, self._reported_events = Publishing(), self._status.happened
         self._haste = Haste()
@@ -353,7 +355,7 @@ class EngineLoop:
             computing=computed.computing or self._changing,
             publishing=self._publishing.status,
             recording=self._recorder.status,
-            beside=self._compared.status,
+            compared=self._compared.status,
             requested=self._requests.requested.number,
         )
         self._ring.write_status(self._status)
@@ -366,7 +368,7 @@ _GRACE = 0.5  # s for an orderly end once the parent is gone
 def serve(
     requests: "Connection[Update, Update]",
     names: tuple[str, str],
-    orphans: Path | None,
+    resume_from: Path | None,
     patience: float,
 ) -> None:
     """Run the engine by the `requests`, with the rings of these `names`, until it is to end."""
@@ -380,7 +382,7 @@ def serve(
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     rings = Ring.attach(names[0]), Ring.attach(names[1])
     try:
-        loop = EngineLoop(RequestReceiver(requests, names, orphans, patience), *rings)
+        loop = EngineLoop(RequestReceiver(requests, names, resume_from, patience), *rings)
         watcher = threading.Thread(target=_end_with_parent, args=(loop,), name="parent-watcher")
         watcher.daemon = True
         watcher.start()

@@ -39,8 +39,8 @@ class Status:
     tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
     tells which channels are not to be trusted, `publishing` where estimates are sent to,
     `recording` what is being written, `replay` where in a recording the source is, None for any
-    other, and `beside` what else is computed of the same frames, None where nothing is. `requested`
-    is the number of the newest request that the engine has.
+    other, and `compared` what else is computed of the same frames, None where nothing is.
+    `requested` is the number of the newest request that the engine has.
     """
 
     state: str = OFF
@@ -71,7 +71,7 @@ class Status:
     publishing: PublishStatus = field(default_factory=PublishStatus)
     recording: RecordingStatus = field(default_factory=RecordingStatus)
     replay: Replay | None = None
-    beside: PipelineStatus | None = None
+    compared: PipelineStatus | None = None
     requested: int = 0
 
     def after(self, events: Sequence[Event]) -> "Status":
