@@ -82,7 +82,7 @@ if file:
 engine.connect("sim:centre")
 while engine.latest(status := engine.status()) is None or (file and not status.recording.messages):
     time.sleep(0.01)
-print(engine.pid, engine._ring.name, engine._beside.name, status.generation, flush=True)
+print(engine.pid, engine._ring.name, engine._compared_ring.name, status.generation, flush=True)
 time.sleep(60)
 """
 

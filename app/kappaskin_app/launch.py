@@ -129,10 +129,10 @@ def _stand_behind() -> None:
 
 def _connected(source: str) -> "Engine":
     """An engine that reads `source`, or one that a window left that is gone."""
-    from kappaskin.live import Engine, orphans_folder
+    from kappaskin.live import Engine, resume_folder
 
-    engine = Engine(orphans=orphans_folder())
-    if engine.adopted is None:
+    engine = Engine(resume_from=resume_folder())
+    if engine.resumed is None:
         engine.connect(source)
     return engine
 
@@ -158,7 +158,7 @@ def launch(
     application, window = opened(source, _kept_file() if seconds is None else None)
     recovering = _recovering(window)
     full_screen = window.layouts.full_screen
-    if presenting and full_screen is not None and not window.session.engine.adopted:
+    if presenting and full_screen is not None and not window.session.engine.resumed:
         full_screen.enter()
     elif seconds is None:
         window.menus.welcome.begin()

@@ -85,11 +85,11 @@ if TYPE_CHECKING:
     from kappaskin.health import Health as Health
     from kappaskin.health import HealthMonitor as HealthMonitor
     from kappaskin.live import LONGEST_NOTE as LONGEST_NOTE
-    from kappaskin.live import Computed as Computed
     from kappaskin.live import Engine as Engine
-    from kappaskin.live import Left as Left
+    from kappaskin.live import PipelineStatus as PipelineStatus
+    from kappaskin.live import ResumeInfo as ResumeInfo
     from kappaskin.live import Status as Status
-    from kappaskin.live import orphans_folder as orphans_folder
+    from kappaskin.live import resume_folder as resume_folder
     from kappaskin.mechanics import Compliance as Compliance
     from kappaskin.mechanics import DiscLoad as DiscLoad
     from kappaskin.mechanics import GaussianLoad as GaussianLoad
@@ -106,21 +106,21 @@ if TYPE_CHECKING:
     from kappaskin.pipeline import Setup as Setup
     from kappaskin.pipeline import curvature_invariant as curvature_invariant
     from kappaskin.publish import Latency as Latency
-    from kappaskin.publish import Published as Published
-    from kappaskin.publish import PublishNews as PublishNews
+    from kappaskin.publish import PublishStatus as PublishStatus
     from kappaskin.publish import Receiver as Receiver
+    from kappaskin.publish import TargetStatus as TargetStatus
     from kappaskin.recording import Exported as Exported
-    from kappaskin.recording import Exporting as Exporting
+    from kappaskin.recording import ExportRequest as ExportRequest
+    from kappaskin.recording import ExportTask as ExportTask
     from kappaskin.recording import Recording as Recording
+    from kappaskin.recording import RecordingStatus as RecordingStatus
     from kappaskin.recording import Repaired as Repaired
-    from kappaskin.recording import Repairing as Repairing
+    from kappaskin.recording import RepairTask as RepairTask
     from kappaskin.recording import Replay as Replay
-    from kappaskin.recording import Wanted as Wanted
-    from kappaskin.recording import Written as Written
     from kappaskin.recording import is_written as is_written
-    from kappaskin.recording import said_of_setup as said_of_setup
-    from kappaskin.recording import setup_from as setup_from
-    from kappaskin.recording import setups_of as setups_of
+    from kappaskin.recording import recorded_setups as recorded_setups
+    from kappaskin.recording import setup_from_text as setup_from_text
+    from kappaskin.recording import setup_to_text as setup_to_text
     from kappaskin.scenes import ADVICE as ADVICE
     from kappaskin.scenes import RADII as RADII
     from kappaskin.scenes import SCENES as SCENES
@@ -216,16 +216,16 @@ else:
             ),
             "frames": "COMPONENTS Estimate Event Frame LocalGeometry OVERTAKEN Touch Truth",
             "health": "Finding Health HealthMonitor",
-            "live": "Computed Engine LONGEST_NOTE Left Status orphans_folder",
+            "live": "PipelineStatus Engine LONGEST_NOTE ResumeInfo Status resume_folder",
             "mechanics": (
                 "Compliance DiscLoad GaussianLoad LineLoad Load PlacedObject Plate PointLoad "
                 "RectangleLoad"
             ),
             "pipeline": "ErrorBars Pipeline QUANTITIES Quantities Setup curvature_invariant",
-            "publish": "Latency PublishNews Published Receiver",
+            "publish": "Latency PublishStatus TargetStatus Receiver",
             "recording": (
-                "Exported Exporting Recording Repaired Repairing Replay Wanted Written "
-                "is_written said_of_setup setup_from setups_of"
+                "Exported ExportTask Recording Repaired RepairTask Replay ExportRequest "
+                "RecordingStatus is_written setup_to_text setup_from_text recorded_setups"
             ),
             "scenes": (
                 "ADVICE AppliedLoads CylinderStep EffectSelection Indenter LoadingHistory Orbit "

@@ -34,7 +34,7 @@ def process_context() -> Generator[Context]:
     context: Context = multiprocessing.get_context("spawn")
     if "forkserver" in multiprocessing.get_all_start_methods():
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["kappaskin.live.serving"])
+        context.set_forkserver_preload(["kappaskin.live.loop"])
     # Small products lose by threading, and the threads would take the cores from whoever draws.
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
     was = {name: os.environ.get(name) for name in names}

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin import Engine, Left, Setup, Status, Written
-from kappaskin.live.requests import Asked
+from kappaskin import Engine, Setup, Status
+from kappaskin.live import ResumeInfo
+from kappaskin.live.requests import Requested
+from kappaskin.recording import RecordingStatus
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.resume import Entrusting, settings_left, words
 from kappaskin_app.shell.settings import Settings
@@ -19,9 +21,9 @@ BEFORE = Settings(
 )
 
 
-def left(source: str | None, entrusted: bytes = b"") -> Left:
-    asked = Asked(source=source, recording=Path("press.mcap"), entrusted=entrusted)
-    return Left(asked, ("", ""), 1, 5.0)
+def left(source: str | None, entrusted: bytes = b"") -> ResumeInfo:
+    asked = Requested(source=source, recording=Path("press.mcap"), entrusted=entrusted)
+    return ResumeInfo(asked, ("", ""), 1, 5.0)
 
 
 @pytest.fixture
@@ -36,7 +38,7 @@ def test_the_next_window_goes_on_as_the_last_one_was(
     monkeypatch.setattr("kappaskin.live.resume._ANSWER", 30.0)  # s, or a busy one passes for stuck
     alone = abandoned(folder, tmp_path / "press.mcap", entrusted=settings_text(BEFORE).encode())
     until(lambda: bool(list(folder.glob("*.note"))))
-    window: MainWindow = opened("/dev/ttyABSENT7", Engine(orphans=folder))
+    window: MainWindow = opened("/dev/ttyABSENT7", Engine(resume_from=folder))
     until(lambda: window.display.badge.state == "SIM" and window.taping.recording)
     status = window.session.status
     assert (status.generation, status.setup) == (alone.generation, Setup(6, 7))
@@ -87,7 +89,7 @@ class Trusted:
 def test_settings_are_entrusted_once_each_and_only_while_it_records(qapp) -> None:
     history, engine = History(Settings()), Trusted()
     entrusting = Entrusting(history, engine)
-    recording = Status(recording=Written("x.mcap", active=True))
+    recording = Status(recording=RecordingStatus("x.mcap", active=True))
     entrusting.follow(Status())
     assert engine.data == []
     for status in (recording, recording, Status()):

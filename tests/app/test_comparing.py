@@ -91,10 +91,10 @@ def test_ending_it_leaves_the_window_as_it_was_and_the_engine_to_a_alone(
 ) -> None:
     size = window.size()
     window.actions_by_name["dock-compare"].trigger()
-    until(lambda: window.session.status.beside is not None)
+    until(lambda: window.session.status.compared is not None)
     assert window.size() == size
     window.actions_by_name["dock-compare"].trigger()
-    until(lambda: window.session.status.beside is None)
+    until(lambda: window.session.status.compared is None)
     assert not window.compare.isVisible()
     assert window.size() == size
 

@@ -8,15 +8,16 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QLabel, QLineEdit, QWidget
 
-from kappaskin import Latency, Published, PublishNews, Receiver, Status
+from kappaskin import Latency, Receiver, Status
+from kappaskin.publish import PublishStatus, TargetStatus
 from kappaskin_app.features.publish.panel import PublishPanel
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.widgets.columns import scrolled
 
-FINE = Published("udp://127.0.0.1:9870", receivers=(Receiver("udp://127.0.0.1:9870", 12345, 6),))
+FINE = TargetStatus("udp://127.0.0.1:9870", receivers=(Receiver("udp://127.0.0.1:9870", 12345, 6),))
 DEAD = Receiver("udp://robot:1", 0, 7, "nobody receives there")
 VIEWER = Receiver("127.0.0.1:50000", 90, 2, "too slow")
-SERVED = Published("foxglove://127.0.0.1:8765", sent=100, dropped=2, receivers=(VIEWER,))
+SERVED = TargetStatus("foxglove://127.0.0.1:8765", sent=100, dropped=2, receivers=(VIEWER,))
 
 
 @pytest.fixture
@@ -28,9 +29,9 @@ def panel(qtbot) -> PublishPanel:
     return made
 
 
-def told(panel: PublishPanel, *targets: Published, late: float = float("nan")) -> str:
+def told(panel: PublishPanel, *targets: TargetStatus, late: float = float("nan")) -> str:
     panel.show_refusal("")
-    news = PublishNews(targets, Latency(late, late, late, late))
+    news = PublishStatus(targets, Latency(late, late, late, late))
     panel.show_status(replace(Status(), publishing=news), True)
     return panel.counts.text()
 
@@ -50,7 +51,7 @@ def test_settings_name_the_targets() -> None:
 
 
 def test_every_receiver_is_told_with_what_it_got(panel: PublishPanel) -> None:
-    text = told(panel, FINE, Published("udp://robot:1", receivers=(DEAD,)), SERVED, late=2.4e-3)
+    text = told(panel, FINE, TargetStatus("udp://robot:1", receivers=(DEAD,)), SERVED, late=2.4e-3)
     assert "127.0.0.1:9870\n    12,345 sent, 6 dropped" in text
     assert "0 sent, 7 dropped, nobody receives there" in text
     assert "8765, 1 connected\n    127.0.0.1:50000: 90 sent, 2 dropped, too slow" in text
@@ -58,9 +59,9 @@ def test_every_receiver_is_told_with_what_it_got(panel: PublishPanel) -> None:
 
 
 def test_what_is_looked_for_or_refused_says_so(panel: PublishPanel) -> None:
-    text = told(panel, Published("udp://robot:1", opening=True))
+    text = told(panel, TargetStatus("udp://robot:1", opening=True))
     assert text.startswith("udp://robot:1: looking for it")
-    text = told(panel, FINE, Published("udp://a:1", refusal="udp://a:1: not known"))
+    text = told(panel, FINE, TargetStatus("udp://a:1", refusal="udp://a:1: not known"))
     assert "udp://a:1" not in text
     assert panel.message.text() == "udp://a:1: not known."
 

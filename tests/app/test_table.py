@@ -15,7 +15,7 @@ def test_the_table_has_what_the_picture_shows_and_can_be_copied(window: MainWind
 
     def there() -> bool:
         counts = numbers.elements.rowCount(), numbers.facts.rowCount()
-        return counts == (100, 6) and bool(numbers.facts.item(2, 1).text())
+        return counts == (100, 8) and bool(numbers.facts.item(2, 1).text())
 
     until(there)
     numbers.copy.click()

@@ -12,7 +12,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox
 
-from kappaskin import LONGEST_NOTE, Recording, Written
+from kappaskin import LONGEST_NOTE, Recording
+from kappaskin.recording import RecordingStatus
 from kappaskin.recording.writing import RecordingFile
 from kappaskin_app.features.recording.recording_mark import RecordingMark, duration_of, size_of
 from kappaskin_app.shell.folders import newest, proposed, recordings_folder, unfinished
@@ -276,9 +277,9 @@ def test_figures_of_a_recording_are_short() -> None:
 def test_what_is_lost_is_shown_in_the_header(qtbot) -> None:
     mark = RecordingMark()
     qtbot.addWidget(mark)
-    mark.show_written(Written("x.mcap", True, 65.0, 5_000_000, 100, 7), "")
+    mark.show_written(RecordingStatus("x.mcap", True, 65.0, 5_000_000, 100, 7), "")
     assert (mark.head, mark.below) == ("REC 1:05", "7 lost")
     assert mark.accessibleName() == "REC 1:05, 7 lost"
     assert "5.0 MB, 7 messages lost" in mark.toolTip()
-    mark.show_written(Written("x.mcap", True, 3723.0, 5_000_000, 100, 0), "")
+    mark.show_written(RecordingStatus("x.mcap", True, 3723.0, 5_000_000, 100, 0), "")
     assert (mark.head, mark.below) == ("1:02:03", "5.0 MB")

@@ -11,7 +11,7 @@ import pytest
 from kappaskin import Drift, Setup, Status, Tare, load_scene
 from kappaskin.calibration import TareStore
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.live.tare_taking import TareNews
+from kappaskin.live.tare_taking import TareStatus
 from kappaskin_app.features.calibration.tare import TarePanel, drift_words, warmth
 from kappaskin_app.features.calibration.taring import Taring, ago
 from kappaskin_app.shell.history import History
@@ -48,7 +48,7 @@ class Bench:
 
     def ask(self):
         self.asked += 1
-        self.tell(tare=TareNews(True, self.status.tare.ended))
+        self.tell(tare=TareStatus(True, self.status.tare.ended))
 
     def tell(self, **changes):
         self.status = replace(self.status, **changes)
@@ -59,7 +59,7 @@ class Bench:
         self.tell(sensor=sensor, meetings=self.status.meetings + 1, state="streaming")
 
     def end(self, tare=None, refusal=""):
-        self.tell(tare=TareNews(False, self.status.tare.ended + 1, tare, refusal))
+        self.tell(tare=TareStatus(False, self.status.tare.ended + 1, tare, refusal))
 
     @property
     def used(self):

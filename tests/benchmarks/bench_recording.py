@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from kappaskin import Pipeline, Setup, load_scene
-from kappaskin.recording import Recorder, Recording, Written
+from kappaskin.recording import Recorder, Recording, RecordingStatus
 from kappaskin.sources import SimulatedSource
 from kappaskin.sources.wire import encode_samples
 
@@ -27,7 +27,7 @@ def test_recording_takes_little_of_a_core(figure, ratio, tmp_path) -> None:
     estimates = [pipeline(frame) for frame in frames]
     computing = time.process_time() - began
 
-    def spent(name, tell) -> tuple[float, Written]:
+    def spent(name, tell) -> tuple[float, RecordingStatus]:
         """CPU seconds of all threads, as frames come, so that the file is written meanwhile."""
         recorder = Recorder(tmp_path / name, now)
         source.record(recorder)

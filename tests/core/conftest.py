@@ -26,7 +26,7 @@ from kappaskin import (
     edges_of,
 )
 from kappaskin.cli import main
-from kappaskin.publish.message import Mark, Message, epoch
+from kappaskin.publish.message import EstimateMessage, MessageHeader, epoch
 
 HEXAGON = [(0, 1), (0.5, 0), (1.5, 0), (2, 1), (1.5, 2), (0.5, 2)] * np.array(
     [0.05, 0.05 * math.sqrt(3) / 2]
@@ -116,7 +116,7 @@ def run(capsys) -> Callable[..., tuple[int, str, str]]:
 
 
 @pytest.fixture
-def messages_of() -> Callable[..., list[Message]]:
+def messages_of() -> Callable[..., list[EstimateMessage]]:
     """Makes the messages about the first frames of a scene; `change` makes another estimate."""
 
     def made(
@@ -124,16 +124,21 @@ def messages_of() -> Callable[..., list[Message]]:
         count: int = 1,
         setup: Setup | None = None,
         change: Callable[[Estimate], Estimate] | None = None,
-    ) -> list[Message]:
+    ) -> list[EstimateMessage]:
         pipeline = Pipeline(scene.sensor(), setup or Setup())
-        simulator, told = Simulator(scene), list[Message]()
+        simulator, told = Simulator(scene), list[EstimateMessage]()
         for sequence in range(count):
             frame = simulator.frame(sequence, time.monotonic)
             estimate = pipeline(replace(frame, taken=frame.host_time, taken_sd=1e-4))
             estimate = change(estimate) if change else estimate
             assert pipeline.fitted is not None
             told.append(
-                Message(estimate, pipeline.fitted, pipeline, Mark("sim", epoch(), sequence, True))
+                EstimateMessage(
+                    estimate,
+                    pipeline.fitted,
+                    pipeline,
+                    MessageHeader("sim", epoch(), sequence, True),
+                )
             )
         return told
 

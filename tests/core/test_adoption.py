@@ -15,31 +15,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kappaskin import Region, Setup, load_scene
-from kappaskin.live import Engine, Left
-from kappaskin.live.asker import Asker
-from kappaskin.live.requests import (
-    Asked,
-    Connect,
-    Disconnect,
-    Entrust,
-    Goodbye,
-    Note,
-    Publish,
-    Record,
-    Request,
-    Seek,
-    Step,
+from kappaskin import Setup
+from kappaskin.live import Engine, ResumeInfo
+from kappaskin.live.requests import Note, Requested, RequestSender
+from kappaskin.live.resume import (
+    RequestReceiver,
+    ResumedProcess,
+    ResumeListener,
+    _address,
+    resume_process,
 )
-from kappaskin.live.resume import Orphan, Waiting, _address, adopted
 from kappaskin.recording import Recording
 from kappaskin.recording import messages as m
-from kappaskin.recording.recorded_frames import Reenactment
+from kappaskin.recording.recompute import RecordedFrames
 from kappaskin.recording.writing import part_of
 
 pytestmark = pytest.mark.slow
 
-LEFT = Left(Asked(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
+LEFT = ResumeInfo(Requested(source="sim:centre"), ("ring", "beside"), os.getpid(), 192.4)
 
 
 def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
@@ -58,29 +51,31 @@ def folder() -> Iterator[Path]:
 
 
 @pytest.fixture
-def waiting(folder: Path) -> Iterator[Waiting]:
-    one = Waiting(folder, lambda: LEFT)
+def waiting(folder: Path) -> Iterator[ResumeListener]:
+    one = ResumeListener(folder, lambda: LEFT)
     yield one
     one.end()
     if one.line is not None:
         one.line.close()
 
 
-Line = tuple["Connection[Any, Any]", Asker]
+Sides = tuple[RequestSender, RequestReceiver]
 
 
 @pytest.fixture
-def asked_by(folder: Path) -> Iterator[Callable[..., Line]]:
-    """Makes who takes requests, and the line by which they come."""
+def asked_by(folder: Path) -> Iterator[Callable[..., Sides]]:
+    """Makes the two sides of a line of requests."""
     lines: list[Connection[Any, Any]] = []
 
-    def make(folder: Path | None = folder, patience: float = 20.0) -> Line:
+    def make(folder: Path | None = folder, patience: float = 20.0) -> Sides:
         theirs, ours = multiprocessing.Pipe(duplex=False)
         lines.extend((theirs, ours))
-        return ours, Asker(theirs, ("ring", "beside"), folder, patience)
+        sender = RequestSender(Requested())
+        sender.connect(ours)
+        return sender, RequestReceiver(theirs, ("ring", "beside"), folder, patience)
 
     yield make
-    while (orphan := adopted(folder)) is not None:
+    while (orphan := resume_process(folder)) is not None:
         orphan.close()
         time.sleep(0.05)
     for line in lines:
@@ -101,11 +96,11 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
     time.sleep(0.7)  # longer than an engine outlives its parent that nobody may adopt
     assert wait_for(lambda: part.stat().st_size > was + 2**18)
 
-    with Engine(orphans=folder) as engine:
-        assert engine.adopted is not None
+    with Engine(resume_from=folder) as engine:
+        assert engine.resumed is not None
         assert engine.pid == engine_alone.pid
-        assert engine.adopted.alone > 0.6
-        assert (engine.source, engine.adopted.asked.setup) == ("sim:centre", Setup(6, 7))
+        assert engine.resumed.alone > 0.6
+        assert (engine.source, engine.resumed.requested.setup) == ("sim:centre", Setup(6, 7))
         assert not list(folder.iterdir())
         status = wait_for(lambda: (s := engine.status()).events and len(s.events) == 2 and s)
         first = wait_for(lambda: engine.latest(engine.status()))
@@ -113,7 +108,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
         assert (status.generation, status.meetings) == (engine_alone.generation, 1)
         assert [event.text for event in status.events] == [
             "the window ended unexpectedly while it recorded",
-            f"the recording {engine.adopted.lasted}",
+            f"the recording {engine.resumed.lasted}",
         ]
         assert wait_for(lambda: engine.latest(engine.status()).sequence > first.sequence + 50)
         lost = engine.status().accounting.lost
@@ -124,7 +119,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
     assert wait_for(lambda: engine_alone.gone)
     assert not any(block.exists() for block in engine_alone.blocks)
 
-    reenact = Reenactment(str(file))
+    reenact = RecordedFrames(str(file))
     with Recording(file) as recording:
         assert recording.whole
         sequences = np.array([f.sequence for said in recording.messages() for f in reenact(said)])
@@ -141,7 +136,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
 def test_adopted_it_is_revived_as_any_other_when_it_dies(abandoned, folder, tmp_path) -> None:
     engine_alone = abandoned(folder, tmp_path / "x.mcap")
     assert wait_for(lambda: list(folder.glob("*.note")))
-    with Engine(orphans=folder) as engine:
+    with Engine(resume_from=folder) as engine:
         os.kill(engine_alone.pid, signal.SIGKILL)
         assert wait_for(lambda: not engine.alive)
 
@@ -176,8 +171,8 @@ def test_one_that_does_not_record_ends_with_its_parent(abandoned, folder) -> Non
 
 
 def test_closed_in_order_it_ends_its_recording_at_once(folder, tmp_path) -> None:
-    with Engine(orphans=folder) as engine:
-        assert engine.adopted is None
+    with Engine(resume_from=folder) as engine:
+        assert engine.resumed is None
         engine.record(tmp_path / "x.mcap")
         assert wait_for(lambda: engine.status().recording.active)
     assert (tmp_path / "x.mcap").exists()
@@ -188,12 +183,12 @@ def test_closed_in_order_it_ends_its_recording_at_once(folder, tmp_path) -> None
 
 
 def test_a_goodbye_is_the_end_after_all_that_was_asked_for_before(asked_by) -> None:
-    line, asker = asked_by()
-    line.send(Note("last"))
-    line.send(Goodbye())
-    line.close()
-    assert asker.asked(1.0) == [Note("last"), Goodbye()]
-    assert asker.look(recording=True) == ""
+    sender, asker = asked_by()
+    sender.act(Note("last"))
+    sender.say_goodbye()
+    sender.disconnect()
+    assert asker.receive(1.0) == [Note("last")]
+    assert asker.check(recording=True) == ""
     assert asker.over
 
 
@@ -202,21 +197,22 @@ def test_a_goodbye_is_the_end_after_all_that_was_asked_for_before(asked_by) -> N
 def test_a_line_that_breaks_is_the_end_but_of_a_recording_that_may_be_adopted(
     asked_by, folder, known: bool, recording: bool
 ) -> None:
-    line, asker = asked_by(folder if known else None)
-    line.send(Note("last"))
-    line.close()
-    assert asker.asked(1.0) == [Note("last")]
-    assert bool(asker.look(recording)) == (known and recording)
+    sender, asker = asked_by(folder if known else None)
+    sender.act(Note("last"))
+    sender.disconnect()
+    assert asker.receive(1.0) == [Note("last")]
+    assert bool(asker.check(recording)) == (known and recording)
     assert asker.over == (not (known and recording))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="writes half a message as POSIX systems do")
-def test_a_request_that_breaks_off_is_no_request(asked_by) -> None:
-    line, asker = asked_by()
-    os.write(line.fileno(), b"\0\0\1\0half")
-    line.close()
-    assert asker.asked(1.0) == []
-    asker.look(recording=False)
+def test_a_request_that_breaks_off_is_no_request() -> None:
+    theirs, ours = multiprocessing.Pipe(duplex=False)
+    asker = RequestReceiver(theirs, ("ring", "beside"), None, 20.0)
+    os.write(ours.fileno(), b"\0\0\1\0half")
+    ours.close()
+    assert asker.receive(1.0) == []
+    asker.check(recording=False)
     assert asker.over
 
 
@@ -224,117 +220,94 @@ def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
     asked_by, folder, monkeypatch
 ) -> None:
     clock, later = time.monotonic, [0.0]
-    monkeypatch.setattr("kappaskin.live.asker.time.monotonic", lambda: clock() + later[0])
-    line, asker = asked_by()
-    line.send(Setup(5, 4))
-    line.send(Connect("sim:line"))
-    line.send(Entrust(b"mine"))
-    line.close()
-    assert wait_for(lambda: not (asker.asked(0.0) or asker.adoptable) or asker.look(True))
+    monkeypatch.setattr("kappaskin.live.resume.time.monotonic", lambda: clock() + later[0])
+    sender, asker = asked_by()
+    sender.change(setup=Setup(5, 4))
+    sender.change(source="sim:line")
+    sender.change(entrusted=b"mine")
+    sender.disconnect()
+    assert wait_for(lambda: not (asker.receive(0.0) or asker.resumable) or asker.check(True))
 
-    orphan = adopted(folder)
+    orphan = resume_process(folder)
     assert orphan is not None
-    assert orphan.left.asked == Asked(Setup(5, 4), source="sim:line", entrusted=b"mine")
-    assert (orphan.left.rings, orphan.pid) == (("ring", "beside"), os.getpid())
+    assert orphan.info.requested == sender.requested
+    assert (orphan.info.rings, orphan.pid) == (("ring", "beside"), os.getpid())
     later[0] = 100.0  # as where this process was put to sleep meanwhile
-    told = wait_for(lambda: asker.look(recording=True))
-    assert told == f"the recording {orphan.left.lasted}"
-    assert orphan.left.alone < 100.0
-    orphan.line.send(Note("here"))
-    assert asker.asked(1.0) == [Note("here")]
+    told = wait_for(lambda: asker.check(recording=True))
+    assert told == f"the recording {orphan.info.lasted}"
+    assert orphan.info.alone < 100.0
+    next_sender = RequestSender(orphan.info.requested)
+    next_sender.connect(orphan.line, known=orphan.info.requested.number)
+    next_sender.act(Note("here"))
+    assert asker.receive(1.0) == [Note("here")]
     orphan.close()
-    asker.asked(1.0)
-    assert asker.look(recording=True) != ""  # and it waits for another
+    asker.receive(1.0)
+    assert asker.check(recording=True) != ""  # and it waits for another
     assert not asker.over
 
 
 def test_nobody_is_waited_for_when_the_recording_ends_by_itself(asked_by, folder) -> None:
-    line, asker = asked_by()
-    line.close()
-    asker.asked(1.0)
-    asker.look(recording=True)
+    sender, asker = asked_by()
+    sender.disconnect()
+    asker.receive(1.0)
+    asker.check(recording=True)
     assert list(folder.iterdir())
-    asker.look(recording=False)
+    asker.check(recording=False)
     assert asker.over
     assert not list(folder.iterdir())
 
 
 def test_nobody_is_waited_for_longer_than_may_be(asked_by, folder, monkeypatch) -> None:
     clock, later = time.monotonic, [0.0]
-    monkeypatch.setattr("kappaskin.live.asker.time.monotonic", lambda: clock() + later[0])
-    line, asker = asked_by(patience=600.0)
-    line.close()
-    asker.asked(1.0)
-    asker.look(recording=True)
+    monkeypatch.setattr("kappaskin.live.resume.time.monotonic", lambda: clock() + later[0])
+    sender, asker = asked_by(patience=600.0)
+    sender.disconnect()
+    asker.receive(1.0)
+    asker.check(recording=True)
     later[0] = 550.0
-    asker.look(recording=True)
+    asker.check(recording=True)
     assert not asker.over
     later[0] = 600.1
-    asker.look(recording=True)
+    asker.check(recording=True)
     assert asker.over
     assert not list(folder.iterdir())
 
 
 def test_where_no_note_can_be_left_it_is_the_end(asked_by, tmp_path) -> None:
     (tmp_path / "file").write_text("no folder")
-    line, asker = asked_by(tmp_path / "file")
-    line.close()
-    asker.asked(1.0)
-    assert asker.look(recording=True) == ""
+    sender, asker = asked_by(tmp_path / "file")
+    sender.disconnect()
+    asker.receive(1.0)
+    assert asker.check(recording=True) == ""
     assert asker.over
-
-
-SCENE = load_scene("line")
-
-
-@pytest.mark.parametrize(
-    ("requests", "asked"),
-    [
-        ([Setup(3, 3)], Asked(Setup(3, 3))),
-        ([Region("skin")], Asked(region=Region("skin"))),
-        ([Publish(("udp://a:1",))], Asked(targets=("udp://a:1",))),
-        ([Connect("sim:"), SCENE], Asked(source="sim:", scene=SCENE)),
-        ([Seek(1.0, 0.5)], Asked(speed=0.5)),
-        ([Step(2)], Asked(speed=0.0)),
-        ([SCENE, Seek(None, 0.0), Connect("x")], Asked(source="x")),
-        ([Connect("x"), Disconnect()], Asked()),
-        ([Record(Path("a")), Record(None)], Asked()),
-        ([Note("n"), Goodbye()], Asked()),
-    ],
-)
-def test_what_was_asked_for_last_is_what_lasts(requests: list[Request], asked: Asked) -> None:
-    was = Asked()
-    for request in requests:
-        was = was.after(request)
-    assert was == asked
 
 
 # Notes, and who finds them.
 
 
 @pytest.mark.skipif(os.name != "posix", reason="the rights are of a POSIX system")
-def test_only_this_user_can_read_a_note(waiting: Waiting, folder: Path) -> None:
+def test_only_this_user_can_read_a_note(waiting: ResumeListener, folder: Path) -> None:
     (note,) = folder.glob("*.note")
     assert note.stat().st_mode & 0o777 == 0o600
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
-def test_of_two_who_come_at_once_one_gets_it(waiting: Waiting, folder: Path) -> None:
+def test_of_two_who_come_at_once_one_gets_it(waiting: ResumeListener, folder: Path) -> None:
     both = threading.Barrier(2)
 
-    def come(_: int) -> Orphan | None:
+    def come(_: int) -> ResumedProcess | None:
         both.wait()
-        return adopted(folder)
+        return resume_process(folder)
 
     with ThreadPoolExecutor(2) as pool:
         found = [orphan for orphan in pool.map(come, range(2)) if orphan]
-    assert [orphan.left for orphan in found] == [LEFT]
+    assert [orphan.info for orphan in found] == [LEFT]
     assert not list(folder.iterdir())
     found[0].close()
 
 
 def test_who_has_not_the_key_is_told_nothing_and_another_may_come(
-    waiting: Waiting, folder: Path
+    waiting: ResumeListener, folder: Path
 ) -> None:
     (note,) = folder.glob("*.note")
     with Client(_address(note)) as stranger:
@@ -347,19 +320,19 @@ def test_who_has_not_the_key_is_told_nothing_and_another_may_come(
             stranger.recv_bytes()
     version, key = note.read_text().split()
     note.write_text(f"{version} {bytes(32).hex()}")
-    assert adopted(folder) is None
+    assert resume_process(folder) is None
     assert waiting.line is None
     note.write_text(f"{version} {key}")
-    orphan = adopted(folder)
+    orphan = resume_process(folder)
     assert orphan is not None
     orphan.close()
 
 
-def test_another_version_leaves_it_to_its_own(waiting: Waiting, folder: Path) -> None:
+def test_another_version_leaves_it_to_its_own(waiting: ResumeListener, folder: Path) -> None:
     (note,) = folder.glob("*.note")
     _, key = note.read_text().split()
     note.write_text(f"0.0.0 {key}")
-    assert adopted(folder) is None
+    assert resume_process(folder) is None
     assert note.exists()
     assert waiting.line is None
 
@@ -370,26 +343,26 @@ def test_another_version_leaves_it_to_its_own(waiting: Waiting, folder: Path) ->
 def test_a_note_that_is_none_is_taken_away(folder: Path, text: bytes) -> None:
     folder.mkdir()
     (folder / "x.note").write_bytes(text)
-    assert adopted(folder) is None
+    assert resume_process(folder) is None
     assert not list(folder.iterdir())
 
 
 def test_a_note_of_one_that_died_is_taken_away_and_another_is_found(
-    waiting: Waiting, folder: Path
+    waiting: ResumeListener, folder: Path
 ) -> None:
     (note,) = folder.glob("*.note")
     stale = folder / "0.note"
     stale.write_text(note.read_text())
     stale.with_suffix(".sock").touch()
-    orphan = adopted(folder)
+    orphan = resume_process(folder)
     assert orphan is not None
-    assert orphan.left == LEFT
+    assert orphan.info == LEFT
     assert wait_for(lambda: not list(folder.iterdir()))
     orphan.close()
 
 
 def test_where_nobody_left_a_note_nobody_is_found(folder: Path) -> None:
-    assert adopted(folder) is None
+    assert resume_process(folder) is None
 
 
 def test_how_long_it_went_on_is_told_in_minutes_and_seconds() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Frame
-from kappaskin.live.timing import Arrivals
+from kappaskin.live.timing import ArrivalTimes
 
 
 def frames(*times):
@@ -16,7 +16,7 @@ def frames(*times):
 
 @pytest.fixture
 def arrivals():
-    return Arrivals()
+    return ArrivalTimes()
 
 
 def come(arrivals, *times):

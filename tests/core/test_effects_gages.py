@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kappaskin.scenes.effects.finite_slope import FiniteSlopeEffect
-from kappaskin.scenes.effects.gage_length import GageLength
 
 from kappaskin import (
     Disk,
@@ -26,6 +24,7 @@ from kappaskin import (
     basis_for,
 )
 from kappaskin.bases import curvature_at
+from kappaskin.scenes.effects import FiniteSlopeEffect, GageLength
 from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
 from kappaskin.sources import sensor_from_json, sensor_to_json
 

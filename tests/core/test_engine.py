@@ -33,7 +33,7 @@ from kappaskin import (
 from kappaskin.live import LOST, STREAMING, Engine, Status
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import OFF
-from kappaskin.live.tare_taking import TareNews
+from kappaskin.live.tare_taking import TareStatus
 
 pytestmark = pytest.mark.slow
 
@@ -627,7 +627,7 @@ SLOW = replace(AT_REST, rate=4.0)
 """The twenty frames of a tare take five seconds."""
 
 
-def tared(engine: Engine) -> TareNews:
+def tared(engine: Engine) -> TareStatus:
     """How the tare that is asked for now ends."""
     before = engine.status().tare.ended
     engine.tare()

@@ -35,9 +35,17 @@ from kappaskin import (
 )
 from kappaskin.bases import curvature_at
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.recording import Exported, Exporting, Recorder, Recording, Verdict, Wanted, verifying
-from kappaskin.recording.export.skin import Skin, Surface
-from kappaskin.recording.export.writing import exported
+from kappaskin.recording import (
+    Exported,
+    ExportRequest,
+    ExportTask,
+    Recorder,
+    Recording,
+    Verification,
+    verify_steps,
+)
+from kappaskin.recording.export.surfaces import SkinMesh, SkinSurface
+from kappaskin.recording.export.writing import export_steps
 from kappaskin.recording.messages import TOPICS
 from kappaskin.sources import SimulatedSource
 
@@ -101,7 +109,7 @@ def recorded(
 def export(recording: Path, to: Path, **asked) -> Exported:
     """Export in this process, which is sooner; into a folder that is made for it."""
     to.parent.mkdir(exist_ok=True)
-    *shares, done = exported(Wanted(recording, to, **asked), to.parent)
+    *shares, done = export_steps(ExportRequest(recording, to, **asked), to.parent)
     assert isinstance(done, Exported)
     assert shares == sorted(shares)
     return done
@@ -206,8 +214,8 @@ def test_a_csv_has_the_same_numbers_as_an_npz(taps, tmp_path) -> None:
 
 
 def test_a_verdict_finds_the_recording_the_same(taps) -> None:
-    *_, verdict = verifying(taps[0])
-    assert isinstance(verdict, Verdict)
+    *_, verdict = verify_steps(taps[0])
+    assert isinstance(verdict, Verification)
     assert verdict.same
     assert verdict.compared > len(taps[1])
 
@@ -309,11 +317,11 @@ def test_another_skin_in_between_is_refused_and_each_of_the_two_is_not(tmp_path)
 # The surface.
 
 
-def shape_on(held_skin, scale: float = 1e-5) -> tuple[Surface, np.ndarray]:
+def shape_on(held_skin, scale: float = 1e-5) -> tuple[SkinSurface, np.ndarray]:
     """A surface of 25 x 25 points, and its coefficients in m."""
     basis = held_skin.basis()
     c = scale * np.random.default_rng(0).standard_normal(basis.shape)
-    return Skin(basis, 25, 25)(c), c
+    return SkinMesh(basis, 25, 25)(c), c
 
 
 def test_the_surface_goes_through_the_skin_moved_along_its_normals(held_skin) -> None:
@@ -350,7 +358,7 @@ def test_a_skin_at_rest_has_its_base_curvature_everywhere(held_skin) -> None:
 def test_the_curvature_of_a_flat_skin_is_that_of_equations_3_to_5() -> None:
     basis = basis_for(Patch(0.1, 0.08), "hinged", 4, 3)
     c = 1e-8 * np.arange(12.0).reshape(4, 3)
-    surface = Skin(basis, 11, 9)(c)
+    surface = SkinMesh(basis, 11, 9)(c)
     exact = curvature_at(basis, surface.points[:, :2]) @ c.ravel()
     np.testing.assert_allclose(surface.curvature, exact.T, rtol=1e-6, atol=1e-9)
 
@@ -414,7 +422,7 @@ def test_a_series_is_one_surface_each_so_many_seconds(taps, tmp_path) -> None:
 
 
 def test_a_process_of_its_own_leaves_the_file_alone(taps, tmp_path) -> None:
-    with Exporting(Wanted(taps[0], tmp_path / "out.npz")) as exporting:
+    with ExportTask(ExportRequest(taps[0], tmp_path / "out.npz")) as exporting:
         assert len(list(tmp_path.iterdir())) == 1
         *shares, done = exporting.wait()
     assert shares == sorted(shares)
@@ -424,7 +432,7 @@ def test_a_process_of_its_own_leaves_the_file_alone(taps, tmp_path) -> None:
 
 
 def test_a_cancelled_export_leaves_nothing(taps, tmp_path) -> None:
-    with Exporting(Wanted(taps[0], tmp_path / "skin.pvd", every=0.001)) as exporting:
+    with ExportTask(ExportRequest(taps[0], tmp_path / "skin.pvd", every=0.001)) as exporting:
         next(exporting.wait())
     assert not list(tmp_path.iterdir())
 
@@ -432,7 +440,7 @@ def test_a_cancelled_export_leaves_nothing(taps, tmp_path) -> None:
 def test_an_export_that_nobody_waits_for_any_more_clears_up(taps, tmp_path) -> None:
     room = tmp_path / "room"
     room.mkdir()
-    work = exported(Wanted(taps[0], tmp_path / "out.csv"), room)
+    work = export_steps(ExportRequest(taps[0], tmp_path / "out.csv"), room)
     next(work)
     assert list(room.iterdir())
     work.close()
@@ -440,7 +448,7 @@ def test_an_export_that_nobody_waits_for_any_more_clears_up(taps, tmp_path) -> N
 
 
 def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
-    with Exporting(Wanted(taps[0], tmp_path / "skin.stl", at=0.1)) as exporting:
+    with ExportTask(ExportRequest(taps[0], tmp_path / "skin.stl", at=0.1)) as exporting:
         (tmp_path / "skin.json").write_text("mine")
         with pytest.raises(Refusal, match="appeared meanwhile"):
             deque(exporting.wait(), 0)
@@ -476,7 +484,7 @@ def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
 def test_what_makes_no_file_is_refused(name: str, asked: dict, why: str, taps, tmp_path) -> None:
     with (
         pytest.raises(Refusal, match=why) as refused,
-        Exporting(Wanted(taps[0], tmp_path / name, **asked)) as work,
+        ExportTask(ExportRequest(taps[0], tmp_path / name, **asked)) as work,
     ):
         deque(work.wait(), 0)
     assert "--" not in str(refused.value)  # it is told in the window too
@@ -488,7 +496,7 @@ def test_what_is_there_already_is_not_written_over(there: str, taps, tmp_path) -
     (tmp_path / there).write_text("mine")
     asked = {"at": 0.1} if there in ("out.stl", "out.json") else {"every": 0.1}
     with pytest.raises(Refusal, match="is there already"):
-        Wanted(taps[0], tmp_path / ("out.stl" if "at" in asked else "out.pvd"), **asked)
+        ExportRequest(taps[0], tmp_path / ("out.stl" if "at" in asked else "out.pvd"), **asked)
     assert (tmp_path / there).read_text() == "mine"
 
 
@@ -513,7 +521,7 @@ def test_damage_in_the_middle_is_refused_and_leaves_nothing(taps, tmp_path) -> N
     (tmp_path / "rec.mcap").write_bytes(data)
     with (
         pytest.raises(Refusal, match=r"is damaged at byte \d+ .*repair"),
-        Exporting(Wanted(tmp_path / "rec.mcap", tmp_path / "out.npz")) as work,
+        ExportTask(ExportRequest(tmp_path / "rec.mcap", tmp_path / "out.npz")) as work,
     ):
         deque(work.wait(), 0)
     assert [path.name for path in tmp_path.iterdir()] == ["rec.mcap"]
@@ -542,13 +550,13 @@ def test_a_recording_that_breaks_off_is_exported_up_to_there(taps, tmp_path) -> 
 def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
     script = (
         "import resource, sys; from pathlib import Path; from kappaskin import Refusal\n"
-        "from kappaskin.recording import Wanted\n"
-        "from kappaskin.recording.export.writing import exported\n"
+        "from kappaskin.recording import ExportRequest\n"
+        "from kappaskin.recording.export.writing import export_steps\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))\n"
         "recording, *places = map(Path, sys.argv[1:])\n"
         "for to in places:\n"
         "    at = 0.1 if to.suffix in ('.vtp', '.stl') else None\n"
-        "    try: list(exported(Wanted(recording, to, at=at), to.parent))\n"
+        "    try: list(export_steps(ExportRequest(recording, to, at=at), to.parent))\n"
         "    except Refusal as refusal: print(refusal)\n"
     )
     places = [tmp_path / f"out{suffix}" for suffix in (".csv", ".npz", ".h5", ".vtp", ".stl")]
@@ -589,11 +597,11 @@ def test_the_command_refuses_with_its_own_code(taps, run, tmp_path) -> None:
 
 
 def test_ctrl_c_stops_the_command_and_leaves_nothing(taps, run, tmp_path, monkeypatch) -> None:
-    def interrupted(self: Exporting):
+    def interrupted(self: ExportTask):
         yield 0.5
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Exporting, "wait", interrupted)
+    monkeypatch.setattr(ExportTask, "wait", interrupted)
     code, _, err = run("export", taps[0], "--to", tmp_path / "out.csv")
     assert code == 2
     assert "nothing was written" in err
@@ -606,5 +614,5 @@ def test_ctrl_c_while_it_begins_leaves_nothing(taps, tmp_path, monkeypatch) -> N
 
     monkeypatch.setattr("kappaskin._processes.BackgroundProcess.__init__", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        Exporting(Wanted(taps[0], tmp_path / "out.csv"))
+        ExportTask(ExportRequest(taps[0], tmp_path / "out.csv"))
     assert not list(tmp_path.iterdir())

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from kappaskin.studies.initial_curvature import SHARES, initial_curvature
 
 from kappaskin import FIRST_GENERATION_LOOPS, Hysteresis
 from kappaskin.scenes.effects import Creep
+from kappaskin.studies.figures.initial_curvature import SHARES, initial_curvature
 
 R0 = 12.9e-3
 THETA = math.pi * (np.arange(10) + 0.5) / 10

@@ -13,12 +13,13 @@ import pytest
 
 from kappaskin import METHODS, SCENES, Calibration, Pipeline, Setup, load_scene
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.live.recorder import Keeping
-from kappaskin.recording import Recorder, Recording, verifying
-from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, StuckElements
+from kappaskin.live.recorder import LiveRecorder
+from kappaskin.recording import Recorder, Recording, verify_steps
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS
+from kappaskin.scenes.effects.failures import StuckElements
 from kappaskin.sources import SimulatedSource
 
-NO_SIDE = SimpleNamespace(pipeline=None, left=None)
+NO_SIDE = SimpleNamespace(pipeline=None, excluded=None)
 
 
 def recorders() -> int:
@@ -27,68 +28,68 @@ def recorders() -> int:
 
 
 def test_recordings_one_after_another_leave_only_the_newest_in_memory(tmp_path) -> None:
-    keeping = Keeping()
+    keeping = LiveRecorder()
     for number in range(5):
         keeping.begin(tmp_path / f"{number}.mcap", None, NO_SIDE)
     deadline = time.monotonic() + 20
     while recorders() > 1 and time.monotonic() < deadline:
-        assert keeping.look(None) == ""
+        assert keeping.check(None) == ""
         time.sleep(0.02)
 
     assert recorders() == 1
-    assert keeping.written.path == str(tmp_path / "4.mcap")
-    assert keeping.written.active
+    assert keeping.status.path == str(tmp_path / "4.mcap")
+    assert keeping.status.active
     keeping.close()
     assert sorted(file.name for file in tmp_path.iterdir()) == [f"{n}.mcap" for n in range(5)]
 
 
 def test_what_was_written_last_is_told_when_nothing_is_recorded_any_more(tmp_path) -> None:
-    keeping = Keeping()
+    keeping = LiveRecorder()
     keeping.begin(tmp_path / "a.mcap", None, NO_SIDE)
     keeping.end(None)
     deadline = time.monotonic() + 20
-    while keeping.written.active or not keeping.written.path:
+    while keeping.status.active or not keeping.status.path:
         assert time.monotonic() < deadline
-        keeping.look(None)
+        keeping.check(None)
         time.sleep(0.01)
 
-    keeping.look(None)
+    keeping.check(None)
 
-    assert keeping.written.path == str(tmp_path / "a.mcap")
-    assert not keeping.written.active
+    assert keeping.status.path == str(tmp_path / "a.mcap")
+    assert not keeping.status.active
 
 
 def test_that_another_recording_is_refused_is_told_while_the_last_one_still_ends(tmp_path) -> None:
-    keeping, taken = Keeping(), tmp_path / "b.mcap"
+    keeping, taken = LiveRecorder(), tmp_path / "b.mcap"
     taken.write_bytes(b"somebody's")
     keeping.begin(tmp_path / "a.mcap", None, NO_SIDE)
 
     keeping.begin(taken, None, NO_SIDE)
 
     for _ in range(2):
-        assert keeping.look(None) == ""
-        assert keeping.written.path == str(taken)
-        assert "is there already" in keeping.written.trouble
+        assert keeping.check(None) == ""
+        assert keeping.status.path == str(taken)
+        assert "is there already" in keeping.status.trouble
         keeping.close()
 
 
 def test_what_was_connected_twice_comes_to_the_same_again(tmp_path) -> None:
     now, path = [100.0], tmp_path / "a.mcap"
     scene = replace(load_scene("circle"), rate=100.0)
-    with closing(Keeping()) as keeping:
+    with closing(LiveRecorder()) as keeping:
         keeping.begin(path, None, NO_SIDE)
         for generation in (1, 2):
             source = SimulatedSource(scene, lambda: now[0])
-            keeping.listen(source)
+            keeping.connect(source)
             pipeline = Pipeline(source.sensor, calibrated(source.sensor), generation)
             keeping.set_up(SimpleNamespace(pipeline=pipeline))
             for _ in range(10):
                 now[0] += 0.01
                 for frame in source.read(0.0):
                     keeping.take(frame, pipeline(frame))
-            keeping.ended()
+            keeping.source_ended()
 
-    *_, verdict = verifying(path)
+    *_, verdict = verify_steps(path)
 
     assert verdict.same, verdict.words
 
@@ -97,18 +98,18 @@ def test_what_another_device_remembered_is_not_taken_for_that_of_the_next(tmp_pa
     now, path = [100.0], tmp_path / "a.mcap"
     before = SimulatedSource(load_scene("circle"), lambda: now[0])
     source = SimulatedSource(load_scene("fingertip"), lambda: now[0])
-    with closing(Keeping()) as keeping:
+    with closing(LiveRecorder()) as keeping:
         gone = Pipeline(before.sensor, calibrated(before.sensor))
-        keeping.begin(path, before, SimpleNamespace(pipeline=gone, left=None))
-        keeping.ended()
-        keeping.listen(source)
+        keeping.begin(path, before, SimpleNamespace(pipeline=gone, excluded=None))
+        keeping.source_ended()
+        keeping.connect(source)
         pipeline = Pipeline(source.sensor, calibrated(source.sensor), 1)
         keeping.set_up(SimpleNamespace(pipeline=pipeline))
         now[0] += 0.01
         for frame in source.read(0.0):
             keeping.take(frame, pipeline(frame))
 
-    *_, verdict = verifying(path)
+    *_, verdict = verify_steps(path)
 
     assert verdict.same, verdict.words
 
@@ -151,11 +152,11 @@ def test_what_is_recorded_from_the_middle_comes_to_the_same_again(method, tmp_pa
             for frame in source.read(0.0):
                 keeping.take(frame, pipeline(frame))
 
-    with closing(Keeping()) as keeping:
+    with closing(LiveRecorder()) as keeping:
         play(0.2)
-        keeping.begin(path, source, SimpleNamespace(pipeline=pipeline, left=None))
+        keeping.begin(path, source, SimpleNamespace(pipeline=pipeline, excluded=None))
         play(0.4)
 
-    *_, verdict = verifying(path)
+    *_, verdict = verify_steps(path)
 
     assert verdict.same, verdict.words

@@ -136,8 +136,18 @@ def test_a_hinged_equilateral_triangle_sags_by_the_closed_form_under_pressure():
 # Tables: Leissa's Vibration of plates, NASA SP-160, with one digit more for the square.
 
 TABLES = {
-    "clamped disk": (Disk(SIDE), "clamped", [10.2158, 21.26, 21.26, 34.88, 34.88, 39.771], 1e-4),
-    "hinged disk": (Disk(SIDE), "hinged", [4.935, 13.898, 13.898, 25.613, 25.613, 29.720], 5e-5),
+    "clamped disk": (
+        Disk(SIDE),
+        "clamped",
+        [10.2158, 21.26, 21.26, 34.88, 34.88, 39.771],
+        1e-4,
+    ),
+    "hinged disk": (
+        Disk(SIDE),
+        "hinged",
+        [4.935, 13.898, 13.898, 25.613, 25.613, 29.720],
+        5e-5,
+    ),
     "clamped square": (SQUARE, "clamped", [35.985, 73.394, 73.394, 108.22, 131.58, 132.21], 5e-5),
 }
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from kappaskin.live.rate_limit import Pace
+from kappaskin.live.timing import RateLimit
 
 
 class Played:
@@ -10,7 +10,7 @@ class Played:
 
     def __init__(self, rate: float, cost: float, reads: float = 1e-3) -> None:
         self.now, self.rate, self.cost, self.reads = 0.0, rate, cost, reads
-        self.pace = Pace(lambda: self.now)
+        self.pace = RateLimit(lambda: self.now)
         self.came = self.computed = 0
         self.busy, self.longest, self._last = 0.0, 0.0, 0.0
 
@@ -73,7 +73,7 @@ def test_a_device_that_becomes_faster_than_can_be_computed_is_noticed_within_a_s
 
 
 def test_nothing_waiting_costs_nothing() -> None:
-    pace = Pace(lambda: 0.0)
+    pace = RateLimit(lambda: 0.0)
     assert pace.affordable(0) == 0
     pace.spend(0, 0.0)
     assert pace.affordable(5) == 1

@@ -18,7 +18,8 @@ import pytest
 
 from kappaskin import Estimate, Frame, Refusal, Simulator, load_scene
 from kappaskin.live import LOST, STREAMING, Engine, Status
-from kappaskin.scenes import CorruptedFrames, DroppedFrames, Orbit
+from kappaskin.scenes import Orbit
+from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
 from kappaskin.sources import Decoder, SerialSource
 from kappaskin.sources.wire import (
     Fault,

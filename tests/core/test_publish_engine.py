@@ -17,7 +17,7 @@ import psutil
 import pytest
 
 from kappaskin import Engine, Refusal, Setup
-from kappaskin.publish import Published
+from kappaskin.publish import TargetStatus
 
 pytestmark = pytest.mark.slow
 
@@ -66,7 +66,7 @@ def until(holds: Callable[[], object]) -> None:
         time.sleep(0.02)
 
 
-def target(engine: Engine, within: float = 30.0) -> Published:
+def target(engine: Engine, within: float = 30.0) -> TargetStatus:
     """How the first target is doing, once that is known of all."""
     end = time.monotonic() + within
     while time.monotonic() < end:

@@ -18,19 +18,24 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from kappaskin import Event, Refusal, load_scene
-from kappaskin.publish import State, foxglove
-from kappaskin.publish.channels import CHANNELS
-from kappaskin.publish.client import LARGEST, PER_SECOND, PROTOCOLS, Client
-from kappaskin.publish.cloud import NAMES, POINTS
-from kappaskin.publish.foxglove import MOST_CLIENTS, Foxglove
-from kappaskin.publish.message import Message
-from kappaskin.publish.target import opened, target_of
+from kappaskin.publish import SourceState, foxglove
+from kappaskin.publish.foxglove import (
+    LARGEST,
+    MOST_CLIENTS,
+    PER_SECOND,
+    PROTOCOLS,
+    Foxglove,
+    FoxgloveClient,
+)
+from kappaskin.publish.foxglove_channels import CHANNELS, NAMES, POINTS
+from kappaskin.publish.message import EstimateMessage
+from kappaskin.publish.publishing import opened, target_of
 
 pytestmark = pytest.mark.slow
 
 PRESSED = load_scene("off-centre")
 EVENT = Event(0.0, "gap", "3 messages lost")
-STATE = State("streaming", "sim", "", PRESSED.sensor(), 500.0, 0.0, (EVENT,))
+STATE = SourceState("streaming", "sim", "", PRESSED.sensor(), 500.0, 0.0, (EVENT,))
 TOPICS = {channel.topic: channel.number for channel in CHANNELS}
 
 HELLO = (
@@ -55,7 +60,7 @@ def server() -> Iterator[Foxglove]:
 
 
 @pytest.fixture
-def message(messages_of) -> Message:
+def message(messages_of) -> EstimateMessage:
     (made,) = messages_of(PRESSED)
     return made
 
@@ -86,11 +91,11 @@ def subscribe(one: ClientConnection, *topics: str) -> None:
     one.send(json.dumps({"op": "subscribe", "subscriptions": pairs}))
 
 
-def clients(server: Foxglove) -> Sequence[Client]:
+def clients(server: Foxglove) -> Sequence[FoxgloveClient]:
     return server._clients  # noqa: SLF001
 
 
-def asked(one: Client) -> int:
+def asked(one: FoxgloveClient) -> int:
     """How many channels it asked for, once that has been dealt with: the lock is free again."""
     channels = len(one.subscribed)
     return channels if not one._lock.locked() else 0  # noqa: SLF001
@@ -157,7 +162,7 @@ def test_every_channel_holds_what_its_schema_says(client, server, message) -> No
     def all_of_it() -> bool:
         # Again where one was dropped: the server's own thread sends the skin meanwhile.
         server.send(copy(message))
-        server.tell(STATE)
+        server.report(STATE)
         with suppress(TimeoutError):
             while len(told) < len(TOPICS):
                 number, when, content = parsed(one.recv(0.5))
@@ -281,7 +286,7 @@ def test_garbage_in_place_of_a_handshake_ends_the_connection(server, data: bytes
 
 
 def test_who_connects_and_says_nothing_is_let_go(server, monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.publish.client._PATIENCE", 0.2)
+    monkeypatch.setattr("kappaskin.publish.foxglove._PATIENCE", 0.2)
     with socket.create_connection(place(server)) as one:
         one.settimeout(PATIENCE)
         assert one.recv(10) == b""
@@ -333,7 +338,7 @@ def test_a_client_that_never_reads_holds_nobody_up(client, server, message, deaf
 
 
 def test_a_client_that_takes_nothing_for_long_is_let_go(server, message, deaf, monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.publish.client.STUCK", 0.3)
+    monkeypatch.setattr("kappaskin.publish.foxglove.STUCK", 0.3)
     end = time.monotonic() + PATIENCE
     while server.receivers and time.monotonic() < end:
         server.send(message)
@@ -342,7 +347,7 @@ def test_a_client_that_takes_nothing_for_long_is_let_go(server, message, deaf, m
 
 
 def test_only_so_many_clients_are_served(server, monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.publish.client._PATIENCE", 2 * PATIENCE)  # they say nothing
+    monkeypatch.setattr("kappaskin.publish.foxglove._PATIENCE", 2 * PATIENCE)  # they say nothing
     many = [socket.create_connection(place(server)) for _ in range(3 * MOST_CLIENTS)]
     until(lambda: len(server.receivers) == MOST_CLIENTS)
     closed = [one for one in many[MOST_CLIENTS:] if one.recv(1) == b""]

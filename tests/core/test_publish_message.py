@@ -26,8 +26,12 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.contact import surface_geometry
-from kappaskin.publish import State, channels, client, cloud, foxglove, message, publishing, target
-from kappaskin.publish.contact import UNKNOWN
+from kappaskin.pipeline.reported import UNKNOWN
+from kappaskin.publish import SourceState, foxglove, message, publishing
+from kappaskin.publish import foxglove as client
+from kappaskin.publish import foxglove_channels as channels
+from kappaskin.publish import foxglove_channels as cloud
+from kappaskin.publish import publishing as target
 from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SWITCHES, text_of
 
 GUIDE = (files("kappaskin_resources") / "publishing" / "messages.md").read_text("utf-8")
@@ -214,12 +218,14 @@ def test_numbers_of_any_kind_become_json(values: list[float]) -> None:
 
 
 def test_the_state_of_the_source_is_json_with_every_number_promised() -> None:
-    lost = State("lost", "", "x" * 5000, None, 0.0, -math.inf)
+    lost = SourceState("lost", "", "x" * 5000, None, 0.0, -math.inf)
     told = read(lost.encoded())
     assert (told["state"], told["source"]) == ("lost", "")
     assert told["since_last_frame_s"] is told["width_x_m"] is None
     assert len(lost.encoded()) < LARGEST
-    there = read(State("streaming", "sim", "", PRESSED.sensor(), 500.0, time.monotonic()).encoded())
+    there = read(
+        SourceState("streaming", "sim", "", PRESSED.sensor(), 500.0, time.monotonic()).encoded()
+    )
     assert (there["source"], there["rate_per_s"], there["width_x_m"]) == ("sim", 500.0, 0.1)
     assert set(there) == set(told)
 
@@ -230,7 +236,7 @@ def test_the_state_of_the_source_is_json_with_every_number_promised() -> None:
 def test_the_guide_names_every_key_with_the_words_of_the_code() -> None:
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", GUIDE, re.MULTILINE))
     assert rows.pop("source").startswith("`live`, `sim`")
-    assert rows == SWITCHES | {field.key: field.words for field in CONTACT}
+    assert rows == SWITCHES | {field.key: field.text for field in CONTACT}
     for key in (*message.STATUS_NUMBERS, "coefficients_sd_m", "functions_x", "edge", "state"):
         assert f"`{key}`" in GUIDE
 

@@ -15,14 +15,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal, load_scene
-from kappaskin.publish import Listener, Publishing, State, targets_of
+from kappaskin.publish import Publishing, SourceState, UdpListener, targets_of
 from kappaskin.publish import udp as transport
-from kappaskin.publish.message import Message
-from kappaskin.publish.target import MOST_TARGETS, Target, opened, target_of
+from kappaskin.publish.message import EstimateMessage
+from kappaskin.publish.publishing import MOST_TARGETS, Target, opened, target_of
 from kappaskin.publish.udp import Udp
 
 PRESSED = load_scene("off-centre")
-STATE = State("streaming", "", "", None, 0.0, 0.0)
+STATE = SourceState("streaming", "", "", None, 0.0, 0.0)
 
 
 def free_port(family: int = socket.AF_INET) -> int:
@@ -40,7 +40,7 @@ def receiver() -> Iterator[socket.socket]:
 
 
 @pytest.fixture
-def message(messages_of) -> Message:
+def message(messages_of) -> EstimateMessage:
     (made,) = messages_of(PRESSED)
     return made
 
@@ -107,10 +107,10 @@ def test_targets_are_given_once_and_not_without_end() -> None:
 # Datagrams
 
 
-def test_a_receiver_gets_contact_and_shape_as_they_are(receiver, message: Message) -> None:
+def test_a_receiver_gets_contact_and_shape_as_they_are(receiver, message: EstimateMessage) -> None:
     sender = to(receiver)
     sender.send(message)
-    sender.tell(STATE)
+    sender.report(STATE)
     assert receiver.recv(9999) == message.contact
     assert receiver.recv(9999) == message.shape
     assert json.loads(receiver.recv(9999))["kind"] == "status"
@@ -118,7 +118,7 @@ def test_a_receiver_gets_contact_and_shape_as_they_are(receiver, message: Messag
     sender.close()
 
 
-def test_a_receiver_over_ipv6_gets_them(message: Message) -> None:
+def test_a_receiver_over_ipv6_gets_them(message: EstimateMessage) -> None:
     if not socket.has_ipv6:
         pytest.skip("no IPv6 on this system")
     with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as receiver:
@@ -133,7 +133,7 @@ def test_a_receiver_over_ipv6_gets_them(message: Message) -> None:
         sender.close()
 
 
-def test_everybody_on_a_network_is_sent_to(message: Message) -> None:
+def test_everybody_on_a_network_is_sent_to(message: EstimateMessage) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("", 0))
         receiver.settimeout(30)
@@ -143,7 +143,7 @@ def test_everybody_on_a_network_is_sent_to(message: Message) -> None:
         sender.close()
 
 
-def test_what_nobody_receives_is_counted_until_somebody_does(message: Message) -> None:
+def test_what_nobody_receives_is_counted_until_somebody_does(message: EstimateMessage) -> None:
     port = free_port()
     sender = transport.opened(target_of(f"udp://127.0.0.1:{port}"))
     for _ in range(50):
@@ -177,7 +177,9 @@ class Failing:
 
 
 @pytest.mark.parametrize("number", [errno.EAGAIN, errno.ENETUNREACH, errno.EPERM, errno.EHOSTDOWN])
-def test_whatever_the_system_says_the_session_goes_on(number: int, message: Message) -> None:
+def test_whatever_the_system_says_the_session_goes_on(
+    number: int, message: EstimateMessage
+) -> None:
     failing = Failing(number)
     sender = Udp("udp://somewhere:1", failing, ("somewhere", 1))
     for _ in range(20):
@@ -187,7 +189,7 @@ def test_whatever_the_system_says_the_session_goes_on(number: int, message: Mess
     assert failing.connected == (number != errno.EAGAIN)  # once a second
 
 
-def test_what_no_datagram_holds_is_dropped_and_counted(receiver, message: Message) -> None:
+def test_what_no_datagram_holds_is_dropped_and_counted(receiver, message: EstimateMessage) -> None:
     sender = to(receiver)
     message.contact = b"x" * 2001
     sender.send(message)
@@ -207,8 +209,8 @@ def test_a_host_that_does_not_resolve_is_refused(host: str) -> None:
 
 def settled(publishing: Publishing) -> None:
     end = time.monotonic() + 30
-    while any(target.opening for target in publishing.news.targets) and time.monotonic() < end:
-        publishing.tell(STATE)
+    while any(target.opening for target in publishing.status.targets) and time.monotonic() < end:
+        publishing.report(STATE)
         time.sleep(0.005)
 
 
@@ -230,13 +232,13 @@ def test_a_look_for_a_host_that_takes_long_holds_nothing_up_and_ends_in_a_refusa
     slow, now = Slow(), [0.0]
     publishing = Publishing(slow, lambda: now[0])
     began = time.monotonic()
-    publishing.ask(["udp://slow:1"])
-    publishing.tell(STATE)
+    publishing.request(["udp://slow:1"])
+    publishing.report(STATE)
     assert time.monotonic() - began < 5.0  # where the look takes 10 s
-    assert publishing.news.targets[0].opening
+    assert publishing.status.targets[0].opening
     now[0] = 6.0
-    publishing.tell(STATE)
-    (told,) = publishing.news.targets
+    publishing.report(STATE)
+    (told,) = publishing.status.targets
     assert "not found out within 5 s" in told.refusal
     slow.go.set()
     assert slow.closed.wait(30)  # come too late
@@ -246,8 +248,8 @@ def test_a_look_for_a_host_that_takes_long_holds_nothing_up_and_ends_in_a_refusa
 def test_what_is_not_wanted_any_more_when_it_opens_is_closed() -> None:
     slow = Slow()
     publishing = Publishing(slow)
-    publishing.ask(["udp://slow:1"])
-    publishing.ask([])
+    publishing.request(["udp://slow:1"])
+    publishing.request([])
     slow.go.set()
     assert slow.closed.wait(30)
 
@@ -265,33 +267,33 @@ def test_a_target_that_stays_is_not_opened_again_and_a_refused_one_is(
     monkeypatch.setattr(socket, "getaddrinfo", found)
     name = f"udp://127.0.0.1:{receiver.getsockname()[1]}"
     publishing = Publishing()
-    publishing.ask([name, "udp://nowhere.invalid:1"])
+    publishing.request([name, "udp://nowhere.invalid:1"])
     settled(publishing)
-    publishing.tell(STATE)
-    stays, refused = publishing.news.targets
+    publishing.report(STATE)
+    stays, refused = publishing.status.targets
     assert (stays.target, stays.refusal) == (name, "")
     assert stays.sent > 0
     assert "not known" in refused.refusal
-    publishing.ask(["udp://nowhere.invalid:1", name])
-    again, same = publishing.news.targets
+    publishing.request(["udp://nowhere.invalid:1", name])
+    again, same = publishing.status.targets
     assert again.opening
     assert same.sent >= stays.sent
     settled(publishing)
     publishing.close()
-    assert publishing.news.targets == ()
+    assert publishing.status.targets == ()
 
 
 # Who listens
 
 
 @pytest.fixture
-def listener() -> Iterator[Listener]:
-    made = Listener(free_port())
+def listener() -> Iterator[UdpListener]:
+    made = UdpListener(free_port())
     yield made
     made.close()
 
 
-def send(listener: Listener, *datagrams: bytes) -> str:
+def send(listener: UdpListener, *datagrams: bytes) -> str:
     port = listener._socket.getsockname()[1]  # noqa: SLF001
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for datagram in datagrams:
@@ -306,7 +308,7 @@ def numbered(number: object, **more: object) -> bytes:
     return json.dumps({"kind": "contact", "version": 1, "number": number} | more).encode()
 
 
-def test_a_contact_is_told_with_its_error_bars_and_age(listener, message: Message) -> None:
+def test_a_contact_is_told_with_its_error_bars_and_age(listener, message: EstimateMessage) -> None:
     said, touch = send(listener, message.contact, message.shape), message.estimate.touch
     assert f"x {1e3 * touch.position[0]:.2f} +- {1e3 * touch.position_sd[0]:.2f} mm" in said
     assert f"force {touch.force:.4f} +- {touch.force_sd:.4f} N" in said
@@ -322,7 +324,7 @@ def test_losses_are_told_by_gaps(listener) -> None:
 
 
 def test_a_state_is_told_once_and_cannot_speak_to_the_terminal(listener) -> None:
-    state = State("lost", "live", "unplugged\x1b[2J\n", None, 0.0, 0.0).encoded()
+    state = SourceState("lost", "live", "unplugged\x1b[2J\n", None, 0.0, 0.0).encoded()
     said = send(listener, state, state)
     assert said.count("unplugged") == 1
     assert said.isprintable()
@@ -341,7 +343,7 @@ def test_what_is_none_of_ours_is_counted(listener) -> None:
     ))
 )  # fmt: skip
 def test_whatever_a_contact_says_can_be_told(told: dict[str, object]) -> None:
-    made = Listener.__new__(Listener)
+    made = UdpListener.__new__(UdpListener)
     made.__dict__ |= {"_clock": time.monotonic, "_began": 0.0, "_shown": -1.0, "_number": 3}
     made.__dict__ |= {"_state": "", "contacts": 0, "lost": 0}
     assert all(line.isprintable() for line in made.lines({"kind": "contact", **told}))
@@ -350,6 +352,6 @@ def test_whatever_a_contact_says_can_be_told(told: dict[str, object]) -> None:
 def test_a_port_that_is_taken_or_none_is_refused(receiver) -> None:
     for port in (0, -1, 65536):
         with pytest.raises(Refusal, match="1 to 65535"):
-            Listener(port)
+            UdpListener(port)
     with pytest.raises(Refusal, match="choose another"):
-        Listener(receiver.getsockname()[1])
+        UdpListener(receiver.getsockname()[1])

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from kappaskin import Pipeline, Port, Setup, SourceError, load_scene
-from kappaskin.live.recorder import Keeping
+from kappaskin.live.recorder import LiveRecorder
 from kappaskin.recording import Recording
-from kappaskin.recording.recompute import Retrace
+from kappaskin.recording.recompute import Recomputation
 from kappaskin.sources import BAUD_RATES, Decoder, SerialSource, information, ports, serial_source
 from kappaskin.sources.decoder import FROM_HOST
 from kappaskin.sources.wire import Operation, encode_information, encode_reply, encode_samples
@@ -327,7 +327,7 @@ def test_a_recording_that_begins_without_the_device_goes_through_what_was_comput
     device, reader = streaming
     source = reader.source
     side = SimpleNamespace(pipeline=Pipeline(source.sensor, Setup(nx=5, ny=5)), left=None)
-    with closing(Keeping()) as keeping:
+    with closing(LiveRecorder()) as keeping:
         if earlier:
             keeping.begin(tmp_path / "earlier.mcap", source, side)
         pull(device, reader)
@@ -342,7 +342,7 @@ def test_a_recording_that_begins_without_the_device_goes_through_what_was_comput
         reader.took(13)
 
     with Recording(tmp_path / "a.mcap") as recording:
-        retrace = Retrace(recording)
+        retrace = Recomputation(recording)
         again = [frame for message in recording.messages() for frame in retrace(message)]
     assert retrace.pipeline is not None
     assert [(f.sequence, f.taken, f.taken_sd) for f in again] == [

@@ -19,14 +19,15 @@ from mcap.records import Message as TheirMessage
 from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
-from kappaskin import Calibration, Refusal, Region, Setup, load_scene, setup_from, write_scene
+from kappaskin import Calibration, Refusal, Region, Setup, load_scene, write_scene
 from kappaskin._processes import BackgroundProcess
 from kappaskin.calibration import Tare
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live import STREAMING, Engine, Status
-from kappaskin.recording import Recording, Verdict, decode, verifying
+from kappaskin.recording import Recording, Verification, decode, verify_steps
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import Layout
+from kappaskin.recording.cdr import MessageLayout
+from kappaskin.recording.setup_text import setup_from_text
 from kappaskin.recording.writing import part_of
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, CorruptedFrames, Creep, DroppedFrames
 from kappaskin.sources import open_source
@@ -44,11 +45,11 @@ def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
     return answer
 
 
-def verdict_of(path: Path) -> Verdict:
+def verdict_of(path: Path) -> Verification:
     """As `kappaskin verify` finds it: in a process of one thread."""
-    with BackgroundProcess[float | Verdict]("verify", verifying, path) as work:
+    with BackgroundProcess[float | Verification]("verify", verify_steps, path) as work:
         *_, verdict = work.wait()
-    assert isinstance(verdict, Verdict)
+    assert isinstance(verdict, Verification)
     return verdict
 
 
@@ -145,7 +146,7 @@ def test_what_was_live_comes_out_of_its_bytes_again_bit_for_bit(name, engine, tm
     assert verdict.frames >= 200
     with Recording(path) as recording:
         said = [decode(m.STRING, got.data)["data"] for got in recording.messages_on(m.SETUP)]
-        setups = [setup_from(text, recording.attachment) for text in said]
+        setups = [setup_from_text(text, recording.attachment) for text in said]
     assert setups == [SETUPS[name], replace(SETUPS[name], Nj=7, hold=0.2)]
 
 
@@ -322,7 +323,7 @@ def test_the_first_difference_is_found(recorded, tmp_path) -> None:
         changed.append(said["sequence"])
         said["force"] = np.nextafter(said["force"], np.inf)
         head = {"header.frame_id": said.pop("header.frame_id")}
-        return Layout(m.CONTACT, head)(said)
+        return MessageLayout(m.CONTACT, head)(said)
 
     verdict = verdict_of(rewritten(recorded, tmp_path / "changed.mcap", harder))
     assert not verdict.same

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin import LONGEST_NOTE, Engine, Recording, Refusal, Setup, Status, setups_of
-from kappaskin.recording import ReplayedSource, Verdict, decode, verifying
+from kappaskin import LONGEST_NOTE, Engine, Recording, Refusal, Setup, Status
+from kappaskin.recording import ReplayedSource, Verification, decode, recorded_setups, verify_steps
 from kappaskin.recording.messages import EVENTS, LOG
 
 pytestmark = pytest.mark.slow
@@ -44,7 +44,7 @@ def test_gaps_events_and_the_day_are_told(source: ReplayedSource, recording: Pat
 
 def test_the_setups_recorded_are_told_with_their_times(recording: Path) -> None:
     with Recording(recording) as opened:
-        found = setups_of(opened)
+        found = recorded_setups(opened)
     assert [(s.Ni, s.Nj) for _, s in found] == [(8, 8), (6, 7), (6, 7)]
     assert [t for t, _ in found] == pytest.approx([0.0, 0.7, 1.8], abs=0.02)
 
@@ -58,7 +58,7 @@ def test_what_is_there_of_a_recording_cut_off_tells_its_setups_too(
     cut.write_bytes(recording.read_bytes()[:within_the_last])
     with Recording(cut) as opened:
         assert not opened.whole
-        assert [(s.Ni, s.Nj) for _, s in setups_of(opened)][:2] == [(8, 8), (6, 7)]
+        assert [(s.Ni, s.Nj) for _, s in recorded_setups(opened)][:2] == [(8, 8), (6, 7)]
 
 
 def test_a_standing_recording_gives_its_frame_again_and_no_other(
@@ -173,12 +173,12 @@ def test_another_setup_is_seen_of_a_recording_that_stands(engine: Engine) -> Non
 
     def shown() -> bool:
         status = engine.status()
-        a, b = engine.latest(status), engine.beside(status)
+        a, b = engine.latest(status), engine.compared(status)
         return a is not None and b is not None and a.coefficients.shape == (5, 4)
 
     until(shown)
     status = engine.status()
-    a, b = engine.latest(status), engine.beside(status)
+    a, b = engine.latest(status), engine.compared(status)
     assert a is not None
     assert b is not None
     assert a.sequence == b.sequence == sequence
@@ -204,8 +204,8 @@ def test_a_recording_goes_on_through_a_replay_which_is_not_recorded(
         time.sleep(0.5)
         engine.record(None)
         until(lambda: path.exists())
-    *_, verdict = verifying(path)
-    assert isinstance(verdict, Verdict)
+    *_, verdict = verify_steps(path)
+    assert isinstance(verdict, Verification)
     assert verdict.same
     source = ReplayedSource(path)
     assert "meanwhile" in [event.text for event in source.replay.events]

@@ -5,11 +5,11 @@ import json
 import pytest
 
 from kappaskin import Refusal, Setup
-from kappaskin.recording import said_of_setup
-from kappaskin.recording.setup_text import setup_from
+from kappaskin.recording import setup_to_text
+from kappaskin.recording.setup_text import setup_from_text
 
 SETUP = Setup(6, 7, method="bayes", edge="clamped", hold=0.25)
-SAID = json.loads(said_of_setup(SETUP)[0])
+SAID = json.loads(setup_to_text(SETUP)[0])
 
 
 def no_file(name: str) -> bytes:
@@ -17,10 +17,10 @@ def no_file(name: str) -> bytes:
 
 
 def test_a_setup_comes_back_from_its_text() -> None:
-    text, files = said_of_setup(SETUP)
+    text, files = setup_to_text(SETUP)
 
     assert files == {}
-    assert setup_from(text, no_file) == SETUP
+    assert setup_from_text(text, no_file) == SETUP
 
 
 @pytest.mark.parametrize(
@@ -41,4 +41,4 @@ def test_a_setup_comes_back_from_its_text() -> None:
 )
 def test_what_is_no_setup_is_refused_with_its_reason(text: str, why: str) -> None:
     with pytest.raises(Refusal, match=f"expected a setup as it was recorded: .*{why}"):
-        setup_from(text, no_file)
+        setup_from_text(text, no_file)

@@ -11,7 +11,7 @@ import pytest
 
 from kappaskin import Frame, load_scene
 from kappaskin.recording import Recorder, Recording, ReplayedSource
-from kappaskin.recording.recorded_frames import Reenactment
+from kappaskin.recording.recompute import RecordedFrames
 from kappaskin.sources import Decoder, SerialSource, SimulatedSource, Source, sensor_to_json
 from kappaskin.sources.wire import Information, Samples, encode_information, encode_samples
 
@@ -153,7 +153,7 @@ def test_a_recording_brings_the_same_frames_again(source, tmp_path) -> None:
     frames = frames_of(source)
 
     recorder.close()
-    again = Reenactment("a.mcap")
+    again = RecordedFrames("a.mcap")
     with Recording(tmp_path / "a.mcap") as recording:
         found = [frame for message in recording.messages() for frame in again(message)]
     assert [of_one(frame) for frame in found] == [of_one(frame) for frame in frames]

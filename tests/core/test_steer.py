@@ -16,7 +16,7 @@ from kappaskin import (
     Setup,
     load_scene,
 )
-from kappaskin.live import steered
+from kappaskin.live import track_region
 from kappaskin.sources import SimulatedSource
 
 pytestmark = pytest.mark.slow
@@ -48,7 +48,7 @@ class Loop:
         self.clock = Clock()
         self.source = SimulatedSource(scene, self.clock, self.clock.sleep)
         self.pipeline = Pipeline(self.source.sensor, Setup(nx=9, ny=9), clock=self.clock)
-        self.steering = steered(self.source, region)
+        self.steering = track_region(self.source, region)
 
     def run(self, seconds):
         """Frames and their estimates."""
@@ -148,7 +148,7 @@ def test_elements_by_hand_are_scanned_and_off_scans_everything_again():
     loop = Loop(Region("elements", elements=(44, 45, 54, 55), share=0.0, rate=RATE))
     by_hand = loop.run(0.05)
 
-    loop.steering = steered(loop.source, Region())
+    loop.steering = track_region(loop.source, Region())
     off = loop.run(0.05)
 
     assert {tuple(elements(frame)) for frame, _ in by_hand} == {(44, 45, 54, 55)}
@@ -162,7 +162,7 @@ def test_a_region_that_is_not_on_the_skin_is_refused_and_everything_scanned():
     loop.run(0.05)
 
     with pytest.raises(Refusal, match="elements from 0 to 99"):
-        steered(loop.source, Region("elements", elements=(500,)))
+        track_region(loop.source, Region("elements", elements=(500,)))
 
     assert {len(frame.channels) for frame, _ in loop.run(0.05)} == {300}
 

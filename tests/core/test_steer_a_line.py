@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Plate, Refusal, Region, Scanner, load_scene
-from kappaskin.live import STREAMING, steered
+from kappaskin.live import STREAMING, track_region
 from kappaskin.sources import SerialSource, information
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
@@ -78,7 +78,7 @@ def scans(*elements):
 
 
 def test_elements_by_hand_are_scanned_as_fast_as_asked_until_they_are_not(source, device):
-    steered(source, Region("elements", elements=ELEMENTS, share=0.0, rate=900.0))
+    track_region(source, Region("elements", elements=ELEMENTS, share=0.0, rate=900.0))
     read_until(source, scans(*ELEMENTS))
     read_until(source, lambda _: device.rate == 900.0)
     frames = [read_until(source, scans(*ELEMENTS)) for _ in range(50)]
@@ -86,7 +86,7 @@ def test_elements_by_hand_are_scanned_as_fast_as_asked_until_they_are_not(source
     each = took / np.diff([f.sequence for f in frames])  # on a busy machine some are passed over
     assert np.median(each) == pytest.approx(1 / 900, rel=1e-2)
 
-    assert steered(source, Region()) is None
+    assert track_region(source, Region()) is None
 
     read_until(source, scans(*range(100)))
     assert device.rate == 200.0
@@ -94,7 +94,7 @@ def test_elements_by_hand_are_scanned_as_fast_as_asked_until_they_are_not(source
 
 
 def test_the_region_follows_the_contact(source):
-    steering = steered(source, Region("skin", radius=0.015, share=0.0))
+    steering = track_region(source, Region("skin", radius=0.015, share=0.0))
     for x in (0.02, 0.08):
         steering(PointTouch(x, 0.05), None)
         frame = read_until(source, partial(inside, source, x))
@@ -122,20 +122,20 @@ def inside(source, x, frame):
     ],
 )
 def test_a_region_that_no_line_carries_is_refused_and_everything_scanned(source, around, why):
-    steered(source, Region("elements", elements=ELEMENTS))
+    track_region(source, Region("elements", elements=ELEMENTS))
     with pytest.raises(Refusal, match=f"elements or skin, got {around}: .*{why}.*; choose another"):
-        steered(source, Region(around))
+        track_region(source, Region(around))
     read_until(source, scans(*range(100)))
 
 
 def test_a_region_off_the_skin_is_refused_and_everything_scanned(source):
     with pytest.raises(Refusal, match="elements from 0 to 99"):
-        steered(source, Region("elements", elements=(4000,)))
+        track_region(source, Region("elements", elements=(4000,)))
     read_until(source, scans(*range(100)))
 
 
 def test_a_device_that_began_anew_scans_the_region_again(source, device):
-    steered(source, Region("elements", elements=ELEMENTS, share=0.0))
+    track_region(source, Region("elements", elements=ELEMENTS, share=0.0))
     before = read_until(source, lambda f: scans(*ELEMENTS)(f) and f.sequence > 40)
     device.begin_anew()
     # It may be told of the region before it has scanned the whole skin once.
@@ -201,7 +201,7 @@ def test_a_deaf_device_is_told_of_and_goes_on(device, monkeypatch):
     monkeypatch.setattr(PseudoDevice, "_listen", lambda self: None)
     source = SerialSource(device.port)
     read_until(source, lambda _: source.sensor is not None)
-    steering = steered(source, Region("elements", elements=ELEMENTS))
+    steering = track_region(source, Region("elements", elements=ELEMENTS))
     assert steering.refusal == ""
     read_until(source, lambda _: steering.refusal)
     assert "got no reply to them; it goes on scanning what it chooses" in steering.refusal

@@ -28,13 +28,14 @@ from kappaskin import (
 )
 from kappaskin.calibration import Tare, TareStore, calibration_to_toml
 from kappaskin.calibration.calibration import digest, fingerprint, read_calibration
-from kappaskin.live.resume import adopted
+from kappaskin.live.resume import resume_process
 from kappaskin.mechanics import HeightMap, Mesh
-from kappaskin.publish.channels import CHANNELS
-from kappaskin.publish.client import Client
-from kappaskin.recording import Recorder, ReplayedSource, Verdict, repairing, verifying
+from kappaskin.publish.foxglove import FoxgloveClient
+from kappaskin.publish.foxglove_channels import CHANNELS
+from kappaskin.recording import Recorder, ReplayedSource, Verification, repair_steps, verify_steps
 from kappaskin.recording.messages import TOPICS
-from kappaskin.scenes import SECOND_GENERATION_LOOPS, Creep, read_scene
+from kappaskin.scenes import read_scene
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
 from kappaskin.sources import Decoder, SimulatedSource, information
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST
 from kappaskin.sources.wire import (
@@ -97,7 +98,7 @@ _ASKED = (
 def _client(data: bytes, _: Path) -> None:
     """In pieces, as they come; messages are offered meanwhile."""
     ours, theirs = socket.socketpair()
-    client = Client(ours, "somebody")
+    client = FoxgloveClient(ours, "somebody")
     with ours, theirs:
         theirs.setblocking(False)
         for at in range(0, len(data), 4096):
@@ -258,7 +259,7 @@ def _recording(data: bytes, folder: Path) -> None:
     path.write_bytes(data)
     out.unlink(missing_ok=True)
     with suppress(Refusal):
-        list(repairing(path, out))
+        list(repair_steps(path, out))
     for place in (path, out):
         if place.exists():
             with suppress(Refusal):
@@ -271,8 +272,8 @@ def _played(path: Path) -> None:
             with suppress(Refusal):
                 recording.attachment(name)
     with suppress(Refusal):
-        *_, verdict = verifying(path)
-        if not isinstance(verdict, Verdict):
+        *_, verdict = verify_steps(path)
+        if not isinstance(verdict, Verification):
             raise TypeError(f"expected a verdict, got {verdict}")
     with closing(ReplayedSource(path, sleep=lambda seconds: None)) as source:
         for at in (source.length, 0.0):
@@ -334,7 +335,7 @@ def _recorded() -> tuple[bytes, bytes]:
 def _note(data: bytes, folder: Path) -> None:
     """What an engine that was left alone leaves where the next one looks."""
     (folder / "x.note").write_bytes(data)
-    if adopted(folder) is not None:
+    if resume_process(folder) is not None:
         raise RuntimeError("nobody is there")
 
 

@@ -100,7 +100,7 @@ class Opening(QObject):
 
     def begin_with(self, file: Path) -> None:
         """Open `file` in a new window; what needs a sensor once it is known which there is."""
-        if self._session.engine.adopted:
+        if self._session.engine.resumed:
             self.told.emit(f"{file.name} is not opened: the recording that was left goes on")
         elif self._session.status.sensor is None and self._waits(file):
             self._first = file

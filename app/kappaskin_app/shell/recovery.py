@@ -101,7 +101,7 @@ class Recovering(QObject):
         self._running, self._next = Running(folder), 0.0
         window.session.reported.connect(guarded(self._keep))
         # What went on recording by itself was taken over with its settings already.
-        if last is not None and window.session.engine.adopted is None:
+        if last is not None and window.session.engine.resumed is None:
             self.offer(last)
 
     def _keep(self, status: Status) -> None:

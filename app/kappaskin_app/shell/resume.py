@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from kappaskin.errors import Refusal
-from kappaskin.live import Engine, Left, Status
+from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings_text import settings_in, settings_text
@@ -25,19 +25,19 @@ class Entrusting:
             self._engine.entrust(settings_text(settings).encode())
 
 
-def settings_left(left: Left) -> Settings:
+def settings_left(left: ResumeInfo) -> Settings:
     """The settings of the window that is gone; those to begin with where they cannot be read."""
-    setup = left.asked.setup
+    setup = left.requested.setup
     try:
-        settings = settings_in(left.asked.entrusted.decode(errors="replace"))
+        settings = settings_in(left.requested.entrusted.decode(errors="replace"))
     except Refusal:
-        return settings_for(left.asked.source or "")
+        return settings_for(left.requested.source or "")
     return replace(settings, calibration=setup.calibration, tare=setup.tare)
 
 
-def words(left: Left, wanted: str) -> str:
+def words(left: ResumeInfo, wanted: str) -> str:
     """What a person should know of what was `left`, who `wanted` this source."""
-    file, source = Path(left.asked.recording or "").name, left.asked.source
+    file, source = Path(left.requested.recording or "").name, left.requested.source
     told = f"The recording {file}{_of(source)} {left.lasted}."
     if wanted == (source or "sim:"):
         return told

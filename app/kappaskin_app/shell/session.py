@@ -12,7 +12,7 @@ from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region, ScanTradeoff, scan_tradeoff
 from kappaskin.frames import Estimate
-from kappaskin.live import Engine, Left, Status
+from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.scenes import CylinderStep, Presentation, Scene
@@ -102,12 +102,12 @@ class Session(QObject):
         self._sought_at = 0.0
         self._ahead = Ahead()
         self.base: Setup | None = None
-        if engine.adopted is None:
+        if engine.resumed is None:
             self.asked = _setup_of(history.settings)
             engine.set_up(self.asked)
             engine.scan(region_of(history.settings))
         else:
-            self.asked = engine.adopted.asked.setup
+            self.asked = engine.resumed.requested.setup
         self._laid: CylinderStep | None = None
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0
@@ -175,9 +175,9 @@ class Session(QObject):
             self._history.change("Simulated skin", -1, **named(self.source))
             self._play()
 
-    def go_on(self, left: Left) -> None:
+    def go_on(self, left: ResumeInfo) -> None:
         """Go on with what the engine was left with, whose settings are the history's."""
-        self.source, self.running = left.asked.source or "", bool(left.asked.speed)
+        self.source, self.running = left.requested.source or "", bool(left.requested.speed)
         self.source_changed.emit(self.source)
         self.engine.compare(None)
         if self.inside:

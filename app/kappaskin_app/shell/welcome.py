@@ -51,7 +51,7 @@ class Welcome(QObject):
 
     def begin(self) -> None:
         """Offer all where a person wants it, and has not begun with something already."""
-        begun = not self._session.inside or self._session.engine.adopted is not None
+        begun = not self._session.inside or self._session.engine.resumed is not None
         if self._history.settings.show_start and not begun:
             self.offer()
 

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QApplication
 
-from kappaskin.live import Engine, Left, Status
+from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.layouts.keeping import Keeping
 from kappaskin_app.shell.menus import Menus
@@ -41,9 +41,9 @@ class MainWindow(Parts):
         source: str = "sim:",
         engine: Engine | None = None,
     ) -> None:
-        handed = engine.adopted if engine else None
+        handed = engine.resumed if engine else None
         if handed and source == "sim:":  # nothing else was asked for
-            source = handed.asked.source or source
+            source = handed.requested.source or source
         super().__init__(settings_left(handed) if handed else settings_for(source), engine)
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
@@ -81,7 +81,7 @@ class MainWindow(Parts):
         for part in (self.opening, self.layouts):
             part.told.connect(guarded(self.tell))
 
-    def _finish(self, source: str, handed: Left | None, already: bool) -> None:
+    def _finish(self, source: str, handed: ResumeInfo | None, already: bool) -> None:
         self.panels.build()
         self.menus.finish()
         self.layouts.begin()

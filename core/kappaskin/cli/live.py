@@ -8,10 +8,11 @@ from cyclopts import Parameter
 
 from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
 from kappaskin.errors import Refusal
+from kappaskin.publish import TargetStatus
 
 if TYPE_CHECKING:
     from kappaskin.live import Engine, Status
-    from kappaskin.publish import Latency, Published
+    from kappaskin.publish import Latency
 
 _EVERY = 1.0  # s between two lines
 _POLL = 0.05  # s
@@ -92,7 +93,7 @@ def _line(status: "Status") -> str:
     return "  ".join([*parts, status.message])
 
 
-def _words(target: "Published") -> str:
+def _words(target: "TargetStatus") -> str:
     text = f"{target.target}: {target.sent} sent, {target.dropped} dropped"
     if target.target.startswith("foxglove"):
         return f"{text}, {len(target.receivers)} connected"
@@ -124,11 +125,11 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
     json
         Print every message as it came, one a line.
     """
-    from kappaskin.publish import Listener
+    from kappaskin.publish import UdpListener
 
     check_time(seconds, "listen")
     stopped = stops()
-    listener, end = Listener(udp), time.monotonic() + seconds
+    listener, end = UdpListener(udp), time.monotonic() + seconds
     try:
         while not stopped and time.monotonic() < end:
             for message in listener.read(_READ):

@@ -219,10 +219,10 @@ def verify(file: Path) -> int:
     """
     # As the engine does: products are summed in another order by more than one thread.
     from kappaskin._processes import BackgroundProcess
-    from kappaskin.recording import Verdict, verifying
+    from kappaskin.recording import Verification, verify_steps
 
-    with BackgroundProcess[float | Verdict]("verify", verifying, file) as work:
-        verdict = result_of(work.wait(), Verdict)
+    with BackgroundProcess[float | Verification]("verify", verify_steps, file) as work:
+        verdict = result_of(work.wait(), Verification)
     print(f"{file}: {verdict.words}")
     return 0 if verdict.same else FAILED
 
@@ -245,9 +245,9 @@ def repair(file: Path, *, out: Path) -> int:
     out
         The new recording; it must not exist yet.
     """
-    from kappaskin.recording import Repaired, repairing
+    from kappaskin.recording import Repaired, repair_steps
 
-    done = result_of(repairing(file, out), Repaired)
+    done = result_of(repair_steps(file, out), Repaired)
     if not (done.total or done.attachments):
         print(f"{file}: {done.words}")
         return _NOTHING
@@ -290,10 +290,10 @@ def export(
     at
         The time of a single surface, in seconds since the recording began.
     """
-    from kappaskin.recording import Exported, Exporting, Wanted
+    from kappaskin.recording import Exported, ExportRequest, ExportTask
 
     try:
-        with Exporting(Wanted(recording, to, begin, until, every, at)) as exporting:
+        with ExportTask(ExportRequest(recording, to, begin, until, every, at)) as exporting:
             done = result_of(exporting.wait(), Exported)
     except KeyboardInterrupt:
         raise Refusal("stopped before the end; nothing was written") from None

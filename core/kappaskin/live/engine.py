@@ -1,9 +1,8 @@
-"""The live process, away from whatever draws: started, asked, watched and ended from here."""
+"""The engine as the window sees it: started, requested of, followed and ended from here."""
 
 import multiprocessing
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -16,24 +15,18 @@ from kappaskin._processes import process_context
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
 from kappaskin.frames import Array, Estimate, Event
+from kappaskin.live.loop import serve
 from kappaskin.live.requests import (
-    Asked,
-    Compare,
-    Connect,
-    Disconnect,
-    Entrust,
-    Goodbye,
     Note,
-    Publish,
-    Record,
-    Request,
+    Requested,
+    RequestSender,
     Seek,
-    Step,
+    StepFrames,
     TakeTare,
+    Update,
 )
-from kappaskin.live.resume import Left, Orphan, adopted
+from kappaskin.live.resume import ResumedProcess, ResumeInfo, resume_process
 from kappaskin.live.ring import Ring
-from kappaskin.live.serving import serve
 from kappaskin.live.status import LOST, Status
 from kappaskin.pipeline import Setup
 from kappaskin.publish import targets_of
@@ -44,7 +37,7 @@ LONGEST_NOTE = 500
 """Characters of a note."""
 
 _ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
-_PATIENCE = 600.0  # s that a recording goes on without one, where another may come
+_PATIENCE = 600.0  # s that a recording goes on without a window
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
 
 _AGAIN = "the engine process ended unexpectedly and was started again"
@@ -57,81 +50,76 @@ _GIVEN_UP = (
 
 
 class Engine:
-    """The live process, seen from the one that shows; no call here waits for it.
+    """The engine process, seen from the window; no call here waits for it.
 
-    It ends when `close` is called, or within a second when this process is gone. With a folder for
-    `orphans` one that records goes on for `patience` s instead, until another `Engine` with that
-    folder adopts it instead of beginning one: `adopted` tells what it was left with.
+    What is requested here is one value, `Requested`, which the engine gets and follows. It ends
+    when `close` is called, or within a second when this process is gone. With a folder to
+    `resume_from` one that records goes on for `patience` s instead, until another `Engine` with
+    that folder resumes it instead of beginning one: `resumed` tells what it goes on with.
     """
 
     def __init__(
         self,
         setup: Setup | None = None,
-        orphans: Path | None = None,
+        resume_from: Path | None = None,
         patience: float = _PATIENCE,
     ) -> None:
-        self._orphans, self._patience = orphans, patience
-        # For a process that takes over.
-        self._asked = Asked(setup or Setup())
+        self._resume_from, self._patience = resume_from, patience
         self._deaths: list[float] = []
         self._seen = Status()
-        self._process: BaseProcess | Orphan | None = None
-        self._requests: Connection[Request, Any] | None = None
-        self.adopted: Left | None = None
-        orphan = adopted(orphans) if orphans else None
-        if orphan is None:
-            self._ring, self._beside = Ring.create(), Ring.create()
-            self._start(Status(setup=self._asked.setup))
+        self._process: BaseProcess | ResumedProcess | None = None
+        self.resumed: ResumeInfo | None = None
+        process = resume_process(resume_from) if resume_from else None
+        if process is None:
+            self._requests = RequestSender(Requested().changing(setup=setup or Setup()))
+            self._ring, self._compared_ring = Ring.create(), Ring.create()
+            self._start(Status(setup=self._requested.setup))
         else:
-            self._adopt(orphan)
+            self._requests = RequestSender(process.info.requested)
+            self._resume(process)
 
-    def _adopt(self, orphan: Orphan) -> None:
-        self._process, self._requests = orphan, orphan.line
-        self.adopted, self._asked = orphan.left, orphan.left.asked
-        self._ring, self._beside = map(Ring.borrow, orphan.left.rings)
+    @property
+    def _requested(self) -> Requested:
+        return self._requests.requested
+
+    def _resume(self, process: ResumedProcess) -> None:
+        self._process, self.resumed = process, process.info
+        self._ring, self._compared_ring = map(Ring.borrow, process.info.rings)
+        self._requests.connect(process.line, known=process.info.requested.number)
 
     def _start(self, status: Status) -> None:
         self._ring.write_status(status)
-        names = self._ring.name, self._beside.name
+        names = self._ring.name, self._compared_ring.name
         theirs, ours = multiprocessing.Pipe(duplex=False)
-        self._requests = cast("Connection[Request, Request]", ours)
         with process_context() as context:
             self._process = context.Process(
                 target=serve,
-                args=(theirs, names, self._orphans, self._patience),
+                args=(theirs, names, self._resume_from, self._patience),
                 name="kappaskin-engine",
                 daemon=True,
             )
             self._process.start()
         theirs.close()
-        asked = self._asked
-        self._send(asked.setup)
-        self._send(asked.region)
-        if asked.compared is not None:
-            self._send(Compare(asked.compared))
-        if asked.targets:
-            self._send(Publish(asked.targets))
-        if asked.entrusted:
-            self._send(Entrust(asked.entrusted))
+        self._requests.connect(cast("Connection[Update, Any]", ours))
 
     def _start_again(self, *events: Event) -> None:
-        """Let another process take over; it goes on counting, so that no generation comes twice."""
-        self._end()
+        """Start another process; it goes on counting, so that no generation comes twice."""
+        self._reap()
         # One killed while it wrote left no status that can be read.
         was = self._ring.read_status() or self._seen
-        if self.adopted is not None:
+        if self.resumed is not None:
             self._give_memory_back()
-            self._ring, self._beside, self.adopted = Ring.create(), Ring.create(), None
-        setup, source = self._asked.setup, self._asked.source
+            self._ring, self._compared_ring, self.resumed = Ring.create(), Ring.create(), None
+        setup, source = self._requested.setup, self._requested.source
         fresh = Status(setup=setup, generation=was.generation, meetings=was.meetings, tare=was.tare)
         if events and source is not None:
             fresh = replace(fresh, state=LOST, source=source, message=events[-1].text)
         self._start(replace(fresh, events=was.events, happened=was.happened).after(events))
 
     def revive(self) -> None:
-        """Start a process that died anew, with all that was asked for last; `status` says so.
+        """Restart a process that died, with all that is requested; `status` says so.
 
-        To be called now and then. Where a scene was is lost. After the third death within ten
+        To be called now and then. The position in a scene is lost. After the third death within ten
         seconds it stays dead until `connect`, and `status` says why.
         """
         if self._process is None or self.alive or self._given_up:
@@ -142,17 +130,13 @@ class Engine:
             was = self._ring.read_status() or self._seen
             self._ring.write_status(was.after((Event(now, "engine", _GIVEN_UP),)))
             return
-        self._start_again(Event(now, "engine", _AGAIN))
-        asked = self._asked
-        if asked.source is not None:
-            self._send(Connect(asked.source))
-        if asked.recording is not None:
+        requested = self._requested
+        if requested.recording is not None:
             # Beside the one that broke off, which `repair` makes whole.
-            self.record(unused(asked.recording))
-        if asked.scene is not None:
-            self._send(asked.scene)
-        if asked.speed != 1.0:
-            self._send(Seek(None, asked.speed))
+            self._requests.change(recording=unused(requested.recording))
+        self._start_again(Event(now, "engine", _AGAIN))
+        if (requested.speed, requested.looped) != (1.0, False):
+            self._requests.act(Seek(None, requested.speed, requested.looped))
 
     @property
     def _given_up(self) -> bool:
@@ -160,8 +144,8 @@ class Engine:
 
     @property
     def source(self) -> str | None:
-        """The source asked for last, None where there is to be none."""
-        return self._asked.source
+        """The source that is requested, None where there is to be none."""
+        return self._requested.source
 
     @property
     def pid(self) -> int | None:
@@ -171,83 +155,84 @@ class Engine:
     def alive(self) -> bool:
         return self._process is not None and self._process.is_alive()
 
-    def _send(self, request: Request) -> None:
-        self._asked = self._asked.after(request)
-        if self._requests is not None:
-            with suppress(OSError):  # the process died: `status` says so
-                self._requests.send(request)
-
     def connect(self, source: str) -> None:
-        """Take frames from `source` instead of the present one; starts a dead process anew."""
-        if not self.alive:
+        """Take frames from `source` instead of the present one; restarts a dead process."""
+        dead = not self.alive
+        if dead:
             self._deaths = []
+            self._requests.disconnect()
+            self._requests.change(recording=None)
+        self._requests.change(source=source, scene=None, speed=1.0, looped=False)
+        if dead:
             self._start_again()
-        self._send(Connect(source))
 
     def disconnect(self) -> None:
-        self._send(Disconnect())
+        self._requests.change(source=None, scene=None, speed=1.0, looped=False)
 
     def set_up(self, setup: Setup) -> None:
         """Compute with another setup; a refused one leaves the present one, `status` says why."""
-        self._send(setup)
+        self._requests.change(setup=setup)
 
     def compare(self, setup: Setup | None) -> None:
         """Compute with another setup too, of the same frames; None ends that."""
-        self._send(Compare(setup))
+        self._requests.change(compared=setup)
 
     def play(self, scene: Scene) -> None:
         """Let the simulated source, if that is what there is, go on with `scene`."""
-        self._send(scene)
+        self._requests.change(scene=scene)
 
     def seek(self, at: float | None = None, speed: float = 1.0, looped: bool | None = None) -> None:
         """Let a simulated scene or a recording go on from its time `at` in s, or from where it is.
 
-        It goes `speed` times as fast as the device's clock, at most ten times; at zero it stands
-        still, and a scene goes on being read. A recording that is `looped` begins anew at its end.
-        Status tells where it is.
+        It goes `speed` times as fast as the device's clock, at most ten times; at zero it is
+        paused, and a scene goes on being read. A recording that is `looped` begins again at its
+        end. Status tells where it is.
         """
         Playback(at or 0.0, 0.0, speed)  # or refused here
-        self._send(Seek(at, speed, looped))
+        after = self._requested.looped if looped is None else looped
+        self._requests.act(Seek(at, speed, looped), speed=speed, looped=after)
 
     def step(self, frames: int) -> None:
-        """Let a recording stand, so many `frames` further on, or back if negative."""
-        self._send(Step(frames))
+        """Pause a recording, so many `frames` further on, or back if negative."""
+        self._requests.act(StepFrames(frames), speed=0.0)
 
     def scan(self, region: Region) -> None:
         """Let every frame scan `region`; where it cannot, `status` says why."""
-        self._send(region)
+        self._requests.change(region=region)
 
     def publish(self, targets: Sequence[str]) -> None:
         """Send estimates to `targets` from now on, such as udp://127.0.0.1:9870 or foxglove://.
 
-        Those asked for before get no more; `status` tells how each is doing. Raises a `Refusal`
+        Those requested before get no more; `status` tells how each is doing. Raises a `Refusal`
         where one is no target.
         """
-        self._send(Publish(tuple(str(target) for target in targets_of(targets))))
+        self._requests.change(targets=tuple(str(target) for target in targets_of(targets)))
 
     def tare(self) -> None:
         """Take a tare; `status` tells what came of it, and a setup with it uses it."""
-        self._send(TakeTare())
+        self._requests.act(TakeTare())
 
     def record(self, path: Path | None) -> None:
         """Record to `path` from now on, or end that with None; `status` tells what came of it."""
-        self._send(Record(path and path.absolute()))
+        self._requests.change(recording=path and path.absolute())
 
     def entrust(self, data: bytes) -> None:
-        """Let `data` be there for whoever adopts the process."""
-        self._send(Entrust(data))
+        """Keep `data` in the engine for a window that resumes it."""
+        self._requests.change(entrusted=data)
 
     def note(self, text: str) -> None:
-        """Let `text` be among what happened, and recorded with it."""
+        """Add `text` to the events, and record it with them."""
         if len(text) > LONGEST_NOTE:
             raise Refusal(
                 f"expected a note of at most {LONGEST_NOTE} characters, got {len(text)}; write two"
             )
-        self._send(Note(text))
+        self._requests.act(Note(text))
 
     def status(self) -> Status:
         # One that is being written is not there to read: the last is nearer the truth than none.
-        self._seen = self._ring.read_status() or self._seen
+        if (read := self._ring.read_status()) is not None:
+            self._seen = read
+            self._requests.acknowledge(read.requested, read.reported)
         if not self.alive:
             message = _GIVEN_UP if self._given_up else _DIED
             return replace(self._seen, state=LOST, rate=0.0, message=message)
@@ -271,11 +256,11 @@ class Engine:
             return np.empty(0), np.empty((0, 3, 0)), 0
         return self._ring.recent(status.generation, status.slot, after)
 
-    def beside(self, status: Status) -> Estimate | None:
+    def compared(self, status: Status) -> Estimate | None:
         """The newest estimate with the setup that is compared with."""
-        if status.beside is None or status.beside.slot is None:
+        if status.compared is None or status.compared.slot is None:
             return None
-        return self._beside.read(status.beside.generation, status.beside.slot)
+        return self._compared_ring.read(status.compared.generation, status.compared.slot)
 
     def __enter__(self) -> "Engine":
         return self
@@ -283,26 +268,26 @@ class Engine:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _end(self) -> None:
-        self._send(Goodbye())
+    def _reap(self) -> None:
+        """Wait for the process to end, or end it."""
         if self._process is not None:
-            self._process.join(_ORDERLY if self._asked.recording is None else _WRITTEN)
+            self._process.join(_ORDERLY if self._requested.recording is None else _WRITTEN)
             if self._process.is_alive():
                 self._process.kill()
                 self._process.join()
             self._process.close()
-        if self._requests is not None:
-            self._requests.close()
-        self._process, self._requests = None, None
+        self._requests.disconnect()
+        self._process = None
 
     def _give_memory_back(self) -> None:
-        for ring in (self._ring, self._beside):
-            if self.adopted is None:
+        for ring in (self._ring, self._compared_ring):
+            if self.resumed is None:
                 ring.destroy()
             else:
-                ring.close()  # the process that was adopted gives it back
+                ring.close()  # the process that was resumed gives it back
 
     def close(self) -> None:
         """End the process and give the memory back."""
-        self._end()
+        self._requests.say_goodbye()
+        self._reap()
         self._give_memory_back()

@@ -1,42 +1,42 @@
-"""Frames to the health of a sensor's channels, and to fits that do without those not well."""
+"""Health monitor of the engine: faulty channels, which the fits then exclude."""
 
 import numpy as np
 
 from kappaskin.frames import Array, Frame
 from kappaskin.health import Health, HealthMonitor
-from kappaskin.live.pipelines import Side
+from kappaskin.live.pipelines import PipelineHost
 from kappaskin.pipeline import Pipeline
 from kappaskin.scenes import Scene
 from kappaskin.sensing import Sensor
 
 
-class Watching:
-    """Looks after the channels of the sensor it met last; without one there is nothing to see."""
+class LiveHealthMonitor:
+    """Monitors the channels of the sensor that is connected."""
 
     def __init__(self) -> None:
         self._monitor: HealthMonitor | None = None
-        self._spoilt: object = None  # by what, in a simulated scene
+        self._effects: object = None  # of a simulated scene
 
-    def meet(self, sensor: Sensor | None) -> None:
+    def connect(self, sensor: Sensor | None) -> None:
         self._monitor = None if sensor is None else HealthMonitor(sensor)
 
-    def spoil(self, scene: Scene) -> None:
-        """Begin anew where other effects are simulated: they may shift every channel."""
-        spoilt = (scene.effects, scene.choice, scene.seed)
-        if spoilt != self._spoilt and self._monitor is not None:
+    def follow_scene(self, scene: Scene) -> None:
+        """Restart where other effects are simulated: they may shift every channel."""
+        effects = (scene.effects, scene.choice, scene.seed)
+        if effects != self._effects and self._monitor is not None:
             self._monitor.reset()
-        self._spoilt = spoilt
+        self._effects = effects
 
     def __call__(self, frame: Frame) -> bool:
-        """Take in the next frame; whether other channels than before may not be well."""
+        """Take the next frame; whether other channels than before may be faulty."""
         return self._monitor is not None and self._monitor(frame)
 
-    def leave_out(self, side: Side) -> bool:
-        """Let a side fit without those that are not well; whether they are others than before."""
-        return self._monitor is not None and side.leave_out(self._monitor)
+    def exclude(self, host: PipelineHost) -> bool:
+        """Let a pipeline fit without the faulty ones; whether they are others than before."""
+        return self._monitor is not None and host.exclude(self._monitor)
 
     def health(self, pipeline: Pipeline | None, place: Array) -> Health:
-        """What is found, and what it costs a `pipeline`, also at `place` (2,) in m."""
+        """Findings, and what they cost a `pipeline` in accuracy, also at `place` (2,) in m."""
         if self._monitor is None or pipeline is None:
             return Health()
         out, kinds = pipeline.left_out, self._monitor.kinds

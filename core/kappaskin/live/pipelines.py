@@ -1,12 +1,13 @@
-"""Setups that are asked for to pipelines that compute with them, made beside the running one."""
+"""Pipelines of the engine: built in the background, then swapped with the one in use."""
 
+import math
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array
+from kappaskin.frames import Array, Frame
 from kappaskin.health import FaultCodes, HealthMonitor
 from kappaskin.live.ring import Ring, slot_type
 from kappaskin.pipeline import Pipeline, Setup
@@ -14,11 +15,11 @@ from kappaskin.sensing import Sensor
 
 
 @dataclass(frozen=True)
-class Computed:
+class PipelineStatus:
     """What is computed: with a `setup` of this `generation`, estimates that fill a `slot`.
 
-    `refusal` says why the setup is not the one asked for last, `computing` that another is on its
-    way. Without a slot there are no estimates yet.
+    `refusal` says why the setup is not the requested one, `computing` that another is being
+    prepared. Without a slot there are no estimates yet.
     """
 
     setup: Setup = field(default_factory=Setup)
@@ -28,58 +29,57 @@ class Computed:
     computing: bool = False
 
 
-class Side:
-    """Computes with the setup asked for last, as far as a sensor can; one ring of estimates.
+class PipelineHost:
+    """Holds the pipeline of the requested setup, or of as much of it as a sensor allows.
 
-    `left` is what the pipeline in use leaves out: the kinds and badness of its channels.
-
-    `pipeline` is the one in use, None without a sensor; `told` says how it is. Pipelines are made
-    by `builder`, and those that are overtaken meanwhile are dropped.
+    `pipeline` is the one in use, None without a sensor, `status` how it is, and `excluded` the
+    kinds and badness of the channels that it leaves out. Its estimates go to `ring`. Pipelines are
+    built by `builder`, and those that are overtaken meanwhile are dropped.
     """
 
-    def __init__(self, ring: Ring, builder: Executor, told: Computed) -> None:
-        self.ring, self._builder, self.told = ring, builder, told
+    def __init__(self, ring: Ring, builder: Executor, status: PipelineStatus) -> None:
+        self.ring, self._builder, self.status = ring, builder, status
         self.pipeline: Pipeline | None = None
         self._sensor: Sensor | None = None
-        self._asked = told.setup
+        self._requested = status.setup
         self._building: Future[_Built] | None = None
-        self.left: tuple[FaultCodes, Array] | None = None
+        self.excluded: tuple[FaultCodes, Array] | None = None
 
-    def ask(self, setup: Setup) -> None:
-        """Begin to build a pipeline for another setup, beside the running one."""
-        self._asked = setup
+    def request(self, setup: Setup) -> None:
+        """Begin to build a pipeline for another setup, while the present one runs on."""
+        self._requested = setup
         self._build(smaller=False)
 
-    def meet(self, sensor: Sensor | None) -> None:
-        """Begin with another sensor; what the last one showed is not this one's."""
+    def connect(self, sensor: Sensor | None) -> None:
+        """Begin with another sensor; estimates of the last one are no longer shown."""
         self._sensor, self.pipeline = sensor, None
-        self.told = replace(self.told, slot=None)
+        self.status = replace(self.status, slot=None)
         if sensor is not None:
             self._build(smaller=True)
 
-    def forget(self) -> None:
-        """The sensor is gone, and nobody waits for what is built."""
+    def disconnect(self) -> None:
+        """Let go of the sensor, and of what is being built."""
         self._building = self._sensor = self.pipeline = None
-        self.told = replace(self.told, computing=False, slot=None)
+        self.status = replace(self.status, computing=False, slot=None)
 
     def _build(self, smaller: bool) -> None:
         if self._sensor is None:
-            self.told = replace(self.told, setup=self._asked, refusal="")
+            self.status = replace(self.status, setup=self._requested, refusal="")
         elif self._building is None:
-            job = (_built, self._sensor, self._asked, self.told.generation + 1, smaller)
+            job = (_built, self._sensor, self._requested, self.status.generation + 1, smaller)
             self._building = self._builder.submit(*job)
-            self.told = replace(self.told, computing=True)
+            self.status = replace(self.status, computing=True)
 
     def swap(self) -> bool:
-        """Go over to another pipeline, if one is built; whether there was one, or a refusal."""
+        """Use the pipeline that was built, if one was; whether there was one, or a refusal."""
         if self._building is None or not self._building.done():
             return False
         made, self._building = self._building.result(), None
-        self.told = replace(self.told, computing=False)
-        if made.asked != self._asked or made.sensor is not self._sensor:
+        self.status = replace(self.status, computing=False)
+        if made.requested != self._requested or made.sensor is not self._sensor:
             self._build(smaller=self.pipeline is None)  # overtaken while it was built
             return False
-        self.told = replace(self.told, refusal=made.refusal)
+        self.status = replace(self.status, refusal=made.refusal)
         if made.pipeline is not None:
             self._use(made.pipeline)
         return True
@@ -89,50 +89,95 @@ class Side:
         try:
             self.ring.lay_out(pipeline.generation, slot)
         except Refusal as refusal:
-            self.told = replace(self.told, refusal=str(refusal))
+            self.status = replace(self.status, refusal=str(refusal))
             return
         if self.pipeline is not None:
             pipeline.continue_from(self.pipeline)
-        self.pipeline, self.left = pipeline, None
-        self.told = replace(
-            self.told, setup=pipeline.setup, generation=pipeline.generation, slot=slot
+        self.pipeline, self.excluded = pipeline, None
+        self.status = replace(
+            self.status, setup=pipeline.setup, generation=pipeline.generation, slot=slot
         )
 
-    def leave_out(self, monitor: HealthMonitor) -> bool:
-        """Fit without the channels that are not well; whether those are others than before."""
+    def exclude(self, monitor: HealthMonitor) -> bool:
+        """Fit without the faulty channels; whether those are others than before."""
         if self.pipeline is None:
             return False
         was = self.pipeline.left_out
         self.pipeline.leave_out(monitor.kinds, monitor.badness)
         if self.pipeline.left_out is was:
             return False
-        self.left = monitor.kinds.copy(), monitor.badness.copy()
+        self.excluded = monitor.kinds.copy(), monitor.badness.copy()
         return True
 
 
 @dataclass(frozen=True, eq=False)
 class _Built:
-    """What came of building a pipeline: `asked` or a smaller one, or none and why."""
+    """A pipeline as `requested`, or a smaller one, or none and why."""
 
     sensor: Sensor
-    asked: Setup
+    requested: Setup
     pipeline: Pipeline | None
     refusal: str = ""
 
 
-def _built(sensor: Sensor, asked: Setup, generation: int, smaller: bool) -> _Built:
-    """A pipeline as asked, or if it may be `smaller` with the most functions that it can have."""
+def _built(sensor: Sensor, requested: Setup, generation: int, smaller: bool) -> _Built:
+    """A pipeline as requested, or if it may be `smaller` with as many functions as possible."""
     refusal = ""
-    most = max(asked.Ni, asked.Nj)
+    most = max(requested.Ni, requested.Nj)
     for limit in range(most, 0 if smaller else most - 1, -1):
-        setup = replace(asked, Ni=min(asked.Ni, limit), Nj=min(asked.Nj, limit))
+        setup = replace(requested, Ni=min(requested.Ni, limit), Nj=min(requested.Nj, limit))
         try:
-            return _Built(sensor, asked, Pipeline(sensor, setup, generation), refusal)
+            return _Built(sensor, requested, Pipeline(sensor, setup, generation), refusal)
         except Refusal as reason:
             refusal = refusal or str(reason)
         except MemoryError:
             refusal = refusal or (
-                f"{asked.Ni} x {asked.Nj} functions for {sensor.layout} do not fit in memory; "
-                "use fewer"
+                f"{requested.Ni} x {requested.Nj} functions for {sensor.layout} do not fit in "
+                "memory; use fewer"
             )
-    return _Built(sensor, asked, None, refusal)
+    return _Built(sensor, requested, None, refusal)
+
+
+_SHOWN_EVERY = 1 / 60  # s between two frames that are computed
+
+
+class ComparedPipeline:
+    """Computes with a second setup as often as the screen shows it, while one is requested."""
+
+    def __init__(self, ring: Ring, builder: Executor, status: PipelineStatus) -> None:
+        self.host = PipelineHost(ring, builder, status)
+        self._active, self._last = False, -math.inf
+
+    @property
+    def status(self) -> PipelineStatus | None:
+        return self.host.status if self._active else None
+
+    def request(self, setup: Setup | None, sensor: Sensor | None) -> None:
+        """Compute frames of `sensor` with this setup too; None ends that."""
+        self._active = setup is not None
+        if setup is None:
+            self.host.connect(None)
+            return
+        self.host.request(setup)
+        if self.host.pipeline is None:
+            self.host.connect(sensor)
+
+    def connect(self, sensor: Sensor | None) -> None:
+        """Begin with another sensor."""
+        self.host.connect(sensor if self._active else None)
+
+    def pass_over(self, frame: Frame) -> None:
+        """Leave out a frame for which there is no time."""
+        if self.host.pipeline is not None:
+            self.host.pipeline.pass_over(frame)
+
+    def take(self, frame: Frame, paused: bool) -> None:
+        """Compute a frame, if the last one is long ago or the source is `paused` at this one."""
+        pipeline = self.host.pipeline
+        if pipeline is None:
+            return
+        if paused or frame.host_time - self._last >= _SHOWN_EVERY:
+            self._last = frame.host_time
+            self.host.ring.write(pipeline(frame))
+        else:
+            pipeline.pass_over(frame)

@@ -1,4 +1,4 @@
-"""What is live to a recording, while one is asked for."""
+"""Recorder of the engine: what the source brings and the pipeline computes, to a file."""
 
 import time
 from collections.abc import Sequence
@@ -6,30 +6,30 @@ from pathlib import Path
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Event, Frame
-from kappaskin.live.pipelines import Side
-from kappaskin.recording import Recorder, ReplayedSource, Written
+from kappaskin.live.pipelines import PipelineHost
+from kappaskin.recording import Recorder, RecordingStatus, ReplayedSource
 from kappaskin.sources import SimulatedSource, Source
 
 
-class Keeping:
-    """Keeps what a source brings and what one side makes of it; `written` tells how that does.
+class LiveRecorder:
+    """Records what a source brings and what a pipeline computes of it; `status` reports on it.
 
-    Nothing is kept, and no call does anything, until `begin`. Only `close` waits for the disk.
+    No call does anything until `begin`. Only `close` waits for the disk.
     """
 
     def __init__(self) -> None:
         self._recorder: Recorder | None = None
-        self._newest: Recorder | None = None  # that `written` is of, until it has ended
+        self._newest: Recorder | None = None  # that `status` is of, until it has ended
         self._ending: list[Recorder] = []
         self._live = True  # what a recording brings is not recorded again
-        self.written = Written()
+        self.status = RecordingStatus()
 
     @property
     def active(self) -> bool:
         return self._recorder is not None
 
-    def begin(self, path: Path | None, source: Source | None, side: Side) -> None:
-        """Record to `path` from now on, instead of to where it was; nowhere if None."""
+    def begin(self, path: Path | None, source: Source | None, host: PipelineHost) -> None:
+        """Record to `path` from now on, instead of to the file before; to none if None."""
         self.end(source)
         if path is None:
             return
@@ -39,49 +39,49 @@ class Keeping:
                 raise Refusal("expected a live source to record, got a recording; copy its file")
             recorder = self._recorder = self._newest = Recorder(path, time.monotonic())
         except Refusal as refusal:
-            self.written = Written(str(path), trouble=str(refusal))
+            self.status = RecordingStatus(str(path), trouble=str(refusal))
             return
-        self.listen(source)
-        if side.pipeline is not None:
-            recorder.set_up(side.pipeline)
-            recorder.remembered(side.pipeline.state())
-            if side.left is not None:
-                recorder.left_out(*side.left)
+        self.connect(source)
+        if host.pipeline is not None:
+            recorder.set_up(host.pipeline)
+            recorder.remembered(host.pipeline.state())
+            if host.excluded is not None:
+                recorder.left_out(*host.excluded)
 
-    def listen(self, source: Source | None) -> None:
-        """Take down what `source` brings, from now on; nothing of a recording."""
+    def connect(self, source: Source | None) -> None:
+        """Record what `source` brings from now on; nothing of a recording."""
         self._live = not isinstance(source, ReplayedSource)
         if self._recorder is not None and source is not None:
             self._recorder.goes_on(time.monotonic())
             source.record(self._recorder)
-            self.plays(source)
+            self.add_scene(source)
 
-    def plays(self, source: Source) -> None:
+    def add_scene(self, source: Source) -> None:
         """Another scene may be simulated from now on."""
         if self._recorder is not None and isinstance(source, SimulatedSource):
             self._recorder.plays(source.scene)
 
-    def ended(self) -> None:
+    def source_ended(self) -> None:
         """The source brings nothing more."""
         if self._recorder is not None and self._live:
             self._recorder.disconnected(time.monotonic())
 
-    def set_up(self, side: Side) -> None:
+    def set_up(self, host: PipelineHost) -> None:
         """Another pipeline is in use."""
-        if self._recorder is not None and side.pipeline is not None and self._live:
-            self._recorder.set_up(side.pipeline)
+        if self._recorder is not None and host.pipeline is not None and self._live:
+            self._recorder.set_up(host.pipeline)
 
-    def leave_out(self, side: Side) -> None:
+    def exclude(self, host: PipelineHost) -> None:
         """Other channels are left out."""
-        if self._recorder is not None and side.left is not None and self._live:
-            self._recorder.left_out(*side.left)
+        if self._recorder is not None and host.excluded is not None and self._live:
+            self._recorder.left_out(*host.excluded)
 
-    def brought(self, events: Sequence[Event]) -> None:
-        """The source tells what happened."""
+    def add_events(self, events: Sequence[Event]) -> None:
+        """Record events of the source."""
         for event in events if self._live else ():
-            self.happened(event)
+            self.add_event(event)
 
-    def happened(self, event: Event) -> None:
+    def add_event(self, event: Event) -> None:
         if self._recorder is not None:
             self._recorder.happened(event)
 
@@ -98,22 +98,22 @@ class Keeping:
             recorder.end()
             self._ending.append(recorder)
 
-    def look(self, source: Source | None) -> str:
-        """Why it ended by itself, when it did since the last look; `written` is new."""
+    def check(self, source: Source | None) -> str:
+        """Why it ended by itself, if it did since the last check; updates `status`."""
         if self._newest is not None:
-            self.written = self._newest.written
+            self.status = self._newest.written
         # Each holds all that its last frames went through.
         self._ending = [one for one in self._ending if one.written.active]
-        if self.written.active:
+        if self.status.active:
             return ""
         self._newest = None
         if self._recorder is None:
             return ""
         self.end(source)
-        return self.written.trouble
+        return self.status.trouble
 
     def close(self) -> None:
-        """End what is kept, and wait until it is on the disk."""
+        """End every file, and wait until it is on the disk."""
         self.end(None)
         for recorder in self._ending:
             recorder.close()

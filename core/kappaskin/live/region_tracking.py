@@ -1,4 +1,4 @@
-"""A region of interest to a source that scans it: each contact moves what is scanned next."""
+"""Region tracking: each contact moves the region that the source scans next."""
 
 from kappaskin.contact import IntrinsicContact
 from kappaskin.errors import Refusal
@@ -19,7 +19,7 @@ _NOT_ON_A_LINE = {
 }
 
 
-class Steering:
+class SimulatedTracking:
     """Lets `source` scan `region`.
 
     Called with each contact that the skin reports, and the estimator that told its shape.
@@ -44,10 +44,10 @@ class Steering:
             self._scanner.choose(estimator.choose(count, touch.position, self._ahead / 2))
 
 
-class Following:
-    """Lets the device on a line scan `region`, and asks it for another list as a contact moves.
+class SerialTracking:
+    """Lets the device on a line scan `region`, and requests another list as a contact moves.
 
-    Called like `Steering`; `refusal` says why the device does not, once that is known.
+    Called like `SimulatedTracking`; `refusal` says why the device does not, once that is known.
     """
 
     def __init__(self, source: SerialSource, sensor: Sensor, region: Region) -> None:
@@ -64,15 +64,15 @@ class Following:
             self._scanner.follow(touch.position)
 
 
-def steered(source: Source, region: Region) -> Steering | Following | None:
-    """What makes `source` scan `region`; None when that is off and everything is scanned.
+def track_region(source: Source, region: Region) -> SimulatedTracking | SerialTracking | None:
+    """The tracking that lets `source` scan `region`; None where that is off.
 
     Raises a `Refusal` when the source cannot or the region is not on its skin; it then goes on with
     everything.
     """
     if isinstance(source, SimulatedSource):
         source.scan(None)
-        return None if region.around == Region.OFF else Steering(source, region)
+        return None if region.around == Region.OFF else SimulatedTracking(source, region)
     if not isinstance(source, SerialSource) or source.sensor is None:
         return None
     source.scan(None)
@@ -83,4 +83,4 @@ def steered(source: Source, region: Region) -> Steering | Following | None:
             f"expected a region around elements or skin, got {region.around}: "
             f"{_NOT_ON_A_LINE[region.around]}; choose another, or a simulated skin"
         )
-    return Following(source, source.sensor, region)
+    return SerialTracking(source, source.sensor, region)

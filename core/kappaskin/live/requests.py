@@ -1,108 +1,79 @@
-"""What may be asked of the live process."""
+"""Requested state of the engine: what the window requests, and how it reaches the engine.
 
+The window holds one frozen value, `Requested`, and the engine another; each change at the window
+makes the next one and sends what the engine is not known to have. Every value has a number and the
+newest wins, so that a message that is dropped, late or doubled changes nothing in the end.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 from kappaskin.estimation import Region
 from kappaskin.pipeline import Setup
 from kappaskin.scenes import Scene
 
+_RESEND = 0.5  # s after which an engine that reports, but not of what was sent, did not get it
 
-@dataclass(frozen=True)
-class Connect:
-    source: str
-
-
-@dataclass(frozen=True)
-class Disconnect:
-    pass
-
-
-@dataclass(frozen=True)
-class Compare:
-    """Compute with another setup too, beside the one in use; None to end that."""
-
-    setup: Setup | None
+SETTINGS = ("setup", "compared", "region", "targets", "source", "scene", "recording")
+"""The fields of `Requested` that the engine does something about when they change."""
 
 
 @dataclass(frozen=True)
 class Seek:
     """Go on with a scene or recording from its time `at` in s, or from where it is, at a `speed`.
 
-    A recording that is `looped` begins anew at its end; None leaves that as it is.
+    A recording that is `looped` begins again at its end; None leaves that as it is.
     """
 
     at: float | None
     speed: float
     looped: bool | None = None
 
+    def overtakes(self, other: "Action | str") -> bool:
+        """Whether nobody would see what the `other` request does, which came just before."""
+        if not isinstance(other, Seek) or self.at is None:
+            return False
+        return other.looped is None or self.looped is not None
+
 
 @dataclass(frozen=True)
-class Step:
-    """Let a recording stand, so many `frames` further on, or back."""
+class StepFrames:
+    """Pause a recording, so many `frames` further on, or back."""
 
     frames: int
 
 
 @dataclass(frozen=True)
 class TakeTare:
-    """Take a tare from now on, and hold what it finds against the tare of the setup."""
-
-
-@dataclass(frozen=True)
-class Record:
-    """Record to a file at `path` from now on, None to end that."""
-
-    path: Path | None
+    """Take a tare from now on."""
 
 
 @dataclass(frozen=True)
 class Note:
-    """Something that a person wants to be recorded, in words."""
+    """A person's note, to be recorded."""
 
     text: str
 
 
-@dataclass(frozen=True)
-class Publish:
-    """Publish to these targets, and to no others."""
-
-    targets: tuple[str, ...]
+Action = Seek | StepFrames | TakeTare | Note
+"""What is to be done once, as opposed to settings that last."""
 
 
 @dataclass(frozen=True)
-class Entrust:
-    """Keep `data` of whoever asks, for the one that asks after it is gone."""
+class Requested:
+    """All that is requested of the engine; another engine can go on with it.
 
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Goodbye:
-    """End, in order."""
-
-
-Request = (
-    Connect
-    | Disconnect
-    | Setup
-    | Compare
-    | Scene
-    | Seek
-    | Step
-    | Region
-    | TakeTare
-    | Record
-    | Note
-    | Publish
-    | Entrust
-    | Goodbye
-)
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What was asked for last, of everything that lasts; another may go on with it."""
+    The settings that last come first: with a scene or recording it goes on at `speed`, `looped` or
+    not, and `entrusted` is kept for a window that resumes the engine. `actions` are the last ones,
+    each with the `number` that the value had with it; the settings in `changed` were requested with
+    that number. `over` ends the engine.
+    """
 
     setup: Setup = field(default_factory=Setup)
     compared: Setup | None = None
@@ -110,34 +81,121 @@ class Asked:
     targets: tuple[str, ...] = ()
     source: str | None = None
     scene: Scene | None = None
-    speed: float = 1.0
     recording: Path | None = None
+    speed: float = 1.0
+    looped: bool = False
     entrusted: bytes = b""
+    actions: tuple[tuple[int, Action], ...] = ()
+    over: bool = False
+    number: int = 0
+    changed: Mapping[str, int] = field(default_factory=dict[str, int])
 
-    def after(self, request: Request) -> "Asked":
-        """The same once `request` was asked for too."""
-        match request:
-            case Setup():
-                return replace(self, setup=request)
-            case Compare():
-                return replace(self, compared=request.setup)
-            case Region():
-                return replace(self, region=request)
-            case Publish():
-                return replace(self, targets=request.targets)
-            case Connect():
-                return replace(self, source=request.source, scene=None, speed=1.0)
-            case Disconnect():
-                return replace(self, source=None, scene=None, speed=1.0)
-            case Scene():
-                return replace(self, scene=request)
-            case Seek():
-                return replace(self, speed=request.speed)
-            case Step():
-                return replace(self, speed=0.0)
-            case Record():
-                return replace(self, recording=request.path)
-            case Entrust():
-                return replace(self, entrusted=request.data)
-            case TakeTare() | Note() | Goodbye():
-                return self
+    def changing(self, **settings: Any) -> "Requested":
+        """The next value, in which these settings are requested, the same ones as before or not."""
+        number = self.number + 1
+        changed = {**self.changed, **dict.fromkeys(settings, number)}
+        return replace(self, number=number, changed=changed, **settings)
+
+    def doing(self, action: Action, **settings: Any) -> "Requested":
+        """The next value, in which an `action` is requested, and these settings."""
+        actions = (*self.actions, (self.number + 1, action))
+        return self.changing(actions=actions, **settings)
+
+    def without_actions(self, number: int) -> "Requested":
+        """The same without the actions up to `number`."""
+        return replace(self, actions=tuple(each for each in self.actions if each[0] > number))
+
+    def since(self, number: int) -> "list[str | Action]":
+        """The settings, by name, and actions requested after `number`, in order.
+
+        Without positions in a source that were left for another one at once.
+        """
+        settings = [(self.changed.get(name, 0), name) for name in SETTINGS]
+        # A stable sort: of one number the settings go first, the source before its scene.
+        ordered = sorted([*settings, *self.actions], key=lambda each: each[0])
+        found: list[str | Action] = []
+        for at, each in ordered:
+            if at <= number:
+                continue
+            if found and isinstance(each, Seek) and each.overtakes(found[-1]):
+                found.pop()
+            found.append(each)
+        return found
+
+    def update(self, number: int) -> "Update":
+        """What makes this value of any one from `number` on."""
+        changed = {name: at for name, at in self.changed.items() if at > number}
+        values = {name: getattr(self, name) for name in changed}
+        return Update(self.number, number, values, changed)
+
+    def updated(self, update: "Update") -> "Requested":
+        """The value that an `update` brings, or this one where it is as new."""
+        if not update.number > self.number >= update.since:
+            return self
+        changed = {**self.changed, **update.changed}
+        return replace(self, number=update.number, changed=changed, **update.values)
+
+
+@dataclass(frozen=True)
+class Update:
+    """The message to the engine: what of `Requested` has `changed` after the number `since`."""
+
+    number: int
+    since: int
+    values: Mapping[str, Any]
+    changed: Mapping[str, int]
+
+
+class RequestSender:
+    """The window's side: holds what is `requested`, and sends it until the engine has it."""
+
+    def __init__(self, requested: Requested, clock: Callable[[], float] = time.monotonic) -> None:
+        self.requested, self._clock = requested, clock
+        self._line: Connection[Update, Any] | None = None
+        self._known, self._sent = 0, math.inf
+
+    def connect(self, line: "Connection[Update, Any]", known: int = 0) -> None:
+        """Send all of it by `line` to an engine that has the value numbered `known`.
+
+        To another engine than before no action is sent again.
+        """
+        self._line, self._known = line, known
+        self.requested = self.requested.without_actions(self.requested.number)
+        self._send()
+
+    def change(self, **settings: Any) -> None:
+        """Request these settings."""
+        self.requested = self.requested.changing(**settings)
+        self._send()
+
+    def act(self, action: Action, **settings: Any) -> None:
+        """Request an action, and the settings that come with it."""
+        self.requested = self.requested.doing(action, **settings)
+        self._send()
+
+    def acknowledge(self, number: int, reported: float) -> None:
+        """The engine `reported`, at a monotonic time in s, that it has the value of this number."""
+        if number > self._known:
+            self._known = number
+            self.requested = self.requested.without_actions(number)
+        if self._known < self.requested.number and reported > self._sent + _RESEND:
+            self._send()
+
+    def _send(self) -> None:
+        if self._line is None or self._known == self.requested.number:
+            return
+        self._sent = self._clock()
+        with suppress(OSError):  # the process died: `status` says so
+            self._line.send(self.requested.update(self._known))
+
+    def say_goodbye(self) -> None:
+        """End the engine; `requested` stays as it is, for another engine."""
+        if self._line is not None:
+            with suppress(OSError):
+                self._line.send(self.requested.changing(over=True).update(self._known))
+
+    def disconnect(self) -> None:
+        """Let go of the line."""
+        if self._line is not None:
+            self._line.close()
+        self._line = None

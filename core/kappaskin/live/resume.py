@@ -1,7 +1,7 @@
-"""A live process that was left alone, and another process that comes for it.
+"""A recording engine that outlives its window, and the next window that resumes it.
 
-The one left alone listens where a note says, with a key that only this user can read. Nothing is
-unpickled before both sides have shown that they have it.
+The engine that was left alone listens where a note says, with a key that only this user can read.
+Nothing is unpickled before both sides have shown that they have it.
 """
 
 import os
@@ -9,6 +9,7 @@ import platform
 import secrets
 import signal
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -27,7 +28,7 @@ from typing import Any, cast
 
 import platformdirs
 
-from kappaskin.live.requests import Asked, Request
+from kappaskin.live.requests import Action, Requested, Update
 
 _LARGEST = 4096  # bytes of a note
 _QUEUE = 16  # that may wait to be heard
@@ -39,28 +40,28 @@ _FOREIGN = (UnpicklingError, AttributeError, ImportError, IndexError, TypeError)
 
 
 @dataclass(frozen=True)
-class Left:
-    """What a process that was left alone tells whoever comes for it.
+class ResumeInfo:
+    """What an engine that was left alone reports to the window that resumes it.
 
-    What it was `asked` for, the `rings` that it writes to, its `pid`, and for how long in s it has
-    been `alone`.
+    What was `requested` of it, the names of the `rings` that it writes to, its `pid`, and for how
+    long in s it has been `alone`.
     """
 
-    asked: Asked
+    requested: Requested
     rings: tuple[str, str]
     pid: int
     alone: float
 
     @property
     def lasted(self) -> str:
-        """How long it went on, in words."""
+        """How long it went on, as text."""
         minutes, seconds = divmod(round(self.alone), 60)
         lasted = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
         return f"went on for {lasted} after the last window ended"
 
 
-def orphans_folder() -> Path:
-    """Where processes of this user and machine that were left alone leave a note."""
+def resume_folder() -> Path:
+    """Folder where engines of this user and machine that were left alone leave a note."""
     state = platformdirs.user_state_path("kappaskin", appauthor=False)
     return state / "left-alone" / platform.node()
 
@@ -72,16 +73,16 @@ def _address(note: Path) -> str:
     return str(note.with_suffix(".sock"))
 
 
-class Waiting:
-    """Waits until another process comes, and tells it what was `left`; `line` is the one to it.
+class ResumeListener:
+    """Waits until another process connects, and sends it `info`; `line` is the one to it.
 
-    `told` is what it was told. An `OSError` where no note can be left in `folder`.
+    `sent` is what it was sent. An `OSError` where no note can be left in `folder`.
     """
 
-    def __init__(self, folder: Path, left: Callable[[], Left]) -> None:
+    def __init__(self, folder: Path, info: Callable[[], ResumeInfo]) -> None:
         self.line: Connection[Any, Any] | None = None
-        self._left, self._over, key = left, threading.Event(), secrets.token_bytes(_KEY)
-        self.told = left()
+        self._info, self._over, key = info, threading.Event(), secrets.token_bytes(_KEY)
+        self.sent = info()
         folder.mkdir(0o700, parents=True, exist_ok=True)
         self._note = folder / f"{secrets.token_hex(8)}.note"
         self._listener = Listener(_address(self._note), backlog=_QUEUE, authkey=key)
@@ -104,13 +105,13 @@ class Waiting:
             self._note.unlink(missing_ok=True)
             self._listener.close()
         if line is not None:
-            self.told = self._left()
+            self.sent = self._info()
             with suppress(OSError):  # it is gone again: whoever reads from it finds out
-                line.send(self.told)
+                line.send(self.sent)
             self.line = line
 
     def end(self) -> None:
-        """Let nobody come any more."""
+        """Stop listening."""
         self._over.set()
         with suppress(OSError):
             Client(_address(self._note)).close()  # to wake who listens
@@ -125,14 +126,14 @@ def _leave(note: Path, key: bytes) -> None:
     os.replace(part, note)
 
 
-class Orphan:
-    """A live process that another one began, in the care of this one; used as a child is.
+class ResumedProcess:
+    """An engine that another window began, used like a child process of this one.
 
     It lives as long as the `line` to it.
     """
 
-    def __init__(self, line: "Connection[Request, Left]", left: Left) -> None:
-        self.line, self.left, self.pid = line, left, left.pid
+    def __init__(self, line: "Connection[Update, ResumeInfo]", info: ResumeInfo) -> None:
+        self.line, self.info, self.pid = line, info, info.pid
 
     def is_alive(self) -> bool:
         return not self._over(0.0)
@@ -155,7 +156,7 @@ class Orphan:
         self.line.close()
 
 
-def adopted(folder: Path) -> Orphan | None:
+def resume_process(folder: Path) -> ResumedProcess | None:
     """A process that left a note in `folder`, None where there is none.
 
     Notes of those that are gone are taken away.
@@ -164,13 +165,13 @@ def adopted(folder: Path) -> Orphan | None:
     return next((orphan for orphan in found if orphan is not None), None)
 
 
-def _reached(note: Path) -> Orphan | None:
+def _reached(note: Path) -> ResumedProcess | None:
     """The process that left a `note`; None where it is gone, another came first, or it is stuck."""
     try:
         version, key = _read(note)
         if version != metadata.version("kappaskin"):
             return None
-        line = cast("Connection[Request, Left]", Client(_address(note)))
+        line = cast("Connection[Update, ResumeInfo]", Client(_address(note)))
     except (OSError, ValueError):
         with suppress(OSError):
             note.unlink(missing_ok=True)
@@ -181,7 +182,7 @@ def _reached(note: Path) -> Orphan | None:
             answer_challenge(line, key)
             deliver_challenge(line, key)
             if line.poll(_ANSWER):
-                return Orphan(line, line.recv())
+                return ResumedProcess(line, line.recv())
     except (OSError, EOFError, AuthenticationError, *_FOREIGN):
         pass
     line.close()
@@ -193,3 +194,81 @@ def _read(note: Path) -> tuple[str, bytes]:
     with note.open("rb") as file:
         version, key = file.read(_LARGEST).decode().split()
     return version, bytes.fromhex(key)
+
+
+_ALONE = "the window ended unexpectedly while it recorded"
+
+
+class RequestReceiver:
+    """The engine's side: holds what is `requested`, by the `line` to a window, until it is `over`.
+
+    It is over where the window says so. Where the line ends without that, another window may
+    resume the engine that finds a note in `folder`; without a folder, a recording or anybody within
+    `patience` s it is over too. That window gets all that is requested, and the names of the
+    `rings`.
+    """
+
+    def __init__(
+        self,
+        line: "Connection[Update, Update]",
+        rings: tuple[str, str],
+        folder: Path | None,
+        patience: float,
+    ) -> None:
+        self._line: Connection[Update, Update] | None = line
+        self._rings, self._folder, self._patience = rings, folder, patience
+        self.requested, self._since = Requested(), 0.0
+        self._listener: ResumeListener | None = None
+        self.over = False
+
+    @property
+    def resumable(self) -> bool:
+        return self._folder is not None and not self.over
+
+    def receive(self, wait: float) -> list[str | Action]:
+        """Settings, by name, and actions newly requested within `wait` s."""
+        if self._line is None:
+            time.sleep(wait)
+            return []
+        before = self.requested.number
+        try:
+            while not self.over and self._line.poll(wait):
+                self.requested, wait = self.requested.updated(self._line.recv()), 0.0
+                self.over = self.requested.over
+        except (EOFError, OSError):  # the window ended in the middle of a message
+            self._line.close()
+            self._line = None
+        return self.requested.since(before)
+
+    def check(self, recording: bool) -> str:
+        """What became of the window since the last check, as text; empty where nothing did."""
+        if self.over or self._line is not None:
+            return ""
+        if self._listener is None:
+            return self._listen() if recording else self._end()
+        if not recording or time.monotonic() - self._since > self._patience:
+            self._listener.end()
+            if self._listener.line is None:
+                return self._end()
+        if self._listener.line is None:
+            return ""
+        self._line, sent, self._listener = self._listener.line, self._listener.sent, None
+        return f"the recording {sent.lasted}"
+
+    def _listen(self) -> str:
+        self._since = time.monotonic()
+        try:
+            if self._folder is not None:
+                self._listener = ResumeListener(self._folder, self._info)
+                return _ALONE
+        except OSError:  # no place for a note: nobody would ever come
+            pass
+        return self._end()
+
+    def _end(self) -> str:
+        self.over = True
+        return ""
+
+    def _info(self) -> ResumeInfo:
+        alone = time.monotonic() - self._since
+        return ResumeInfo(self.requested, self._rings, os.getpid(), alone)

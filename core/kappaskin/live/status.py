@@ -1,4 +1,4 @@
-"""How the live process is doing, as it tells the one that shows."""
+"""Status of the engine, as it reports it to the window."""
 
 import math
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from kappaskin.calibration import Drift
 from kappaskin.estimation import Region
 from kappaskin.frames import Event
 from kappaskin.health import Health
-from kappaskin.live.pipelines import Computed
-from kappaskin.live.tare_taking import TareNews
+from kappaskin.live.pipelines import PipelineStatus
+from kappaskin.live.tare_taking import TareStatus
 from kappaskin.pipeline import Setup
-from kappaskin.publish import PublishNews, State
-from kappaskin.recording import Replay, Written
+from kappaskin.publish import PublishStatus, SourceState
+from kappaskin.recording import RecordingStatus, Replay
 from kappaskin.scenes import FROM_THE_BEGINNING, Playback
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting
@@ -29,8 +29,8 @@ class Status:
     """How the engine is doing.
 
     `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
-    `message` says why. `setup` is the one in use, `refusal` says why it is not the one asked for
-    last, and `computing` that another is on its way. `region` is scanned unless `region_refusal`
+    `message` says why. `setup` is the one in use, `refusal` says why it is not the one requested
+    last, `computing` that another is being prepared. `region` is scanned unless `region_refusal`
     says why not. `meetings` counts the devices that said what they are, `skipped` the frames that
     came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
     of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
@@ -39,7 +39,8 @@ class Status:
     tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
     tells which channels are not to be trusted, `publishing` where estimates are sent to,
     `recording` what is being written, `replay` where in a recording the source is, None for any
-    other, and `beside` what else is computed of the same frames, None where nothing is.
+    other, and `compared` what else is computed of the same frames, None where nothing is.
+    `requested` is the number of the newest request that the engine has.
     """
 
     state: str = OFF
@@ -64,13 +65,14 @@ class Status:
     events: tuple[Event, ...] = ()
     happened: int = 0
     temperature: float = math.nan
-    tare: TareNews = field(default_factory=TareNews)
+    tare: TareStatus = field(default_factory=TareStatus)
     drift: Drift | None = None
     health: Health = field(default_factory=Health)
-    publishing: PublishNews = field(default_factory=PublishNews)
-    recording: Written = field(default_factory=Written)
+    publishing: PublishStatus = field(default_factory=PublishStatus)
+    recording: RecordingStatus = field(default_factory=RecordingStatus)
     replay: Replay | None = None
-    beside: Computed | None = None
+    compared: PipelineStatus | None = None
+    requested: int = 0
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status once `events` happened."""
@@ -98,16 +100,16 @@ class Status:
 
     @property
     def kind(self) -> str:
-        """Where readings come from, as receivers are told; nothing without a sensor."""
+        """Where readings come from, as receivers read it; empty without a sensor."""
         if self.sensor is None:
             return ""
         if self.replay is not None:
             return "replay"
         return "sim" if self.sensor.simulated else "live"
 
-    def told_since(self, happened: int) -> State:
-        """What receivers are told, with what came after so many had `happened`."""
+    def source_status(self, happened: int) -> SourceState:
+        """What receivers get, with the events after so many had `happened`."""
         fresh = min(self.happened - happened, len(self.events))
         events = self.events[len(self.events) - fresh :]
-        told = self.message, self.sensor, self.rate, self.last_frame
-        return State(self.state, self.kind, *told, events)
+        rest = self.message, self.sensor, self.rate, self.last_frame
+        return SourceState(self.state, self.kind, *rest, events)

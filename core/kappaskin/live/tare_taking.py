@@ -1,4 +1,4 @@
-"""A tare taken while the engine streams: estimates go in, news of it come out."""
+"""Tare of the running engine: taken from the estimates while it streams."""
 
 import time
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from kappaskin.sources import Source
 
 
 @dataclass(frozen=True)
-class TareNews:
+class TareStatus:
     """Whether one is being taken, how many ended, and how the last: with a `tare`, or why not.
 
     A `tare` that was taken is not in use before a setup has it.
@@ -28,22 +28,22 @@ class TareNews:
     refusal: str = ""
 
 
-class TareTaking:
-    """Takes one tare at a time; it is worked out by the `worker`, beside the frames.
+class TareCapture:
+    """Takes one tare at a time, which the `worker` computes in the background.
 
-    `news` goes on from what was told `before`, by an engine that may have died taking one.
+    `status` goes on from the one `before`, of an engine that may have died taking a tare.
     """
 
     def __init__(
         self,
         worker: Executor,
-        before: TareNews,
+        before: TareStatus,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._worker, self._clock = worker, clock
         self._taring: TareMeasurement | None = None
         self._found: Future[Tare] | None = None
-        self.news = before
+        self.status = before
         if before.taking:
             self._end("the engine ended while it was taken; tare again")
 
@@ -53,18 +53,18 @@ class TareTaking:
             self._end("nothing streams: connect a sensor, then tare")
             return
         self._taring, self._found = TareMeasurement(sensor, self._clock()), None
-        self.news = TareNews(True, self.news.ended)
+        self.status = TareStatus(True, self.status.ended)
 
-    def receive(self, estimate: Estimate) -> None:
-        """Take in an estimate, while a tare is being taken."""
+    def take(self, estimate: Estimate) -> None:
+        """Take an estimate, while a tare is being taken."""
         if self._taring is not None and self._found is None:
             try:
                 self._taring.take(estimate.device_time, estimate.host_time, estimate.nominal)
             except Refusal as refusal:
                 self._end(str(refusal))
 
-    def go_on(self, pipeline: Pipeline, source: Source) -> None:
-        """Work it out once there is enough, and tell what came of it."""
+    def update(self, pipeline: Pipeline, source: Source) -> None:
+        """Compute the tare once there are enough estimates; `status` has the result."""
         if self._found is not None and self._found.done():
             try:
                 self._end("", self._found.result())
@@ -79,11 +79,11 @@ class TareTaking:
             lambda: taring.tare(LoadDetector(taring.sensor, edge), rest, now, temperature)
         )
 
-    def give_up(self, why: str) -> None:
+    def cancel(self, why: str) -> None:
         """End the tare that is being taken, if one is."""
         if self._taring is not None:
             self._end(why)
 
     def _end(self, refusal: str, tare: Tare | None = None) -> None:
         self._taring, self._found = None, None
-        self.news = TareNews(False, self.news.ended + 1, tare, refusal)
+        self.status = TareStatus(False, self.status.ended + 1, tare, refusal)

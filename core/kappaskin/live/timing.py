@@ -1,23 +1,73 @@
-"""When frames came, and how evenly."""
+"""Timing of frames: when they came, how evenly, and how many there is time to compute."""
 
 import math
+import time
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
 from kappaskin.frames import Frame
 
-_KEPT = 4096  # frames, and gaps between them
+_ALL = 0.8  # of the time: where estimates of all frames take less, every one is computed
+_SHARE = 0.4  # of it, for estimates where they take more: reading and drawing must not wait
+_SAVED = 0.05  # s of computing that may be saved up for a burst, or be owed
+_AT_ONCE = 0.02  # s of computing between two reads at most
+_SEEN = 1 / 30  # s after which one is computed whatever there is time for: somebody looks on
+_LATEST = 0.1  # weight of the last costs in what one is taken to cost
+_WHILE = 0.5  # s over which it is judged how many come
+
+
+class RateLimit:
+    """Lets every frame be computed where there is time, else the newest, in a share of the time.
+
+    A frame that is not computed costs a hundredth of one that is.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._credit, self._cost, self._rate = _SAVED, 0.0, 0.0
+        self._then, self._seen = clock(), -math.inf
+
+    def affordable(self, waiting: int, within: float = _AT_ONCE) -> int:
+        """How many of so many frames are to be computed now; more than one only `within` so many s.
+
+        The last of those that arrived together is as late as all of them take.
+        """
+        now = self._clock()
+        passed, self._then = now - self._then, now
+        if passed:
+            latest = min(1.0, passed / _WHILE)
+            self._rate += latest * (waiting / passed - self._rate)
+        self._credit = min(_SAVED, self._credit + _SHARE * passed)
+        least = int(now - self._seen >= _SEEN)
+        if not self._cost:
+            return min(waiting, least)
+        allowed = _AT_ONCE if self._rate * self._cost <= _ALL else self._credit
+        soon = max(1, int(within / self._cost))
+        return min(waiting, soon, max(int(allowed / self._cost), least))
+
+    def spend(self, count: int, seconds: float) -> None:
+        """`count` frames were computed in so many s."""
+        if not count:
+            return
+        each = seconds / count
+        self._cost = self._cost + _LATEST * (each - self._cost) if self._cost else each
+        self._credit = max(-_SAVED, self._credit - seconds)
+        self._seen = self._clock()
+
+
+_LAST = 4096  # frames, and gaps between them
 _RATE = 1.0  # s that the rate is of
 _AGAIN = 0.5  # s between two times that the percentile is worked out
 
 
-class Arrivals:
+class ArrivalTimes:
     """Keeps when frames came since the last `clear`; `last` is when the last that was used did."""
 
     def __init__(self) -> None:
-        self._gaps: deque[float] = deque(maxlen=_KEPT)
-        self._times: deque[float] = deque(maxlen=_KEPT)
+        self._gaps: deque[float] = deque(maxlen=_LAST)
+        self._times: deque[float] = deque(maxlen=_LAST)
         self.clear()
 
     def clear(self) -> None:
@@ -27,14 +77,14 @@ class Arrivals:
         self._last, self._gap, self._next = math.inf, math.nan, -math.inf
 
     def read(self, frames: list[Frame]) -> None:
-        """So many have come."""
+        """Frames have arrived."""
         for frame in frames:
             if frame.host_time > self._last:
                 self._gaps.append(frame.host_time - self._last)
             self._last = frame.host_time
 
     def used(self, frame: Frame) -> None:
-        """It has been worked out, or passed over."""
+        """A frame has been computed, or passed over."""
         self._times.append(frame.host_time)
         self.last = frame.host_time
 

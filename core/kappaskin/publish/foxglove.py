@@ -1,26 +1,234 @@
-"""Messages to a WebSocket server that Foxglove, or anything that speaks its protocol, connects to.
+"""Foxglove transport: a WebSocket server for Foxglove and others that speak its protocol.
 
 The protocol is foxglove.websocket.v1, and foxglove.sdk.v1, its name since 2025. The thread that
-computes writes a message straight into the socket of each client that asked for it; what a client
-leaves no room for is dropped. Another thread accepts clients, reads what they say, and draws the
-skin as a cloud of points, when one of them looks at it.
+computes writes a message straight into the socket of each client that request for it; what a client
+leaves no room for is dropped. Another thread accepts clients, reads what they send, and computes
+the skin as a cloud of points, when one of them shows it.
 """
 
+import json
 import selectors
 import socket
+import struct
 import sys
 import threading
 import time
 from contextlib import suppress
-from typing import Any
+from typing import Any, cast
+
+from websockets.exceptions import WebSocketException
+from websockets.frames import Frame, Opcode
+from websockets.http11 import Request
+from websockets.protocol import State
+from websockets.server import ServerProtocol
+from websockets.typing import Subprotocol
 
 from kappaskin.errors import Refusal
-from kappaskin.publish.channels import CONTACT, LOG, POSE, SHAPE, SKIN, STATUS, logged
-from kappaskin.publish.client import Client
-from kappaskin.publish.cloud import Cloud, pose
-from kappaskin.publish.message import Message, State
-from kappaskin.publish.publisher import Receiver
-from kappaskin.publish.target import Target, reason
+from kappaskin.publish.foxglove_channels import (
+    CHANNELS,
+    CONTACT,
+    LOG,
+    POSE,
+    SHAPE,
+    SKIN,
+    STATUS,
+    Channel,
+    Cloud,
+    logged,
+    pose,
+)
+from kappaskin.publish.message import EstimateMessage, SourceState
+from kappaskin.publish.publishing import Receiver, Target, reason
+
+PROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+"""Names of the protocol, which are two of one thing."""
+
+_Answer = dict[str, Any]
+
+_SERVER_INFO: _Answer = {
+    "op": "serverInfo",
+    "name": "kappaskin",
+    "capabilities": [],
+    "sessionId": str(time.time_ns()),  # of this process: one that comes back goes on
+}
+_ADVERTISED = {"op": "advertise", "channels": [channel.advertised for channel in CHANNELS]}
+_BY_NUMBER = {channel.number: channel for channel in CHANNELS}
+
+LARGEST = 65536  # bytes of what a client says
+PER_SECOND = 2**18  # bytes that a client may say in a second: more is no viewer
+_WAITING = 2**18  # bytes in the socket that the client has not taken yet
+_REST = 2**20  # bytes besides, of answers to a client that asks and asks and takes nothing
+_PATIENCE = 5.0  # s for a handshake
+STUCK = 30.0  # s for which a client may take nothing
+_MOMENT = 1e-3  # s that the other thread may have the socket
+_WARNING = 1
+_HEADER = struct.Struct("<BIQ")  # opcode of data, subscription, time in ns
+_DATA = 1
+_MOST_IDS = 2**32
+
+
+class FoxgloveClient:
+    """A connection; `offer` is called by one thread, everything else by another.
+
+    `subscribed` are the channels that it request for, with the numbers it gave them.
+    """
+
+    def __init__(self, made: socket.socket, name: str) -> None:
+        self.socket, self.name = made, name
+        made.setblocking(False)
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING)
+        self._protocol = ServerProtocol(
+            subprotocols=[Subprotocol(name) for name in PROTOCOLS], max_size=LARGEST
+        )
+        self.subscribed: dict[Channel, int] = {}  # replaced whole: two threads read it
+        self.sent = self.dropped = 0
+        self.ended = False
+        self._lock = threading.Lock()  # of the socket, and of what is left to be written
+        self._rest = bytearray()
+        self._last_shut = False
+        now = time.monotonic()
+        self._since = self._moved = now
+        self._second, self._heard = now, 0
+
+    @property
+    def receiver(self) -> Receiver:
+        return Receiver(self.name, self.sent, self.dropped, "too slow" if self._rest else "")
+
+    def offer(self, channel: Channel, when: float, data: bytes) -> None:
+        """Send a message of `when` in s since 1970, if the client leaves room for it now."""
+        number = self.subscribed.get(channel)
+        if number is None:
+            return
+        # The other thread has it for microseconds, unless the system let it sleep meanwhile.
+        if not self._lock.acquire(timeout=_MOMENT):
+            self.dropped += 1
+            return
+        try:
+            self._flush()
+            if self._rest or self._protocol.state is not State.OPEN:
+                self.dropped += 1
+                return
+            head = _HEADER.pack(_DATA, number, round(when * 1e9))
+            self._rest += Frame(Opcode.BINARY, head + data).serialize(mask=False)
+            self._flush()
+            self.sent += 1
+        finally:
+            self._lock.release()
+
+    def _flush(self) -> None:
+        """Write what the socket takes of what is left, without waiting."""
+        if not self._rest or self.ended:
+            return
+        try:
+            taken = self.socket.send(self._rest)
+        except BlockingIOError:
+            return
+        except OSError:
+            self.ended = True
+            return
+        del self._rest[:taken]
+        self._moved = time.monotonic()
+
+    def go_on(self) -> None:
+        """Write what was left, and end what is over: called now and then."""
+        now = time.monotonic()
+        # The lock is taken for who lags behind alone: were this thread put to sleep with it, the
+        # one that computes would drop messages to a client that takes all of them.
+        if self._rest:
+            with self._lock:
+                self._flush()
+        if not self._rest:
+            self._moved = now
+            self.ended = self.ended or self._last_shut
+        stuck = now - self._moved > STUCK or len(self._rest) > _REST
+        if self._protocol.state is State.CONNECTING and now - self._since > _PATIENCE:
+            stuck = True
+        self.ended = self.ended or stuck
+
+    def read(self) -> None:
+        """Take in what came, and answer it."""
+        try:
+            data = self.socket.recv(LARGEST)
+        except BlockingIOError:
+            return
+        except OSError:
+            self.ended = True
+            return
+        if not data or self._floods(len(data)):
+            self.ended = True
+            return
+        with self._lock:
+            self._protocol.receive_data(data)
+            for event in self._protocol.events_received():
+                self._take(event)
+            self._answer()
+
+    def _floods(self, count: int) -> bool:
+        now = time.monotonic()
+        if now - self._second > 1.0:
+            self._second, self._heard = now, 0
+        self._heard += count
+        return self._heard > PER_SECOND
+
+    def _answer(self) -> None:
+        for data in self._protocol.data_to_send():
+            self._rest += data
+            self._last_shut = self._last_shut or not data  # an empty one is the end
+        self._flush()
+
+    def _take(self, event: object) -> None:
+        if isinstance(event, Request):
+            if self._protocol.close_expected():
+                return  # what came right behind it was wrong
+            self._protocol.send_response(self._protocol.accept(event))
+            if self._protocol.state is State.OPEN:
+                self._reply(_SERVER_INFO)
+                self._reply(_ADVERTISED)
+        elif isinstance(event, Frame) and event.opcode in (Opcode.TEXT, Opcode.BINARY):
+            if event.opcode is Opcode.TEXT and event.fin and self._handle(bytes(event.data)):
+                return
+            words = "expected a JSON object with op subscribe or unsubscribe and their lists"
+            self._reply({"op": "status", "level": _WARNING, "message": words})
+
+    def _reply(self, answer: _Answer) -> None:
+        with suppress(WebSocketException):  # it is closing
+            self._protocol.send_text(json.dumps(answer).encode())
+
+    def _handle(self, text: bytes) -> bool:
+        """Do what a message asks for; whether it could be understood."""
+        try:
+            request = cast("_Answer", json.loads(text))
+            if request["op"] == "subscribe":
+                pairs = [
+                    (each["id"], _BY_NUMBER.get(each["channelId"]))
+                    for each in request["subscriptions"]
+                ]
+                self._subscribe(pairs)
+            elif request["op"] == "unsubscribe":
+                gone = set(request["subscriptionIds"])
+                self.subscribed = {c: n for c, n in self.subscribed.items() if n not in gone}
+            else:
+                return False
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return False
+        return True
+
+    def _subscribe(self, pairs: "list[tuple[object, Channel | None]]") -> None:
+        """Add channels, under numbers that fit in a message; those not known are passed over."""
+        fresh = dict(self.subscribed)
+        for number, channel in pairs:
+            if not (isinstance(number, int) and 0 <= number < _MOST_IDS):
+                raise ValueError(number)
+            if channel is not None:
+                fresh[channel] = number
+        self.subscribed = fresh
+
+    def close(self) -> None:
+        with self._lock:
+            self.ended = True
+            self.subscribed = {}
+            self.socket.close()
+
 
 MOST_CLIENTS = 16
 """So many clients at most are served at the same time."""
@@ -72,10 +280,10 @@ class Foxglove:
 
     def __init__(self, server: socket.socket) -> None:
         self._server = server
-        self._clients: tuple[Client, ...] = ()  # replaced whole: two threads read it
+        self._clients: tuple[FoxgloveClient, ...] = ()  # replaced whole: two threads read it
         self._gone = (0, 0)
-        self._latest: Message | None = None
-        self._drawn: Message | None = None
+        self._latest: EstimateMessage | None = None
+        self._drawn: EstimateMessage | None = None
         self._cloud, self._next_cloud = Cloud(), 0.0
         self._ending, self._wake = socket.socketpair()
         self._selector = selectors.DefaultSelector()
@@ -88,7 +296,7 @@ class Foxglove:
 
     @property
     def receivers(self) -> tuple[Receiver, ...]:
-        return tuple(client.told for client in self._clients)
+        return tuple(client.receiver for client in self._clients)
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -97,18 +305,18 @@ class Foxglove:
             sent, dropped = sent + client.sent, dropped + client.dropped
         return sent, dropped
 
-    def send(self, message: Message) -> None:
+    def send(self, message: EstimateMessage) -> None:
         self._latest = message
         for client in self._clients:
-            wanted = client.subscribed
-            if CONTACT in wanted:
+            subscribed = client.subscribed
+            if CONTACT in subscribed:
                 client.offer(CONTACT, message.timestamp, message.contact)
-            if POSE in wanted and message.estimate.touch.present:
+            if POSE in subscribed and message.estimate.touch.present:
                 client.offer(POSE, message.timestamp, pose(message))
-            if SHAPE in wanted and message.mark.with_shape:
+            if SHAPE in subscribed and message.mark.with_shape:
                 client.offer(SHAPE, message.timestamp, message.shape)
 
-    def tell(self, state: State) -> None:
+    def report(self, state: SourceState) -> None:
         now, encoded = time.time(), state.encoded()
         lines: list[tuple[float, bytes]] = []
         for event in state.events:
@@ -159,11 +367,11 @@ class Foxglove:
                 made.close()
                 return
             made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            client = Client(made, f"{address[0]}:{address[1]}")
+            client = FoxgloveClient(made, f"{address[0]}:{address[1]}")
             self._clients = (*self._clients, client)
             self._selector.register(made, selectors.EVENT_READ, client)
 
-    def _drop(self, client: Client) -> None:
+    def _drop(self, client: FoxgloveClient) -> None:
         self._selector.unregister(client.socket)
         client.close()
         sent, dropped = self._gone

@@ -1,21 +1,131 @@
-"""Estimates to every target that was asked for: opened beside the frames, sent between them."""
+"""Publishing: targets such as `udp://HOST:PORT`, opened in the background and sent to."""
 
+import importlib
 import math
+import re
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from typing import Protocol, cast
 
 import numpy as np
 
-from kappaskin.errors import Refusal
+from kappaskin.errors import Refusal, lacking
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import Pipeline
-from kappaskin.publish.message import Mark, Message, State, epoch
-from kappaskin.publish.publisher import Publisher, Receiver
-from kappaskin.publish.target import Target, opened, targets_of
+from kappaskin.publish.message import EstimateMessage, MessageHeader, SourceState, epoch
+
+
+@dataclass(frozen=True)
+class Receiver:
+    """A receiver of messages: how many were `sent` and `dropped`, and why the last of these was."""
+
+    name: str
+    sent: int = 0
+    dropped: int = 0
+    trouble: str = ""
+
+
+class Publisher(Protocol):
+    """Transport of messages to receivers.
+
+    No call waits for a receiver: what one does not take at once is dropped and counted.
+    """
+
+    @property
+    def receivers(self) -> tuple[Receiver, ...]: ...
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Messages sent and dropped, with those of receivers that have gone."""
+        ...
+
+    def send(self, message: EstimateMessage) -> None:
+        """Send what one frame says."""
+        ...
+
+    def report(self, state: SourceState) -> None:
+        """Send how the source is doing; called several times a second."""
+        ...
+
+    def close(self) -> None: ...
+
+
+MOST_TARGETS = 8
+"""So many targets at most are published to at the same time."""
+
+PORTS = {"udp": 9870, "foxglove": 8765}  # PlotJuggler's and Foxglove's own
+_HOSTS = {"udp": "", "foxglove": "127.0.0.1"}
+_FORM = re.compile(
+    r"(\w+)://(?:\[([0-9a-fA-F:.]+(?:%[\w.-]+)?)\]|([\w.-]*))(?::([^:/]*))?/?"  # IPv6, or a name
+)
+_LONGEST = 253  # characters of a name on the internet
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where messages go, and how: by `scheme`."""
+
+    scheme: str
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}://{host}:{self.port}"
+
+
+def target_of(text: str) -> Target:
+    """The target called `text`, refused where it is none."""
+    found = _FORM.fullmatch(text.strip())
+    scheme = found[1].lower() if found else ""
+    if found is None or scheme not in PORTS:
+        raise Refusal(
+            f"expected a target such as udp://127.0.0.1:9870 or foxglove://, got {text[:99]!r}"
+        )
+    host = (found[2] or found[3] or _HOSTS[scheme]).lower()
+    if not host or len(host) > _LONGEST:
+        raise Refusal(
+            f"expected a host in front of the port, such as udp://127.0.0.1:9870, got {text[:99]!r}"
+        )
+    return Target(scheme, host, _port(found[4], PORTS[scheme]))
+
+
+def _port(text: str | None, usual: int) -> int:
+    if text is None:
+        return usual
+    if not re.fullmatch("[0-9]{1,5}", text) or not 0 < int(text) < 65536:
+        raise Refusal(f"expected a port from 1 to 65535, got {text[:20]!r}")
+    return int(text)
+
+
+def targets_of(texts: Sequence[str]) -> tuple[Target, ...]:
+    """The targets with these names, none of them twice."""
+    targets = tuple(map(target_of, texts))
+    for number, target in enumerate(targets):
+        if target in targets[:number]:
+            raise Refusal(f"{target} is given twice; give every target once")
+    if len(targets) > MOST_TARGETS:
+        raise Refusal(f"expected at most {MOST_TARGETS} targets, got {len(targets)}")
+    return targets
+
+
+def reason(error: OSError | UnicodeError) -> str:
+    """The message of a system error, without its number."""
+    return getattr(error, "strerror", None) or str(error)
+
+
+def opened(target: Target) -> Publisher:
+    """The transport to `target`; a `Refusal` where there can be none. This may take a while."""
+    try:  # by name: a transport is imported when somebody asks for it
+        module = importlib.import_module(f"kappaskin.publish.{target.scheme}")
+    except ImportError as error:
+        raise lacking(target.scheme, str(target), error) from error
+    return cast("Publisher", module.opened(target))
+
 
 SHAPES = 0.01
 """Seconds between two messages of kind shape at least: they are long, and change slowly."""
@@ -41,7 +151,7 @@ class Latency:
 
 
 @dataclass(frozen=True)
-class Published:
+class TargetStatus:
     """How a target is doing: `opening`, refused and why, or sent to.
 
     `sent` and `dropped` count with receivers that have gone.
@@ -56,15 +166,15 @@ class Published:
 
 
 @dataclass(frozen=True)
-class PublishNews:
+class PublishStatus:
     """How each target is doing, and how late messages are."""
 
-    targets: tuple[Published, ...] = ()
+    targets: tuple[TargetStatus, ...] = ()
     latency: Latency = field(default_factory=Latency)
 
 
-class _Place:
-    """A target and what sends there, once it is open."""
+class _OpenTarget:
+    """A target and its transport, once that is open."""
 
     def __init__(self, target: Target, how: Opened, clock: Callable[[], float]) -> None:
         self.target, self._clock = target, clock
@@ -76,7 +186,7 @@ class _Place:
             target=_open, args=(self._opening, how, target), name="target-opener", daemon=True
         ).start()
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Take over what was opened, or why it cannot be."""
         if self.publisher is not None or self.refusal:
             return
@@ -91,11 +201,11 @@ class _Place:
                 "its address instead of its name"
             )
 
-    def news(self) -> Published:
+    def status(self) -> TargetStatus:
         name, sender = str(self.target), self.publisher
         if sender is None:
-            return Published(name, not self.refusal, self.refusal)
-        return Published(name, False, "", *sender.counts, sender.receivers)
+            return TargetStatus(name, not self.refusal, self.refusal)
+        return TargetStatus(name, False, "", *sender.counts, sender.receivers)
 
     def close(self) -> None:
         if not self._opening.cancel() and self._opening.exception() is None:
@@ -117,28 +227,30 @@ def _open(opening: "Future[Publisher]", how: Opened, target: Target) -> None:
 
 
 class Publishing:
-    """Publishes to the targets that were asked for last; at first there are none."""
+    """Publishes to the requested targets; at first there are none."""
 
     def __init__(self, how: Opened = opened, clock: Callable[[], float] = time.monotonic) -> None:
         self._how, self._clock = how, clock
-        self._places: list[_Place] = []
+        self._places: list[_OpenTarget] = []
         self._source, self._epoch = "", epoch()
         self._number, self._next_shape = 0, -math.inf
         self._parts: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
-        self._latency, self._next_look = Latency(), -math.inf
+        self._latency, self._next_check = Latency(), -math.inf
 
-    def ask(self, texts: Sequence[str]) -> None:
-        """Publish to these targets; those that are open stay so, what was refused is tried anew."""
-        wanted = targets_of(texts)
-        kept = {p.target: p for p in self._places if p.target in wanted and not p.refusal}
+    def request(self, texts: Sequence[str]) -> None:
+        """Publish to these targets; open ones stay open, refused ones are retried."""
+        targets = targets_of(texts)
+        open_already = {p.target: p for p in self._places if p.target in targets and not p.refusal}
         for place in self._places:
-            if place.target not in kept:
+            if place.target not in open_already:
                 place.close()
         self._places = [
-            kept[target] if target in kept else _Place(target, self._how, self._clock)
-            for target in wanted
+            open_already[target]
+            if target in open_already
+            else _OpenTarget(target, self._how, self._clock)
+            for target in targets
         ]
-        if not wanted:
+        if not targets:
             self._parts.clear()
             self._latency = Latency()
 
@@ -156,31 +268,31 @@ class Publishing:
         with_shape = began >= self._next_shape
         if with_shape:
             self._next_shape = began + SHAPES
-        mark = Mark(self._source, self._epoch, self._number, with_shape)
-        message = Message(estimate, fit, pipeline, mark)
+        mark = MessageHeader(self._source, self._epoch, self._number, with_shape)
+        message = EstimateMessage(estimate, fit, pipeline, mark)
         self._number += 1
         for sender in senders:
             sender.send(message)
         ready = estimate.ready_time
         self._parts.append((began - estimate.host_time, ready - began, self._clock() - ready))
 
-    def tell(self, state: State) -> None:
+    def report(self, state: SourceState) -> None:
         """Say how the source is doing, and see which targets have been opened."""
         self._source, self._epoch = state.source, epoch()
         for place in self._places:
-            place.look()
+            place.check()
             if place.publisher is not None:
-                place.publisher.tell(state)
+                place.publisher.report(state)
 
     @property
-    def news(self) -> PublishNews:
+    def status(self) -> PublishStatus:
         now = self._clock()
-        if self._parts and now >= self._next_look:
-            self._next_look = now + _EVERY
+        if self._parts and now >= self._next_check:
+            self._next_check = now + _EVERY
             parts = np.array(self._parts)
             whole = np.percentile(parts.sum(axis=1), 99)
             self._latency = Latency(float(whole), *np.percentile(parts, 99, axis=0).tolist())
-        return PublishNews(tuple(place.news() for place in self._places), self._latency)
+        return PublishStatus(tuple(place.status() for place in self._places), self._latency)
 
     def close(self) -> None:
-        self.ask(())
+        self.request(())

@@ -33,7 +33,7 @@ _MOST = 4096  # messages in a list
 
 
 @dataclass(frozen=True)
-class Field:
+class MessageField:
     """A field of `kind`; `count` of them, None for one alone and 0 for a list of any length."""
 
     name: str
@@ -51,14 +51,14 @@ class MessageType:
         self.name, self.text, self.parts = name, text.strip() + "\n", parts
         self.fields = tuple(self._parsed())
 
-    def _parsed(self) -> Iterator[Field]:
+    def _parsed(self) -> Iterator[MessageField]:
         for line in self.text.splitlines():
             if line and not line.startswith("#"):
                 found = _FIELD.fullmatch(line)
                 if found is None:
                     raise ValueError(f"{self.name}: expected a field, got {line!r}")
                 kind, several, count, name, _ = found.groups()
-                yield Field(name, kind, int(count or 0) if several else None)
+                yield MessageField(name, kind, int(count or 0) if several else None)
 
     @property
     def short(self) -> str:
@@ -81,7 +81,7 @@ class MessageType:
         return "".join(texts).encode()
 
 
-class Layout:
+class MessageLayout:
     """The bytes of messages of one type whose texts and lengths of lists are always the same.
 
     `fixed` has by the path of a field (such as `header.frame_id`) its text, or the length of its
@@ -176,7 +176,7 @@ def encode(kind: MessageType, values: Mapping[str, Any]) -> bytes:
         for path, value in values.items()
         if not isinstance(value, str) and fixed.get(path) != 0
     }
-    return Layout(kind, fixed)(others)
+    return MessageLayout(kind, fixed)(others)
 
 
 def decode(kind: MessageType, data: bytes) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A file on a disk that may fill: whatever is written to it stands there whole, or not at all."""
+"""Files on a disk that may fill up: a write succeeds whole, or changes nothing."""
 
 import os
 import sys
@@ -11,7 +11,7 @@ from kappaskin.errors import Refusal
 _RESERVE = 2**20  # bytes kept for the end of the file, which a full disk has no room for otherwise
 
 
-class Disk:
+class ReservedFile:
     """The new file `path`, as what the MCAP writer writes to.
 
     Once the disk is full, `trouble` says so; what has been kept in reserve is then used for what is

@@ -1,4 +1,4 @@
-"""The messages of a recording: standard ones of ROS 2 where there are, and our own, with units."""
+"""Message types of a recording: those of ROS 2 where there are, else our own, with units."""
 
 import struct
 from collections.abc import Iterable

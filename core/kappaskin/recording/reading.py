@@ -1,11 +1,20 @@
-"""MCAP files to the messages in them: whole ones, unfinished ones, and none of what is not one."""
+"""MCAP files to the messages in them: whole files, and unfinished ones up to where they break off.
+
+Every size is checked against what is there: no file takes more memory than a few times `LARGEST`.
+"""
 
 import struct
+import zlib
 from collections import Counter
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeVar
 
+import lz4.frame  # pyright: ignore[reportMissingTypeStubs]
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -13,6 +22,7 @@ from mcap.records import (
     Channel,
     Chunk,
     ChunkIndex,
+    Footer,
     Header,
     Metadata,
     MetadataIndex,
@@ -21,26 +31,149 @@ from mcap.records import (
 )
 
 from kappaskin.errors import Damaged, Refusal
+from kappaskin.recording.disk import is_there
 from kappaskin.recording.messages import TOPICS, Topic
-from kappaskin.recording.records import (
-    MAGIC,
-    Record,
-    Spoilt,
-    check_file,
-    parsed,
-    record_at,
-    records_in,
-    summary_of,
-    unpacked,
-)
 from kappaskin.recording.writing import FORMAT
+
+MAGIC = b"\x89MCAP0\r\n"
+LARGEST = 2**26  # bytes of a record, or of what is in a chunk
+_HEAD = struct.Struct("<BQ")
+_FOOTER = _HEAD.size + 20
+_FAULTS = (
+    McapError,
+    ValueError,
+    OverflowError,
+    struct.error,
+    RuntimeError,
+    zstandard.ZstdError,
+    MemoryError,
+)
+
+
+class CorruptRecord(Exception):
+    """A record is cut off, or is not what it says it is."""
+
+
+class McapRecord(NamedTuple):
+    """A record at the byte `at` of a file, whose next record begins at `end`."""
+
+    at: int
+    end: int
+    code: int
+    body: bytes
+
+
+class Bytes(Protocol):
+    """A file, or what is in memory like one."""
+
+    def seek(self, pos: int, /) -> object: ...
+
+    def read(self, n: int = -1, /) -> bytes: ...
+
+
+_Kind = TypeVar("_Kind")
+
+
+def record_at(file: Bytes, at: int, size: int) -> McapRecord:
+    """The record at the byte `at` of a `file` of `size` bytes."""
+    if not 0 <= at <= size:
+        raise CorruptRecord("it is said to begin beyond the end")
+    file.seek(at)
+    head = file.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        raise CorruptRecord("it is cut off")
+    code, length = _HEAD.unpack(head)
+    end = at + _HEAD.size + length
+    if end > size or length > LARGEST:
+        raise CorruptRecord("it is cut off" if end > size else f"it has a record of {length} bytes")
+    return McapRecord(at, end, code, file.read(length))
+
+
+def parsed(kind: type[_Kind], body: bytes) -> _Kind:
+    """The record of a `kind` in `body`."""
+    try:
+        return kind.read(ReadDataStream(BytesIO(body)))  # type: ignore[attr-defined]
+    except _FAULTS as error:
+        why = str(error)[:80] or "it is cut off"
+        raise CorruptRecord(f"a {kind.__name__.lower()} cannot be read ({why})") from error
+
+
+def unpacked(body: bytes) -> bytes:
+    """What is in the chunk of a record's `body`: the bytes of its records, checked."""
+    chunk = parsed(Chunk, body)
+    if chunk.uncompressed_size > LARGEST:
+        raise CorruptRecord(f"a chunk says that it holds {chunk.uncompressed_size} bytes")
+    data = decompressed(chunk.compression, chunk.data)
+    if len(data) != chunk.uncompressed_size or (
+        chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc
+    ):
+        raise CorruptRecord("a chunk is damaged")
+    return data
+
+
+def decompressed(compression: str, data: bytes) -> bytes:
+    """The bytes as far as they are there, at most one more than are allowed."""
+    try:
+        if compression == "zstd":
+            with zstandard.ZstdDecompressor().stream_reader(data) as reader:
+                return reader.read(LARGEST + 1)
+        if compression == "lz4":
+            unpacker: Any = lz4.frame.LZ4FrameDecompressor()
+            return unpacker.decompress(data, LARGEST + 1)
+    except _FAULTS as error:
+        raise CorruptRecord(f"a chunk cannot be decompressed ({error!s:.80})") from error
+    if compression:
+        raise CorruptRecord(
+            f"a chunk is compressed by {compression!r:.20}, which nobody here knows"
+        )
+    return data
+
+
+def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Code and body of the records in a chunk; a `CorruptRecord` at the first that is cut off."""
+    at = 0
+    while at < len(data):
+        if at + _HEAD.size > len(data):
+            raise CorruptRecord("a chunk ends within a record")
+        code, length = _HEAD.unpack_from(data, at)
+        at += _HEAD.size
+        if at + length > len(data):
+            raise CorruptRecord("a chunk ends within a record")
+        yield code, data[at : at + length]
+        at += length
+
+
+def summary_of(file: Bytes, size: int) -> Iterator[McapRecord]:
+    """The records at the end of a `file` of `size` bytes that say what is in it.
+
+    None where it has no such end; a `CorruptRecord` where that is damaged.
+    """
+    end = size - len(MAGIC)
+    file.seek(max(end, 0))
+    if file.read(len(MAGIC)) != MAGIC or end < _FOOTER:
+        return
+    footer = record_at(file, end - _FOOTER, end)
+    at = parsed(Footer, footer.body).summary_start
+    if footer.code != Opcode.FOOTER or at < len(MAGIC):
+        return
+    while at < footer.at:
+        record = record_at(file, at, footer.at)
+        yield record
+        at = record.end
+
+
+def check_file(path: Path) -> None:
+    """Refuse what is there but is no file, as a pipe that nobody writes to: opening it may wait."""
+    if is_there(path) and not path.is_file():
+        raise Refusal(f"{path}: cannot be read; expected a file")
+
 
 _MESSAGE = struct.Struct("<HIQQ")
 _DIGITS = 9  # of a version
 _KINDS = {topic.name: topic.kind.name for topic in TOPICS}
 
 
-class Message(NamedTuple):
+class RecordedMessage(NamedTuple):
     """What one message says: when it was logged in ns since 1970, and its bytes."""
 
     topic: str
@@ -103,7 +236,7 @@ class Recording:
         try:
             record = record_at(self._file, len(MAGIC), self._size)
             self.library = parsed(Header, record.body).library
-        except Spoilt as fault:
+        except CorruptRecord as fault:
             raise Damaged(f"{self.path}: is no recording: {fault}") from fault
 
     def _check_format(self) -> None:
@@ -131,10 +264,10 @@ class Recording:
             for record in list(summary_of(self._file, self._size)):
                 self._take(record)
             return bool(self.chunks)
-        except Spoilt:
+        except CorruptRecord:
             return False
 
-    def _take(self, record: Record) -> None:
+    def _take(self, record: McapRecord) -> None:
         """Take in a record of the end, or one of the body outside of its chunks."""
         self._learn(record.code, record.body)
         if record.code == Opcode.STATISTICS:
@@ -166,7 +299,7 @@ class Recording:
         elif record.code == Opcode.CHUNK:
             self._count(record)
 
-    def _count(self, record: Record) -> None:
+    def _count(self, record: McapRecord) -> None:
         """Take in a chunk of a file that does not say at its end what is in it."""
         chunk, counts = parsed(Chunk, record.body), Counter[str]()
         for message in self._messages_in(unpacked(record.body)):
@@ -200,7 +333,7 @@ class Recording:
                     break
                 self._take(record)
                 at = record.end
-        except Spoilt:
+        except CorruptRecord:
             return
 
     # What is in it.
@@ -213,7 +346,7 @@ class Recording:
     def last(self) -> int:
         return max((chunk.last for chunk in self.chunks), default=0)
 
-    def messages(self, chunk: int = 0) -> Iterator[Message]:
+    def messages(self, chunk: int = 0) -> Iterator[RecordedMessage]:
         """The messages from the chunk of that number on, in the order in which they were written.
 
         A `Refusal` at the first chunk that is damaged.
@@ -221,7 +354,7 @@ class Recording:
         for place in self.chunks[chunk:]:
             yield from self.messages_of(place)
 
-    def messages_on(self, *topics: Topic) -> Iterator[Message]:
+    def messages_on(self, *topics: Topic) -> Iterator[RecordedMessage]:
         """The messages of these topics, without a look at what has none of them."""
         names = {topic.name for topic in topics}
         channels = {n for n, topic in self._topics.items() if topic in names}
@@ -229,7 +362,7 @@ class Recording:
             if not channels.isdisjoint(chunk.channels):
                 yield from (m for m in self.messages_of(chunk) if m.topic in names)
 
-    def last_before(self, topic: Topic, stamp: int) -> Message | None:
+    def last_before(self, topic: Topic, stamp: int) -> RecordedMessage | None:
         """The last message of a topic up to `stamp`."""
         channels = {n for n, name in self._topics.items() if name == topic.name}
         for chunk in reversed(self.chunks):
@@ -243,30 +376,30 @@ class Recording:
                     return found[-1]
         return None
 
-    def messages_of(self, chunk: ChunkAt) -> Iterator[Message]:
+    def messages_of(self, chunk: ChunkAt) -> Iterator[RecordedMessage]:
         """The messages of one chunk."""
         try:
             record = record_at(self._file, chunk.at, self._size)
             if record.code != Opcode.CHUNK:
-                raise Spoilt("its index is wrong")
+                raise CorruptRecord("its index is wrong")
             yield from self._messages_in(unpacked(record.body))
         except OSError as error:
             raise Refusal(
                 f"{self.path}: cannot be read any more ({error.strerror or error}); is it still "
                 "there?"
             ) from error
-        except Spoilt as fault:
+        except CorruptRecord as fault:
             raise Damaged(
                 f"{self.path}: is damaged at byte {chunk.at} ({fault}); `kappaskin repair` saves "
                 "what is whole"
             ) from fault
 
-    def _messages_in(self, data: bytes) -> Iterator[Message]:
+    def _messages_in(self, data: bytes) -> Iterator[RecordedMessage]:
         for code, body in records_in(data):
             if code == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
                 channel, _, stamp, _ = _MESSAGE.unpack_from(body)
                 if topic := self._topics.get(channel):
-                    yield Message(topic, stamp, body[_MESSAGE.size :])
+                    yield RecordedMessage(topic, stamp, body[_MESSAGE.size :])
             else:
                 self._learn(code, body)
 
@@ -280,11 +413,11 @@ class Recording:
         try:
             record = record_at(self._file, self._attached[name], self._size)
             if record.code != Opcode.ATTACHMENT:
-                raise Spoilt("its index is wrong")
+                raise CorruptRecord("its index is wrong")
             return parsed(Attachment, record.body).data
         except KeyError as error:
             raise Refusal(f"{self.path}: has no attachment {name!r:.80}") from error
-        except Spoilt as fault:
+        except CorruptRecord as fault:
             raise Refusal(f"{self.path}: {name!r:.80} in it is damaged ({fault})") from fault
 
     def close(self) -> None:
@@ -297,6 +430,6 @@ class Recording:
         self.close()
 
 
-def _format(said: dict[str, str]) -> int:
-    text = said.get("format", "")
+def _format(metadata: dict[str, str]) -> int:
+    text = metadata.get("format", "")
     return int(text[:_DIGITS]) if text.isascii() and text.isdigit() else FORMAT

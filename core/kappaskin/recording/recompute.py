@@ -1,24 +1,131 @@
-"""The messages of a recording to its estimates: what its frames went through, once more."""
+"""Recorded messages to the frames and estimates that there were, bit for bit."""
 
+import math
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from kappaskin._state import StateArrays
+from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Estimate, Frame
+from kappaskin.frames import Array, Estimate, Frame, Truth
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
-from kappaskin.recording.reading import Message, Recording
-from kappaskin.recording.recorded_frames import Reenactment
-from kappaskin.recording.setup_text import setup_from
+from kappaskin.recording.reading import RecordedMessage, Recording
+from kappaskin.recording.setup_text import setup_from_text
 from kappaskin.sensing import Sensor
+from kappaskin.sources import Accounting, ClockState, Decoder, Interpreter, RecordedClock, wire
+
+_UNREAD = 2**16  # messages kept until the device says what they are of
+_FUNCTIONS = 128  # of a truth along one side, at most
+
+
+class RecordedFrames:
+    """Takes the messages of the recording called `name` as they were written.
+
+    Sensors `made` by another of the same recording are the same ones here.
+    """
+
+    def __init__(self, name: str, made: dict[str, Sensor] | None = None) -> None:
+        self._decoder = Decoder()
+        self._times = RecordedClock()
+        self._means = Interpreter(name, made)
+        self._means.begin(self._times)
+        self._pending: deque[tuple[float, wire.FromDevice]] = deque(maxlen=_UNREAD)
+        self._truth: Truth | None = None
+
+    @property
+    def sensor(self) -> Sensor | None:
+        return self._means.sensor
+
+    @property
+    def trouble(self) -> str:
+        """Why what was recorded cannot be used; empty when it can."""
+        return self._means.unusable
+
+    def accounting(self) -> Accounting:
+        return self._decoder.accounting()
+
+    def begin_with(self, message: RecordedMessage) -> None:
+        """Take it, from the middle of a recording, that a device or clock was last told of so."""
+        if message.topic == m.CLOCKS.name:
+            self._map(decode(m.CLOCK, message.data) | {"since": math.nan})
+        else:
+            self._means.learn(decode(m.STRING, message.data)["data"])
+
+    def __call__(self, message: RecordedMessage) -> Iterator[Frame]:
+        """The frames that came with one message, each of the `sensor` that there is then.
+
+        A `Refusal` when it is none of its topic.
+        """
+        if message.topic == m.LINES.name:
+            host_time, sent, data = m.unpack_line(message.data)
+            if not sent and data:
+                yield from self._came(host_time, data)
+            elif not sent:
+                self._ended()
+        elif message.topic == m.DEVICE.name:
+            self._means.learn(decode(m.STRING, message.data)["data"])
+        elif message.topic == m.CLOCKS.name:
+            self._map(decode(m.CLOCK, message.data))
+        elif message.topic == m.TRUTHS.name:
+            self._truth = _truth(decode(m.TRUTH, message.data), self.sensor)
+
+    def _ended(self) -> None:
+        self._decoder.line_ended()
+        self._decoder.sequence.interrupt()
+        self._pending.clear()
+        self._times, self._truth = RecordedClock(), None
+        self._means.begin(self._times)
+
+    def _map(self, fields: dict[str, Any]) -> None:
+        numbers = (fields[name] for name in ("at", "offset", "half", "drift", "spread"))
+        known = ClockState(
+            (*numbers, bool(fields["doubted"])), int(fields["wraps"]), fields["last"]
+        )
+        if math.isnan(fields["since"]):
+            self._times.restore(known)
+        else:
+            self._times.changes.append((fields["since"], known))
+
+    def _came(self, now: float, data: bytes) -> Iterator[Frame]:
+        messages = self._decoder.feed(data)
+        self._pending += [(now, got) for got in messages if not isinstance(got, wire.Command)]
+        if not self._means.known and not self._introduced():
+            return
+        while self._pending:
+            now, message = self._pending.popleft()
+            if isinstance(message, wire.Information):
+                self._means.learn(message.text)
+            elif isinstance(message, wire.Samples) and (frame := self._means.frame(message, now)):
+                yield replace(frame, truth=self._truth)
+
+    def _introduced(self) -> bool:
+        """Whether the device is known, now that it has been looked for in what came."""
+        for _, message in self._pending:
+            if isinstance(message, wire.Information):
+                self._means.learn(message.text)
+                break
+        return self._means.known
+
+
+def _truth(fields: dict[str, Any], sensor: Sensor | None) -> Truth | None:
+    """The truth of the frames that follow; None where there is none."""
+    shape, coefficients = tuple(fields["shape"].tolist()), fields["coefficients"]
+    if sensor is None or not coefficients.size:
+        return None
+    check_edge(sensor.layout.patch, fields["edge"])
+    if math.prod(shape) != coefficients.size or max(shape) > _FUNCTIONS:
+        raise Refusal(f"expected a truth of shape {shape}, got {coefficients.size} numbers")
+    return Truth(coefficients.reshape(shape), fields["contact"], fields["edge"])
+
 
 _WAITING = 2**14  # frames that wait until one is asked for, at most
 
 
-class Retrace:
+class Recomputation:
     """Takes the messages of a `recording` as they were written, and works out what is asked for.
 
     Frames go through the `pipeline` of their time, whose generation counts those recorded from 0;
@@ -28,7 +135,7 @@ class Retrace:
 
     def __init__(self, recording: Recording, setup: Setup | None = None) -> None:
         self._recording, self._setup = recording, setup
-        self._reenact = Reenactment(str(recording.path))
+        self._frames = RecordedFrames(str(recording.path))
         self.sensor: Sensor | None = None
         self.pipeline: Pipeline | None = None
         self._memory: StateArrays = {}
@@ -36,49 +143,49 @@ class Retrace:
         self._waiting: deque[Frame] = deque()
         self._last: Estimate | None = None
 
-    def __call__(self, message: Message) -> Iterator[Frame]:
+    def __call__(self, message: RecordedMessage) -> Iterator[Frame]:
         """The frames that came with one message; what it says otherwise is done when they are out.
 
         A `Refusal` when it is none of its topic.
         """
-        for frame in self._reenact(message):
-            self._meet()
+        for frame in self._frames(message):
+            self._follow_device()
             if len(self._waiting) == _WAITING:
                 self._pass_over(1)
             self._waiting.append(frame)
             yield frame
-        self._meet()
+        self._follow_device()
         self._take(message)
 
-    def _take(self, message: Message) -> None:
+    def _take(self, message: RecordedMessage) -> None:
         if message.topic == m.DEVICE.name:
             self.sensor = None  # another source, if of the same device: it begins at rest
-            self._meet()
+            self._follow_device()
         elif message.topic == m.LEFT_OUTS.name:
             self._leave_out(decode(m.LEFT_OUT, message.data))
         elif self._setup is not None:
             return
         elif message.topic == m.SETUP.name:
             text = decode(m.STRING, message.data)["data"]
-            self._set_up(setup_from(text, self._recording.attachment))
+            self._set_up(setup_from_text(text, self._recording.attachment))
         elif message.topic == m.MEMORIES.name:
-            said = decode(m.MEMORY, message.data)
-            self._memory[said["name"]] = _shaped(said)
+            fields = decode(m.MEMORY, message.data)
+            self._memory[fields["name"]] = _shaped(fields)
 
-    def _leave_out(self, said: dict[str, Any]) -> None:
+    def _leave_out(self, fields: dict[str, Any]) -> None:
         self._pass_over(len(self._waiting))
         if self.pipeline is None:
             return
-        C, sizes = self.pipeline.sensor.channels, {said["kinds"].size, said["badness"].size}
+        C, sizes = self.pipeline.sensor.channels, {fields["kinds"].size, fields["badness"].size}
         if sizes != {C}:
             raise Refusal(f"expected {C} channels of which some are left out, got {sizes}")
-        self.pipeline.leave_out(said["kinds"], said["badness"])
+        self.pipeline.leave_out(fields["kinds"], fields["badness"])
 
-    def _meet(self) -> None:
+    def _follow_device(self) -> None:
         """Another device, if that is what the next frame is of, has no pipeline yet."""
-        if self._reenact.sensor is self.sensor:
+        if self._frames.sensor is self.sensor:
             return
-        self.sensor, self.pipeline, self._last = self._reenact.sensor, None, None
+        self.sensor, self.pipeline, self._last = self._frames.sensor, None, None
         self._waiting.clear()
         self._memory.clear()
         if self._setup is not None and self.sensor is not None:
@@ -125,8 +232,8 @@ class Retrace:
         return self._last
 
 
-def _shaped(said: dict[str, Any]) -> Array:
+def _shaped(fields: dict[str, Any]) -> Array:
     try:
-        return said["values"].reshape(said["shape"])
+        return fields["values"].reshape(fields["shape"])
     except ValueError as error:
         raise Refusal(f"expected what was remembered in its shape: {error!s:.80}") from error

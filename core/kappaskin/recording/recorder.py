@@ -1,4 +1,4 @@
-"""What the live process reads and finds to a recording, before it goes anywhere else."""
+"""Recorder: bytes, frames, estimates and events of the engine to a recording."""
 
 import math
 from collections.abc import Callable
@@ -11,10 +11,10 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Event, Frame, Truth
 from kappaskin.pipeline import Pipeline
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import Layout, encode
-from kappaskin.recording.disk import Disk
-from kappaskin.recording.setup_text import said_of_setup
-from kappaskin.recording.writing import RecordingFile, Written
+from kappaskin.recording.cdr import MessageLayout, encode
+from kappaskin.recording.disk import ReservedFile
+from kappaskin.recording.setup_text import setup_to_text
+from kappaskin.recording.writing import RecordingFile, RecordingStatus
 from kappaskin.scenes import Scene, write_scene
 from kappaskin.sources import ClockState
 
@@ -34,16 +34,19 @@ class Recorder:
     A `Refusal` where no file can be made. No call waits for the disk.
     """
 
-    def __init__(self, path: Path, now: float, disk: Callable[[Path], Disk] = Disk) -> None:
+    def __init__(
+        self, path: Path, now: float, disk: Callable[[Path], ReservedFile] = ReservedFile
+    ) -> None:
         self._file = RecordingFile(path, disk)
         self._now = now  # host time in s of what came last
-        self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)  # told last, and its layout
+        # The one recorded last, and its layout.
+        self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)
         self._attached: set[str] = set()
         self._views: _Views | None = None
-        self._contacts = _Room(_CONTACTS)
+        self._contacts = _RateLimit(_CONTACTS)
 
     @property
-    def written(self) -> Written:
+    def written(self) -> RecordingStatus:
         return self._file.written
 
     def end(self) -> None:
@@ -55,10 +58,10 @@ class Recorder:
         self._file.close()
 
     def goes_on(self, now: float) -> None:
-        """What is told next belongs to the time `now`: a while may have passed without a source."""
+        """What comes next belongs to the time `now`: a while may have passed without a source."""
         self._now = now
 
-    # What the source tells.
+    # What the source brings.
 
     def connected(self, information: str) -> None:
         self._file.put(m.DEVICE, self._now, encode(m.STRING, {"data": information}))
@@ -77,7 +80,7 @@ class Recorder:
 
     def clock(self, since: float, state: ClockState) -> None:
         at, offset, half, drift, spread, doubted = state.map
-        said = {
+        fields = {
             "since": since,
             "at": at,
             "offset": offset,
@@ -88,39 +91,39 @@ class Recorder:
             "wraps": state.wraps,
             "last": state.last,
         }
-        self._file.put(m.CLOCKS, self._now, encode(m.CLOCK, said))
+        self._file.put(m.CLOCKS, self._now, encode(m.CLOCK, fields))
 
     def simulated(self, frame: Frame) -> None:
-        told, was = frame.truth or _NO_TRUTH, self._truth
-        if told is was or _same(told, was):
+        truth, was = frame.truth or _NO_TRUTH, self._truth
+        if truth is was or _same(truth, was):
             return
-        if (told.edge, told.coefficients.shape) != (was.edge, was.coefficients.shape):
-            self._truths = _truths_like(told)
-        self._truth = told
-        said: dict[str, object] = {
+        if (truth.edge, truth.coefficients.shape) != (was.edge, was.coefficients.shape):
+            self._truths = _truths_like(truth)
+        self._truth = truth
+        fields: dict[str, object] = {
             "sequence": frame.sequence,
-            "shape": told.coefficients.shape,
-            "contact": told.contact,
+            "shape": truth.coefficients.shape,
+            "contact": truth.contact,
         }
-        if told.coefficients.size:
-            said["coefficients"] = told.coefficients.ravel()
-        self._file.put(m.TRUTHS, frame.host_time, self._truths(said))
+        if truth.coefficients.size:
+            fields["coefficients"] = truth.coefficients.ravel()
+        self._file.put(m.TRUTHS, frame.host_time, self._truths(fields))
 
-    # What becomes of it.
+    # What is computed of it.
 
     def plays(self, scene: Scene) -> None:
         """The scene is this from now on."""
         name = f"scene-{len(self._attached)}.toml"
         self._attached.add(name)
         try:
-            told = write_scene(scene)
+            text = write_scene(scene)
         except Refusal as refusal:  # an object from a file of its own, say
-            told = f"# {scene.name}: {refusal}\n"
-        self._file.attach(name, "application/toml", told.encode())
+            text = f"# {scene.name}: {refusal}\n"
+        self._file.attach(name, "application/toml", text.encode())
 
     def set_up(self, pipeline: Pipeline) -> None:
         """Frames go through `pipeline` from now on."""
-        text, files = said_of_setup(pipeline.setup)
+        text, files = setup_to_text(pipeline.setup)
         for name in files.keys() - self._attached:
             self._attached.add(name)
             self._file.attach(name, "application/toml", files[name])
@@ -130,17 +133,17 @@ class Recorder:
     def remembered(self, memory: StateArrays) -> None:
         """The pipeline goes on from this."""
         for name, values in memory.items():
-            said = {"name": name, "shape": values.shape, "values": values.ravel()}
-            self._file.put(m.MEMORIES, self._now, encode(m.MEMORY, said))
+            fields = {"name": name, "shape": values.shape, "values": values.ravel()}
+            self._file.put(m.MEMORIES, self._now, encode(m.MEMORY, fields))
 
     def left_out(self, kinds: "np.ndarray[tuple[int], np.dtype[np.uint8]]", badness: Array) -> None:
         """These channels are left out from now on."""
-        said = {"kinds": kinds, "badness": badness}
-        self._file.put(m.LEFT_OUTS, self._now, encode(m.LEFT_OUT, said))
+        fields = {"kinds": kinds, "badness": badness}
+        self._file.put(m.LEFT_OUTS, self._now, encode(m.LEFT_OUT, fields))
 
     def happened(self, event: Event) -> None:
         stamp = self._file.stamp(event.time)
-        said = {
+        fields = {
             "stamp.sec": stamp // 10**9,
             "stamp.nanosec": stamp % 10**9,
             "level": _INFO,
@@ -150,21 +153,21 @@ class Recorder:
             "function": "",
             "line": 0,
         }
-        self._file.put(m.EVENTS, event.time, encode(m.LOG, said))
+        self._file.put(m.EVENTS, event.time, encode(m.LOG, fields))
 
     def take(self, frame: Frame, estimate: Estimate) -> None:
-        """Take down what a frame came to, as often as there is room for it."""
+        """Record the estimate of a frame, as often as the rate allows."""
         views, time = self._views, estimate.host_time
         if views is None or not (self._contacts(time) or views.every):
             return
         self._file.put(m.CONTACTS, time, _contact(estimate, self._file.stamp(time)))
-        if views.room(time):
+        if views.affordable(time):
             for topic, data in views.heavy(frame, estimate, self._file.stamp(time)):
                 self._file.put(topic, time, data)
 
 
-def _truths_like(truth: Truth) -> Layout:
-    return Layout(m.TRUTH, {"edge": truth.edge, "coefficients": truth.coefficients.size})
+def _truths_like(truth: Truth) -> MessageLayout:
+    return MessageLayout(m.TRUTH, {"edge": truth.edge, "coefficients": truth.coefficients.size})
 
 
 def _same(a: Truth, b: Truth) -> bool:
@@ -175,8 +178,8 @@ def _same(a: Truth, b: Truth) -> bool:
     return shapes[0] == shapes[1] and a.coefficients.tobytes() == b.coefficients.tobytes()
 
 
-class _Room:
-    """Says of each time whether there is room for something that is wanted at a `rate` at most."""
+class _RateLimit:
+    """Whether something may be recorded at a time: at a `rate` at most, but for short bursts."""
 
     def __init__(self, rate: float) -> None:
         self._period, self._next = 1 / rate, -math.inf
@@ -197,12 +200,12 @@ class _Views:
         self._displacement = pipeline.basis.at(layout.positions)
         P, C, N = len(layout), pipeline.sensor.channels, pipeline.basis.shape
         head: dict[str, str | int] = {"header.frame_id": m.FRAME}
-        self._pose = Layout(m.POSE, head)
-        self._curvature = Layout(m.CURVATURE, head | {"curvature": 3 * P, "suspect": P})
-        self._shape = Layout(m.COEFFICIENTS, head | {"coefficients": math.prod(N)})
+        self._pose = MessageLayout(m.POSE, head)
+        self._curvature = MessageLayout(m.CURVATURE, head | {"curvature": 3 * P, "suspect": P})
+        self._shape = MessageLayout(m.COEFFICIENTS, head | {"coefficients": math.prod(N)})
         self._functions = N
-        self._scanned = 0  # channels in the frame told last
-        self._counts = Layout(m.COUNTS, head | {"channels": 0, "counts": 0})
+        self._scanned = 0  # channels in the frame recorded last
+        self._counts = MessageLayout(m.COUNTS, head | {"channels": 0, "counts": 0})
         step = 4 * len(_COLUMNS)
         cloud = head | {"fields": len(_COLUMNS), "data": P * step}
         for n, name in enumerate(_COLUMNS):
@@ -210,13 +213,13 @@ class _Views:
             cloud[f"fields.{n}.offset"] = 4 * n
             cloud[f"fields.{n}.datatype"] = _FLOAT32
             cloud[f"fields.{n}.count"] = 1
-        self._cloud = Layout(m.POINT_CLOUD, cloud)
+        self._cloud = MessageLayout(m.POINT_CLOUD, cloud)
         self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
         fit = pipeline.fit
         self.every = isinstance(fit, Stateful) and not fit.remembers
-        """Whether estimates depend on which others were made, and so all have to be told."""
+        """Whether estimates depend on which others were made, and so all have to be recorded."""
         bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
-        self.room = _Room(min(_HEAVY, _BYTES / bytes_each))
+        self.affordable = _RateLimit(min(_HEAVY, _BYTES / bytes_each))
 
     def heavy(self, frame: Frame, estimate: Estimate, stamp: int) -> list[tuple[m.Topic, bytes]]:
         """What is as large as a frame."""
@@ -229,7 +232,7 @@ class _Views:
         C = len(frame.counts)
         if self._scanned != C:
             fixed = {"header.frame_id": m.FRAME, "channels": C, "counts": C}
-            self._scanned, self._counts = C, Layout(m.COUNTS, fixed)
+            self._scanned, self._counts = C, MessageLayout(m.COUNTS, fixed)
         counts = {**head, "channels": frame.channels, "counts": frame.counts} if C else head
         readings = {"curvature": curvature, "noise": estimate.noise, "suspect": estimate.suspect}
         shape = {"shape": self._functions, "coefficients": estimate.coefficients.ravel()}
@@ -285,9 +288,9 @@ def _stamped(stamp: int) -> dict[str, int]:
 def _pose(estimate: Estimate) -> dict[str, float]:
     """The contact as a pose: its x along the skin's, its z along the outward normal."""
     where, axes = estimate.geometry.position.tolist(), estimate.geometry.frame.T.tolist()
-    said = {f"pose.position.{name}": value for name, value in zip("xyz", where, strict=True)}
+    fields = {f"pose.position.{name}": value for name, value in zip("xyz", where, strict=True)}
     turn = _quaternion(axes)
-    return said | {f"pose.orientation.{n}": q for n, q in zip("xyzw", turn, strict=True)}
+    return fields | {f"pose.orientation.{n}": q for n, q in zip("xyzw", turn, strict=True)}
 
 
 def _quaternion(R: list[list[float]]) -> tuple[float, float, float, float]:

@@ -12,14 +12,15 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
+from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
-from kappaskin.recording.disk import Disk, is_there
+from kappaskin.recording.disk import ReservedFile, is_there, is_written
 from kappaskin.recording.messages import TOPICS
-from kappaskin.recording.records import (
+from kappaskin.recording.reading import (
     LARGEST,
     MAGIC,
-    Record,
-    Spoilt,
+    CorruptRecord,
+    McapRecord,
     check_file,
     decompressed,
     parsed,
@@ -66,7 +67,7 @@ class Repaired:
         return f"{self.total:,} messages and {self.attachments} attachments; {lost}"
 
 
-def repairing(path: Path, out: Path) -> Generator[float | Repaired]:
+def repair_steps(path: Path, out: Path) -> Generator[float | Repaired]:
     """Save every whole message of `path` to `out`, with summary and index.
 
     Now and then the share that is done, and what was saved at the end. Nothing is written where
@@ -105,7 +106,7 @@ class _Repair:
         self._ended = False
 
     def run(self) -> Generator[float, None, Repaired]:
-        disk, next_report = Disk(part_of(self._out)), 0.0
+        disk, next_report = ReservedFile(part_of(self._out)), 0.0
         try:
             self._writer = Writer(disk.stream, _CHUNK, CompressionType.LZ4)
             self._begin()
@@ -132,7 +133,7 @@ class _Repair:
             try:
                 header = parsed(Header, record_at(self._data, len(MAGIC), self._size).body)
                 profile, library = header.profile, header.library
-            except Spoilt:
+            except CorruptRecord:
                 pass
         elif (found := self._next_chunk(0)) < self._size:
             self._at = self._lost = found
@@ -154,7 +155,7 @@ class _Repair:
             for record in summary_of(self._data, self._size):
                 if record.code in (Opcode.SCHEMA, Opcode.CHANNEL):
                     self._take(record.code, record.body)
-        except Spoilt:
+        except CorruptRecord:
             return
 
     def _through(self) -> Iterator[int]:
@@ -166,7 +167,7 @@ class _Repair:
                     self._save(record)
                     self._at = record.end
                     continue
-                except Spoilt:
+                except CorruptRecord:
                     if self._record(record.end) is not None:
                         self._go_on(record.end)
                         continue
@@ -178,11 +179,11 @@ class _Repair:
         self._lost += at - self._at
         self._at = at
 
-    def _record(self, at: int) -> Record | None:
+    def _record(self, at: int) -> McapRecord | None:
         """The record that begins at `at`, if one does."""
         try:
             record = record_at(self._data, at, self._size)
-        except Spoilt:
+        except CorruptRecord:
             return None
         return record if record.code in _KNOWN or record.code >= _PRIVATE else None
 
@@ -199,12 +200,12 @@ class _Repair:
                 if record.code == Opcode.CHUNK:
                     unpacked(record.body)
                     return at
-            except Spoilt:
+            except CorruptRecord:
                 pass
             at += 1
         return self._size
 
-    def _save(self, record: Record) -> None:
+    def _save(self, record: McapRecord) -> None:
         if record.code == Opcode.CHUNK:
             for code, body in records_in(unpacked(record.body)):
                 self._take(code, body)
@@ -229,7 +230,7 @@ class _Repair:
         try:
             for code, record in records_in(decompressed(name[4:].decode(), packed)):
                 self._take(code, record)
-        except Spoilt:
+        except CorruptRecord:
             return
 
     def _take(self, code: int, body: bytes) -> None:
@@ -242,7 +243,7 @@ class _Repair:
             self._channels[channel.id] = channel
         elif code == Opcode.MESSAGE:
             if len(body) < _MESSAGE.size:
-                raise Spoilt("a message is too short")
+                raise CorruptRecord("a message is too short")
             channel, sequence, logged, published = _MESSAGE.unpack_from(body)
             if (to := self._channel(channel)) is not None:
                 data = body[_MESSAGE.size :]
@@ -269,9 +270,37 @@ class _Repair:
 
     def _attach(self, body: bytes) -> None:
         if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
-            raise Spoilt("an attachment is damaged")
+            raise CorruptRecord("an attachment is damaged")
         found = parsed(Attachment, body)
         self._writer.add_attachment(
             found.create_time, found.log_time, found.name, found.media_type, found.data
         )
         self._attached += 1
+
+
+class RepairTask:
+    """Saves what is whole of the file `path` to the new file `out`; no call waits.
+
+    A `Refusal` where `out` is there. It ends when it is done, when `close` is called, which leaves
+    nothing of what is not whole, or when the process that started it is gone.
+    """
+
+    def __init__(self, path: Path, out: Path) -> None:
+        check_new(out)
+        self._part = part_of(out)
+        self._task = BackgroundProcess[float | Repaired](
+            "kappaskin-repair", repair_steps, path, out
+        )
+
+    def poll(self) -> list[float | Repaired]:
+        """The shares that are done since the last call, and in the end what was saved.
+
+        A `Refusal` where nothing could be.
+        """
+        return self._task.poll()
+
+    def close(self) -> None:
+        """End it, done or not."""
+        self._task.close()
+        if not is_written(self._part):  # by another that began it meanwhile
+            self._part.unlink(missing_ok=True)

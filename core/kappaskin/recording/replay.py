@@ -1,4 +1,4 @@
-"""A recording, played as if it were live: as fast as it was, faster, slower, or frame by frame."""
+"""Replay source: a recording played back at any speed, or frame by frame."""
 
 import time
 from collections import deque
@@ -13,8 +13,8 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Event, Frame
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
-from kappaskin.recording.reading import Message, Recording
-from kappaskin.recording.recorded_frames import Reenactment
+from kappaskin.recording.reading import RecordedMessage, Recording
+from kappaskin.recording.recompute import RecordedFrames
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting, InputRecorder, register_scheme
 
@@ -27,7 +27,7 @@ _MOST = 512  # frames given at once
 _BACK = 0.25  # s that are looked through at first for frames to step back over
 _GAP = 0.5  # s without a message that is a gap
 _BRIEF = 0.1  # s of messages between two of them that leave it one
-_TOLD = 500  # gaps, and events, that are told of at most: each status brings them
+_MOST_LISTED = 500  # gaps, and events, that are listed at most: each status brings them
 _LONGEST = 200  # characters of an event
 
 
@@ -106,13 +106,13 @@ class ReplayedSource:
                 gaps.append((gaps.pop()[0] if brief else begin, end))
         events: list[Event] = []
         with suppress(Refusal):  # damage is told of where it is played
-            for message in islice(self._recording.messages_on(m.EVENTS), _TOLD):
+            for message in islice(self._recording.messages_on(m.EVENTS), _MOST_LISTED):
                 events.append(self._event(message, self._place(message.stamp)))
-        return tuple(gaps[:_TOLD]), tuple(events)
+        return tuple(gaps[:_MOST_LISTED]), tuple(events)
 
-    def _event(self, message: Message, when: float) -> Event:
-        said = decode(m.LOG, message.data)
-        return Event(when, said["name"][:_LONGEST], said["msg"][:_LONGEST])
+    def _event(self, message: RecordedMessage, when: float) -> Event:
+        fields = decode(m.LOG, message.data)
+        return Event(when, fields["name"][:_LONGEST], fields["msg"][:_LONGEST])
 
     def _place(self, stamp: int) -> float:
         """Where a stamp is, in s from the beginning."""
@@ -123,8 +123,8 @@ class ReplayedSource:
     @property
     def replay(self) -> Replay:
         where = min(max(self._at(), 0.0), self.length)
-        told = self._speed, self._looped, self._gaps, self._happened
-        return Replay(where, self.length, *told, self._first * 1e-9, self._recording.whole)
+        rest = self._speed, self._looped, self._gaps, self._happened
+        return Replay(where, self.length, *rest, self._first * 1e-9, self._recording.whole)
 
     def _at(self) -> float:
         return self._from + (self._clock() - self._since) * self._speed
@@ -132,7 +132,7 @@ class ReplayedSource:
     def _go_to(self, at: float) -> None:
         """Go on from `at` s."""
         self._from, self._since = at, self._clock()
-        self._reenact = Reenactment(str(self._recording.path), self._made)
+        self._frames = RecordedFrames(str(self._recording.path), self._made)
         self._ready: deque[_Ready] = deque()
         stamp = self._first + round(at * 1e9)
         # From the chunk before, so that no message is begun in its middle.
@@ -140,9 +140,9 @@ class ReplayedSource:
         later = next((n for n, chunk in enumerate(chunks) if chunk.last >= stamp), len(chunks))
         for topic in (m.DEVICE, m.CLOCKS):
             if message := self._recording.last_before(topic, stamp):
-                self._reenact.begin_with(message)
-        self._messages: Iterator[Message] = self._recording.messages(max(later - 1, 0))
-        self._next: Message | None = next(self._messages, None)
+                self._frames.begin_with(message)
+        self._messages: Iterator[RecordedMessage] = self._recording.messages(max(later - 1, 0))
+        self._next: RecordedMessage | None = next(self._messages, None)
         while self._next is not None and self._next.stamp < stamp:
             self._take(self._next)
         self._ready.clear()
@@ -207,10 +207,10 @@ class ReplayedSource:
 
     # What comes.
 
-    def _take(self, message: Message) -> None:
+    def _take(self, message: RecordedMessage) -> None:
         """Let one message be the last that came."""
-        for n, frame in enumerate(self._reenact(message)):
-            self._ready.append(_Ready((message.stamp, n), frame, self._reenact.sensor))
+        for n, frame in enumerate(self._frames(message)):
+            self._ready.append(_Ready((message.stamp, n), frame, self._frames.sensor))
         self._next = next(self._messages, None)
 
     def _fill(self, until: float = float("inf")) -> bool:
@@ -218,11 +218,11 @@ class ReplayedSource:
         while not self._ready and self._next is not None:
             if self._place(self._next.stamp) > until:
                 break
-            self._tell(self._next)
+            self._add_event(self._next)
             self._take(self._next)
         return bool(self._ready) and self._place(self._ready[0].mark[0]) <= until
 
-    def _tell(self, message: Message) -> None:
+    def _add_event(self, message: RecordedMessage) -> None:
         if message.topic == m.EVENTS.name:
             self._events.append(self._event(message, self._clock()))
 
@@ -271,11 +271,11 @@ class ReplayedSource:
 
     @property
     def sensor(self) -> Sensor | None:
-        return self._sensor or self._reenact.sensor
+        return self._sensor or self._frames.sensor
 
     @property
     def trouble(self) -> str:
-        return self._reenact.trouble
+        return self._frames.trouble
 
     @property
     def temperature(self) -> float:
@@ -284,14 +284,14 @@ class ReplayedSource:
 
     def events(self) -> list[Event]:
         """What happened, as it is played."""
-        told, self._events = self._events, []
-        return told
+        events, self._events = self._events, []
+        return events
 
     def record(self, recorder: InputRecorder | None) -> None:
         """Not recorded again: it is a recording."""
 
     def accounting(self) -> Accounting:
-        return self._reenact.accounting()
+        return self._frames.accounting()
 
     def close(self) -> None:
         self._recording.close()

@@ -26,20 +26,20 @@ _LONGEST = 2**16
 _SETUPS = 500  # of a recording, the first of more
 
 
-def said_of_setup(setup: Setup) -> tuple[str, dict[str, bytes]]:
+def setup_to_text(setup: Setup) -> tuple[str, dict[str, bytes]]:
     """The text, and by name the files that it names."""
-    said: dict[str, Any] = {name: getattr(setup, name) for name in (*_WHOLE, *_REAL, *_TEXT)}
+    keys: dict[str, Any] = {name: getattr(setup, name) for name in (*_WHOLE, *_REAL, *_TEXT)}
     files: dict[str, bytes] = {}
     if setup.calibration is not None:
-        said["calibration"] = f"calibration-{setup.calibration.digest[:16]}.toml"
-        files[said["calibration"]] = calibration_to_toml(setup.calibration).encode()
+        keys["calibration"] = f"calibration-{setup.calibration.digest[:16]}.toml"
+        files[keys["calibration"]] = calibration_to_toml(setup.calibration).encode()
     if setup.tare is not None:
-        said["tare"] = f"tare-{setup.tare.digest[:16]}.toml"
-        files[said["tare"]] = tare_to_toml(setup.tare).encode()
-    return json.dumps(said), files
+        keys["tare"] = f"tare-{setup.tare.digest[:16]}.toml"
+        files[keys["tare"]] = tare_to_toml(setup.tare).encode()
+    return json.dumps(keys), files
 
 
-def setup_from(text: str, file: Callable[[str], bytes]) -> Setup:
+def setup_from_text(text: str, file: Callable[[str], bytes]) -> Setup:
     """The setup that `text` tells of, `file` giving what a name stands for.
 
     A `Refusal` when it is none.
@@ -47,49 +47,49 @@ def setup_from(text: str, file: Callable[[str], bytes]) -> Setup:
     try:
         if len(text) > _LONGEST:
             raise ValueError(f"it is {len(text)} characters long")
-        said: Any = json.loads(text)
-        if not isinstance(said, dict):
+        keys: Any = json.loads(text)
+        if not isinstance(keys, dict):
             raise TypeError("it has no keys")
-        said = cast("dict[str, Any]", said)
-        if unknown := set(said) - {field.name for field in fields(Setup)}:
+        keys = cast("dict[str, Any]", keys)
+        if unknown := set(keys) - {field.name for field in fields(Setup)}:
             raise ValueError(f"it has unknown keys {sorted(unknown)}")
-        values = _checked(said)
+        values = _checked(keys)
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise Refusal(f"expected a setup as it was recorded: {error!s:.120}") from error
-    if name := said.get("calibration"):
+    if name := keys.get("calibration"):
         values["calibration"] = calibration_from_toml(file(str(name)), Path(str(name)))
-    if name := said.get("tare"):
+    if name := keys.get("tare"):
         values["tare"] = tare_from_toml(file(str(name)), str(name))
     return Setup(**values)
 
 
-def setups_of(recording: Recording) -> list[tuple[float, Setup]]:
+def recorded_setups(recording: Recording) -> list[tuple[float, Setup]]:
     """The setups in a recording, each with the time in s from its beginning on which it was used.
 
     A `Refusal` where one is none.
     """
-    told = recording.messages_on(m.SETUP)
+    messages = recording.messages_on(m.SETUP)
     return [
         (
             (message.stamp - recording.first) * 1e-9,
-            setup_from(decode(m.STRING, message.data)["data"], recording.attachment),
+            setup_from_text(decode(m.STRING, message.data)["data"], recording.attachment),
         )
-        for message in islice(told, _SETUPS)
+        for message in islice(messages, _SETUPS)
     ]
 
 
-def _checked(said: dict[str, Any]) -> dict[str, Any]:
+def _checked(keys: dict[str, Any]) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name in _WHOLE:
-        values[name] = said[name]
-        if type(said[name]) is not int or not 0 < said[name] <= _MOST:
-            raise ValueError(f"{name} is {said[name]!r:.40}")
+        values[name] = keys[name]
+        if type(keys[name]) is not int or not 0 < keys[name] <= _MOST:
+            raise ValueError(f"{name} is {keys[name]!r:.40}")
     for name in _REAL:
-        values[name] = float(said[name])
+        values[name] = float(keys[name])
     for name in _TEXT:
-        values[name] = said[name]
-        if not isinstance(said[name], str):
-            raise TypeError(f"{name} is {said[name]!r:.40}")
+        values[name] = keys[name]
+        if not isinstance(keys[name], str):
+            raise TypeError(f"{name} is {keys[name]!r:.40}")
     if values["method"] not in METHODS:
         raise ValueError(f"method is {values['method']!r:.40}, expected one of {list(METHODS)}")
     return values

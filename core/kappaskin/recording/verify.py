@@ -1,7 +1,7 @@
-"""A recording to a verdict: whether its bytes come to the same estimates again, bit for bit."""
+"""Verification of a recording: whether its bytes give the same estimates again, bit for bit."""
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.frames import Estimate
+from kappaskin.pipeline import Getter, Reported, getters
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
-from kappaskin.recording.reading import Message, Recording
-from kappaskin.recording.recompute import Retrace
+from kappaskin.recording.reading import RecordedMessage, Recording
+from kappaskin.recording.recompute import Recomputation
 
 _COMPARED = {
     m.CONTACTS.name: m.CONTACT,
@@ -21,29 +22,17 @@ _COMPARED = {
     m.SHAPES.name: m.COEFFICIENTS,
 }
 _TOLD = 1000  # messages between two times that the share is told
-_NAMED_AS: dict[str, Callable[[Estimate], Any]] = {
-    "present": lambda e: e.touch.present,
-    "single": lambda e: e.touch.single,
-    "near_rim": lambda e: e.touch.near_rim,
-    "spare": lambda e: e.touch.spare,
-    "position": lambda e: e.touch.position,
-    "position_sd": lambda e: e.touch.position_sd,
-    "force": lambda e: e.touch.force,
-    "force_sd": lambda e: e.touch.force_sd,
-    "displacement": lambda e: e.touch.displacement,
-    "displacement_sd": lambda e: e.touch.displacement_sd,
-    "point": lambda e: e.geometry.position,
-    "frame": lambda e: e.geometry.frame,
-    "metric": lambda e: e.geometry.metric,
-    "curvature_form": lambda e: e.geometry.curvature_form,
-    "torsion_form": lambda e: e.geometry.torsion_form,
-    "covariance": lambda e: e.geometry.covariance,
-    "shape": lambda e: np.array(e.coefficients.shape),
-}
+
+
+def _functions(reported: Reported) -> tuple[int, ...]:
+    return reported.estimate.coefficients.shape
+
+
+_GETTERS: dict[str, Getter] = {**getters(), "shape": _functions}
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verification:
     """What came of it: contacts, curvatures and shapes `compared`, of `frames`; `different` ones.
 
     `first` tells the first difference, `largest` is the largest one as a share of the largest
@@ -64,10 +53,10 @@ class Verdict:
     @property
     def words(self) -> str:
         """The verdict as a sentence or two."""
-        told = f"{self.compared:,} recorded results of {self.frames:,} frames"
+        counts = f"{self.compared:,} recorded results of {self.frames:,} frames"
         if not self.compared:
-            return f"{told}: there is nothing to compare"
-        parts = [f"{told}: {'the same bit for bit' if self.same else 'not the same'}"]
+            return f"{counts}: there is nothing to compare"
+        parts = [f"{counts}: {'the same bit for bit' if self.same else 'not the same'}"]
         if self.different:
             parts.append(f"{self.different:,} differ, by {self.largest:.1g} of the largest number")
             parts.append(f"first {self.first}")
@@ -76,7 +65,7 @@ class Verdict:
         return "; ".join(parts)
 
 
-def verifying(path: Path) -> Generator[float | Verdict]:
+def verify_steps(path: Path) -> Generator[float | Verification]:
     """Work out everything that was recorded in `path` once more, and compare.
 
     Now and then the share that is done, and the verdict at the end. To be run where the engine's
@@ -97,32 +86,36 @@ class _Worker:
     """Takes the messages as they were written."""
 
     def __init__(self, recording: Recording) -> None:
-        self._retrace = Retrace(recording)
+        self._recomputation = Recomputation(recording)
         self._frames = self._compared = self._missing = self._different = 0
         self._first, self._largest = "", 0.0
 
-    def __call__(self, message: Message) -> None:
+    def __call__(self, message: RecordedMessage) -> None:
         if kind := _COMPARED.get(message.topic):
             self._compare(decode(kind, message.data))
             return
-        for _ in self._retrace(message):
+        for _ in self._recomputation(message):
             self._frames += 1
 
-    def _compare(self, said: dict[str, Any]) -> None:
+    def _compare(self, recorded: dict[str, Any]) -> None:
         """Work out the frame that a recorded estimate is of, and hold the two together."""
-        estimate = self._retrace.estimate(said["sequence"])
+        estimate = self._recomputation.estimate(recorded["sequence"])
         if estimate is None:
             self._missing += 1
             return
         self._compared += 1
-        names = (name for name in said if not name.startswith("header."))
-        differences = [d for name in names if (d := self._difference(name, said[name], estimate))]
+        names = (name for name in recorded if not name.startswith("header."))
+        differences = [
+            d for name in names if (d := self._difference(name, recorded[name], estimate))
+        ]
         self._different += bool(differences)
         self._first = self._first or "; ".join(differences[:1])
 
     def _difference(self, name: str, value: Any, estimate: Estimate) -> str:
         """In which way one number, or list of numbers, is another now; nothing if it is not."""
-        again = _NAMED_AS[name](estimate) if name in _NAMED_AS else getattr(estimate, name)
+        again = (
+            estimate.coefficients.shape if name == "shape" else _GETTERS[name](Reported(estimate))
+        )
         was, now = np.asarray(value).ravel(), np.asarray(again).ravel()
         real = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape
         if was.tobytes() == now.tobytes() if real else np.array_equal(was, now):
@@ -132,11 +125,11 @@ class _Worker:
         self._largest = max(self._largest, share if share == share else math.inf)
         return (
             f"frame {estimate.sequence} at {estimate.device_time:.6f} s: {name} was "
-            f"{_told(was)}, and is {_told(now)} now"
+            f"{_short(was)}, and is {_short(now)} now"
         )
 
-    def verdict(self) -> Verdict:
-        return Verdict(
+    def verdict(self) -> Verification:
+        return Verification(
             self._frames,
             self._compared,
             self._missing,
@@ -146,5 +139,5 @@ class _Worker:
         )
 
 
-def _told(values: "NDArray[Any]") -> str:
+def _short(values: "NDArray[Any]") -> str:
     return ", ".join(f"{value!r}" for value in values[:4].tolist()) + ", ..." * (len(values) > 4)

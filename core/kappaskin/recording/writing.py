@@ -1,4 +1,4 @@
-"""Messages to an MCAP file, by a thread of its own: nothing that is live waits for a disk."""
+"""MCAP writer in a thread of its own: nothing live waits for the disk."""
 
 import itertools
 import threading
@@ -12,7 +12,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from kappaskin.errors import Refusal
-from kappaskin.recording.disk import Disk, is_there
+from kappaskin.recording.disk import ReservedFile, is_there
 from kappaskin.recording.messages import TOPICS, Topic
 
 FORMAT = 1
@@ -28,7 +28,7 @@ _UNDATED = 0
 
 
 @dataclass(frozen=True)
-class Written:
+class RecordingStatus:
     """How a recording is doing: where it goes, for how long (s) and how much it is.
 
     `path` is empty where none was asked for. `lost` counts messages that found too many waiting for
@@ -51,7 +51,7 @@ class RecordingFile:
     it. One that ends by itself, as on a full disk, is closed as one that is asked to.
     """
 
-    def __init__(self, path: Path, disk: Callable[[Path], Disk] = Disk) -> None:
+    def __init__(self, path: Path, disk: Callable[[Path], ReservedFile] = ReservedFile) -> None:
         self.path, self.part = path, part_of(path)
         for there in (self.path, self.part):
             if is_there(there):
@@ -68,7 +68,7 @@ class RecordingFile:
         self._put = self._taken = 0  # bytes: each counted by one thread only
         self._channels: dict[str, int] = {}
         self._sequences = dict.fromkeys(range(1, len(TOPICS) + 1), 0)
-        self.written = Written(str(path), active=True)
+        self.written = RecordingStatus(str(path), active=True)
         self._lost = 0
         self._closing = threading.Event()
         self._writer = Writer(self._disk.stream, _CHUNK, CompressionType.LZ4)

@@ -10,7 +10,7 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region, scan_tradeoff
 from kappaskin.frames import Array, Estimate
-from kappaskin.live import steered
+from kappaskin.live import track_region
 from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.scenes import TABLE_1_NOISE, Orbit, Scene, load_scene
@@ -78,7 +78,7 @@ def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[
     clock = _Clock()
     source = SimulatedSource(scene, clock, clock.sleep)
     pipeline = Pipeline(source.sensor, Setup(nx=_POINTS, ny=_POINTS, method=method), clock=clock)
-    steering = steered(source, region)
+    steering = track_region(source, region)
     answers: list[_Answer] = []
     while clock.now < seconds:
         for frame in source.read(seconds):

@@ -83,7 +83,10 @@ def test_dead_elements_are_left_out(reliefs):
 
 @pytest.mark.parametrize(
     "patch",
-    [Disk(0.05), Polygon([(0, 0), (0.1, 0), (0.1, 0.04), (0.04, 0.04), (0.04, 0.1), (0, 0.1)])],
+    [
+        Disk(0.05),
+        Polygon([(0, 0), (0.1, 0), (0.1, 0.04), (0.04, 0.04), (0.04, 0.1), (0, 0.1)]),
+    ],
     ids=["disk", "polygon"],
 )
 def test_a_skin_ends_at_its_outline(patch):

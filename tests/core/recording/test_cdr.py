@@ -11,7 +11,7 @@ from mcap_ros2.decoder import DecoderFactory
 from kappaskin import Refusal
 from kappaskin.recording import decode
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import Layout, MessageType, encode
+from kappaskin.recording.cdr import MessageLayout, MessageType, encode
 
 INNER = MessageType("pkg/msg/Inner", "uint8 a\nfloat64 b")
 NESTED = MessageType(
@@ -43,7 +43,7 @@ def plain(value):
 @pytest.mark.parametrize("small", [0, 1, 5])
 @pytest.mark.parametrize("inner", [0, 1, 3])
 def test_texts_lists_and_messages_within_are_read_by_others(text, small, inner) -> None:
-    layout = Layout(NESTED, {"text": text, "small": small, "inner": inner})
+    layout = MessageLayout(NESTED, {"text": text, "small": small, "inner": inner})
     values = {"yes": True, "pair": [1.5, -2.0], "last": -7}
     values |= {"small": np.arange(small)} if small else {}
     for n in range(inner):

@@ -146,14 +146,14 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_not_written_is_counted(
     tmp_path, monkeypatch
 ) -> None:
     monkeypatch.setattr(writing, "_BACKLOG", 2**16)
-    go, write = threading.Event(), disk_room.Disk.write
+    go, write = threading.Event(), disk_room.ReservedFile.write
     file = RecordingFile(tmp_path / "slow.mcap")
 
     def slow(self, data):
         go.wait(10)
         write(self, data)
 
-    monkeypatch.setattr(disk_room.Disk, "write", slow)
+    monkeypatch.setattr(disk_room.ReservedFile, "write", slow)
     began = time.monotonic()
     for n in range(1000):
         file.put(m.LINES, n * 1e-3, LINE)

@@ -10,9 +10,10 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
-from kappaskin import Damaged, Refusal, Wanted
-from kappaskin.recording import Recording, records, repairing, writing
+from kappaskin import Damaged, Refusal
+from kappaskin.recording import ExportRequest, Recording, repair_steps, writing
 from kappaskin.recording import messages as m
+from kappaskin.recording import reading as records
 from kappaskin.recording.writing import RecordingFile, part_of
 
 LINE = m.pack_line(0.0, False, bytes(600))
@@ -110,7 +111,7 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
         Recording(tmp_path)
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")
-        for read in (Recording, lambda pipe: list(repairing(pipe, path))):
+        for read in (Recording, lambda pipe: list(repair_steps(pipe, path))):
             with pytest.raises(Refusal, match="expected a file"):
                 read(tmp_path / "pipe")
     for data in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), records.MAGIC, records.MAGIC * 20):
@@ -182,7 +183,7 @@ def test_a_bomb_takes_no_memory(whole, tmp_path) -> None:
             Recording(path)
     body = chunk(1000)
     for size in (2**27, 1000):
-        with pytest.raises(records.Spoilt):
+        with pytest.raises(records.CorruptRecord):
             records.unpacked(chunk(size)[len(body) - len(bomb) - 44 :])
 
 
@@ -211,8 +212,8 @@ def test_a_damaged_chunk_is_said_to_be_one(whole, tmp_path) -> None:
     [
         RecordingFile,
         Recording,
-        lambda path: list(repairing(path, path)),
-        lambda path: Wanted(path, path),
+        lambda path: list(repair_steps(path, path)),
+        lambda path: ExportRequest(path, path),
     ],
     ids=["record", "read", "repair", "export"],
 )

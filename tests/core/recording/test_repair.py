@@ -10,8 +10,8 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
-from kappaskin import Refusal, Repairing
-from kappaskin.recording import Recording, Repaired, repairing
+from kappaskin import Refusal
+from kappaskin.recording import Recording, Repaired, RepairTask, repair_steps
 from kappaskin.recording import messages as m
 from kappaskin.recording.writing import part_of
 
@@ -57,7 +57,7 @@ def places(whole):
 
 
 def repair(path, out) -> Repaired:
-    *_, done = repairing(path, out)
+    *_, done = repair_steps(path, out)
     return done
 
 
@@ -210,7 +210,7 @@ def test_a_file_of_others_is_repaired_too(tmp_path) -> None:
 
 
 def test_the_share_that_is_done_is_told(whole, tmp_path) -> None:
-    *shares, _ = repairing(whole, tmp_path / "out.mcap")
+    *shares, _ = repair_steps(whole, tmp_path / "out.mcap")
     assert shares == sorted(shares)
     assert 0 <= shares[0] < 0.1
     assert shares[-1] > 0.9
@@ -219,11 +219,11 @@ def test_the_share_that_is_done_is_told(whole, tmp_path) -> None:
 @pytest.mark.slow
 def test_a_process_of_its_own_saves_as_much(whole, tmp_path) -> None:
     out, told = tmp_path / "out.mcap", list[float | Repaired]()
-    work = Repairing(whole, out)
+    work = RepairTask(whole, out)
     while not (told and isinstance(told[-1], Repaired)):
         told += work.poll()
     work.close()
-    *_, alone = repairing(whole, tmp_path / "alone.mcap")
+    *_, alone = repair_steps(whole, tmp_path / "alone.mcap")
     assert told[-1] == alone
     assert out.exists()
 
@@ -238,7 +238,7 @@ class Far:
 @pytest.mark.slow
 def test_one_given_up_leaves_nothing(tmp_path) -> None:
     out = tmp_path / "out.mcap"
-    work = Repairing(Far(), out)
+    work = RepairTask(Far(), out)
     part_of(out).write_bytes(b"as far as it is")
     work.close()
     assert not list(tmp_path.glob("out*"))
@@ -247,7 +247,7 @@ def test_one_given_up_leaves_nothing(tmp_path) -> None:
 @pytest.mark.slow
 def test_one_whose_process_died_leaves_nothing(tmp_path) -> None:
     out = tmp_path / "out.mcap"
-    work = Repairing(Far(), out)
+    work = RepairTask(Far(), out)
     (child,) = (p for p in multiprocessing.active_children() if p.name == "kappaskin-repair")
     child.kill()
     part_of(out).write_bytes(b"as far as it was")
@@ -260,5 +260,5 @@ def test_one_whose_process_died_leaves_nothing(tmp_path) -> None:
 def test_what_another_writes_is_left_alone(whole, tmp_path) -> None:
     part_of(tmp_path / "out.mcap").write_bytes(b"another's")
     with pytest.raises(Refusal, match="is there already"):
-        Repairing(whole, tmp_path / "out.mcap")
+        RepairTask(whole, tmp_path / "out.mcap")
     assert part_of(tmp_path / "out.mcap").read_bytes() == b"another's"

@@ -1,7 +1,6 @@
 """What the engine computes of the same frames with other settings, held against what is in use."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,8 +8,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.frames import Estimate
-from kappaskin.live import Computed, Status
-from kappaskin.pipeline import Setup
+from kappaskin.live import PipelineStatus, Status
+from kappaskin.pipeline import REPORTED, Setup, readouts
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
@@ -50,37 +49,16 @@ class Pair:
 
     def figures(self) -> list[Figure]:
         """What both say of the contact."""
-        found = [
-            (
-                label,
-                unit,
-                digits,
-                *((scale * v, scale * sd) for v, sd in map(read, (self.a, self.b))),
-            )
-            for label, unit, digits, scale, read in _FIGURES
+        pairs = zip(readouts(self.a), readouts(self.b), strict=True)
+        return [
+            Figure(a.label, a.unit, a.digits, (a.value, a.sd), (b.value, b.sd))
+            for a, b in pairs
+            if a.label in _COMPARED
         ]
-        return [Figure(*row) for row in found]
 
 
-def _place(axis: int) -> Callable[[Estimate], tuple[float, float]]:
-    return lambda e: (float(e.touch.position[axis]), float(e.touch.position_sd[axis]))
-
-
-def _principal(which: int) -> Callable[[Estimate], tuple[float, float]]:
-    return lambda e: (
-        float(e.geometry.principal[which]),
-        float(e.geometry.principal_sd[which]),
-    )
-
-
-_FIGURES: tuple[tuple[str, str, int, float, Callable[[Estimate], tuple[float, float]]], ...] = (
-    ("Contact x", "mm", 2, 1e3, _place(0)),
-    ("Contact y", "mm", 2, 1e3, _place(1)),
-    ("Force", "mN", 1, 1e3, lambda e: (e.touch.force, e.touch.force_sd)),
-    ("Depth", "\N{MICRO SIGN}m", 0, 1e6, lambda e: (e.touch.displacement, e.touch.displacement_sd)),
-    ("Larger \N{GREEK SMALL LETTER KAPPA}", "1/m", 2, 1.0, _principal(0)),
-    ("Smaller \N{GREEK SMALL LETTER KAPPA}", "1/m", 2, 1.0, _principal(1)),
-)
+_COMPARED = {label for each in REPORTED if each.sd is not None for label in each.labels_shown}
+"""Readouts that have a standard deviation, against which a difference is judged."""
 
 
 def other_setup(settings: Settings, setup: Setup) -> Setup:
@@ -155,10 +133,10 @@ class Comparing(QObject):
     def _read(self, status: Status) -> Pair | None:
         """The newest frame that was computed with both."""
         engine = self._session.engine
-        b = engine.beside(status)
+        b = engine.compared(status)
         a = None if b is None else engine.latest(status, b.sequence)
         return None if a is None or b is None else Pair(a, b)
 
     @property
-    def told(self) -> Computed | None:
-        return self._session.status.beside if self._watched else None
+    def told(self) -> PipelineStatus | None:
+        return self._session.status.compared if self._watched else None

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.bases import edges_of
-from kappaskin.live import Computed, Status
+from kappaskin.live import PipelineStatus, Status
 from kappaskin.sensing import Sensor
 from kappaskin_app.features.compare.comparing import Comparing, Pair
 from kappaskin_app.guard import guarded
@@ -56,7 +56,7 @@ class OtherForm(Form):
         self.swap = button("Swap A and B", "swap", "Let what is in use and B change places.")
         self.body.addWidget(self.swap)
 
-    def show_told(self, told: Computed | None, sensor: Sensor | None) -> None:
+    def show_told(self, told: PipelineStatus | None, sensor: Sensor | None) -> None:
         if sensor is not None:
             self.offer("other_edge", ("", *edges_of(sensor.layout.patch)))
         if told is None:
@@ -117,10 +117,10 @@ class ComparePanel(QWidget):
         self._status = status
         if not self.isVisible():
             return
-        self.form.show_told(status.beside, status.sensor)
+        self.form.show_told(status.compared, status.sensor)
         for view in self.maps.values():
             view.map.show_faded(old)
-        if status.slot is None or status.beside is None or status.beside.slot is None:
+        if status.slot is None or status.compared is None or status.compared.slot is None:
             self._empty()
 
     def _empty(self) -> None:
@@ -159,7 +159,7 @@ class ComparePanel(QWidget):
         self._show_figures(pair)
 
     def _show_words(self, pair: Pair) -> None:
-        beside = self._status.beside
+        beside = self._status.compared
         setups = {"a": self._status.setup, "b": beside.setup if beside else None}
         for name, setup in setups.items():
             if setup is not None:

@@ -1,6 +1,6 @@
 """Connection: which source is read."""
 
-from kappaskin.live import Left
+from kappaskin.live import ResumeInfo
 from kappaskin_app.features.connection.panel import ConnectionPanel
 from kappaskin_app.features.connection.plugs import Plugs
 from kappaskin_app.guard import guarded
@@ -34,7 +34,7 @@ class Connection:
         shell.begun.connect(guarded(self._begin))
         shell.closing.connect(guarded(self.plugs.close))
 
-    def _begin(self, _: Left | None, source: str) -> None:
+    def _begin(self, _: ResumeInfo | None, source: str) -> None:
         """Show the source that was asked for, which is not read where another one goes on."""
         self.connection.show_source(source)
         self.plugs.look()

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.pipeline import readouts
 from kappaskin.sensing import Sensor
 
 FACTS = ("What", "Value", "95 % within", "Unit")
@@ -17,16 +18,11 @@ Rows = list[tuple[str, ...]]
 
 def facts_of(estimate: Estimate, touches: str) -> Rows:
     """The contact, what `touches` there in words, and how well the shape is known."""
-    touch = estimate.touch
-    (x, y), (x_95, y_95) = 1e3 * touch.position, 1e3 * touch.position_95
-    return [
-        ("Contact, x", _told(x, 2), _told(x_95, 2), "mm"),
-        ("Contact, y", _told(y, 2), _told(y_95, 2), "mm"),
-        ("Force", _told(1e3 * touch.force, 1), _told(1e3 * touch.force_95, 1), "mN"),
-        ("Depth", _told(1e3 * touch.displacement, 3), _told(1e3 * touch.displacement_95, 3), "mm"),
-        ("Noise of a reading", _told(estimate.noise, 3), "", "1/m"),
-        ("Touches", touches or "nothing known", "", ""),
+    rows = [
+        (each.label, _told(each.value, each.digits), _told(each.half_width, each.digits), each.unit)
+        for each in readouts(estimate)
     ]
+    return [*rows, ("Touches", touches or "nothing known", "", "")]
 
 
 def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:

@@ -6,7 +6,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFileDialog, QLineEdit, QWidget
 
 from kappaskin.pipeline import Setup
-from kappaskin.recording import Exported, Exporting, Wanted
+from kappaskin.recording import Exported, ExportRequest, ExportTask
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.work_dialog import (
     WorkDialog,
@@ -117,17 +117,17 @@ class ExportDialog(WorkDialog):
         self.begin_button.setEnabled(both and not busy)
 
     @property
-    def wanted(self) -> Wanted:
+    def wanted(self) -> ExportRequest:
         """What is asked for; a `Refusal` where that makes no file."""
         setup = self._setup if self.settings.currentIndex() else None
         files = path_in(self.recording), path_in(self.to)
         if self._at_once:
-            return Wanted(*files, at=self.at.value(), setup=setup)
+            return ExportRequest(*files, at=self.at.value(), setup=setup)
         until = self.until.value() or math.inf
-        return Wanted(*files, self.begin.value(), until, self.every.value(), setup=setup)
+        return ExportRequest(*files, self.begin.value(), until, self.every.value(), setup=setup)
 
-    def _begun(self) -> Exporting:
-        exporting = Exporting(self.wanted)
+    def _begun(self) -> ExportTask:
+        exporting = ExportTask(self.wanted)
         self._files = exporting.files
         return exporting
 

@@ -10,7 +10,7 @@ from typing import Any
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
 from kappaskin.pipeline import Setup
-from kappaskin.recording import said_of_setup
+from kappaskin.recording import setup_to_text
 from kappaskin.scenes import SCENES, read_scene_text, scene_file, write_scene
 from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import Settings
@@ -116,7 +116,7 @@ def _made(value: Any, always: tuple[str, ...] = ()) -> str:
 
 def _setup(setup: Setup, folder: Path) -> tuple[str, Mapping[str, bytes]]:
     """A setup as it is made, and the files that it has its calibration and its tare from."""
-    text, files = said_of_setup(setup)
+    text, files = setup_to_text(setup)
     if not files:
         return _made(setup, ("Ni", "Nj", "method")), files
     read = f"lambda name: Path({_said(str(folder))}, name).read_bytes()"

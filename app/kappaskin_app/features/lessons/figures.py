@@ -9,6 +9,7 @@ import numpy as np
 
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
+from kappaskin.pipeline import Reported, getters
 from kappaskin_app.features.lessons.expression import NUMBER, WORD
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.asks import Choice, Several, Text
@@ -24,20 +25,28 @@ def _peak(row: int) -> Callable[[Estimate], float]:
     return peak
 
 
+_GETTERS = getters()
+
+
+def _reported(name: str, part: int = 0) -> Callable[[Estimate], float]:
+    """What gets a number of the table of quantities; yes is 1."""
+    return lambda estimate: float(np.ravel(_GETTERS[name](Reported(estimate)))[part])
+
+
 OF_AN_ESTIMATE: dict[str, Callable[[Estimate], float]] = {
     "error_rms": lambda e: e.error_rms,
     "error_at_load": lambda e: e.error_at_load,
-    "noise": lambda e: e.noise,
-    "contact": lambda e: float(e.touch.present),
-    "contact_x": lambda e: float(e.touch.position[0]),
-    "contact_y": lambda e: float(e.touch.position[1]),
+    "noise": _reported("noise"),
+    "contact": _reported("present"),
+    "contact_x": _reported("position", 0),
+    "contact_y": _reported("position", 1),
     "contact_sd": lambda e: float(np.max(e.touch.position_sd)),
-    "measured_force": lambda e: e.touch.force,
-    "force_sd": lambda e: e.touch.force_sd,
-    "depth": lambda e: e.touch.displacement,
-    "depth_sd": lambda e: e.touch.displacement_sd,
+    "measured_force": _reported("force"),
+    "force_sd": _reported("force_sd"),
+    "depth": _reported("displacement"),
+    "depth_sd": _reported("displacement_sd"),
     "spread": lambda e: float(e.touch.present and not e.touch.single),
-    "near_rim": lambda e: float(e.touch.near_rim),
+    "near_rim": _reported("near_rim"),
     "peak_xx": _peak(0),
     "peak_yy": _peak(1),
     "peak_xy": _peak(2),

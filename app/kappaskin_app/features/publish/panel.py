@@ -6,7 +6,7 @@ import time
 from PySide6.QtWidgets import QWidget
 
 from kappaskin.live import Status
-from kappaskin.publish import Published
+from kappaskin.publish import TargetStatus
 from kappaskin_app.shell.form import Form
 from kappaskin_app.widgets.parts import ELLIPSIS, text_label
 
@@ -51,7 +51,7 @@ class PublishPanel(Form):
         self.show_message("\n".join(f"{why}." for why in [self._refusal, *refused] if why))
 
 
-def _words(target: Published) -> list[str]:
+def _words(target: TargetStatus) -> list[str]:
     """A target in words, and each of its clients; nothing where its refusal says it all."""
     if target.refusal:
         return []

@@ -3,7 +3,7 @@
 from functools import partial
 from pathlib import Path
 
-from kappaskin.live import Left
+from kappaskin.live import ResumeInfo
 from kappaskin_app.features.recording.panel import RecordingPanel
 from kappaskin_app.features.recording.recording_mark import RecordingMark
 from kappaskin_app.features.recording.replaying import Replaying
@@ -85,7 +85,7 @@ class Recording:
         if self._shell.session.replaying:
             self.replaying.toggle()
 
-    def _begin(self, left: Left | None, source: str) -> None:
+    def _begin(self, left: ResumeInfo | None, source: str) -> None:
         """Go on with what was left, or say what could be repaired."""
         if left is not None:
             self.taping.go_on(left, source)

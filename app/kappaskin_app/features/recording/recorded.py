@@ -6,7 +6,7 @@ from pathlib import Path
 from kappaskin.errors import Refusal
 from kappaskin.frames import Event
 from kappaskin.pipeline import Setup
-from kappaskin.recording import Recording, Replay, setups_of
+from kappaskin.recording import Recording, Replay, recorded_setups
 from kappaskin_app.features.recording.landmarks import minutes
 from kappaskin_app.shell.folders import repairing
 from kappaskin_app.widgets.amounts import day
@@ -50,7 +50,7 @@ def recorded(path: Path) -> Recorded:
     with Recording(path) as recording:
         length = (recording.last - recording.first) * 1e-9
         try:
-            setups = tuple(setups_of(recording))
+            setups = tuple(recorded_setups(recording))
         except Refusal as refusal:
             return Recorded(path, length, recording.whole, (), str(refusal))
         return Recorded(path, length, recording.whole, setups)

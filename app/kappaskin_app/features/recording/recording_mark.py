@@ -4,7 +4,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin.recording import Written
+from kappaskin.recording import RecordingStatus
 from kappaskin_app.theme import LIGHT, Theme
 
 _WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin
@@ -44,7 +44,7 @@ class RecordingMark(QWidget):
 
     minimumSizeHint = sizeHint
 
-    def show_written(self, written: Written, trouble: str) -> None:
+    def show_written(self, written: RecordingStatus, trouble: str) -> None:
         """Show what is being written, or why it ended by itself."""
         if written.active:
             head, size = duration_of(written.seconds), size_of(written.size)

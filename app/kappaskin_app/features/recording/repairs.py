@@ -5,7 +5,7 @@ from pathlib import Path
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 
-from kappaskin.recording import Repaired, Repairing
+from kappaskin.recording import Repaired, RepairTask
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.folders import repaired
 from kappaskin_app.shell.work_dialog import WorkDialog, beside, choosing, ended, named, path_in
@@ -53,8 +53,8 @@ class RepairDialog(WorkDialog):
             widget.setEnabled(not self.busy)
         self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
-    def _begun(self) -> Repairing:
-        return Repairing(path_in(self.recording), path_in(self.to))
+    def _begun(self) -> RepairTask:
+        return RepairTask(path_in(self.recording), path_in(self.to))
 
     def _told(self, result: object) -> str:
         if not isinstance(result, Repaired):

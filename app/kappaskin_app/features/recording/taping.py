@@ -6,8 +6,8 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox, QWidget
 
-from kappaskin.live import LONGEST_NOTE, Engine, Left, Status
-from kappaskin.recording import Written
+from kappaskin.live import LONGEST_NOTE, Engine, ResumeInfo, Status
+from kappaskin.recording import RecordingStatus
 from kappaskin_app.features.recording.recording_mark import duration_of, size_of
 from kappaskin_app.features.recording.repairs import RepairDialog
 from kappaskin_app.guard import guarded
@@ -35,7 +35,7 @@ class Taping(QObject):
         super().__init__(window)
         self._engine, self._window = engine, window
         self._replays = False
-        self.written, self.ended = Written(), ""
+        self.written, self.ended = RecordingStatus(), ""
         """How it does, and why it ended by itself."""
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
@@ -160,7 +160,7 @@ class Taping(QObject):
         )
         self.told.emit(f"The recording {file.name} was never ended: see Recording on the page Live")
 
-    def go_on(self, left: Left, wanted: str) -> None:
+    def go_on(self, left: ResumeInfo, wanted: str) -> None:
         """Say what went on without a window, to one who `wanted` this source."""
         self._say(words(left, wanted), alarming=False)
 

@@ -1,62 +1,131 @@
-"""Moments to files of the skin's surface, one or a series of them."""
+"""Exported meshes of the skin's surface: STL, VTP and PVD."""
 
+import base64
 import math
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TypeAlias
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from numpy.typing import NDArray
 
+from kappaskin.bases import Basis
+from kappaskin.contact import surface_geometry
 from kappaskin.errors import Refusal
+from kappaskin.frames import COMPONENTS, Array
 from kappaskin.pipeline import Pipeline
-from kappaskin.recording.export.about import About
-from kappaskin.recording.export.moment import Moment
-from kappaskin.recording.export.skin import Skin, Surface
-from kappaskin.recording.export.wanted import Wanted
+from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
+from kappaskin.skin import snapped_to_rim
+
+Triangles: TypeAlias = "NDArray[np.int64]"
+
+_AT_ONCE = 2**20  # values of functions that are worked out at once
 
 
-class Surfaces(ABC):
+@dataclass(frozen=True, eq=False)
+class SkinSurface:
+    """The skin: `points` (k, 3) in m with outward `normals`, and `triangles` (n, 3) of them.
+
+    `displacement` (k,) in m, positive inward, `curvature` (k, 3) in 1/m, xx, yy and xy of the
+    curvature form along x and across it.
+    """
+
+    points: Array
+    normals: Array
+    triangles: Triangles
+    displacement: Array
+    curvature: Array
+
+
+class SkinMesh:
+    """The skin of a `basis` by nx x ny points of its rectangle, those beside its rim on that."""
+
+    def __init__(self, basis: Basis, nx: int, ny: int) -> None:
+        self._basis, patch = basis, basis.patch
+        grid = np.stack(np.meshgrid(*patch.grid(nx, ny)), axis=-1)
+        on = patch.contains(grid.reshape(-1, 2)).reshape(ny, nx)
+        if not on.all():
+            grid, _ = snapped_to_rim(patch, grid, on)
+        corners = _triangles(on)
+        self.triangles: Triangles
+        used, self.triangles = np.unique(corners, return_inverse=True)
+        self._positions = grid.reshape(-1, 2)[used]
+        self._rest, self._out = patch.at_rest(self._positions)
+
+    def __call__(self, coefficients: Array) -> SkinSurface:
+        """The surface with `coefficients` (Ni, Nj) in m."""
+        step = max(_AT_ONCE // self._basis.size, 1)
+        parts = [
+            surface_geometry(self._basis, coefficients, self._positions[n : n + step], _no_error)
+            for n in range(0, len(self._positions), step)
+        ]
+        points = np.concatenate([part.position for part in parts])
+        K = np.concatenate([part.curvature_form for part in parts])
+        displacement = np.einsum("pi,pi->p", self._rest - points, self._out)
+        normals = np.concatenate([part.normal for part in parts])
+        curvature = np.stack([K[:, 0, 0], K[:, 1, 1], K[:, 0, 1]], axis=-1)
+        return SkinSurface(points, normals, self.triangles, displacement, curvature)
+
+
+def _no_error(rows: Array) -> Array:
+    """The covariance (..., 6, 6) of the shape as it is given."""
+    return np.zeros((*rows.shape[:-1], rows.shape[-2]))
+
+
+def _triangles(on: NDArray[np.bool_]) -> Triangles:
+    """Two for each square with a corner `on` the skin, turning left as seen from outside."""
+    index = np.arange(on.size).reshape(on.shape)
+    square = (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+    corners = np.stack(square, axis=-1).reshape(-1, 4)
+    corners = corners[on.ravel()[corners].any(axis=1)]
+    return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+
+
+class SurfaceWriter(ABC):
     """Surfaces, of which a kind of file need only say how one of them is written."""
 
     suffix: str
 
-    def __init__(self, room: Path, wanted: Wanted, about: About) -> None:
-        self.room, self.wanted, self.about = room, wanted, about
+    def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
+        self.scratch, self.request, self.info = scratch, request, info
         self.times: dict[str, float] = {}
         """Of the surfaces that were written, in s, by the file's place beside the others."""
-        self._made: tuple[Pipeline, Skin] | None = None
-        if wanted.folder is not None:
-            (room / wanted.folder.name).mkdir()
+        self._made: tuple[Pipeline, SkinMesh] | None = None
+        if request.folder is not None:
+            (scratch / request.folder.name).mkdir()
 
-    def take(self, moment: Moment) -> bool:
-        coefficients = moment.estimate.coefficients
+    def take(self, frame: ExportedFrame) -> bool:
+        coefficients = frame.estimate.coefficients
         if not np.isfinite(coefficients).all():
-            if self.wanted.at is not None:
+            if self.request.at is not None:
                 raise Refusal(
-                    f"the readings at {moment.at:.6g} s decide no shape; choose another moment"
+                    f"the readings at {frame.at:.6g} s decide no shape; choose another moment"
                 )
             return False
-        name = self.wanted.to.name
-        if self.wanted.folder is not None:
-            name = f"{self.wanted.folder.name}/{len(self.times):06d}{self.suffix}"
-        self.write(self.room / name, moment, self._skin(moment.pipeline)(coefficients))
-        self.times[name] = moment.at
+        name = self.request.to.name
+        if self.request.folder is not None:
+            name = f"{self.request.folder.name}/{len(self.times):06d}{self.suffix}"
+        self.write(self.scratch / name, frame, self._skin(frame.pipeline)(coefficients))
+        self.times[name] = frame.at
         return True
 
-    def _skin(self, pipeline: Pipeline) -> Skin:
+    def _skin(self, pipeline: Pipeline) -> SkinMesh:
         if self._made is None or self._made[0] is not pipeline:
             setup = pipeline.setup
-            self._made = pipeline, Skin(pipeline.basis, setup.nx, setup.ny)
+            self._made = pipeline, SkinMesh(pipeline.basis, setup.nx, setup.ny)
         return self._made[1]
 
-    def said(self, moment: Moment) -> str:
-        """What a file says of the surface at one moment."""
-        estimate = moment.estimate
-        numbers = {"time": moment.at, "sequence": estimate.sequence, "setup": estimate.generation}
+    def description(self, frame: ExportedFrame) -> str:
+        """What a file says of the surface of one frame, as JSON."""
+        estimate = frame.estimate
+        numbers = {"time": frame.at, "sequence": estimate.sequence, "setup": estimate.generation}
         force = estimate.touch.force
-        return self.about.json(**numbers, force=force if math.isfinite(force) else None)
+        return self.info.json(**numbers, force=force if math.isfinite(force) else None)
 
     @abstractmethod
-    def write(self, path: Path, moment: Moment, surface: Surface) -> None: ...
+    def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None: ...
 
     @abstractmethod
     def finish(self) -> None: ...
@@ -66,28 +135,88 @@ class Surfaces(ABC):
         self._made = None
 
 
-class StlSurfaces(Surfaces):
+class StlSurfaces(SurfaceWriter):
     """Binary STL in m; what that cannot say stands in a JSON file beside it."""
 
     suffix = ".stl"
 
-    def write(self, path: Path, moment: Moment, surface: Surface) -> None:
+    def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
         facets = np.zeros(len(surface.triangles), _FACET)
         facets["corners"] = corners = surface.points[surface.triangles]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normals, axis=-1, keepdims=True)
         facets["normal"] = normals / np.where(length > 0, length, 1.0)
-        head = f"{self.about.program}, {self.about.sensor.name}, {moment.at:.6f} s, in m"
+        head = f"{self.info.program}, {self.info.sensor.name}, {frame.at:.6f} s, in m"
         # Shorter than 80 bytes it is filled with zeros.
         with path.open("wb") as file:
             file.write(np.array(head.encode("ascii", "replace")[:80], "S80").tobytes())
             file.write(np.array(len(facets), "<u4").tobytes() + facets.tobytes())
 
     def finish(self) -> None:
-        beside = self.wanted.beside
-        if beside is not None:
-            told = self.about.json(times=self.times, lengths="m", time="s")
-            (self.room / beside.name).write_text(told, encoding="utf-8")
+        file = self.request.metadata_file
+        if file is not None:
+            text = self.info.json(times=self.times, lengths="m", time="s")
+            (self.scratch / file.name).write_text(text, encoding="utf-8")
 
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
+
+
+class VtpSurfaces(SurfaceWriter):
+    """Points in m with `displacement` [m], `curvature` [1/m] and normals; `about` as field data."""
+
+    suffix = ".vtp"
+
+    def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
+        count, n = len(surface.points), len(surface.triangles)
+        about = "".join(f"{byte} " for byte in self.description(frame).encode() + b"\0")
+        names = "".join(f'ComponentName{n}="{c}" ' for n, c in enumerate(COMPONENTS))
+        path.write_text(
+            _HEAD.format("PolyData", "1.0")
+            + "<PolyData><FieldData>"
+            + _array("TimeValue", np.array([frame.at]), 'NumberOfTuples="1"')
+            + '<Array type="String" Name="about" NumberOfTuples="1" format="ascii">'
+            + f"{about}</Array></FieldData>"
+            + f'<Piece NumberOfPoints="{count}" NumberOfVerts="0" NumberOfLines="0" '
+            + f'NumberOfStrips="0" NumberOfPolys="{n}">'
+            + '<PointData Scalars="displacement [m]" Normals="normals">'
+            + _array("displacement [m]", surface.displacement)
+            + _array("curvature [1/m]", surface.curvature, names)
+            + _array("normals", surface.normals)
+            + "</PointData><Points>"
+            + _array("points [m]", surface.points)
+            + "</Points><Polys>"
+            + _array("connectivity", surface.triangles.ravel())
+            + _array("offsets", 3 * np.arange(1, n + 1))
+            + "</Polys></Piece></PolyData></VTKFile>\n",
+            encoding="ascii",
+        )
+
+    def finish(self) -> None:
+        if self.request.folder is None:
+            return
+        sets = "".join(
+            f'<DataSet timestep="{at!r}" part="0" file={quoteattr(name)}/>\n'
+            for name, at in self.times.items()
+        )
+        (self.scratch / self.request.to.name).write_text(
+            _HEAD.format("Collection", "0.1") + f"<Collection>\n{sets}</Collection></VTKFile>\n",
+            encoding="utf-8",
+        )
+
+
+_HEAD = (
+    '<?xml version="1.0"?>\n'
+    '<VTKFile type="{}" version="{}" byte_order="LittleEndian" header_type="UInt64">\n'
+)
+
+
+def _array(name: str, values: "NDArray[Any]", more: str = "") -> str:
+    kind, little = ("Int64", "<i8") if values.dtype.kind == "i" else ("Float64", "<f8")
+    width = values.shape[1] if values.ndim > 1 else 1
+    data = values.astype(little).tobytes()
+    text = base64.b64encode(np.array(len(data), "<u8").tobytes() + data).decode()
+    return (
+        f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{width}" {more} '
+        f'format="binary">{text}</DataArray>\n'
+    )

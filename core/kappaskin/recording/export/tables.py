@@ -1,40 +1,123 @@
-"""Moments to rows of a table, many at once."""
+"""Exported tables, a row for each frame: CSV, HDF5 and NPZ."""
 
+import importlib
+import io
+import json
+import shutil
+import zipfile
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.recording.export.about import About
-from kappaskin.recording.export.columns import columns
-from kappaskin.recording.export.moment import Moment
-from kappaskin.recording.export.wanted import Wanted
+from kappaskin.errors import lacking
+from kappaskin.pipeline import ACROSS, ALONG, ELEMENT, REPORTED, Getter
+from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
+
+
+class Column(NamedTuple):
+    """A number, or an array of some `shape`, of each frame; `labels` name those in it, flattened.
+
+    Of a `unit`, which is empty for a plain number, and of the NumPy type `kind`; `text` says what
+    it is, and `value` gets it.
+    """
+
+    name: str
+    unit: str
+    kind: str
+    shape: tuple[int, ...]
+    labels: tuple[str, ...]
+    text: str
+    value: Callable[[ExportedFrame], Any]
+
+    def heads(self) -> list[str]:
+        """What its numbers are called one by one, with their unit."""
+        unit = f" [{self.unit}]" if self.unit else ""
+        return [f"{self.name}{label}{unit}" for label in self.labels or ("",)]
+
+    def row(self, exported: ExportedFrame) -> "NDArray[Any]":
+        """The value of one frame; NaN where it has fewer numbers than the column."""
+        found = np.asarray(self.value(exported), self.kind)
+        if found.ndim == len(self.shape) and found.shape != self.shape:
+            missing = np.subtract(self.shape, found.shape)
+            found = np.pad(found, [(0, count) for count in missing], constant_values=np.nan)
+        return found.reshape(self.shape)
+
+
+def columns(info: RecordingInfo) -> tuple[Column, ...]:
+    """All of them, for P elements and Ni x Nj functions: of the frame, then of its estimate."""
+    P = len(info.sensor.layout)
+    lengths = {ELEMENT: P, ALONG: info.functions[0], ACROSS: info.functions[1]}
+    axes = {axis: tuple(map(str, range(length))) for axis, length in lengths.items()}
+
+    def counts(exported: ExportedFrame) -> "NDArray[np.float64]":
+        found = np.full(3 * P, np.nan)
+        found[exported.frame.channels] = exported.frame.counts
+        return found.reshape(3, P)
+
+    nominal = next(quantity for quantity in REPORTED if quantity.name == "nominal")
+    made = {group: _columns(group, axes) for group in ("frame", "fit", "contact")}
+    return (
+        Column("time", "s", "<f8", (), (), "when it came, since the recording began", _time),
+        *made["frame"],
+        Column("counts", "", "<f8", (3, P), nominal.labels(axes), "NaN where not scanned", counts),
+        *made["fit"],
+        *made["contact"],
+    )
+
+
+def _time(exported: ExportedFrame) -> float:
+    return exported.at
+
+
+def _columns(group: str, axes: dict[str, tuple[str, ...]]) -> list[Column]:
+    """The columns of the quantities of one group."""
+    return [
+        Column(
+            f"{quantity.name}{suffix}",
+            quantity.unit,
+            quantity.kind,
+            tuple(len(axes[axis] if isinstance(axis, str) else axis) for axis in quantity.parts),
+            quantity.labels(axes) if quantity.parts else (),
+            text,
+            _value(getter),
+        )
+        for quantity in REPORTED
+        for suffix, text, getter in quantity.forms
+        if quantity.group == group and suffix in quantity.columns
+    ]
+
+
+def _value(getter: Getter) -> Callable[[ExportedFrame], Any]:
+    return lambda exported: getter(exported.reported)
+
 
 Block = dict[str, NDArray[Any]]
 
 _BLOCK = 2**22  # bytes of rows that are written at once, about
 
 
-class Table(ABC):
+class TableWriter(ABC):
     """A table, of which a kind of file need only say how some rows (n, ...) are written."""
 
-    def __init__(self, room: Path, wanted: Wanted, about: About) -> None:
-        self.path, self.about, self.columns = room / wanted.to.name, about, columns(about)
+    def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
+        self.path, self.info, self.columns = scratch / request.to.name, info, columns(info)
         sizes = (np.dtype(c.kind).itemsize * int(np.prod(c.shape)) for c in self.columns)
         self.rows_at_once = max(_BLOCK // sum(sizes), 1)
         self._rows: list[list[NDArray[Any]]] = []
-        self.begin(room)
+        self.begin(scratch)
 
     @abstractmethod
-    def begin(self, room: Path) -> None: ...
+    def begin(self, scratch: Path) -> None: ...
 
     @abstractmethod
     def write(self, block: Block) -> None: ...
 
-    def take(self, moment: Moment) -> bool:
-        self._rows.append([column.row(moment) for column in self.columns])
+    def take(self, frame: ExportedFrame) -> bool:
+        self._rows.append([column.row(frame) for column in self.columns])
         if len(self._rows) == self.rows_at_once:
             self._flush()
         return True
@@ -54,3 +137,140 @@ class Table(ABC):
 
     @abstractmethod
     def close(self) -> None: ...
+
+
+class CsvTable(TableWriter):
+    """Numbers as short as they come back bit for bit; 0 or 1 for what is so or not."""
+
+    def begin(self, scratch: Path) -> None:
+        self._file = self.path.open("w", encoding="utf-8", newline="\n")
+        facts = self.info.facts | {"columns": {c.name: c.text for c in self.columns}}
+        for name, value in facts.items():
+            self._file.write(f"# {name}: {json.dumps(value)}\n")
+        heads = [head for column in self.columns for head in column.heads()]
+        self._file.write(",".join(heads) + "\n")
+
+    def write(self, block: Block) -> None:
+        flat = [values.reshape(len(values), -1) for values in block.values()]
+        parts = [
+            cast("list[list[float]]", (v + 0 if v.dtype == bool else v).tolist()) for v in flat
+        ]
+        for n in range(len(flat[0])):
+            row: list[float] = []
+            for part in parts:
+                row += part[n]
+            # A list's own text, in a third of the time that joining the numbers' takes.
+            self._file.write(repr(row)[1:-1].replace(" ", "") + "\n")
+
+    def end(self) -> None:
+        self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class _File(io.FileIO):
+    """A new file that accepts what a full disk does not, or HDF5 would crash; `check` raises."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "x+")
+        self._trouble: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        left = memoryview(data).cast("B")
+        try:
+            while left and self._trouble is None:
+                left = left[super().write(left) :]
+        except OSError as error:
+            self._trouble = error
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self._trouble = error
+            return size or 0
+
+    def check(self) -> None:
+        if self._trouble is not None:
+            raise self._trouble
+
+
+class Hdf5Table(TableWriter):
+    """Data sets that grow with the rows."""
+
+    def begin(self, scratch: Path) -> None:
+        try:
+            h5py: Any = importlib.import_module("h5py")
+        except ImportError as error:
+            raise lacking("hdf5", "a .h5 file, unlike an .npz,", error) from error
+        self._disk = _File(self.path)
+        # Attributes of older versions end at 64 KiB.
+        self._file: Any = h5py.File(self._disk, "w", libver=("v108", "v108"))
+        for name, value in self.info.facts.items():
+            self._file.attrs[name] = value if isinstance(value, str) else json.dumps(value)
+        for column in self.columns:
+            made = self._file.create_dataset(
+                column.name,
+                (0, *column.shape),
+                column.kind,
+                maxshape=(None, *column.shape),
+                chunks=(self.rows_at_once, *column.shape),
+            )
+            made.attrs["unit"], made.attrs["description"] = column.unit, column.text
+
+    def write(self, block: Block) -> None:
+        for name, values in block.items():
+            data = self._file[name]
+            data.resize(len(data) + len(values), axis=0)
+            data[-len(values) :] = values
+        self._disk.check()
+
+    def end(self) -> None:
+        self._file.close()
+        self._disk.check()
+
+    def close(self) -> None:
+        self._file.close()
+        self._disk.close()
+
+
+class NpzTable(TableWriter):
+    """Columns wait in files of their own, since one archive takes one array after the other."""
+
+    def begin(self, scratch: Path) -> None:
+        self._length = 0
+        self._waiting: dict[str, IO[bytes]] = {}
+        self._folder = scratch / "columns"
+        self._folder.mkdir()
+        for column in self.columns:
+            self._waiting[column.name] = (self._folder / column.name).open("w+b")
+
+    def write(self, block: Block) -> None:
+        for name, values in block.items():
+            self._waiting[name].write(values.tobytes())
+            self._length += len(values) if name == self.columns[0].name else 0
+
+    def end(self) -> None:
+        with zipfile.ZipFile(self.path, "w") as archive:
+            for column in self.columns:
+                head = {
+                    "descr": column.kind,
+                    "fortran_order": False,
+                    "shape": (self._length, *column.shape),
+                }
+                waiting = self._waiting[column.name]
+                waiting.seek(0)
+                with archive.open(f"{column.name}.npy", "w", force_zip64=True) as member:
+                    np.lib.format.write_array_header_1_0(member, head)
+                    shutil.copyfileobj(waiting, member, 2**20)
+                waiting.truncate(0)
+            with archive.open("about.npy", "w") as member:
+                texts = {column.name: [column.unit, column.text] for column in self.columns}
+                np.lib.format.write_array(member, np.array(self.info.json(columns=texts)))
+
+    def close(self) -> None:
+        for file in self._waiting.values():
+            file.close()
+        shutil.rmtree(self._folder, ignore_errors=True)

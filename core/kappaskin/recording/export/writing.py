@@ -1,29 +1,33 @@
-"""A recording to what is wanted of it, written into a folder: step by step, as far as it is."""
+"""Export of a recording: frames recomputed and written, by a process of its own."""
 
 import math
 import shutil
+import tempfile
 import time
 from collections.abc import Generator
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
+from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.frames import Frame
-from kappaskin.recording.export.about import About, about, another
-from kappaskin.recording.export.moment import Moment, Writer
-from kappaskin.recording.export.surfaces import StlSurfaces
-from kappaskin.recording.export.to_csv import CsvTable
-from kappaskin.recording.export.to_hdf5 import Hdf5Table
-from kappaskin.recording.export.to_npz import NpzTable
-from kappaskin.recording.export.to_vtp import VtpSurfaces
-from kappaskin.recording.export.wanted import Wanted
-from kappaskin.recording.reading import Message, Recording
-from kappaskin.recording.recompute import Retrace
+from kappaskin.recording.export.request import (
+    ExportedFrame,
+    ExportRequest,
+    ExportWriter,
+    RecordingInfo,
+    another,
+    recording_info,
+)
+from kappaskin.recording.export.surfaces import StlSurfaces, VtpSurfaces
+from kappaskin.recording.export.tables import CsvTable, Hdf5Table, NpzTable
+from kappaskin.recording.reading import RecordedMessage, Recording
+from kappaskin.recording.recompute import Recomputation
 from kappaskin.sensing import Sensor
 from kappaskin.sources import sensor_to_json
 
-FORMATS: dict[str, type[Writer]] = {
+FORMATS: dict[str, type[ExportWriter]] = {
     ".csv": CsvTable,
     ".npz": NpzTable,
     ".h5": Hdf5Table,
@@ -52,37 +56,39 @@ class Exported(NamedTuple):
     @property
     def words(self) -> str:
         """What was written, and what was not."""
-        told = [f"{self.written:,} frame{'s' * (self.written != 1)}"]
+        parts = [f"{self.written:,} frame{'s' * (self.written != 1)}"]
         if self.unsettled:
-            told.append(f"{self.unsettled:,} that came before there were settings are left out")
+            parts.append(f"{self.unsettled:,} that came before there were settings are left out")
         if self.shapeless:
-            told.append(f"{self.shapeless:,} whose readings decide no shape are left out")
+            parts.append(f"{self.shapeless:,} whose readings decide no shape are left out")
         if not self.whole:
-            told.append("the recording broke off, and this is up to there")
-        return "; ".join(told)
+            parts.append("the recording broke off, and this is up to there")
+        return "; ".join(parts)
 
 
-def exported(wanted: Wanted, room: Path) -> Generator[float | Exported]:
-    """Write all that is `wanted` into the folder `room`.
+def export_steps(request: ExportRequest, scratch: Path) -> Generator[float | Exported]:
+    """Write all that is requested into the folder `scratch`.
 
     Now and then the share that is done, and what came of it at the end.
     """
     try:
-        with Recording(wanted.recording) as recording:
-            yield from _exported(recording, wanted, room)
+        with Recording(request.recording) as recording:
+            yield from _exported(recording, request, scratch)
     except OSError as error:
         raise Refusal(
-            f"{wanted.to}: cannot be written ({error.strerror or error}); choose another place"
+            f"{request.to}: cannot be written ({error.strerror or error}); choose another place"
         ) from error
     except GeneratorExit:  # nobody waits for it any more
-        shutil.rmtree(room, ignore_errors=True)
+        shutil.rmtree(scratch, ignore_errors=True)
         raise
 
 
-def _exported(recording: Recording, wanted: Wanted, room: Path) -> Generator[float | Exported]:
-    told = about(recording, wanted)
-    with closing(FORMATS[wanted.format](room, wanted, told)) as writer:
-        work, next_report = _Work(recording, wanted, told, writer), 0.0
+def _exported(
+    recording: Recording, request: ExportRequest, scratch: Path
+) -> Generator[float | Exported]:
+    info = recording_info(recording, request)
+    with closing(FORMATS[request.format](scratch, request, info)) as writer:
+        work, next_report = _Work(recording, request, info, writer), 0.0
         for message in recording.messages():
             if not work.take(message):
                 break
@@ -95,39 +101,45 @@ def _exported(recording: Recording, wanted: Wanted, room: Path) -> Generator[flo
 
 
 class _Work:
-    """Takes the messages as they were written, until all that is wanted is."""
+    """Takes the messages as they were written, until all that is requested is written."""
 
-    def __init__(self, recording: Recording, wanted: Wanted, about: About, writer: Writer) -> None:
-        self._recording, self._wanted, self._writer = recording, wanted, writer
-        self._retrace = Retrace(recording, wanted.setup)
-        self._device, self._sensor = sensor_to_json(about.sensor), about.sensor
-        self._due = wanted.first  # s since the recording began
+    def __init__(
+        self,
+        recording: Recording,
+        request: ExportRequest,
+        info: RecordingInfo,
+        writer: ExportWriter,
+    ) -> None:
+        self._recording, self._request, self._writer = recording, request, writer
+        self._recomputation = Recomputation(recording, request.setup)
+        self._device, self._sensor = sensor_to_json(info.sensor), info.sensor
+        self._due = request.first  # s since the recording began
         self._last = math.nan  # s, when the last frame that was looked at came
         self._written = self._unsettled = self._shapeless = 0
 
-    def _at(self, message: Message) -> float:
+    def _at(self, message: RecordedMessage) -> float:
         return (message.stamp - self._recording.first) * 1e-9
 
-    def take(self, message: Message) -> bool:
-        """Take one message; whether the next one is wanted too."""
-        for frame in self._retrace(message):
+    def take(self, message: RecordedMessage) -> bool:
+        """Take one message; whether the next one is needed too."""
+        for frame in self._recomputation(message):
             self._last = at = self._at(message)
-            if at > self._wanted.end:
+            if at > self._request.end:
                 return False
             if at >= self._due:
                 self._write(at, frame)
-            if self._written and self._wanted.at is not None:
+            if self._written and self._request.at is not None:
                 return False
         return True
 
     def _write(self, at: float, frame: Frame) -> None:
-        self._check_device(at, self._retrace.sensor)
-        estimate, pipeline = self._retrace.newest(), self._retrace.pipeline
+        self._check_device(at, self._recomputation.sensor)
+        estimate, pipeline = self._recomputation.newest(), self._recomputation.pipeline
         if estimate is None or pipeline is None:
             self._unsettled += 1
-        elif self._writer.take(Moment(at, frame, estimate, pipeline)):
+        elif self._writer.take(ExportedFrame(at, frame, estimate, pipeline)):
             self._written += 1
-            first, every = self._wanted.first, self._wanted.every
+            first, every = self._request.first, self._request.every
             if every:
                 self._due = first + every * (math.floor((at - first) / every) + 1)
         else:
@@ -145,9 +157,9 @@ class _Work:
         """Refuse to end with nothing."""
         if self._written:
             return
-        span = f"from {self._wanted.first:g} s on"
-        if math.isfinite(self._wanted.end):
-            span = f"from {self._wanted.first:g} s until {self._wanted.end:g} s"
+        span = f"from {self._request.first:g} s on"
+        if math.isfinite(self._request.end):
+            span = f"from {self._request.first:g} s until {self._request.end:g} s"
         if self._unsettled:
             why = f"those {span} came before there were settings to work them out with"
         elif self._shapeless:
@@ -155,16 +167,95 @@ class _Work:
         elif math.isnan(self._last):
             why = "got none that can be used"
         else:
-            which = "next" if self._last > self._wanted.end else "last"
+            which = "next" if self._last > self._request.end else "last"
             why = f"got none {span}; the {which} one came at {self._last:.6g} s"
         raise Refusal(f"{self._recording.path}: expected frames, {why}; choose another span")
 
-    def share(self, message: Message) -> float:
-        """What of the time that is wanted has passed with a message."""
-        end = self._wanted.end if self._wanted.at is None else self._wanted.at
+    def share(self, message: RecordedMessage) -> float:
+        """The share of the requested time that has passed with a message."""
+        end = self._request.end if self._request.at is None else self._request.at
         until = min(end, (self._recording.last - self._recording.first) * 1e-9)
         return min(max(self._at(message) / until, 0.0), 1.0) if until > 0 else 0.0
 
     def done(self) -> Exported:
         whole = self._recording.whole
         return Exported(self._written, self._unsettled, self._shapeless, whole)
+
+
+class ExportTask:
+    """Writes what is requested, in a folder beside it until it is whole; only `wait` waits.
+
+    Refused where there is no place. It ends when it is done, when `close` is called, which leaves
+    nothing of what is not whole, or when the process that started it is gone.
+    """
+
+    def __init__(self, request: ExportRequest) -> None:
+        self.request = request
+        try:
+            scratch = tempfile.mkdtemp(prefix=f".{request.to.name}.", dir=request.to.parent)
+        except OSError as error:
+            raise _unwritable(request.to, error) from error
+        self._scratch = Path(scratch)
+        try:
+            self._task = BackgroundProcess[float | Exported](
+                "kappaskin-export", export_steps, request, self._scratch
+            )
+        except BaseException:  # Ctrl+C, while it begins
+            shutil.rmtree(self._scratch, ignore_errors=True)
+            raise
+
+    @property
+    def done(self) -> bool:
+        return self._task.done
+
+    def poll(self) -> list[float | Exported]:
+        """The shares that are done since the last call, and in the end what came of it.
+
+        A `Refusal` where that is nothing.
+        """
+        over, found = self.done, self._task.poll()
+        if self.done and not over:
+            self._give()
+        return found
+
+    def wait(self) -> Generator[float | Exported]:
+        """Each share as soon as it is done, and in the end what came of it."""
+        for found in self._task.wait():
+            if isinstance(found, Exported):
+                self._give()
+            yield found
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What is there when it is done: files, and the folder of a series."""
+        return self.request.files
+
+    def _give(self) -> None:
+        """Give what is whole its place; nothing, where one is taken."""
+        given: list[tuple[Path, Path]] = []
+        try:
+            for place in self.files:
+                if place.exists():
+                    raise FileExistsError(17, "it has appeared meanwhile")
+                made = self._scratch / place.name
+                made.rename(place)
+                given.append((place, made))
+        except OSError as error:
+            for place, made in given:
+                place.rename(made)
+            raise _unwritable(self.request.to, error) from error
+
+    def close(self) -> None:
+        """End it, done or not."""
+        self._task.close()
+        shutil.rmtree(self._scratch, ignore_errors=True)
+
+    def __enter__(self) -> "ExportTask":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _unwritable(path: Path, error: OSError) -> Refusal:
+    return Refusal(f"{path}: cannot be written ({error.strerror or error}); choose another place")

@@ -15,7 +15,7 @@ import numpy as np
 
 from kappaskin.calibration import Calibration, save_calibration
 from kappaskin.errors import Refusal
-from kappaskin.recording import Disk, Recorder, Recording, Written
+from kappaskin.recording import Recorder, Recording, RecordingStatus, ReservedFile
 from kappaskin.recording import messages as m
 from kappaskin.studies.drills.stand import Drill, DrillOutcome, Stand
 
@@ -81,7 +81,7 @@ _SLOW = 0.5  # s that one write takes
 _ROOM = 2**16  # bytes of a file, until the disk is full but for what is kept in reserve
 
 
-class _SlowDisk(Disk):
+class _SlowDisk(ReservedFile):
     """One on which every write takes its time."""
 
     def put(self, data: bytes) -> None:
@@ -89,7 +89,7 @@ class _SlowDisk(Disk):
         super().put(data)
 
 
-class _FullDisk(Disk):
+class _FullDisk(ReservedFile):
     """A disk with little room apart from the reserve."""
 
     def put(self, data: bytes) -> None:
@@ -110,7 +110,7 @@ class _Listener(Recorder):
         super().received(host_time, data)
 
 
-def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> DrillOutcome:
+def _recorded(disk: Callable[[Path], ReservedFile], full: bool, stand: Stand) -> DrillOutcome:
     """Record for a while to a bad disk: reads go on, the file is whole, and trouble is reported."""
     stand.settle()
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
@@ -130,7 +130,9 @@ def _recorded(disk: Callable[[Path], Disk], full: bool, stand: Stand) -> DrillOu
     )
 
 
-def _claims(path: Path, written: Written, received: int, full: bool) -> list[tuple[bool, str]]:
+def _claims(
+    path: Path, written: RecordingStatus, received: int, full: bool
+) -> list[tuple[bool, str]]:
     """Whether the file is what it should be, of so many bytes that the recorder received."""
     try:
         with Recording(path) as recording:

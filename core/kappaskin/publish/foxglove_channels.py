@@ -1,12 +1,18 @@
-"""What a client of Foxglove's protocol may subscribe to, and the schema of each."""
+"""Channels of the Foxglove transport: their schemas, and the skin as a cloud of points."""
 
+import base64
 import json
 from dataclasses import dataclass
 from typing import Any
 
-from kappaskin.frames import Event
+import numpy as np
+import scipy
+
+from kappaskin.bases import CurvatureMap
+from kappaskin.frames import COMPONENTS, Array, Event
+from kappaskin.pipeline import Pipeline
 from kappaskin.publish.message import CONTACT as CONTACT_NUMBERS
-from kappaskin.publish.message import STATUS_NUMBERS, SWITCHES
+from kappaskin.publish.message import STATUS_NUMBERS, SWITCHES, EstimateMessage
 
 FRAME = "skin"
 """The frame of reference: that of `Patch`, x along the skin, z outward at its middle."""
@@ -60,7 +66,7 @@ _CONTACT = _object(
     **_KIND,
     source=_TEXT,
     **{key: {"type": "boolean", "description": words} for key, words in SWITCHES.items()},
-    **{f.key: {"type": "number", "description": f.words} for f in CONTACT_NUMBERS},
+    **{f.key: {"type": "number", "description": f.text} for f in CONTACT_NUMBERS},
 )
 _SHAPE = _object(
     **_KIND,
@@ -114,4 +120,76 @@ def logged(event: Event, when: float) -> bytes:
     return (
         f'{{"timestamp":{moment(when)},"level":{level},"message":{json.dumps(text)},'
         '"name":"kappaskin","file":"","line":0}'
+    ).encode()
+
+
+POINTS = 33
+"""Points of the cloud along each side of the skin, edges included."""
+
+NAMES = ("x", "y", "z", "displacement", *(f"curvature_{name}" for name in COMPONENTS))
+"""What each point has: place and displacement in m, change of curvature in 1/m."""
+
+_FLOAT32 = 7  # as Foxglove numbers types
+_AT_ORIGIN = '{"position":{"x":0,"y":0,"z":0},"orientation":{"x":0,"y":0,"z":0,"w":1}}'
+_FIELDS = json.dumps(
+    [{"name": name, "offset": 4 * k, "type": _FLOAT32} for k, name in enumerate(NAMES)]
+)
+
+
+class _Grid:
+    """Points of a skin, and the maps from coefficients to what they have; made once a setup."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        basis = pipeline.basis
+        x, y = basis.patch.grid(POINTS, POINTS)
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        self._on_skin = basis.patch.contains(places)
+        self._at_rest, self._outward = basis.patch.at_rest(places[self._on_skin])
+        self._maps = [
+            basis.on_grid(x, y),
+            *(CurvatureMap(basis, component, x, y) for component in COMPONENTS),
+        ]
+
+    def __call__(self, coefficients: Array) -> Array:
+        """What the points have, (points, 7)."""
+        values = [of(coefficients).ravel()[self._on_skin] for of in self._maps]
+        points = self._at_rest - values[0][:, None] * self._outward
+        return np.column_stack([points, *values])
+
+
+class Cloud:
+    """Messages to clouds of points."""
+
+    def __init__(self) -> None:
+        self._pipeline: Pipeline | None = None
+        self._grid: _Grid | None = None
+
+    def __call__(self, message: EstimateMessage) -> bytes | None:
+        """The skin as a foxglove.PointCloud in JSON; None when its shape is not known."""
+        coefficients = message.estimate.coefficients
+        if not np.isfinite(coefficients).all():
+            return None
+        if self._grid is None or self._pipeline is not message.pipeline:
+            self._pipeline, self._grid = message.pipeline, _Grid(message.pipeline)
+        data = base64.b64encode(self._grid(coefficients).astype("<f4").tobytes()).decode()
+        return (
+            f'{{"timestamp":{moment(message.timestamp)},"frame_id":"{FRAME}","pose":{_AT_ORIGIN},'
+            f'"point_stride":{4 * len(NAMES)},"fields":{_FIELDS},"data":"{data}"}}'
+        ).encode()
+
+
+def pose(message: EstimateMessage) -> bytes:
+    """The contact as a foxglove.PoseInFrame in JSON: z is the skin's normal, x along the skin."""
+    geometry = message.estimate.geometry
+    x, y, z = geometry.position.tolist()
+    turn = dict(
+        zip(
+            "xyzw",
+            scipy.spatial.transform.Rotation.from_matrix(geometry.frame.T).as_quat().tolist(),
+            strict=True,
+        )
+    )
+    return (
+        f'{{"timestamp":{moment(message.timestamp)},"frame_id":"{FRAME}","pose":{{"position":'
+        f'{{"x":{x},"y":{y},"z":{z}}},"orientation":{json.dumps(turn)}}}}}'
     ).encode()

@@ -1,0 +1,268 @@
+"""What is to be exported, and what every exported file says of its recording."""
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from datetime import UTC, datetime
+from functools import cached_property
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from kappaskin.calibration import Calibration, Tare
+from kappaskin.errors import Refusal
+from kappaskin.frames import Estimate, Frame
+from kappaskin.pipeline import Pipeline, Reported, Setup
+from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import decode
+from kappaskin.recording.disk import is_there
+from kappaskin.recording.messages import Topic
+from kappaskin.recording.reading import Recording
+from kappaskin.recording.setup_text import setup_from_text
+from kappaskin.sensing import Sensor
+from kappaskin.sources import sensor_from_json
+
+TABLES = (".csv", ".npz", ".h5")
+"""Suffixes of files with a row for each frame."""
+
+SURFACES = (".vtp", ".stl", ".pvd")
+"""Suffixes of files of the skin's surface."""
+
+
+@dataclass(frozen=True)
+class ExportRequest:
+    """The file `to` of a `recording`, in the format that its suffix names.
+
+    Times are in s since the recording began: from `begin` until `end`, one frame each `every` s, or
+    all where that is 0; or the first frame from `at` on alone. Frames are worked out with the
+    settings that were recorded, or with `setup`. A `Refusal` where that makes no file.
+    """
+
+    recording: Path
+    to: Path
+    begin: float = 0.0
+    end: float = math.inf
+    every: float = 0.0
+    at: float | None = None
+    setup: Setup | None = None
+
+    def __post_init__(self) -> None:
+        self._check_times()
+        self._check_format()
+        self._check_place()
+
+    @property
+    def format(self) -> str:
+        return self.to.suffix.lower()
+
+    @property
+    def folder(self) -> Path | None:
+        """Where the files of a series are; None for one file."""
+        series = self.format == ".pvd" or (self.format == ".stl" and self.at is None)
+        return self.to.with_suffix("") if series else None
+
+    @property
+    def metadata_file(self) -> Path | None:
+        """The file beside an STL file, with what that cannot hold itself."""
+        return self.to.with_suffix(".json") if self.format == ".stl" else None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that is made: files, and the folder of a series."""
+        alone = self.format == ".stl" and self.folder is not None
+        places = (None if alone else self.to, self.folder, self.metadata_file)
+        return tuple(place for place in places if place is not None)
+
+    @property
+    def first(self) -> float:
+        """From when on frames are taken, in s since the beginning."""
+        return self.begin if self.at is None else self.at
+
+    def _check_times(self) -> None:
+        at = self.first
+        if not (math.isfinite(at) and self.end >= at >= 0 and 0 <= self.every < math.inf):
+            raise Refusal(
+                f"expected times in s from 0 on, in order, got from {at:g} until {self.end:g}, "
+                f"every {self.every:g}"
+            )
+        if self.at is not None and (self.begin, self.end, self.every) != (0.0, math.inf, 0.0):
+            raise Refusal("expected one moment, or a span, got both; leave one of them out")
+
+    def _check_format(self) -> None:
+        if self.format not in TABLES + SURFACES:
+            raise Refusal(
+                f"{self.to}: expected a file that ends in one of {', '.join(TABLES + SURFACES)}"
+            )
+        if self.format in TABLES and self.at is not None:
+            raise Refusal(
+                f"a {self.format} has a row for each frame: give from when until when instead of "
+                "a moment"
+            )
+        if self.format == ".vtp" and self.at is None:
+            raise Refusal(
+                "a .vtp is the skin at one moment: give it, or export a series to a .pvd, with "
+                "the time between two surfaces"
+            )
+        if self.format == ".pvd" and not self.every:
+            raise Refusal("a .pvd is a series: give the time between two surfaces")
+        if self.format == ".stl" and self.at is None and not self.every:
+            raise Refusal(
+                "an .stl is the skin at one moment, or a series: give the moment, or the time "
+                "between two surfaces"
+            )
+
+    def _check_place(self) -> None:
+        for place in self.files:
+            if is_there(place):
+                raise Refusal(f"{place}: is there already; choose another name")
+
+
+@dataclass(frozen=True)
+class RecordingInfo:
+    """What the frames are of: a `sensor`, and at most so many `functions` along x and y.
+
+    `facts` has all of it as JSON values.
+    """
+
+    facts: dict[str, Any]
+    sensor: Sensor
+    functions: tuple[int, int]
+
+    @property
+    def program(self) -> str:
+        return self.facts["program"]
+
+    def json(self, **more: object) -> str:
+        """All of it, and `more`, as JSON."""
+        return json.dumps(self.facts | more)
+
+
+class _StampedText(NamedTuple):
+    """The `number`th text on its topic, `at` s after the beginning."""
+
+    number: int
+    at: float
+    text: str
+
+
+def recording_info(recording: Recording, request: ExportRequest) -> RecordingInfo:
+    """What files of the requested span say; a `Refusal` where there were two devices."""
+    path = recording.path
+    devices = list(_in_force(recording, m.DEVICE, request))
+    if not devices:
+        raise Refusal(f"{path}: expected a device from {request.first:g} s on, got none")
+    for device in devices[1:]:
+        if device.text != devices[0].text:
+            raise Refusal(f"{path}: {another(device.at)}")
+    sensor = sensor_from_json(devices[0].text)
+    setups = [_setup_facts(request.setup, sensor)] if request.setup else []
+    if request.setup is None:
+        for each in _in_force(recording, m.SETUP, request):
+            setup = setup_from_text(each.text, recording.attachment)
+            number = {"number": each.number, "since": max(each.at, 0.0)}
+            setups.append(number | _setup_facts(setup, sensor))
+    if not setups:
+        raise Refusal(
+            f"{path}: was recorded without settings until {request.end:g} s, so that no frame was "
+            "worked out; export a later span"
+        )
+    functions = (max(setup[name] for setup in setups) for name in ("Ni", "Nj"))
+    return RecordingInfo(_facts(recording, devices[0].text, sensor, setups), sensor, (*functions,))
+
+
+def another(at: float) -> str:
+    """The message about a device that came `at` s after the beginning, as another one."""
+    before, after = math.ceil(1e3 * at - 1) / 1e3, math.floor(1e3 * at + 1) / 1e3
+    return (
+        f"another device, or another skin, came at {at:.6g} s, and a file is of one: export the "
+        f"time until {before:.3f} s (--until), or from {after:.3f} s on (--from)"
+    )
+
+
+def _in_force(recording: Recording, topic: Topic, request: ExportRequest) -> Iterator[_StampedText]:
+    """The texts on a topic that held at some time of the span."""
+    texts = [
+        _StampedText(
+            number, (message.stamp - recording.first) * 1e-9, decode(m.STRING, message.data)["data"]
+        )
+        for number, message in enumerate(recording.messages_on(topic))
+    ]
+    last = None
+    for one in texts:
+        if one.at > request.end:
+            break
+        if last is not None and one.at > request.first:
+            yield last
+        last = one
+    if last is not None:
+        yield last
+
+
+def _setup_facts(setup: Setup, sensor: Sensor) -> dict[str, Any]:
+    facts = {field.name: getattr(setup, field.name) for field in fields(setup)}
+    facts["Nj"] = 1 if sensor.layout.patch.strip else setup.Nj
+    facts["edge"] = setup.edge or sensor.edge
+    return facts | {"calibration": _dated(setup.calibration), "tare": _dated(setup.tare)}
+
+
+def _dated(made: Calibration | Tare | None) -> dict[str, str] | None:
+    if made is None:
+        return None
+    return {
+        "name": made.name,
+        "serial_number": made.serial_number,
+        "date": made.date.isoformat(),
+        "digest": made.digest,
+    }
+
+
+def _facts(
+    recording: Recording, device: str, sensor: Sensor, setups: list[dict[str, Any]]
+) -> dict[str, Any]:
+    began = datetime.fromtimestamp(recording.first * 1e-9, UTC)
+    return {
+        "program": f"kappaskin {metadata.version('kappaskin')}",
+        "recording": recording.path.name,
+        "recorded_by": recording.library,
+        "began": began.isoformat(timespec="milliseconds"),
+        "ended_properly": recording.whole,
+        "device": json.loads(device),
+        "skin": sensor.layout.patch.name,
+        "positions": sensor.layout.positions.tolist(),
+        "settings": setups,
+        "units": "SI: m, s, N, 1/m; curvature components xx, yy, xy",
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedFrame:
+    """A `frame`, that came `at` s after the recording began, and what `pipeline` made of it."""
+
+    at: float
+    frame: Frame
+    estimate: Estimate
+    pipeline: Pipeline
+
+    @cached_property
+    def reported(self) -> Reported:
+        """What the table of quantities is computed of."""
+        return Reported(self.estimate, self.pipeline.fitted)
+
+
+class ExportWriter(Protocol):
+    """Writes what is requested into the folder `scratch`; an `OSError` where the disk is full."""
+
+    def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None: ...
+
+    def take(self, frame: ExportedFrame) -> bool:
+        """Write one frame; whether there was anything to write."""
+        ...
+
+    def finish(self) -> None:
+        """Write what is still to be written."""
+        ...
+
+    def close(self) -> None:
+        """Hold no file open any more."""
+        ...

@@ -1,0 +1,244 @@
+"""One table of what an estimate reports: what is in it is in every file and message."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from kappaskin import COMPONENTS, load_scene
+from kappaskin.pipeline import REPORTED
+from kappaskin.pipeline.reported import getters, readouts
+from kappaskin.publish.foxglove_channels import CHANNELS
+from kappaskin.publish.message import CONTACT, SWITCHES
+from kappaskin.recording import messages as m
+from kappaskin.recording.export.tables import columns
+
+COLUMNS = [
+    "time",
+    "sequence",
+    "setup",
+    "device_time",
+    "host_time",
+    "taken",
+    "taken_sd",
+    "counts",
+    "nominal",
+    "curvature",
+    "fresh",
+    "residual",
+    "suspect",
+    "coefficients",
+    "noise",
+    "converged",
+    "present",
+    "single",
+    "near_rim",
+    "spare",
+    "position",
+    "position_sd",
+    "position_95",
+    "force",
+    "force_sd",
+    "force_95",
+    "displacement",
+    "displacement_sd",
+    "point",
+    "frame",
+    "metric",
+    "curvature_form",
+    "torsion_form",
+    "covariance",
+    "principal",
+    "principal_sd",
+    "angle",
+]
+"""Names of columns of CSV and HDF5 files and of arrays of NPZ files, which others read."""
+
+UNITS = {
+    **dict.fromkeys(("time", "device_time", "host_time", "taken", "taken_sd"), "s"),
+    **dict.fromkeys(("nominal", "curvature", "residual", "noise"), "1/m"),
+    **dict.fromkeys(("coefficients", "position", "position_sd", "position_95", "point"), "m"),
+    **dict.fromkeys(("displacement", "displacement_sd"), "m"),
+    **dict.fromkeys(("force", "force_sd", "force_95"), "N"),
+    **dict.fromkeys(("curvature_form", "torsion_form", "principal", "principal_sd"), "1/m"),
+    **{"covariance": "1/m^2", "angle": "rad"},
+}
+
+HEADS = """
+position_x [m],position_y [m],position_sd_x [m],position_sd_y [m]
+position_95_x [m],position_95_y [m]
+force [N],force_sd [N],force_95 [N],displacement [m],displacement_sd [m]
+point_x [m],point_y [m],point_z [m]
+frame_t_x,frame_t_y,frame_t_z,frame_s_x,frame_s_y,frame_s_z,frame_n_x,frame_n_y,frame_n_z
+metric_t_x,metric_t_y,metric_s_x,metric_s_y
+curvature_form_t_t [1/m],curvature_form_t_s [1/m],curvature_form_s_t [1/m],curvature_form_s_s [1/m]
+torsion_form_t [1/m],torsion_form_s [1/m]
+""".replace("\n", ",").strip(",")
+"""Part of the line at the head of a CSV file."""
+
+KEYS = [
+    "timestamp",
+    "number",
+    "sequence",
+    "generation",
+    "device_time_s",
+    "taken_sd_s",
+    "age_s",
+    "noise_per_m",
+    "x_m",
+    "y_m",
+    "x_sd_m",
+    "y_sd_m",
+    "force_N",
+    "force_sd_N",
+    "displacement_m",
+    "displacement_sd_m",
+    "position_x_m",
+    "position_y_m",
+    "position_z_m",
+    "position_x_sd_m",
+    "position_y_sd_m",
+    "position_z_sd_m",
+    "normal_x",
+    "normal_y",
+    "normal_z",
+    "normal_sd_rad",
+    "curvature_1_per_m",
+    "curvature_1_sd_per_m",
+    "curvature_2_per_m",
+    "curvature_2_sd_per_m",
+    "direction_1_x",
+    "direction_1_y",
+    "direction_1_z",
+    "direction_2_x",
+    "direction_2_y",
+    "direction_2_z",
+    "direction_sd_rad",
+]
+"""Keys of the numbers in a message by UDP or Foxglove, which others read."""
+
+FLAGS = ["present", "single", "near_rim", "shape_follows"]
+
+
+@pytest.fixture
+def made() -> list:
+    sensor = load_scene("centre").sensor()
+    return list(columns(SimpleNamespace(sensor=sensor, functions=(5, 4))))  # pyright: ignore
+
+
+def test_columns_are_called_as_they_always_were(made) -> None:
+    assert [column.name for column in made] == COLUMNS
+    assert {column.name: column.unit for column in made if column.unit} == UNITS
+    heads = ",".join(head for column in made for head in column.heads())
+    assert HEADS in heads
+    P = made[COLUMNS.index("suspect")].shape[0]
+    readings = [f"curvature_{name}_{n} [1/m]" for name in COMPONENTS for n in range(P)]
+    assert ",".join(readings) in heads
+    assert "coefficients_0_3 [m],coefficients_1_0 [m]" in heads
+
+
+def test_columns_have_the_types_that_they_always_had(made) -> None:
+    kinds = {column.name: column.kind for column in made if column.kind != "<f8"}
+    assert kinds == {
+        **dict.fromkeys(("sequence", "setup", "spare"), "<i8"),
+        **dict.fromkeys(("fresh", "converged", "present", "single", "near_rim"), "?"),
+        "suspect": "|u1",
+    }
+
+
+def test_messages_have_the_keys_that_they_always_had() -> None:
+    assert [number.key for number in CONTACT] == KEYS
+    assert list(SWITCHES) == FLAGS
+    schema = json.loads(CHANNELS[0].schema)["properties"]
+    assert list(schema) == ["kind", "version", "source", *FLAGS, *KEYS]
+
+
+def test_names_are_one_of_a_kind_and_every_unit_has_a_suffix() -> None:
+    names = [f"{q.name}{suffix}" for q in REPORTED for suffix, _, _ in q.forms]
+    assert len(set(names)) == len(names)
+    assert all(number.key for quantity in REPORTED for number in quantity.published)
+
+
+def test_everything_recorded_of_a_contact_can_be_verified() -> None:
+    recorded = {field.name for field in m.CONTACT.fields} - {"header"}
+    assert recorded <= set(getters())
+
+
+ADDED = """
+import sys, json
+from pathlib import Path
+from types import SimpleNamespace
+
+import h5py, numpy as np
+import kappaskin.pipeline as pipeline
+from kappaskin.pipeline.reported import ReportedQuantity
+import kappaskin.pipeline.reported as table
+
+pipeline.REPORTED = table.REPORTED = (
+    *table.REPORTED,
+    ReportedQuantity(
+        "twice", "N", "twice the force", lambda r: 2 * r.touch.force,
+        sd=lambda r: 2 * r.touch.force_sd,
+    ),
+)
+
+from kappaskin import Setup, Simulator, load_scene
+from kappaskin.pipeline import Pipeline
+from kappaskin.publish.foxglove_channels import CHANNELS
+from kappaskin.publish.message import EstimateMessage, MessageHeader
+from kappaskin.recording import ExportRequest
+from kappaskin.recording.export.writing import export_steps
+
+recording, folder = map(Path, sys.argv[1:])
+found = {}
+for suffix in (".csv", ".npz", ".h5"):
+    to = folder / f"out{suffix}"
+    list(export_steps(ExportRequest(recording, to), folder))
+with np.load(folder / "out.npz") as npz, h5py.File(folder / "out.h5") as h5:
+    found["npz"] = np.array_equal(npz["twice"], 2 * npz["force"], equal_nan=True)
+    found["hdf5"] = np.array_equal(h5["twice_sd"][:], 2 * npz["force_sd"], equal_nan=True)
+    found["unit"] = h5["twice"].attrs["unit"]
+heads = [line for line in (folder / "out.csv").read_text().splitlines() if line[0] != "#"][0]
+found["csv"] = heads.endswith(",twice [N],twice_sd [N]")
+scene = load_scene("off-centre")
+made = Pipeline(scene.sensor(), Setup())
+estimate = made(Simulator(scene).frame(0, lambda: 1.0))
+message = EstimateMessage(estimate, made.fitted, made, MessageHeader("sim", 0.0, 0, True))
+said = json.loads(message.contact)
+found["udp"] = abs(said["twice_N"] / said["force_N"] - 2) < 1e-4 and "twice_sd_N" in said
+described = json.loads(CHANNELS[0].schema)["properties"]["twice_N"]
+found["foxglove"] = described["description"] == "twice the force"
+print(json.dumps(found))
+"""
+
+
+@pytest.mark.slow
+def test_a_quantity_added_to_the_table_is_in_every_file_and_message(
+    recording: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("h5py")
+    command = [sys.executable, "-c", ADDED, str(recording), str(tmp_path)]
+
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180)
+
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found.pop("unit") == "N"
+    assert found == dict.fromkeys(("npz", "hdf5", "csv", "udp", "foxglove"), True)
+
+
+def test_readouts_are_the_estimate_in_units_of_the_screen(messages_of) -> None:
+    (made,) = messages_of(load_scene("off-centre"))
+    touch, geometry = made.estimate.touch, made.estimate.geometry
+    found = {each.label: each for each in readouts(made.estimate)}
+    assert list(found)[:4] == ["Contact x", "Contact y", "Force", "Depth"]
+    assert found["Contact y"].value == 1e3 * touch.position[1]
+    assert found["Contact y"].half_width == 1e3 * touch.position_95[1]
+    assert (found["Force"].value, found["Force"].unit) == (1e3 * touch.force, "mN")
+    assert found["Depth"].sd == 1e3 * touch.displacement_sd
+    assert found["Smaller \N{GREEK SMALL LETTER KAPPA}"].sd == geometry.principal_sd[1]
+    assert math.isnan(found["Noise of a reading"].sd)
