@@ -64,7 +64,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Touch:
+class Contact:
     """A contact: `position` (2,) in m with `position_sd` (2,) in m, and how hard it is.
 
     `force` and `force_sd` in N, `displacement` and `displacement_sd` in m, of the skin at the
@@ -241,7 +241,7 @@ class Estimate:
     suspect: NDArray[np.uint8]
     converged: bool
     fit_time: float
-    touch: Touch
+    contact: Contact
     geometry: LocalGeometry
     true_surface: Array
     true_contact: Array

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import Refusal, read_scene, scene_file
+from kappaskin import Refusal, read_scene
+from kappaskin.scenes import scene_file
 from kappaskin_app.shell.cache import Memo
 from kappaskin_app.shell.loads import tried
 from kappaskin_app.shell.scene_making import Ahead

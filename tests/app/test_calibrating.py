@@ -9,21 +9,10 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import (
-    RADII,
-    Calibration,
-    Estimate,
-    Presentation,
-    Refusal,
-    Setup,
-    Simulator,
-    Status,
-    Tare,
-    Tolerance,
-    load_scene,
-)
+from kappaskin import Calibration, Estimate, Refusal, Setup, Simulator, Status, Tare, load_scene
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.scenes import CylinderStep
+from kappaskin.scenes import RADII, CylinderStep, Presentation
+from kappaskin.scenes.effects import Tolerance
 from kappaskin_app.features.calibration.calibrating import Calibrating, parsed_radii
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings

@@ -7,7 +7,8 @@ import pytest
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QWidget
 
-from kappaskin import Patch, SensorLayout, schedule
+from kappaskin import Patch, SensorLayout
+from kappaskin.scenes import schedule
 from kappaskin_app.features.calibration.cylinder import CylinderView
 from kappaskin_app.features.calibration.loop_plot import Loop, LoopPlot
 from kappaskin_app.features.calibration.pass_map import PassMap

@@ -9,7 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLineEdit
 
-from kappaskin import Event, Port, Status, load_scene
+from kappaskin import Event, Status, load_scene
+from kappaskin.sources import Port
 from kappaskin_app.features.connection import plugs
 from kappaskin_app.features.connection.panel import ConnectionPanel
 from kappaskin_app.features.connection.plugs import Plugs

@@ -29,8 +29,8 @@ def _estimate(force=0.5, x=0.05, rigid=None, functions=8):
 
 
 def _found(estimate) -> Found:
-    what = _finder()(estimate.curvature, estimate.noise, estimate.touch)
-    return Found(what, estimate.touch)
+    what = _finder()(estimate.curvature, estimate.noise, estimate.contact)
+    return Found(what, estimate.contact)
 
 
 def _of_nothing():
@@ -50,7 +50,7 @@ def test_the_force_of_a_ball_that_lies_against_the_skin_is_the_hands(force) -> N
 
     assert cue.force == pytest.approx(force, abs=2 * cue.force_95)
     assert cue.force_95 < 0.02 * force
-    assert abs(estimate.touch.force - force) > 2 * cue.force_95  # a point load would not tell
+    assert abs(estimate.contact.force - force) > 2 * cue.force_95  # a point load would not tell
 
 
 def test_what_was_found_a_moment_ago_corrects_the_force_of_now() -> None:

@@ -9,8 +9,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QFileDialog
 
-from kappaskin import load_scene, prospect, write_scene
+from kappaskin import load_scene, write_scene
 from kappaskin.scenes import read_scene
+from kappaskin.studies import prospect
 from kappaskin_app.features.design.designing import design_of, scene_of
 from kappaskin_app.features.design.panel import DesignForm, _meant, _place
 from kappaskin_app.shell.settings import Settings, ask_of

@@ -52,9 +52,11 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
     errors: list[float] = []
 
     def note(estimate) -> None:
-        if estimate.touch.present:
+        if estimate.contact.present:
             errors.append(
-                float(np.linalg.norm(estimate.touch.position - sent_contact(estimate.device_time)))
+                float(
+                    np.linalg.norm(estimate.contact.position - sent_contact(estimate.device_time))
+                )
             )
 
     window.session.estimated.connect(note)

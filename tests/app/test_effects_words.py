@@ -2,7 +2,7 @@
 
 import pytest
 
-from kappaskin import EFFECTS
+from kappaskin.scenes.effects import EFFECTS
 from kappaskin_app.shell.effects import called, explained
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
-from kappaskin import scene_file
+from kappaskin.scenes import scene_file
 from kappaskin_app.shell.finder.finder import Finder
 from kappaskin_app.shell.finder.matching import score
 from kappaskin_app.shell.finder.things import Thing, things_in

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from kappaskin import FAULTS, Finding, Health, Patch, SensorLayout, Status, load_scene
+from kappaskin import Patch, SensorLayout, Status, load_scene
 from kappaskin.calibration import PressPhase
+from kappaskin.estimation import FAULTS
+from kappaskin.health import Finding, Health
 from kappaskin_app.features.health.map_testing import MapTesting
 from kappaskin_app.features.health.panel import HealthPanel
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
@@ -123,7 +125,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert "Press it now" in page.words.text()
     asked = window.testing.test.asked
     x, y = window.session.scene.layout.positions[asked]
-    wishes, at = window.requests, window.session.estimate.touch.position
+    wishes, at = window.requests, window.session.estimate.contact.position
 
     wishes.grab(*at)
     wishes.drag(float(x), float(y))

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import Distances
+from kappaskin.skin import Distances
 from kappaskin_app.features.contact.readouts import Health
 from kappaskin_app.shell.title import Title
 from kappaskin_app.shell.window import MainWindow

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from kappaskin import Distances
+from kappaskin.skin import Distances
 from kappaskin_app.features.membrane.ruler import told
 from kappaskin_app.features.membrane.sight import Sight
 from kappaskin_app.shell.window import MainWindow

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import Pipeline, Setup, Simulator, Touch, load_scene
+from kappaskin import Pipeline, Setup, Simulator, load_scene
 from kappaskin.estimation import FAULTS
+from kappaskin.frames import Contact
 from kappaskin_app.shell.notice import Notice, warnings
 from kappaskin_app.theme import DARK, LIGHT
 
-INSIDE = Touch(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
+INSIDE = Contact(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
 NEAR = replace(INSIDE, near_rim=True)
 SCENE = load_scene("centre")
 ESTIMATE = Pipeline(SCENE.sensor(), Setup())(Simulator(SCENE).frame(0, lambda: 0.0))
@@ -31,8 +32,8 @@ def suspecting(**why: int) -> np.ndarray:
         (NEAR, 12, "12 elements over 1 % strain; contact too near the rim to trust"),
     ],
 )
-def test_what_is_doubtful_is_told_in_words(touch: Touch, strained: int, words: str) -> None:
-    assert warnings(replace(ESTIMATE, touch=touch), strained) == words
+def test_what_is_doubtful_is_told_in_words(contact: Contact, strained: int, words: str) -> None:
+    assert warnings(replace(ESTIMATE, contact=contact), strained) == words
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import scene_file
+from kappaskin.scenes import scene_file
 from kappaskin_app.features.calibration import is_calibration
 from kappaskin_app.shell.touching import may_choose
 from kappaskin_app.shell.window import MainWindow

@@ -39,7 +39,7 @@ def test_nothing_is_drawn_over_the_skin_until_it_is_wanted_and_then_all_of_it(
     opened, until
 ) -> None:
     window: MainWindow = opened("sim:sphere")
-    until(lambda: window.display.badge.state == "SIM" and window.session.estimate.touch.present)
+    until(lambda: window.display.badge.state == "SIM" and window.session.estimate.contact.present)
     over = window.view.overlays
     assert not over.frame.actor.visibility
     assert over.directions.actor is None

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from kappaskin import Finding, Health, Status, load_scene
+from kappaskin import Status, load_scene
+from kappaskin.health import Finding, Health
 from kappaskin_app.features.membrane.sight import Sight
 from kappaskin_app.features.traces.facts import facts
 from kappaskin_app.features.traces.past import SECONDS, Past

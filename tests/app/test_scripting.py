@@ -16,8 +16,9 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 import kappaskin
-from kappaskin import Engine, Estimate, Refusal, Tare, scene_file
+from kappaskin import Engine, Estimate, Refusal, Tare
 from kappaskin.calibration.calibration import fingerprint
+from kappaskin.scenes import scene_file
 from kappaskin_app.features.export.scripting import script_of
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
@@ -33,9 +34,9 @@ sys.path.insert(0, sys.argv[1])
 if __name__ == "__main__":
     from script import estimates
     for e in estimates(40.0):
-        if np.isfinite(e.touch.force) and e.sequence >= int(sys.argv[2]):
+        if np.isfinite(e.contact.force) and e.sequence >= int(sys.argv[2]):
             np.savez(sys.argv[1] + "/out.npz", coefficients=e.coefficients, surface=e.surface,
-                     position=e.touch.position, force=e.touch.force, noise=e.noise,
+                     position=e.contact.position, force=e.contact.force, noise=e.noise,
                      rms=e.error_rms, sequence=e.sequence)
             break
 """
@@ -65,7 +66,7 @@ class Asked:
             and estimate.host_time > status.events[-1].time
             and status.setup == session.asked
             and estimate.generation == status.generation
-            and math.isfinite(estimate.touch.force)
+            and math.isfinite(estimate.contact.force)
         )
 
     def text(self, folder: Path) -> str:
@@ -96,7 +97,7 @@ def _numbers(text: str, folder: Path, sequence: int = 0) -> dict[str, Any]:
 
 
 def _same_bits(found: dict[str, Any], estimate: Estimate) -> bool:
-    touch = estimate.touch
+    touch = estimate.contact
     parts = (estimate.coefficients, estimate.surface, touch.position, touch.force)
     names = ("coefficients", "surface", "position", "force")
     return all(

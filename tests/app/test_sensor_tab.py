@@ -3,17 +3,10 @@
 import numpy as np
 import pytest
 
-from kappaskin import (
-    SECOND_GENERATION,
-    SECOND_GENERATION_LOOPS,
-    Creep,
-    PointLoad,
-    Region,
-    Status,
-    Tolerance,
-    UniformNoise,
-)
+from kappaskin import PointLoad, Region, Status
 from kappaskin.estimation import scan_tradeoff
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, Tolerance, UniformNoise
+from kappaskin.sensing import SECOND_GENERATION
 from kappaskin_app.features.sensor.panel import RegionPanel
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import region_of, scene_of, with_consequences

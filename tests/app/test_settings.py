@@ -3,7 +3,8 @@ from dataclasses import fields, replace
 import pytest
 from PySide6.QtWidgets import QAbstractSpinBox, QComboBox, QLabel
 
-from kappaskin import EDGES, Status
+from kappaskin import Status
+from kappaskin.bases import EDGES
 from kappaskin_app.features.compare.panel import OtherForm
 from kappaskin_app.features.design.panel import DesignForm
 from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of, part

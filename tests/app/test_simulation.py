@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
-    EDGES,
     DiscLoad,
     GaussianLoad,
     LineLoad,
@@ -17,8 +16,9 @@ from kappaskin import (
     Refusal,
     Simulator,
     load_scene,
-    scene_file,
 )
+from kappaskin.bases import EDGES
+from kappaskin.scenes import scene_file
 from kappaskin_app.shell.loads import dragged
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.load import LOAD_CASES, SPREAD_CASES

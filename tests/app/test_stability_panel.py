@@ -11,7 +11,8 @@ from PySide6.QtWidgets import (
     QTableWidget,
 )
 
-from kappaskin import Refusal, SensorLayout, SineBasis, singular_values
+from kappaskin import Refusal, SensorLayout, SineBasis
+from kappaskin.estimation import singular_values
 from kappaskin_app.features.stability.demonstrations import DEMONSTRATIONS
 from kappaskin_app.features.stability.seeing import MOST, Spectrum
 from kappaskin_app.shell.settings import Settings

@@ -4,7 +4,9 @@ from dataclasses import replace
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import Finding, Health, Replay, Status, load_scene
+from kappaskin import Status, load_scene
+from kappaskin.health import Finding, Health
+from kappaskin.recording import Replay
 from kappaskin_app.shell.badge import Badge, colour_of, origin
 from kappaskin_app.shell.states import state_of
 from kappaskin_app.theme import LIGHT

@@ -12,7 +12,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox
 
-from kappaskin import LONGEST_NOTE, Recording
+from kappaskin import Recording
+from kappaskin.live import LONGEST_NOTE
 from kappaskin.recording import RecordingStatus
 from kappaskin.recording.writing import RecordingFile
 from kappaskin_app.features.recording.recording_mark import RecordingMark, duration_of, size_of

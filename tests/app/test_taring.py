@@ -8,8 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from kappaskin import Drift, Setup, Status, Tare, load_scene
-from kappaskin.calibration import TareStore
+from kappaskin import Setup, Status, Tare, load_scene
+from kappaskin.calibration import Drift, TareStore
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live.tare_taking import TareStatus
 from kappaskin_app.features.calibration.tare import TarePanel, drift_words, warmth
@@ -273,7 +273,7 @@ def test_a_window_tares_a_skin_at_rest_and_refuses_a_loaded_one(window, until):
     assert "loaded" in panel.message.text() or "move" in panel.message.text()
 
     window.history.change("Lift", -1, load_case="point", force=0.0)
-    until(lambda: not window.session.estimate.touch.present)
+    until(lambda: not window.session.estimate.contact.present)
     action.trigger()
     until(lambda: window.history.settings.tare is not None)
     until(lambda: window.session.status.setup.tare is not None)

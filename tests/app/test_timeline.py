@@ -7,7 +7,8 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 
-from kappaskin import Presentation, load_scene
+from kappaskin import load_scene
+from kappaskin.scenes import Presentation
 from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.features.scene.track import profile

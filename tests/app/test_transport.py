@@ -7,7 +7,8 @@ from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtGui import QHelpEvent, QTextDocument
 from PySide6.QtWidgets import QApplication, QToolTip
 
-from kappaskin import Event, Replay
+from kappaskin import Event
+from kappaskin.recording import Replay
 from kappaskin_app.features.recording.landmarks import minutes
 from kappaskin_app.features.recording.transport import SPEEDS, Transport
 from kappaskin_app.theme import DARK, LIGHT

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from kappaskin import EDGES, Disk
+from kappaskin import Disk
+from kappaskin.bases import EDGES
 from kappaskin_app.shell.window import MainWindow
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from kappaskin import SCENES, Port
+from kappaskin.scenes import SCENES
+from kappaskin.sources import Port
 from kappaskin_app.shell.settings.load import READY_CASES
 from kappaskin_app.shell.window import MainWindow
 

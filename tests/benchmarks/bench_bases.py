@@ -65,7 +65,7 @@ def estimate(patch, layout):
     scene = scene.touched_by(PointLoad(0.03, 0.04, 0.3))
     pipeline = Pipeline(scene.sensor(), Setup())
     frame = replace(Simulator(scene).frame(0, time.monotonic), truth=None)
-    assert pipeline(frame).touch.force > 0.2
+    assert pipeline(frame).contact.force > 0.2
     return lambda: pipeline(frame)
 
 

@@ -7,17 +7,9 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from kappaskin import (
-    SECOND_GENERATION_LOOPS,
-    Calibration,
-    Creep,
-    Hysteresis,
-    Pipeline,
-    Setup,
-    Simulator,
-    load_scene,
-)
+from kappaskin import Calibration, Pipeline, Setup, Simulator, load_scene
 from kappaskin.calibration.calibration import fingerprint
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, Hysteresis
 
 
 def test_a_corrected_frame_costs_at_most_eight_uncorrected_ones(medians, figure, ratio) -> None:

@@ -3,31 +3,25 @@
 import numpy as np
 import pytest
 
-from kappaskin import (
-    SECOND_GENERATION_LOOPS,
-    Amplifier,
-    Creep,
-    GaussianNoise,
-    HalfBridge,
-    Patch,
-    SensorLayout,
-    SineBasis,
-    Tolerance,
-    Transduction,
-    UniformNoise,
-)
+from kappaskin import Patch, SensorLayout, SineBasis, Transduction
 from kappaskin.scenes.effects import (
+    SECOND_GENERATION_LOOPS,
+    Creep,
     DroppedFrames,
     FiniteSlopeEffect,
+    GaussianNoise,
     IntermittentElements,
     Quantisation,
     Saturation,
     StrainLimit,
     StuckElements,
     Temperature,
+    Tolerance,
+    UniformNoise,
 )
 from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
 from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.sensing import Amplifier, HalfBridge
 
 CHANNELS = 300
 EFFECTS = [

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from kappaskin import SECOND_GENERATION, Pipeline, Region, Scanner, Setup, Simulator, load_scene
+from kappaskin import Pipeline, Region, Setup, Simulator, load_scene
 from kappaskin.contact import ForceTorqueSensor, IntrinsicContact
+from kappaskin.estimation import Scanner
 from kappaskin.pipeline.pipeline import FrameAssembly
+from kappaskin.sensing import SECOND_GENERATION
 
 SCENE = replace(load_scene("centre"), transduction=SECOND_GENERATION, rate=160.0)
 SENSOR = SCENE.sensor()

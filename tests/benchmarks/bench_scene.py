@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import SCENES, PointLoad, Simulator, load_scene
-from kappaskin.scenes import EffectSelection, kept_effects
+from kappaskin import PointLoad, Simulator, load_scene
+from kappaskin.scenes import SCENES, EffectSelection, kept_effects
 from kappaskin.scenes.effects import EFFECTS
 from kappaskin.scenes.plan import effects_of
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kappaskin import SECOND_GENERATION, LeastSquares, Simulator, SineBasis, Tracking, load_scene
+from kappaskin import LeastSquares, Simulator, SineBasis, Tracking, load_scene
+from kappaskin.sensing import SECOND_GENERATION
 
 SCENE = replace(load_scene("circle"), transduction=SECOND_GENERATION, rate=160.0)
 SENSOR = SCENE.sensor()

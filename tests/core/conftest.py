@@ -12,19 +12,8 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from kappaskin import (
-    Basis,
-    Disk,
-    Estimate,
-    Patch,
-    Pipeline,
-    Polygon,
-    Scene,
-    Setup,
-    Simulator,
-    basis_for,
-    edges_of,
-)
+from kappaskin import Disk, Estimate, Patch, Pipeline, Polygon, Scene, Setup, Simulator, basis_for
+from kappaskin.bases import Basis, edges_of
 from kappaskin.cli import main
 from kappaskin.publish.message import EstimateMessage, MessageHeader, epoch
 

@@ -12,16 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kappaskin import (
-    AsPrinted,
-    Direct,
-    LeastSquares,
-    Patch,
-    RankDeficient,
-    Refusal,
-    SensorLayout,
-    SineBasis,
-)
+from kappaskin import LeastSquares, Patch, RankDeficient, Refusal, SensorLayout, SineBasis
+from kappaskin.estimation import AsPrinted, Direct
 
 METHODS = {"least-squares": LeastSquares, "direct": Direct}
 every_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)

@@ -7,21 +7,19 @@ from itertools import product
 import numpy as np
 import pytest
 
-from kappaskin import (
-    COMPONENTS,
+from kappaskin import Disk, Patch, Polygon, Refusal, SineBasis, basis_for
+from kappaskin.bases import (
     EDGES,
+    ORDERS,
     CurvatureMap,
-    Disk,
-    Patch,
-    Polygon,
-    Refusal,
-    SineBasis,
-    basis_for,
+    ElasticBasis,
+    curvature_at,
     edges_of,
+    overlaps,
 )
-from kappaskin.bases import ORDERS, ElasticBasis, curvature_at, overlaps
 from kappaskin.bases.modes import DiskBasis, PolygonBasis
 from kappaskin.bases.product import ClampedBasis
+from kappaskin.frames import COMPONENTS
 
 MIXED = [(2, 1), (1, 2), (2, 2)]
 

@@ -18,24 +18,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kappaskin import (
-    ADVICE,
-    Creep,
-    Frame,
-    GaussianNoise,
-    Presentation,
-    Refusal,
-    SensorLayout,
-    Simulator,
-    Tolerance,
-    calibrate,
-    load_scene,
-    schedule,
-)
-from kappaskin.calibration import take_sweep
+from kappaskin import Frame, Refusal, SensorLayout, Simulator, load_scene
+from kappaskin.calibration import calibrate, take_sweep
 from kappaskin.calibration.calibration import read_calibration
 from kappaskin.errors import SourceError
-from kappaskin.scenes.effects import ReadingEffect, Size, Survey
+from kappaskin.scenes import ADVICE, Presentation, schedule
+from kappaskin.scenes.effects import Creep, GaussianNoise, ReadingEffect, Size, Survey, Tolerance
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
 from kappaskin.sources import PseudoDevice

@@ -12,33 +12,34 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    FIRST_GENERATION_LOOPS,
-    SECOND_GENERATION_LOOPS,
     Calibration,
-    Creep,
     Engine,
-    GaussianNoise,
-    Hysteresis,
     Patch,
     Pipeline,
     Plate,
-    Presentation,
-    Procedure,
     Refusal,
     SensorLayout,
     Setup,
     Simulator,
     Status,
-    Tolerance,
-    calibrate,
     load_scene,
-    schedule,
 )
+from kappaskin.calibration import Procedure, calibrate
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.calibration.identification import fit_lines, identify_hysteresis, play_thresholds
 from kappaskin.calibration.report import ChannelLimits
 from kappaskin.live.ring import Ring
-from kappaskin.scenes.effects import ReadingEffect, Size
+from kappaskin.scenes import Presentation, schedule
+from kappaskin.scenes.effects import (
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION_LOOPS,
+    Creep,
+    GaussianNoise,
+    Hysteresis,
+    ReadingEffect,
+    Size,
+    Tolerance,
+)
 
 pytestmark = pytest.mark.slow
 

@@ -11,19 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import (
-    SECOND_GENERATION_LOOPS,
-    Calibration,
-    Creep,
-    Patch,
-    Refusal,
-    SensorLayout,
-    load_calibration,
-    load_scene,
-    save_calibration,
-)
-from kappaskin.calibration import calibration_to_toml
+from kappaskin import Calibration, Patch, Refusal, SensorLayout, load_calibration, load_scene
+from kappaskin.calibration import calibration_to_toml, save_calibration
 from kappaskin.calibration.calibration import fingerprint, read_calibration
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
 
 SENSOR = replace(
     load_scene("calibration").sensor(), layout=SensorLayout.regular(Patch(0.1, 0.1), 3, 2)

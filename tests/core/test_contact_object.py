@@ -508,7 +508,7 @@ def test_a_weak_press_into_a_corner_is_answered():
     find, pipeline = ObjectFinder(sensor.plate, sensor.layout), Pipeline(sensor, Setup())
     for number in range(3):
         estimate = pipeline(simulator.frame(number, lambda: 0.0))
-        found = find(estimate.curvature, estimate.noise, estimate.touch)
+        found = find(estimate.curvature, estimate.noise, estimate.contact)
         assert found.kind in found.probability
 
 

@@ -13,33 +13,32 @@ import pytest
 
 import kappaskin.studies
 from kappaskin import (
-    Amplifier,
-    Cost,
-    GaussianNoise,
-    Orbit,
     Patch,
     Plate,
     PointLoad,
     Refusal,
-    Refused,
     Scene,
     SensorLayout,
-    Setting,
     Transduction,
-    cheapest,
-    costs,
-    frontier,
     load_scene,
-    settings_to_try,
 )
 from kappaskin.cli.common import FAILED, REFUSED
-from kappaskin.scenes import SCENES
+from kappaskin.scenes import SCENES, Orbit
+from kappaskin.scenes.effects import GaussianNoise
+from kappaskin.sensing import Amplifier
 from kappaskin.studies import (
+    Cost,
     CostMeasurement,
+    Refused,
+    Setting,
     accuracy_verdict,
+    cheapest,
     cost_rows,
+    costs,
     costs_text,
+    frontier,
     parse_length,
+    settings_to_try,
     write_plot,
 )
 from kappaskin.studies.cost.bench import Bench

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from kappaskin import Creep, Refusal
+from kappaskin import Refusal
+from kappaskin.scenes.effects import Creep
 from kappaskin.sensing import StandardLinearSolid
 
 SHARE, TAU = 0.2, 3.0

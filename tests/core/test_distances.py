@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from kappaskin import Patch, distances
+from kappaskin import Patch
+from kappaskin.skin import distances
 
 FLAT = Patch(0.1, 0.06)
 

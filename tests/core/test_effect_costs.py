@@ -10,18 +10,7 @@ import pytest
 
 import kappaskin.studies
 import kappaskin.studies.simulation
-from kappaskin import (
-    Cost,
-    EffectCost,
-    Refusal,
-    Refused,
-    Scene,
-    SensorLayout,
-    Setting,
-    costs,
-    effect_costs,
-    load_scene,
-)
+from kappaskin import Refusal, Scene, SensorLayout, load_scene
 from kappaskin.cli.common import REFUSED
 from kappaskin.scenes import EffectSelection, plan
 from kappaskin.scenes.effects import (
@@ -31,7 +20,18 @@ from kappaskin.scenes.effects import (
     GaussianNoise,
     Temperature,
 )
-from kappaskin.studies import CostMeasurement, effect_rows, effects_text, usual_setting
+from kappaskin.studies import (
+    Cost,
+    CostMeasurement,
+    EffectCost,
+    Refused,
+    Setting,
+    costs,
+    effect_costs,
+    effect_rows,
+    effects_text,
+    usual_setting,
+)
 
 pytestmark = pytest.mark.slow
 

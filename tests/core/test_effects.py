@@ -7,21 +7,14 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from kappaskin import (
-    FIRST_GENERATION_LOOPS,
-    SECOND_GENERATION_LOOPS,
-    Amplifier,
-    Creep,
-    GaussianNoise,
-    HalfBridge,
-    Refusal,
-    Tolerance,
-    Transduction,
-    UniformNoise,
-)
+from kappaskin import Refusal, Transduction
 from kappaskin.scenes.effects import (
     EFFECTS,
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION_LOOPS,
+    Creep,
     GageLength,
+    GaussianNoise,
     Hysteresis,
     IntermittentElements,
     Quantisation,
@@ -30,11 +23,14 @@ from kappaskin.scenes.effects import (
     StrainLimit,
     StuckElements,
     Temperature,
+    Tolerance,
+    UniformNoise,
     Within,
     parameters,
 )
 from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
 from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.sensing import Amplifier, HalfBridge
 
 DRAWS = 200_000
 EFFECTS_AT_WORK = [

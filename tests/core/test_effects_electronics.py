@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter, welch
 
-from kappaskin import Amplifier, Converter, HalfBridge, Refusal, Transduction
+from kappaskin import Refusal, Transduction
 from kappaskin.scenes.effects import Quantisation, Saturation, StrainLimit, Temperature
 from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
 from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.sensing import Amplifier, Converter, HalfBridge
 
 
 def started(effect, shape=(12,), seed=0):

@@ -24,8 +24,7 @@ from kappaskin import (
     basis_for,
 )
 from kappaskin.bases import curvature_at
-from kappaskin.scenes.effects import FiniteSlopeEffect, GageLength
-from kappaskin.scenes.effects.skin import Fluid, Foam, Tension
+from kappaskin.scenes.effects import FiniteSlopeEffect, Fluid, Foam, GageLength, Tension
 from kappaskin.sources import sensor_from_json, sensor_to_json
 
 SQUARE = Patch(0.1, 0.1)

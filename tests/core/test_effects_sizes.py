@@ -8,32 +8,27 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    SECOND_GENERATION_LOOPS,
-    Amplifier,
-    Creep,
     Disk,
     GaussianLoad,
-    GaussianNoise,
-    HalfBridge,
     Patch,
     Plate,
     PointLoad,
-    Scan,
     SensorLayout,
-    Tolerance,
     Transduction,
-    UniformNoise,
     basis_for,
 )
 from kappaskin.scenes.effects import (
     EFFECTS,
+    SECOND_GENERATION_LOOPS,
     CorruptedFrames,
+    Creep,
     DeadElements,
     DroppedFrames,
     FiniteSlopeEffect,
     Fluid,
     Foam,
     GageLength,
+    GaussianNoise,
     IntermittentElements,
     Quantisation,
     Saturation,
@@ -44,10 +39,13 @@ from kappaskin.scenes.effects import (
     Survey,
     Temperature,
     Tension,
+    Tolerance,
+    UniformNoise,
 )
 from kappaskin.scenes.effects.effect import LayoutEffect
 from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
 from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.sensing import Amplifier, HalfBridge, Scan
 
 DURATION, FRAMES = 2.0, 40
 LOUD = Transduction(amplifier=Amplifier(gain=1500.0))

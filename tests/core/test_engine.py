@@ -95,7 +95,7 @@ def test_a_simulated_scene_gives_estimates_with_the_truth_beside_them(engine) ->
     engine.connect("sim:centre")
     estimate, status = next_estimate(engine), state(engine, STREAMING)
     assert estimate.surface.shape == (65, 65)
-    assert estimate.touch.position == pytest.approx([0.05, 0.05], abs=1e-3)
+    assert estimate.contact.position == pytest.approx([0.05, 0.05], abs=1e-3)
     assert estimate.true_contact.tolist() == [0.05, 0.05]
     assert abs(estimate.error_at_load) < 0.5e-3
     assert 0 <= estimate.ready_time - estimate.host_time < 5
@@ -207,7 +207,7 @@ def test_another_scene_plays_on_the_same_line(engine) -> None:
     assert wait_for(lambda: np.array_equal(next_estimate(engine).true_contact, here))
     after = wait_for(lambda: next_estimate(engine))
     assert after.generation == before.generation
-    assert np.abs(after.touch.position - here).max() < 2e-3
+    assert np.abs(after.contact.position - here).max() < 2e-3
 
 
 def test_a_scene_stands_still_where_it_is_sought_and_the_status_says_so(engine) -> None:

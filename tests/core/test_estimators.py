@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kappaskin import METHODS, Patch, Refusal, SensorLayout, SineBasis, estimator_for
+from kappaskin import Patch, Refusal, SensorLayout, SineBasis, estimator_for
+from kappaskin.estimation import METHODS
 
 SQUARE = Patch(0.1, 0.1)
 TENS = SensorLayout.regular(SQUARE, 10, 10)

@@ -154,16 +154,16 @@ OF_ESTIMATE: dict[str, Callable[[Estimate], object]] = {
     "coefficients": lambda e: e.coefficients,
     "noise": lambda e: e.noise,
     "converged": lambda e: e.converged,
-    "present": lambda e: e.touch.present,
-    "spare": lambda e: e.touch.spare,
-    "position": lambda e: e.touch.position,
-    "position_sd": lambda e: e.touch.position_sd,
-    "position_95": lambda e: e.touch.position_95,
-    "force": lambda e: e.touch.force,
-    "force_sd": lambda e: e.touch.force_sd,
-    "force_95": lambda e: e.touch.force_95,
-    "displacement": lambda e: e.touch.displacement,
-    "displacement_sd": lambda e: e.touch.displacement_sd,
+    "present": lambda e: e.contact.present,
+    "spare": lambda e: e.contact.spare,
+    "position": lambda e: e.contact.position,
+    "position_sd": lambda e: e.contact.position_sd,
+    "position_95": lambda e: e.contact.position_95,
+    "force": lambda e: e.contact.force,
+    "force_sd": lambda e: e.contact.force_sd,
+    "force_95": lambda e: e.contact.force_95,
+    "displacement": lambda e: e.contact.displacement,
+    "displacement_sd": lambda e: e.contact.displacement_sd,
     "point": lambda e: e.geometry.position,
     "frame": lambda e: e.geometry.frame,
     "metric": lambda e: e.geometry.metric,
@@ -186,7 +186,7 @@ def test_a_table_has_every_frame_bit_for_bit_as_it_was_live(suffix: str, taps, t
     recording, told = taps
     export(recording, tmp_path / f"out{suffix}")
     found = columns_in(tmp_path / f"out{suffix}")
-    assert any(one.estimate.touch.present for one in told)
+    assert any(one.estimate.contact.present for one in told)
     for name, of in OF_ESTIMATE.items():
         was = np.array([of(one.estimate) for one in told])
         assert found[name].tobytes() == was.astype(found[name].dtype).tobytes(), name

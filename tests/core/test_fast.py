@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin import (
-    METHODS,
     Disk,
     Fast,
     LeastSquares,
@@ -30,6 +29,7 @@ from kappaskin import (
     estimator_for,
     load_scene,
 )
+from kappaskin.estimation import METHODS
 
 EPS, EPS32 = np.finfo(float).eps, np.finfo(np.float32).eps
 LONG = Patch(0.12, 0.07)
@@ -619,5 +619,5 @@ def test_a_pipeline_runs_on_it():
     )
 
     np.testing.assert_allclose(fast.surface, plain.surface, atol=1e-15)
-    np.testing.assert_allclose(fast.touch.position, plain.touch.position, rtol=1e-9)
-    np.testing.assert_allclose(fast.touch.position_sd, plain.touch.position_sd, rtol=1e-9)
+    np.testing.assert_allclose(fast.contact.position, plain.contact.position, rtol=1e-9)
+    np.testing.assert_allclose(fast.contact.position_sd, plain.contact.position_sd, rtol=1e-9)

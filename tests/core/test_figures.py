@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import RendererAgg
 
-from kappaskin import FIGURES, SECOND_GENERATION, Refusal, load_scene, write_figures
+from kappaskin import Refusal, load_scene
 from kappaskin.cli import main
+from kappaskin.sensing import SECOND_GENERATION
+from kappaskin.studies import FIGURES, write_figures
 from kappaskin.studies.figures import fig2, fig9, style
 from kappaskin.studies.figures.initial_curvature import initial_curvature
 

@@ -426,7 +426,7 @@ def test_an_estimate_tells_the_geometry_at_its_contact():
     pipeline = Pipeline(scene.sensor(), Setup())
     estimate = pipeline(Simulator(scene).frame(0, lambda: 0.0))
 
-    here = local_geometry(pipeline.fit(estimate.curvature), estimate.touch.position)
+    here = local_geometry(pipeline.fit(estimate.curvature), estimate.contact.position)
 
     np.testing.assert_array_equal(estimate.geometry.curvature_form, here.curvature_form)
     # A push dents the skin: concave as seen from where it comes.

@@ -7,25 +7,23 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    SCENES,
     Frame,
     GaussianLoad,
-    GaussianNoise,
-    Orbit,
     Patch,
     Plate,
     PointLoad,
     Region,
-    Scanner,
     Scene,
     SensorLayout,
     Simulator,
     Stimulus,
     load_scene,
 )
-from kappaskin.estimation import FAULTS
+from kappaskin.estimation import FAULTS, Scanner
 from kappaskin.health import HealthMonitor
 from kappaskin.health.inconsistency import StatisticsWindow
+from kappaskin.scenes import SCENES, Orbit
+from kappaskin.scenes.effects import GaussianNoise
 
 pytestmark = pytest.mark.slow
 

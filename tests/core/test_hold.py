@@ -187,7 +187,7 @@ def test_a_frame_whose_hold_has_expired_is_answered_as_if_nothing_was_held():
 
     np.testing.assert_array_equal(expired.curvature, alone.curvature)
     np.testing.assert_array_equal(expired.surface, alone.surface)
-    np.testing.assert_array_equal(expired.touch.position, alone.touch.position)
+    np.testing.assert_array_equal(expired.contact.position, alone.contact.position)
 
 
 def test_patterns_of_missing_readings_that_change_each_frame_stay_exact():
@@ -213,7 +213,7 @@ def test_readings_that_hardly_decide_the_shape_give_none():
     assert len(channels) > 64
     assert np.linalg.matrix_rank(pipeline.fit.M[channels]) == 64
     assert np.isnan(estimate.surface).all()
-    assert not estimate.touch.present
+    assert not estimate.contact.present
 
 
 def test_a_frame_passed_over_is_held_all_the_same():

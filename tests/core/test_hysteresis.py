@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS, Hysteresis, Refusal
+from kappaskin import Refusal
+from kappaskin.scenes.effects import FIRST_GENERATION_LOOPS, SECOND_GENERATION_LOOPS, Hysteresis
 from kappaskin.sensing import PrandtlIshlinskii
 
 CURVATURES = st.lists(st.floats(-90, 90), min_size=1, max_size=40)

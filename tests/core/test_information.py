@@ -10,18 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import (
-    Amplifier,
-    Converter,
-    HalfBridge,
-    Multiplexer,
-    Patch,
-    Plate,
-    Sensor,
-    SensorLayout,
-    SourceError,
-    Transduction,
-)
+from kappaskin import Patch, Plate, Sensor, SensorLayout, SourceError, Transduction
+from kappaskin.sensing import Amplifier, Converter, HalfBridge, Multiplexer
 from kappaskin.sources import sensor_from_json, sensor_to_json
 from kappaskin.sources.information import DEFAULTS
 

@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kappaskin import FIRST_GENERATION_LOOPS, Hysteresis
-from kappaskin.scenes.effects import Creep
+from kappaskin.scenes.effects import FIRST_GENERATION_LOOPS, Creep, Hysteresis
 from kappaskin.studies.figures.initial_curvature import SHARES, initial_curvature
 
 R0 = 12.9e-3

@@ -7,15 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import (
-    ForceTorqueSensor,
-    IntrinsicContact,
-    LineLoad,
-    Patch,
-    PointLoad,
-    Refusal,
-    Wrench,
-)
+from kappaskin import IntrinsicContact, LineLoad, Patch, PointLoad, Refusal
+from kappaskin.contact import ForceTorqueSensor, Wrench
 
 FLAT = Patch(0.04, 0.03)
 FINGER = Patch(math.pi * 12.9e-3, 0.03, radius=12.9e-3)  # half a cylinder

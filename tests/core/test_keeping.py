@@ -11,12 +11,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kappaskin import METHODS, SCENES, Calibration, Pipeline, Setup, load_scene
+from kappaskin import Calibration, Pipeline, Setup, load_scene
 from kappaskin.calibration.calibration import fingerprint
+from kappaskin.estimation import METHODS
 from kappaskin.live.recorder import LiveRecorder
 from kappaskin.recording import Recorder, Recording, verify_steps
-from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS
-from kappaskin.scenes.effects.failures import StuckElements
+from kappaskin.scenes import SCENES
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, StuckElements
 from kappaskin.sources import SimulatedSource
 
 NO_SIDE = SimpleNamespace(pipeline=None, excluded=None)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import METHODS, LeastSquares, Pipeline, Setup, Simulator, SineBasis, load_scene
-from kappaskin.estimation import FAULTS
+from kappaskin import LeastSquares, Pipeline, Setup, Simulator, SineBasis, load_scene
+from kappaskin.estimation import FAULTS, METHODS
 
 SCENE = replace(load_scene("centre"), effects=())
 SENSOR = SCENE.sensor()

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    Amplifier,
-    Converter,
     Frame,
     Pipeline,
     PointLoad,
@@ -21,6 +19,7 @@ from kappaskin import (
     Transduction,
     load_scene,
 )
+from kappaskin.sensing import Amplifier, Converter
 
 SETUP = Setup(nx=33, ny=17, hold=0)
 QUIET = replace(load_scene("off-centre"), effects=())
@@ -103,9 +102,9 @@ def test_the_residual_is_the_curvature_the_shape_does_not_explain():
 def test_the_contact_is_found_in_the_noise_of_table_1():
     estimate = pipeline_of(load_scene("centre"))(frame_of(load_scene("centre")))
 
-    assert estimate.touch.present
-    np.testing.assert_allclose(estimate.touch.position, [0.05, 0.05], atol=1e-3)
-    assert estimate.touch.displacement == pytest.approx(4.65e-3, abs=0.15e-3)
+    assert estimate.contact.present
+    np.testing.assert_allclose(estimate.contact.position, [0.05, 0.05], atol=1e-3)
+    assert estimate.contact.displacement == pytest.approx(4.65e-3, abs=0.15e-3)
 
 
 def test_the_generation_times_and_number_are_carried():
@@ -188,7 +187,7 @@ def test_too_few_readings_give_no_shape_and_no_contact(count):
     assert np.isnan(estimate.surface).all()
     assert np.isnan(estimate.coefficients).all()
     assert np.isnan([estimate.noise, estimate.error_rms, estimate.error_at_load]).all()
-    assert not estimate.touch.present
+    assert not estimate.contact.present
     assert np.isfinite(estimate.curvature).sum() == count
 
 
@@ -234,7 +233,7 @@ def test_an_unloaded_skin_is_flat_and_untouched():
     estimate = pipeline_of(scene)(frame_of(scene))
 
     assert not estimate.surface.any()
-    assert not estimate.touch.present
+    assert not estimate.contact.present
     assert estimate.error_rms == 0
     assert math.isnan(estimate.error_at_load)
 
@@ -243,7 +242,7 @@ def test_the_noise_of_an_untouched_skin_is_no_contact():
     scene = load_scene("centre").touched_by()
     simulator, pipeline = Simulator(scene), pipeline_of(scene)
 
-    touches = [pipeline(simulator.frame(n, lambda: 0.0)).touch for n in range(500)]
+    touches = [pipeline(simulator.frame(n, lambda: 0.0)).contact for n in range(500)]
 
     assert not any(touch.present for touch in touches)
 
@@ -278,7 +277,7 @@ def test_the_force_follows_the_rigidity_of_the_skin():
     plate = replace(QUIET.plate, rigidity=2 * QUIET.plate.rigidity)
     stiff = replace(QUIET, plate=plate).touched_by(QUIET.loads[0].scaled(2))
 
-    soft_touch, stiff_touch = (pipeline_of(s)(frame_of(s)).touch for s in (QUIET, stiff))
+    soft_touch, stiff_touch = (pipeline_of(s)(frame_of(s)).contact for s in (QUIET, stiff))
 
     assert stiff_touch.force == pytest.approx(2 * soft_touch.force, rel=1e-6)
     assert isinstance(stiff, Scene)

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import NO_OBJECT, Patch
-from kappaskin.contact import placed_object
+from kappaskin import Patch
+from kappaskin.contact import NO_OBJECT, placed_object
 
 FLAT, PLACE = Patch(0.1, 0.1), np.array([0.05, 0.04])
 

@@ -9,21 +9,25 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    SCENES,
     GaussianLoad,
-    GaussianNoise,
     Patch,
     Plate,
-    Presentation,
     Refusal,
     Scene,
     SensorLayout,
     Simulator,
     load_scene,
+)
+from kappaskin.scenes import (
+    SCENES,
+    EffectSelection,
+    Orbit,
+    Presentation,
+    kept_effects,
+    plan,
     schedule,
 )
-from kappaskin.scenes import EffectSelection, Orbit, kept_effects, plan
-from kappaskin.scenes.effects import EFFECTS
+from kappaskin.scenes.effects import EFFECTS, GaussianNoise
 from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import survey
 from kappaskin.scenes.stimulus import (

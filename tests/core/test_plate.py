@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from skfem.helpers import d, dd, ddot, dot, eye, trace
 
 from kappaskin import (
-    Compliance,
     DiscLoad,
     Disk,
     GaussianLoad,
@@ -27,6 +26,7 @@ from kappaskin import (
     Stimulus,
     basis_for,
 )
+from kappaskin.mechanics import Compliance
 
 SQUARE = Patch(0.1, 0.1)
 inside = st.tuples(st.floats(0.0, 0.1), st.floats(0.0, 0.06))

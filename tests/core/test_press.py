@@ -7,16 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from kappaskin import (
-    COMPONENTS,
-    PointLoad,
-    PressTest,
-    Refusal,
-    SensorLayout,
-    elements_to_press,
-    load_scene,
-)
-from kappaskin.calibration import PressPhase
+from kappaskin import PointLoad, Refusal, SensorLayout, load_scene
+from kappaskin.calibration import PressPhase, PressTest, elements_to_press
+from kappaskin.frames import COMPONENTS
 from kappaskin.sources import SimulatedSource
 
 pytestmark = pytest.mark.slow

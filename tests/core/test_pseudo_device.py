@@ -519,7 +519,9 @@ def test_an_engine_on_a_real_port_loses_nothing_and_follows_the_contact(device) 
         after = wait_for(lambda: (found := engine.status()).state == LOST and found)
 
     report, seen = json.loads(err), after.accounting
-    errors = [np.hypot(*(e.touch.position - contact_at(e.device_time))) for e in estimates.values()]
+    errors = [
+        np.hypot(*(e.contact.position - contact_at(e.device_time))) for e in estimates.values()
+    ]
     close = np.mean(np.array(errors) < 1e-3)
     print(
         f"rate {status.rate:.1f}/s, reader gap {status.reader_gap * 1e3:.1f} ms; {report}; {seen}; "

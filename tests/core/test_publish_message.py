@@ -13,19 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import (
-    METHODS,
-    Disk,
-    GaussianNoise,
-    Patch,
-    Plate,
-    PointLoad,
-    Scene,
-    SensorLayout,
-    Setup,
-    load_scene,
-)
+from kappaskin import Disk, Patch, Plate, PointLoad, Scene, SensorLayout, Setup, load_scene
 from kappaskin.contact import surface_geometry
+from kappaskin.estimation import METHODS
 from kappaskin.pipeline.reported import UNKNOWN
 from kappaskin.publish import SourceState, foxglove, message, publishing
 from kappaskin.publish import foxglove as client
@@ -33,6 +23,7 @@ from kappaskin.publish import foxglove_channels as channels
 from kappaskin.publish import foxglove_channels as cloud
 from kappaskin.publish import publishing as target
 from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SWITCHES, text_of
+from kappaskin.scenes.effects import GaussianNoise
 
 GUIDE = (files("kappaskin_resources") / "publishing" / "messages.md").read_text("utf-8")
 PRESSED = load_scene("off-centre")
@@ -60,7 +51,7 @@ def vector(told: dict[str, object], name: str) -> np.ndarray:
 @pytest.mark.parametrize("scene", [PRESSED, bent()], ids=["flat", "bent"])
 def test_a_contact_says_what_the_estimate_says(messages_of, scene: Scene) -> None:
     (made,) = messages_of(scene)
-    told, touch, geometry = read(made.contact), made.estimate.touch, made.estimate.geometry
+    told, touch, geometry = read(made.contact), made.estimate.contact, made.estimate.geometry
     assert touch.present
     assert told["present"] is True
     assert (told["x_m"], told["y_m"]) == pytest.approx(tuple(touch.position), rel=1e-6)
@@ -81,7 +72,7 @@ def test_a_contact_says_what_the_estimate_says(messages_of, scene: Scene) -> Non
 @pytest.mark.parametrize("scene", [PRESSED, bent()], ids=["flat", "bent"])
 def test_error_bars_are_what_noise_does_to_the_geometry(messages_of, scene: Scene) -> None:
     (made,) = messages_of(scene)
-    told, basis, touch = read(made.contact), made.pipeline.basis, made.estimate.touch
+    told, basis, touch = read(made.contact), made.pipeline.basis, made.estimate.contact
     rng, count = np.random.default_rng(1), 1000
     shapes = rng.multivariate_normal(made.fit.coefficients.ravel(), made.fit.covariance, count)
     places = rng.normal(touch.position, touch.position_sd, (count, 2))

@@ -309,7 +309,7 @@ def numbered(number: object, **more: object) -> bytes:
 
 
 def test_a_contact_is_told_with_its_error_bars_and_age(listener, message: EstimateMessage) -> None:
-    said, touch = send(listener, message.contact, message.shape), message.estimate.touch
+    said, touch = send(listener, message.contact, message.shape), message.estimate.contact
     assert f"x {1e3 * touch.position[0]:.2f} +- {1e3 * touch.position_sd[0]:.2f} mm" in said
     assert f"force {touch.force:.4f} +- {touch.force_sd:.4f} N" in said
     assert "age" in said

@@ -9,16 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
-    COMPONENTS,
-    QUANTITIES,
     Disk,
-    ErrorBars,
     Estimate,
     LeastSquares,
     Patch,
     Pipeline,
     Polygon,
-    Quantities,
     Refusal,
     Scene,
     SensorLayout,
@@ -28,6 +24,8 @@ from kappaskin import (
     load_scene,
     local_geometry,
 )
+from kappaskin.frames import COMPONENTS
+from kappaskin.pipeline import QUANTITIES, ErrorBars, Quantities
 from kappaskin.pipeline.quantities import curvature_invariant
 
 FLAT, BENT = Patch(0.1, 0.06), Patch(0.04, 0.03, 12.9e-3)

@@ -16,11 +16,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kappaskin import Pipeline, Port, Setup, SourceError, load_scene
+from kappaskin import Pipeline, Setup, SourceError, load_scene
 from kappaskin.live.recorder import LiveRecorder
 from kappaskin.recording import Recording
 from kappaskin.recording.recompute import Recomputation
-from kappaskin.sources import BAUD_RATES, Decoder, SerialSource, information, ports, serial_source
+from kappaskin.sources import (
+    BAUD_RATES,
+    Decoder,
+    Port,
+    SerialSource,
+    information,
+    ports,
+    serial_source,
+)
 from kappaskin.sources.decoder import FROM_HOST
 from kappaskin.sources.wire import Operation, encode_information, encode_reply, encode_samples
 

@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
-    METHODS,
     DiscLoad,
     Disk,
     Fast,
@@ -30,6 +29,7 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin.contact import KINDS
+from kappaskin.estimation import METHODS
 from kappaskin.pipeline import reconstruct
 
 RNG = np.random.default_rng(7)
@@ -330,7 +330,7 @@ def test_what_is_no_archive_is_refused(tmp_path, case: str) -> None:
 def test_nothing_in_a_file_is_ever_executed(tmp_path) -> None:
     class Trap:
         def __reduce__(self) -> tuple[Any, ...]:
-            return (Path.touch, (tmp_path / "sprung",))
+            return (Path.contact, (tmp_path / "sprung",))
 
     np.savez(tmp_path / "trap.npz", **GOOD | {"sigma": np.array([Trap()], object)})
     with pytest.raises(Refusal, match="cannot be read as NPZ"):

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
-    SECOND_GENERATION,
     LeastSquares,
     Patch,
     Plate,
@@ -17,13 +16,12 @@ from kappaskin import (
     PointLoad,
     Refusal,
     Region,
-    Scanner,
     SensorLayout,
     SineBasis,
-    contact_bound,
     load_scene,
 )
-from kappaskin.estimation import scan_tradeoff
+from kappaskin.estimation import Scanner, contact_bound, scan_tradeoff
+from kappaskin.sensing import SECOND_GENERATION
 
 NOISE = 0.231
 SENSOR = replace(load_scene("centre"), transduction=SECOND_GENERATION, rate=160.0).sensor()

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin import LONGEST_NOTE, Engine, Recording, Refusal, Setup, Status
+from kappaskin import Engine, Recording, Refusal, Setup, Status
+from kappaskin.live import LONGEST_NOTE
 from kappaskin.recording import ReplayedSource, Verification, decode, recorded_setups, verify_steps
 from kappaskin.recording.messages import EVENTS, LOG
 

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from kappaskin import COMPONENTS, load_scene
-from kappaskin.pipeline import REPORTED
-from kappaskin.pipeline.reported import getters, readouts
+from kappaskin import load_scene
+from kappaskin.frames import COMPONENTS
+from kappaskin.pipeline import REPORTED, getters, readouts
 from kappaskin.publish.foxglove_channels import CHANNELS
 from kappaskin.publish.message import CONTACT, SWITCHES
 from kappaskin.recording import messages as m
@@ -181,8 +181,8 @@ import kappaskin.pipeline.reported as table
 pipeline.REPORTED = table.REPORTED = (
     *table.REPORTED,
     ReportedQuantity(
-        "twice", "N", "twice the force", lambda r: 2 * r.touch.force,
-        sd=lambda r: 2 * r.touch.force_sd,
+        "twice", "N", "twice the force", lambda r: 2 * r.contact.force,
+        sd=lambda r: 2 * r.contact.force_sd,
     ),
 )
 
@@ -233,7 +233,7 @@ def test_a_quantity_added_to_the_table_is_in_every_file_and_message(
 
 def test_readouts_are_the_estimate_in_units_of_the_screen(messages_of) -> None:
     (made,) = messages_of(load_scene("off-centre"))
-    touch, geometry = made.estimate.touch, made.estimate.geometry
+    touch, geometry = made.estimate.contact, made.estimate.geometry
     found = {each.label: each for each in readouts(made.estimate)}
     assert list(found)[:4] == ["Contact x", "Contact y", "Force", "Depth"]
     assert found["Contact y"].value == 1e3 * touch.position[1]

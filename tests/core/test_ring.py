@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kappaskin import Estimate, LocalGeometry, Pipeline, Refusal, Setup, Simulator, load_scene
-from kappaskin.frames import Array, Touch
+from kappaskin import Estimate, Pipeline, Refusal, Setup, Simulator, load_scene
+from kappaskin.frames import Array, Contact, LocalGeometry
 from kappaskin.live.ring import Ring, slot_type
 
 
@@ -200,7 +200,7 @@ def all_of(number: float) -> Estimate:
     estimate = estimate_of(pipeline_of(Setup(8, 8, 129, 129)))
     parts = {f.name: np.full(np.shape(getattr(estimate, f.name)), number) for f in fields(estimate)}
     pair, matrix = np.full(2, number), np.full((2, 2), number)
-    touch = Touch(pair, pair, number, number, number, number, int(number), True, False)
+    touch = Contact(pair, pair, number, number, number, number, int(number), True, False)
     square = np.full((3, 3), number)
     geometry = LocalGeometry(square[0], square, matrix, matrix, pair, square)
     return Estimate(**parts | {"touch": touch, "geometry": geometry})

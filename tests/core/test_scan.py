@@ -7,14 +7,10 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    SECOND_GENERATION,
-    Multiplexer,
-    Orbit,
     Patch,
     Plate,
     PointLoad,
     Refusal,
-    Scan,
     Scene,
     SensorLayout,
     Simulator,
@@ -22,6 +18,8 @@ from kappaskin import (
     Transduction,
     load_scene,
 )
+from kappaskin.scenes import Orbit
+from kappaskin.sensing import SECOND_GENERATION, Multiplexer, Scan
 
 SETTLING = replace(SECOND_GENERATION, multiplexer=Multiplexer(settling_time=5e-6))
 PATCH = Patch(0.1, 0.1)

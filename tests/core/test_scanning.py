@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Region, Scanner, load_scene
+from kappaskin import Region, load_scene
+from kappaskin.estimation import Scanner
 from kappaskin.sources.commands import ScanControl, in_few_runs
 from kappaskin.sources.wire import MOST_RUNS, Fault, Operation, Reply, pack_runs, unpack_runs
 

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    SCENES,
     Disk,
     LineLoad,
-    Orbit,
     Patch,
     Plate,
     PointLoad,
@@ -21,7 +19,7 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.scenes import TABLE_1_NOISE, LoadingHistory, scaled_to, survey_times
+from kappaskin.scenes import SCENES, TABLE_1_NOISE, LoadingHistory, Orbit, scaled_to, survey_times
 from kappaskin.scenes.read import check_elements
 from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep, SlideStep, contact_of
 

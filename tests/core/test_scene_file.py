@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin import SCENES, GaussianLoad, PointLoad, Refusal, load_scene
+from kappaskin import GaussianLoad, PointLoad, Refusal, load_scene
 from kappaskin.mechanics import Cylinder, Mesh
-from kappaskin.scenes import Indenter, read_scene
+from kappaskin.scenes import SCENES, Indenter, read_scene
 
 HEAD = "format = 1\n\n[skin]\nsize = [0.1, 0.1]\n"
 TOUCH = HEAD + '\n[[touch]]\nwhat = "gaussian"\nx = 0.05\ny = 0.05\nsd = 0.005\nforce = 0.2\n'

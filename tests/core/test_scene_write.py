@@ -9,48 +9,51 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin import (
-    FIRST_GENERATION,
-    FIRST_GENERATION_LOOPS,
-    SCENES,
-    SECOND_GENERATION,
-    SECOND_GENERATION_LOOPS,
-    Creep,
     DiscLoad,
     Disk,
     GaussianLoad,
-    GaussianNoise,
-    Hysteresis,
     LineLoad,
-    Orbit,
     Patch,
     Plate,
     PointLoad,
     Polygon,
-    Presentation,
     RectangleLoad,
     Refusal,
     Scene,
     SensorLayout,
     Simulator,
     Stimulus,
-    Tolerance,
     Transduction,
     load_scene,
     read_scene,
-    scene_file,
-    schedule,
     write_scene,
 )
 from kappaskin.mechanics import Block, Cylinder, HeightMap, Mesh, Punch, Sphere, Wedge
-from kappaskin.scenes import EffectSelection, Indenter, kept_effects, plan
+from kappaskin.scenes import (
+    SCENES,
+    EffectSelection,
+    Indenter,
+    Orbit,
+    Presentation,
+    kept_effects,
+    plan,
+    scene_file,
+    schedule,
+)
 from kappaskin.scenes.effects import (
     EFFECTS,
+    FIRST_GENERATION_LOOPS,
+    SECOND_GENERATION_LOOPS,
     CorruptedFrames,
+    Creep,
     Foam,
+    GaussianNoise,
+    Hysteresis,
     IntermittentElements,
     StrainLimit,
     StuckElements,
     Temperature,
+    Tolerance,
 )
 from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
 from kappaskin.scenes.effects.noise import FlickerNoise
@@ -66,6 +69,7 @@ from kappaskin.scenes.stimulus import (
     TapStep,
     TurnStep,
 )
+from kappaskin.sensing import FIRST_GENERATION, SECOND_GENERATION
 from kappaskin.sources import information
 
 SQUARE = Patch(0.1, 0.1)

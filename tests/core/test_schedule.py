@@ -8,19 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import (
-    RADII,
-    Amplifier,
-    HalfBridge,
-    Presentation,
-    Procedure,
-    Refusal,
-    Transduction,
-    load_scene,
-    radii_for,
-    schedule,
-)
-from kappaskin.scenes import CylinderStep
+from kappaskin import Refusal, Transduction, load_scene
+from kappaskin.calibration import Procedure
+from kappaskin.scenes import RADII, CylinderStep, Presentation, radii_for, schedule
+from kappaskin.sensing import Amplifier, HalfBridge
 
 SENSOR = load_scene("calibration").sensor()
 SHORT = schedule((0.05, 0.025, 0.015))

@@ -5,23 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import (
-    SECOND_GENERATION_LOOPS,
-    Creep,
-    GaussianNoise,
-    Orbit,
-    Patch,
-    Plate,
-    PointLoad,
-    Presentation,
-    Refusal,
-    Scene,
-    SensorLayout,
-    Simulator,
-    UniformNoise,
-    load_scene,
-)
-from kappaskin.scenes import CylinderStep
+from kappaskin import Patch, Plate, PointLoad, Refusal, Scene, SensorLayout, Simulator, load_scene
+from kappaskin.scenes import CylinderStep, Orbit, Presentation
+from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, GaussianNoise, UniformNoise
 
 PATCH = Patch(0.1, 0.1)
 QUIET = Scene("quiet", Plate(PATCH), SensorLayout.regular(PATCH, 5, 4)).touched_by(

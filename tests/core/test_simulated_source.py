@@ -11,16 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
-    Amplifier,
     DiscLoad,
     Frame,
-    Indenter,
     Patch,
     Plate,
     PointLoad,
     Refusal,
     Region,
-    Scanner,
     Scene,
     SensorLayout,
     Simulator,
@@ -28,11 +25,13 @@ from kappaskin import (
     Transduction,
     load_scene,
 )
+from kappaskin.estimation import Scanner
 from kappaskin.mechanics import Sphere
 from kappaskin.recording import Recorder, Recording
 from kappaskin.recording.messages import LINES
-from kappaskin.scenes import EffectSelection
+from kappaskin.scenes import EffectSelection, Indenter
 from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
+from kappaskin.sensing import Amplifier
 from kappaskin.sources import SimulatedSource, open_source
 from kappaskin.sources.wire import pack_runs, unpack_runs
 

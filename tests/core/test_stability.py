@@ -13,17 +13,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from kappaskin import (
-    AsPrinted,
-    LeastSquares,
-    Patch,
-    RankDeficient,
-    SensorLayout,
-    SineBasis,
-    basis_for,
-    singular_values,
-)
-from kappaskin.estimation import METHODS
+from kappaskin import LeastSquares, Patch, RankDeficient, SensorLayout, SineBasis, basis_for
+from kappaskin.estimation import METHODS, AsPrinted, singular_values
 from kappaskin.estimation.fit import DenseUncertainty
 from kappaskin.studies import run_stability
 from kappaskin.studies.stability.gallery import CaseKind, gallery

@@ -6,17 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kappaskin import (
-    SECOND_GENERATION,
-    Orbit,
-    Pipeline,
-    PointLoad,
-    Refusal,
-    Region,
-    Setup,
-    load_scene,
-)
+from kappaskin import Pipeline, PointLoad, Refusal, Region, Setup, load_scene
 from kappaskin.live import track_region
+from kappaskin.scenes import Orbit
+from kappaskin.sensing import SECOND_GENERATION
 from kappaskin.sources import SimulatedSource
 
 pytestmark = pytest.mark.slow
@@ -57,7 +50,7 @@ class Loop:
             for frame in self.source.read(seconds):
                 seen.append((frame, self.pipeline(frame)))
                 if self.steering is not None:
-                    self.steering(seen[-1][1].touch, self.pipeline.fit)
+                    self.steering(seen[-1][1].contact, self.pipeline.fit)
         return seen
 
 
@@ -74,7 +67,7 @@ def test_the_region_follows_the_contact_all_the_way_round(around):
     positions = loop.source.sensor.layout.positions
     for frame, estimate in seen:
         assert len(frame.channels) < 90
-        assert estimate.touch.present
+        assert estimate.contact.present
         off = np.hypot(*(positions - frame.truth.contact).T)
         missed = set(np.flatnonzero(off <= 0.015)) - set(elements(frame).tolist())
         assert not missed  # what lies well within 20 mm of the true contact is scanned
@@ -114,9 +107,9 @@ def test_when_the_contact_is_lost_everything_is_scanned_again(around):
 
     assert len(touched[-1][0].channels) < 90
     assert [len(frame.channels) for frame, _ in lifted[-5:]] == [300] * 5
-    assert not lifted[-1][1].touch.present
+    assert not lifted[-1][1].contact.present
     assert len(again[-1][0].channels) < 90
-    assert again[-1][1].touch.position == pytest.approx([0.03, 0.07], abs=1e-3)
+    assert again[-1][1].contact.position == pytest.approx([0.03, 0.07], abs=1e-3)
 
 
 def test_a_load_elsewhere_is_seen_through_the_elements_in_turn():
@@ -127,7 +120,7 @@ def test_a_load_elsewhere_is_seen_through_the_elements_in_turn():
     loop.source.play(still.touched_by(PointLoad(0.08, 0.075, 0.2)))
     seen = loop.run(0.05)
 
-    assert seen[-1][1].touch.position == pytest.approx([0.08, 0.075], abs=1e-3)
+    assert seen[-1][1].contact.position == pytest.approx([0.08, 0.075], abs=1e-3)
 
 
 def test_without_a_share_of_the_others_a_contact_is_off_by_no_more_than_it_moved_meanwhile():
@@ -140,7 +133,7 @@ def test_without_a_share_of_the_others_a_contact_is_off_by_no_more_than_it_moved
     # When what is held expires, too few readings decide the shape; the next frame reads them all.
     assert undecided.sum() >= 3
     assert (channels[1:][undecided[:-1]] == 300).all()
-    off = [np.hypot(*(e.touch.position - f.truth.contact)) for f, e in seen if e.touch.present]
+    off = [np.hypot(*(e.contact.position - f.truth.contact)) for f, e in seen if e.contact.present]
     assert max(off) < 2 * np.pi * 0.022 * 0.1  # while the oldest reading was held
 
 

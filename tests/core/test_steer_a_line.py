@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from kappaskin import Plate, Refusal, Region, Scanner, load_scene
+from kappaskin import Plate, Refusal, Region, load_scene
+from kappaskin.estimation import Scanner
 from kappaskin.live import STREAMING, track_region
 from kappaskin.sources import SerialSource, information
 

@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 
 from kappaskin import (
-    SCENES,
-    SECOND_GENERATION_LOOPS,
     Calibration,
-    Creep,
     DiscLoad,
-    GaussianNoise,
     LineLoad,
     Pipeline,
     PointLoad,
@@ -21,13 +17,19 @@ from kappaskin import (
     Setup,
     Simulator,
     Tare,
-    Tolerance,
     load_scene,
 )
 from kappaskin.calibration import DriftMonitor, Rest, TareMeasurement
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.contact import LoadDetector
-from kappaskin.scenes.effects import Temperature
+from kappaskin.scenes import SCENES
+from kappaskin.scenes.effects import (
+    SECOND_GENERATION_LOOPS,
+    Creep,
+    GaussianNoise,
+    Temperature,
+    Tolerance,
+)
 from kappaskin.scenes.effects.noise import FlickerNoise
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,6 @@ import pytest
 from scipy import linalg
 
 from kappaskin import (
-    SECOND_GENERATION,
     LeastSquares,
     Patch,
     Pipeline,
@@ -25,6 +24,7 @@ from kappaskin import (
 from kappaskin.estimation.bayes import prior_root
 from kappaskin.estimation.kalman import ModalKalmanFilter
 from kappaskin.estimation.tracking import most_informative
+from kappaskin.sensing import SECOND_GENERATION
 
 pytestmark = pytest.mark.slow
 
@@ -568,7 +568,7 @@ def test_a_pipeline_tracks_and_what_is_passed_over_counts():
     last = other(frames[-1])
 
     np.testing.assert_array_equal(last.coefficients, estimates[-1].coefficients)
-    assert all(e.touch.present for e in estimates)
+    assert all(e.contact.present for e in estimates)
     assert 1e3 * estimates[-1].error_rms < 0.03
     assert np.isfinite(estimates[-1].residual).all()
 

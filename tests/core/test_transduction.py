@@ -8,19 +8,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kappaskin import (
+from kappaskin import Patch, Plate, Refusal, Sensor, SensorLayout, Transduction
+from kappaskin.sensing import (
     FIRST_GENERATION,
     SECOND_GENERATION,
     Amplifier,
     Converter,
     HalfBridge,
     Multiplexer,
-    Patch,
-    Plate,
-    Refusal,
-    Sensor,
-    SensorLayout,
-    Transduction,
 )
 
 transductions = st.builds(

@@ -15,7 +15,6 @@ import numpy as np
 from mcap.writer import Writer
 
 from kappaskin import (
-    SCENES,
     Calibration,
     Event,
     Frame,
@@ -34,7 +33,7 @@ from kappaskin.publish.foxglove import FoxgloveClient
 from kappaskin.publish.foxglove_channels import CHANNELS
 from kappaskin.recording import Recorder, ReplayedSource, Verification, repair_steps, verify_steps
 from kappaskin.recording.messages import TOPICS
-from kappaskin.scenes import read_scene
+from kappaskin.scenes import SCENES, read_scene
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
 from kappaskin.sources import Decoder, SimulatedSource, information
 from kappaskin.sources.decoder import FROM_DEVICE, FROM_HOST

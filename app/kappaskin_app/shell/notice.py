@@ -38,7 +38,7 @@ def warnings(estimate: Estimate, strained: int) -> str:
         told.append("the iteration gave up, least squares shown")
     if strained:
         told.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
-    if estimate.touch.near_rim:
+    if estimate.contact.near_rim:
         told.append("contact too near the rim to trust")
     words = "; ".join(told)
     return words[:1].upper() + words[1:]

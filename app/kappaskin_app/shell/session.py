@@ -302,7 +302,7 @@ class Session(QObject):
         region, estimate, sensor = self.status.region, self.estimate, self.status.sensor
         if region.around == "off" or estimate is None or sensor is None:
             return None
-        touch = estimate.touch
+        touch = estimate.contact
         if not (touch.present and math.isfinite(estimate.noise)):
             return None
         try:

@@ -7,11 +7,7 @@ from numpy.typing import NDArray
 
 from kappaskin.estimation import FAULTS
 from kappaskin.pipeline import QUANTITIES
-from kappaskin_app.theme import (
-    DIVERGING,
-    PULLED,
-    SEQUENTIAL,
-)
+from kappaskin_app.theme import DIVERGING, PULLED, SEQUENTIAL
 from kappaskin_app.widgets.tint import Tint, rgb_of
 
 Array = NDArray[np.float64]

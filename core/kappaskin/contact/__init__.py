@@ -6,7 +6,7 @@ from kappaskin.contact.geometry import local_geometry as local_geometry
 from kappaskin.contact.geometry import surface_geometry as surface_geometry
 from kappaskin.contact.intrinsic import ForceTorqueSensor as ForceTorqueSensor
 from kappaskin.contact.intrinsic import IntrinsicContact as IntrinsicContact
-from kappaskin.contact.intrinsic import IntrinsicTouch as IntrinsicTouch
+from kappaskin.contact.intrinsic import IntrinsicEstimate as IntrinsicEstimate
 from kappaskin.contact.intrinsic import Wrench as Wrench
 from kappaskin.contact.load_detection import LoadDetector as LoadDetector
 from kappaskin.contact.objects import KINDS as KINDS
@@ -14,5 +14,5 @@ from kappaskin.contact.objects import NO_OBJECT as NO_OBJECT
 from kappaskin.contact.objects import ContactObject as ContactObject
 from kappaskin.contact.objects import ObjectFinder as ObjectFinder
 from kappaskin.contact.objects import placed_object as placed_object
-from kappaskin.contact.point import NO_TOUCH as NO_TOUCH
+from kappaskin.contact.point import NO_CONTACT as NO_CONTACT
 from kappaskin.contact.point import PointContact as PointContact

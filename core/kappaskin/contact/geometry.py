@@ -8,7 +8,7 @@ import numpy as np
 from kappaskin.bases import ORDERS, Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit, propagated_covariance
-from kappaskin.frames import Array, LocalGeometry, Touch
+from kappaskin.frames import Array, Contact, LocalGeometry
 from kappaskin.skin import Patch
 
 Number = Any  # a float, or an array of P
@@ -34,9 +34,9 @@ def local_geometry(fit: Fit, positions: Array) -> LocalGeometry:
     return _geometry(basis.patch, positions, jet.tolist(), covariance)
 
 
-def contact_geometry(fit: Fit, touch: Touch) -> LocalGeometry:
+def contact_geometry(fit: Fit, contact: Contact) -> LocalGeometry:
     """Geometry of the skin at the contact; NaN when there is none."""
-    return local_geometry(fit, touch.position) if touch.present else NO_GEOMETRY
+    return local_geometry(fit, contact.position) if contact.present else NO_GEOMETRY
 
 
 def surface_geometry(

@@ -29,7 +29,7 @@ from kappaskin.contact.interior import (
     middle,
     ring_pattern,
 )
-from kappaskin.frames import Array, Mask, Touch
+from kappaskin.frames import Array, Contact, Mask
 
 SHARE = 0.2
 """Prior standard deviation of the inequality of the forces on two ends."""
@@ -59,17 +59,17 @@ def fit_hypotheses(
     readings: Array,
     used: Mask,
     noise: float,
-    touch: Touch,
+    contact: Contact,
 ) -> Hypotheses:
-    """The best objects for `readings` (R,) in 1/m, zero where not `used`, at the contact `touch`.
+    """The best objects for `readings` (R,) in 1/m, zero where not `used`, at the contact `contact`.
 
     First on the `coarse` skin: a reading grows without bound as a force comes close, and with many
     functions a force would stay on the side of an element where it started.
     """
     frame = _WeightedReadings(coarse, readings, used)
-    pair, forces = coarse.best_pair(touch.position, readings, used)
-    frame.trust(noise, _at(touch.position[None], np.array([touch.force])), _at(pair, forces))
-    sphere, edge = frame.sphere(touch), frame.edge(pair, forces)
+    pair, forces = coarse.best_pair(contact.position, readings, used)
+    frame.trust(noise, _at(contact.position[None], np.array([contact.force])), _at(pair, forces))
+    sphere, edge = frame.sphere(contact), frame.edge(pair, forces)
     cylinder = frame.cylinder(edge)
     tried = (sphere, edge, cylinder)
     noise *= frame.spread(tried)
@@ -133,8 +133,10 @@ class _WeightedReadings:
         """The optimum of `contact` near another's, as many of its `parameters` as it has."""
         return self._climb(contact, optimum.parameters[:parameters], 4)
 
-    def sphere(self, touch: Touch) -> Optimum:
-        return self._climb(ring(ROUND), np.array([*touch.position, touch.force, self._start]), 4)
+    def sphere(self, contact: Contact) -> Optimum:
+        return self._climb(
+            ring(ROUND), np.array([*contact.position, contact.force, self._start]), 4
+        )
 
     def edge(self, pair: Array, forces: Array) -> Optimum:
         force, apart = float(forces.sum()), pair[0] - pair[1]

@@ -74,7 +74,7 @@ def _pieces(load: Load) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class IntrinsicTouch:
+class IntrinsicEstimate:
     """A contact found from the base: its position, and the force and torque on the skin.
 
     `position` (2,) in m on the patch; `pressure` in N, the normal force, inward; `traction` (2,) in
@@ -97,9 +97,9 @@ class IntrinsicTouch:
         return not self.reason
 
 
-def _no_touch(reason: str) -> IntrinsicTouch:
+def _no_touch(reason: str) -> IntrinsicEstimate:
     nowhere, nan = np.full(2, np.nan), math.nan
-    return IntrinsicTouch(nowhere, nowhere, nan, nan, nowhere, nowhere, nan, nan, reason)
+    return IntrinsicEstimate(nowhere, nowhere, nan, nan, nowhere, nowhere, nan, nan, reason)
 
 
 def _across(r: Array | tuple[float, float, float]) -> Array:
@@ -127,7 +127,7 @@ class IntrinsicContact:
         self._variance = np.repeat(np.square(noise), 3)
         self._least = max(_LEAST, _SIGNIFICANT * sensor.force_noise)
 
-    def __call__(self, wrench: Wrench) -> IntrinsicTouch:
+    def __call__(self, wrench: Wrench) -> IntrinsicEstimate:
         """The contact; NaN and a reason when the wrench is not that of one on the skin."""
         F = np.asarray(wrench.force, float)
         M = np.asarray(wrench.moment, float)
@@ -144,7 +144,7 @@ class IntrinsicContact:
             return _no_touch("the force passes beside the skin's cylinder")
         return self._judged(place, F, M)
 
-    def _no_press(self, pressure: float) -> IntrinsicTouch:
+    def _no_press(self, pressure: float) -> IntrinsicEstimate:
         return _no_touch(f"expected a press above {self._least:.3g} N, got {pressure:.3g} N")
 
     def _place(self, F: Array, M: Array, most: float) -> Array | None:
@@ -166,7 +166,7 @@ class IntrinsicContact:
         n = np.array([math.sin(angle), 0.0, math.cos(angle)])
         return np.array([middle + R * angle, (about_axis @ t + R * F[1]) / (F @ n)])
 
-    def _judged(self, place: Array, F: Array, M: Array) -> IntrinsicTouch:
+    def _judged(self, place: Array, F: Array, M: Array) -> IntrinsicEstimate:
         """The contact at `place` (2,) in m, or the reason why it is none."""
         at, n = self.patch.at_rest(place)
         arm, t = at - self.sensor.origin, np.array([n[2], 0.0, -n[0]])
@@ -185,7 +185,7 @@ class IntrinsicContact:
         if (np.abs(place - inside) > _BESIDE * sd[:2] + 1e-9 * self._side).any():
             x, y = 1e3 * place
             return _no_touch(f"the force passes beside the skin, through ({x:.3g}, {y:.3g}) mm")
-        return IntrinsicTouch(
+        return IntrinsicEstimate(
             inside, sd[:2], pressure, float(sd[2]), traction, sd[3:5], torque, float(sd[5])
         )
 

@@ -10,7 +10,7 @@ import scipy
 from kappaskin.contact.elastic_skin import ElasticSkin
 from kappaskin.contact.hypotheses import Hypotheses, fit_hypotheses, log_likelihoods
 from kappaskin.contact.interior import Hypothesis, Width
-from kappaskin.frames import Array, Touch
+from kappaskin.frames import Array, Contact
 from kappaskin.mechanics import Block, Cylinder, PlacedObject, Plate, RigidObject, Sphere, Wedge
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
@@ -131,18 +131,18 @@ class ObjectFinder:
             self._skin = ElasticSkin(plate, layout, edge, fine)
         self._live = layout.live.ravel()
 
-    def __call__(self, curvature: Array, noise: float, touch: Touch) -> ContactObject:
-        """The object for `curvature` (3, P) in 1/m, NaN where missing, and the contact `touch`.
+    def __call__(self, curvature: Array, noise: float, contact: Contact) -> ContactObject:
+        """The object for `curvature` (3, P) in 1/m, NaN where missing, and the contact `contact`.
 
         `noise` in 1/m is the standard deviation of a reading, as the fit estimates it.
         """
         used = self._live & np.isfinite(curvature).ravel()
-        if not touch.present or used.sum() < _ENOUGH:
+        if not contact.present or used.sum() < _ENOUGH:
             return NO_OBJECT
         K = np.where(used, curvature.ravel(), 0.0)
         noise = max(noise, _QUIET * float(np.abs(K).max()))
         return _judged(
-            self._skin, fit_hypotheses(self._coarse, self._skin, K, used, noise, touch), noise
+            self._skin, fit_hypotheses(self._coarse, self._skin, K, used, noise, contact), noise
         )
 
 

@@ -10,7 +10,7 @@ from scipy.linalg import blas
 
 from kappaskin.bases import Basis, SineBasis, basis_for
 from kappaskin.estimation import Fit, PatternCache
-from kappaskin.frames import Array, Mask, Touch
+from kappaskin.frames import Array, Contact, Mask
 from kappaskin.mechanics import Compliance, Plate
 from kappaskin.sensing import SensorLayout, gage_multipliers
 
@@ -233,7 +233,7 @@ _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
 _AS_WELL = 1.2  # times the residual of the fitted shape that a single point load may leave
 _REACH = 1.96  # standard deviations to either side in a 95 % interval
 
-NO_TOUCH = Touch(
+NO_CONTACT = Contact(
     np.full(2, np.nan), np.full(2, np.nan), math.nan, math.nan, math.nan, math.nan, 0, False, False
 )
 
@@ -292,7 +292,7 @@ class PointContact:
         norm[norm <= 0] = math.inf  # a load that these readings do not see explains nothing
         return _ContactTables(loads, norm, max(len(M) - 3, 1))
 
-    def __call__(self, curvature: Array, fit: Fit) -> Touch:
+    def __call__(self, curvature: Array, fit: Fit) -> Contact:
         """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
         K, tables, power = self._used(curvature.ravel())
         readings = _Readings(self._modal(K), power, tables.spare)
@@ -303,7 +303,7 @@ class PointContact:
         row, column = divmod(int(explained.argmax()), len(self._x))
         least = _threshold(float(cast("float", fit.spare))) * float(fit.noise) ** 2
         if not explained[row, column] > least:
-            return NO_TOUCH
+            return NO_CONTACT
         x = _parabola_peak(self._x, explained[row], column)
         y = _parabola_peak(self._y, explained[:, column], row)
         return self._refined(*self.patch.inward(x, y), readings, tables.loads, fit)
@@ -319,12 +319,12 @@ class PointContact:
 
     def _refined(
         self, x: float, y: float, readings: _Readings, loads: LoadResponses, fit: Fit
-    ) -> Touch:
+    ) -> Contact:
         x, y, place = self._optimised(x, y, readings.h, loads)
         # What a point load leaves of the readings: the noise, or more where it is no point load.
         spread = math.sqrt(max(readings.power - place.explained, 0.0) / readings.spare)
         sd_x, sd_y, sd_force = place.unit_sd
-        return Touch(
+        return Contact(
             np.array([x, y]),
             np.array([spread * sd_x, spread * sd_y]),
             place.force,

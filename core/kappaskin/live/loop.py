@@ -264,9 +264,9 @@ class EngineLoop:
             self._main.ring.write(estimate)
             self._tare.take(estimate)
             self._arrivals.used(frame)
-            self._place = estimate.touch.position
+            self._place = estimate.contact.position
             if self._tracking is not None:
-                self._tracking(estimate.touch, pipeline.fit)
+                self._tracking(estimate.contact, pipeline.fit)
             self._recorder.take(frame, estimate)
             self._compared.take(frame, paused)
         self._rate_limit.spend(len(frames) - late, time.monotonic() - began)

@@ -2,13 +2,8 @@
 
 from kappaskin.contact import IntrinsicContact
 from kappaskin.errors import Refusal
-from kappaskin.estimation import (
-    Estimator,
-    Region,
-    Scanner,
-    Tracking,
-)
-from kappaskin.frames import Touch
+from kappaskin.estimation import Estimator, Region, Scanner, Tracking
+from kappaskin.frames import Contact
 from kappaskin.sensing import Sensor
 from kappaskin.sources import SerialSource, SimulatedSource, Source
 
@@ -34,14 +29,14 @@ class SimulatedTracking:
         self._ahead = source.sensor.scan().interval * max(self._scanner.count, 1)
         source.scan(self._scanner)
 
-    def __call__(self, touch: Touch, estimator: Estimator) -> None:
+    def __call__(self, contact: Contact, estimator: Estimator) -> None:
         if self._around == Region.SKIN:
-            self._scanner.follow(touch.position)
+            self._scanner.follow(contact.position)
         elif self._around == Region.INTRINSIC:
             self._scanner.follow(self._intrinsic(self._source.wrench()).position)
         elif self._around == Region.ADAPTIVE and isinstance(estimator, Tracking):
             count = self._scanner.count
-            self._scanner.choose(estimator.choose(count, touch.position, self._ahead / 2))
+            self._scanner.choose(estimator.choose(count, contact.position, self._ahead / 2))
 
 
 class SerialTracking:
@@ -59,9 +54,9 @@ class SerialTracking:
     def refusal(self) -> str:
         return self._source.scan_refusal
 
-    def __call__(self, touch: Touch, estimator: Estimator) -> None:
+    def __call__(self, contact: Contact, estimator: Estimator) -> None:
         if self._follows:
-            self._scanner.follow(touch.position)
+            self._scanner.follow(contact.position)
 
 
 def track_region(source: Source, region: Region) -> SimulatedTracking | SerialTracking | None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Estimate, LocalGeometry, Touch
+from kappaskin.frames import Array, Contact, Estimate, LocalGeometry
 from kappaskin.pipeline import Pipeline
 
 _SIZE = 96 * 2**20  # pages that are never written cost no memory
@@ -26,7 +26,7 @@ _HEADER = 64
 _MOST_SLOTS = 64
 _TRIES = 100
 
-_TOUCH = [
+_CONTACT = [
     ("position", "f8", 2),
     ("position_sd", "f8", 2),
     ("force", "f8"),
@@ -45,7 +45,7 @@ _GEOMETRY = [
     ("torsion_form", "f8", 2),
     ("covariance", "f8", (3, 3)),
 ]
-_RECORDS: dict[str, type[Touch | LocalGeometry]] = {"touch": Touch, "geometry": LocalGeometry}
+_RECORDS: dict[str, type[Contact | LocalGeometry]] = {"contact": Contact, "geometry": LocalGeometry}
 
 
 def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
@@ -72,7 +72,7 @@ def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
             ("suspect", "u1", P),
             ("converged", "?"),
             ("fit_time", "f8"),
-            ("touch", _TOUCH),
+            ("contact", _CONTACT),
             ("geometry", _GEOMETRY),
             ("true_surface", *surface),
             ("true_contact", "f8", 2),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kappaskin._state import StateArrays, Stateful
 from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
-from kappaskin.contact import NO_TOUCH, LoadDetector, PointContact, contact_geometry
+from kappaskin.contact import NO_CONTACT, LoadDetector, PointContact, contact_geometry
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import METHODS, RIM_SD, Fit, estimator_for
 from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
@@ -238,7 +238,7 @@ class Pipeline:
         fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
-        touch = self._contact(fit.curvature, fit) if math.isfinite(noise) else NO_TOUCH
+        contact = self._contact(fit.curvature, fit) if math.isfinite(noise) else NO_CONTACT
         if self.drift is not None:
             self.drift.follow(frame.device_time, curvature, surface, noise)
         return Estimate(
@@ -259,8 +259,8 @@ class Pipeline:
             out.words(fit.suspect),
             bool(fit.converged),
             fit_time,
-            touch,
-            contact_geometry(fit, touch),
+            contact,
+            contact_geometry(fit, contact),
             *self._compared(surface, fit.coefficients, frame.truth),
         )
 

@@ -12,7 +12,7 @@ from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import KINDS, ContactObject, ObjectFinder, PointContact, contact_geometry
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import METHODS, Estimator, Fit, check_method, estimator_for
-from kappaskin.frames import Array, Touch
+from kappaskin.frames import Array, Contact
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Disk, Patch, Polygon
@@ -197,13 +197,13 @@ def reconstruct(
     return out
 
 
-def _contacts(fits: list[Fit], contacts: list[Touch], forces: bool) -> dict[str, NDArray[Any]]:
+def _contacts(fits: list[Fit], contacts: list[Contact], forces: bool) -> dict[str, NDArray[Any]]:
     """The contact of each frame and the skin's geometry there; NaN where there is none.
 
     `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m; `normal`
     (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with
     `forces` also `force` and `force_sd` (T,) in N. `single` and `near_rim` (T,) say whether to
-    trust them (`Touch`). All readings weigh the same.
+    trust them (`Contact`). All readings weigh the same.
     """
     there = [contact_geometry(one, contact) for one, contact in zip(fits, contacts, strict=True)]
     names = ["displacement", "displacement_sd", "single", "near_rim"]

@@ -40,11 +40,11 @@ class Reported:
     Error bars in space, those of `spread` and `tilt`, need the `fit` that made it.
     """
 
-    __slots__ = ("_in_space", "_principal", "estimate", "fit", "geometry", "touch")
+    __slots__ = ("_in_space", "_principal", "contact", "estimate", "fit", "geometry")
 
     def __init__(self, estimate: Estimate, fit: Fit | None = None) -> None:
         self.estimate, self.fit = estimate, fit
-        self.touch, self.geometry = estimate.touch, estimate.geometry
+        self.contact, self.geometry = estimate.contact, estimate.geometry
         self._in_space: tuple[list[float], list[float]] | None = None
         self._principal: tuple[list[float], list[float]] | None = None
 
@@ -62,8 +62,8 @@ class Reported:
             return [math.nan] * 3, [*self.geometry.normal.tolist(), math.nan]
         geometry, estimator = self.geometry, self.fit.estimator
         patch = estimator.basis.patch
-        x, y = self.touch.position.tolist()
-        x_sd, y_sd = self.touch.position_sd.tolist()
+        x, y = self.contact.position.tolist()
+        x_sd, y_sd = self.contact.position_sd.tolist()
         f_sd, *slopes_sd = self.fit.sd_of(estimator.basis.jet(x, y)[:3]).tolist()
         t, e, normal = geometry.frame.tolist()
         (L, m), (_, k) = geometry.metric.tolist()
@@ -388,7 +388,7 @@ _CONTACT = (
         "present",
         "",
         "whether there is a contact",
-        lambda r: r.touch.present,
+        lambda r: r.contact.present,
         kind="?",
         keys=(
             ("present", "whether the readings hold a contact; without one its numbers are null"),
@@ -398,7 +398,7 @@ _CONTACT = (
         "single",
         "",
         "whether one point load explains the readings",
-        lambda r: r.touch.single,
+        lambda r: r.contact.single,
         kind="?",
         keys=(
             ("single", "whether one point load explains the readings as well as the shape does"),
@@ -408,7 +408,7 @@ _CONTACT = (
         "near_rim",
         "",
         "whether it is too near a held edge",
-        lambda r: r.touch.near_rim,
+        lambda r: r.contact.near_rim,
         kind="?",
         keys=(
             (
@@ -418,18 +418,18 @@ _CONTACT = (
         ),
     ),
     ReportedQuantity(
-        "spare", "", "readings more than needed", lambda r: r.touch.spare, kind="<i8", keys=()
+        "spare", "", "readings more than needed", lambda r: r.contact.spare, kind="<i8", keys=()
     ),
     ReportedQuantity(
         "position",
         "m",
         "of the contact",
-        lambda r: r.touch.position,
+        lambda r: r.contact.position,
         symbol="x",
         parts=(("x", "y"),),
-        sd=lambda r: r.touch.position_sd,
-        half_width=lambda r: r.touch.position_95,
-        quick=lambda r: [*r.touch.position.tolist(), *r.touch.position_sd.tolist()],
+        sd=lambda r: r.contact.position_sd,
+        half_width=lambda r: r.contact.position_95,
+        quick=lambda r: [*r.contact.position.tolist(), *r.contact.position_sd.tolist()],
         labels_shown=("Contact x", "Contact y"),
         shown=("mm", 1e3, 2),
         keys=(
@@ -442,10 +442,10 @@ _CONTACT = (
         "force",
         "N",
         "of the contact",
-        lambda r: r.touch.force,
+        lambda r: r.contact.force,
         symbol="F",
-        sd=lambda r: r.touch.force_sd,
-        half_width=lambda r: r.touch.force_95,
+        sd=lambda r: r.contact.force_sd,
+        half_width=lambda r: r.contact.force_95,
         keys=(("force_N", "of the contact, above zero where it presses"),),
         labels_shown=("Force",),
         shown=("mN", 1e3, 1),
@@ -454,10 +454,10 @@ _CONTACT = (
         "displacement",
         "m",
         _OF_SKIN,
-        lambda r: r.touch.displacement,
+        lambda r: r.contact.displacement,
         symbol="w",
-        sd=lambda r: r.touch.displacement_sd,
-        half_width=lambda r: r.touch.displacement_95,
+        sd=lambda r: r.contact.displacement_sd,
+        half_width=lambda r: r.contact.displacement_95,
         columns=("", "_sd"),
         keys=(("displacement_m", f"{_OF_SKIN}, above zero inward"),),
         labels_shown=("Depth",),

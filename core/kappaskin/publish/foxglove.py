@@ -311,7 +311,7 @@ class Foxglove:
             subscribed = client.subscribed
             if CONTACT in subscribed:
                 client.offer(CONTACT, message.timestamp, message.contact)
-            if POSE in subscribed and message.estimate.touch.present:
+            if POSE in subscribed and message.estimate.contact.present:
                 client.offer(POSE, message.timestamp, pose(message))
             if SHAPE in subscribed and message.mark.with_shape:
                 client.offer(SHAPE, message.timestamp, message.shape)

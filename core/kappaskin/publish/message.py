@@ -155,7 +155,7 @@ class EstimateMessage:
     @cached_property
     def values(self) -> list[float]:
         """The numbers of `CONTACT`; NaN where they are not known."""
-        reported, present = self._reported, self.estimate.touch.present
+        reported, present = self._reported, self.estimate.contact.present
         return [
             *self._head(),
             *_frame_numbers(reported),

@@ -242,7 +242,7 @@ class _Views:
             (m.SHAPES, self._shape(head | shape)),
             (m.SKIN, self._cloud(_stamped(stamp) | self._points(estimate))),
         ]
-        if estimate.touch.present:
+        if estimate.contact.present:
             found.append((m.POSES, self._pose(_stamped(stamp) | _pose(estimate))))
         return found
 
@@ -256,21 +256,21 @@ class _Views:
 
 
 def _contact(estimate: Estimate, stamp: int) -> bytes:
-    touch, here = estimate.touch, estimate.geometry
+    contact, here = estimate.contact, estimate.geometry
     return m.pack_contact(
         stamp,
         estimate.sequence,
         (estimate.device_time, estimate.host_time, estimate.taken, estimate.taken_sd),
-        (touch.present, touch.single, touch.near_rim, estimate.converged),
-        touch.spare,
+        (contact.present, contact.single, contact.near_rim, estimate.converged),
+        contact.spare,
         (
             estimate.noise,
-            *touch.position.tolist(),
-            *touch.position_sd.tolist(),
-            touch.force,
-            touch.force_sd,
-            touch.displacement,
-            touch.displacement_sd,
+            *contact.position.tolist(),
+            *contact.position_sd.tolist(),
+            contact.force,
+            contact.force_sd,
+            contact.displacement,
+            contact.displacement_sd,
             *here.position.tolist(),
             *here.frame.ravel().tolist(),
             *here.metric.ravel().tolist(),

@@ -87,7 +87,7 @@ def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[
             began = frame.device_time
             answers.append(_Answer(estimate, began, began + duration, len(frame.channels)))
             if steering is not None:
-                steering(estimate.touch, pipeline.fit)
+                steering(estimate.contact, pipeline.fit)
     return [answer for answer in answers if answer.began >= _SETTLED]
 
 
@@ -102,7 +102,7 @@ class _Errors:
     def __call__(self, estimate: Estimate, time: float) -> tuple[float, float]:
         """Distance of the contact and RMS of the shape from the truth at `time`."""
         (load,) = self._scene.loads_at(time)
-        off = estimate.touch.position - load.centre()
+        off = estimate.contact.position - load.centre()
         w = self._surface(self._compliance(load.modal(self._basis)))
         rms = math.sqrt(float(np.mean((estimate.surface - w) ** 2)))
         return 1e3 * math.hypot(*off), 1e3 * rms
@@ -137,7 +137,7 @@ def measured(
         "share": None if region.around == Region.OFF else region.share,
         "channels": float(np.mean([a.channels for a in answers])),
         "rate": (len(answers) - 1) / (answers[-1].began - answers[0].began),
-        "found": float(np.mean([a.estimate.touch.present for a in answers])),
+        "found": float(np.mean([a.estimate.contact.present for a in answers])),
         "bound_mm": 1e3 * math.hypot(*bounds.bound[:2]),
         "contact_mm": float(own[0]),
         "shape_mm": float(own[1]),

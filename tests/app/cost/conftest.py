@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import Cost, Setting
+from kappaskin.studies import Cost, Setting
 from kappaskin_app.features.accuracy import costing
 from kappaskin_app.features.accuracy.costing import in_words
 from kappaskin_app.shell.window import MainWindow

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from kappaskin import Cost, EffectCost, Refused, Setting
+from kappaskin.studies import Cost, EffectCost, Refused, Setting
 from kappaskin_app.features.accuracy.cost_plot import CostPlot
 from kappaskin_app.features.accuracy.costing import in_words
 from kappaskin_app.shell.effects import called

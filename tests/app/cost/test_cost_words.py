@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from kappaskin import METHODS
+from kappaskin.estimation import METHODS
 from kappaskin_app.features.accuracy.costing import Frontier
 from kappaskin_app.shell.settings.shown import METHOD_NAMES
 from kappaskin_app.widgets.amounts import duration, length

@@ -5,7 +5,7 @@ import multiprocessing
 import pytest
 from PySide6.QtCore import Qt
 
-from kappaskin import Setting
+from kappaskin.studies import Setting
 from kappaskin_app.features.accuracy.costing import in_words
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import scene_of, scene_of_sensor

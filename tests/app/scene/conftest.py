@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QApplication, QDoubleSpinBox
 
-from kappaskin import SCENES
+from kappaskin.scenes import SCENES
 from kappaskin.sources import information
 from kappaskin_app.features.scene.scene_form.form import SceneForm
 from kappaskin_app.shell.window import MainWindow

@@ -15,8 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin import SCENES
-from kappaskin.scenes import Key, Unit
+from kappaskin.scenes import SCENES, Key, Unit
 from kappaskin_app.features.scene.scene_form.form import SceneForm
 from kappaskin_app.features.scene.scene_form.sections import sections_of
 from kappaskin_app.features.scene.scene_text import changes

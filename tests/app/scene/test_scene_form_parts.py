@@ -12,8 +12,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QToolButton
 
-from kappaskin import EFFECTS
 from kappaskin.scenes import PARTS, read_scene
+from kappaskin.scenes.effects import EFFECTS
 from kappaskin_app.features.scene.scene_form.form import SceneForm
 from kappaskin_app.features.scene.scene_form.section import Addition, Section
 from kappaskin_app.features.scene.scene_form.sections import sections_of

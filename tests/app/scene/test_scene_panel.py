@@ -6,7 +6,9 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog
 
-from kappaskin import EFFECTS, read_scene, scene_file
+from kappaskin import read_scene
+from kappaskin.scenes import scene_file
+from kappaskin.scenes.effects import EFFECTS
 from kappaskin_app.features.scene.card import PLAYING
 from kappaskin_app.shell.settings import Settings
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QSize
 
-from kappaskin import SCENES, Disk, PointLoad, Polygon, SensorLayout, load_scene
+from kappaskin import Disk, PointLoad, Polygon, SensorLayout, load_scene
+from kappaskin.scenes import SCENES
 from kappaskin_app.features.scene.relief import relief
 from kappaskin_app.features.scene.scene_picture import picture
 from kappaskin_app.theme import DARK, LIGHT

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from kappaskin import scene_file
+from kappaskin.scenes import scene_file
 from kappaskin_app.shell.touching import touches_at
 
 from .conftest import EDIT, EFFECTS_PAGE, plays

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import SCENES, Refusal, load_scene, planned, read_scene, scene_file
+from kappaskin import Refusal, load_scene, planned, read_scene
+from kappaskin.scenes import SCENES, scene_file
 from kappaskin_app.features.scene.editing import SceneEditing
 from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import OFF, ON, PLANNED, forced

@@ -10,7 +10,8 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
-from kappaskin import Damaged, Refusal
+from kappaskin import Refusal
+from kappaskin.errors import Damaged
 from kappaskin.recording import ExportRequest, Recording, repair_steps, writing
 from kappaskin.recording import messages as m
 from kappaskin.recording import reading as records

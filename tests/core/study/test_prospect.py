@@ -6,21 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import (
-    Design,
-    Disk,
-    GaussianNoise,
-    Patch,
-    Plate,
-    PointLoad,
-    Refusal,
-    Scene,
-    SensorLayout,
-    check,
-    edges_of,
-    predicted_sd,
-    prospect,
-)
+from kappaskin import Disk, Patch, Plate, PointLoad, Refusal, Scene, SensorLayout, predicted_sd
+from kappaskin.bases import edges_of
+from kappaskin.scenes.effects import GaussianNoise
+from kappaskin.studies import Design, check, prospect
 
 FLAT, DISK = Patch(0.1, 0.1), Disk(0.05)
 

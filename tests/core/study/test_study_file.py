@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin import PLACEMENTS, Refusal
+from kappaskin import Refusal
+from kappaskin.estimation import PLACEMENTS
 from kappaskin.studies import load_study
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.setup import (

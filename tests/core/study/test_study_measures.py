@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from kappaskin import METHODS, Refusal
+from kappaskin import Refusal
+from kappaskin.estimation import METHODS
 from kappaskin.studies.design.results import BlockTask, run_task, version
 
 POINT = 'what = "point"\nx = 0.05\ny = 0.03\nforce = 0.1'

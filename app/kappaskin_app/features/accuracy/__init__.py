@@ -6,7 +6,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
 
-class Accuracy:
+class AccuracyFeature:
     name = "accuracy"
 
     def install(self, shell: MainWindow) -> None:

@@ -21,7 +21,7 @@ _HEAD = 4096  # characters, among which it is
 _STOPPED = "Cancelled while it was computed; what was taken is forgotten."
 
 
-class Calibration:
+class CalibrationFeature:
     name = "calibration"
 
     def install(self, shell: MainWindow) -> None:

@@ -146,7 +146,7 @@ class ComparePanel(QWidget):
         colours = SEQUENTIAL if into else SEQUENTIAL[::-1]
         for name, values, estimate in (("a", a, pair.a), ("b", b, pair.b)):
             self.maps[name].show_surface(
-                values, limits, colours, estimate.touch.position, self._sides
+                values, limits, colours, estimate.contact.position, self._sides
             )
         difference = pair.difference
         if difference is not None:

@@ -9,7 +9,7 @@ from kappaskin_app.shell.parts import SOURCE
 from kappaskin_app.shell.window import MainWindow
 
 
-class Connection:
+class ConnectionFeature:
     name = "connection"
 
     def install(self, shell: MainWindow) -> None:

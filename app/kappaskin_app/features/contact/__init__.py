@@ -19,7 +19,7 @@ _OBJECT = (
 )
 
 
-class Contact:
+class ContactFeature:
     name = "contact"
 
     def install(self, shell: MainWindow) -> None:

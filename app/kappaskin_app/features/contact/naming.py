@@ -15,7 +15,7 @@ _LEARNING = "computing what objects read like on this skin\N{HORIZONTAL ELLIPSIS
 def curved(estimate: Estimate) -> str:
     """How the skin curves at the contact, in words; empty without one."""
     geometry = estimate.geometry
-    if not estimate.touch.present:
+    if not estimate.contact.present:
         return ""
     (one, other), (sd, other_sd) = geometry.principal, geometry.principal_sd
     words = (
@@ -64,7 +64,7 @@ class Naming(QObject):
         self._meet(status)
         found, what = NO_OBJECT, self._finder
         if not isinstance(what, str):
-            found = what(estimate.curvature, estimate.noise, estimate.touch)
+            found = what(estimate.curvature, estimate.noise, estimate.contact)
             what = found.describe()
         return "; ".join(filter(None, [what, curved(estimate)])), found, estimate
 

@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import QFont, QFontInfo, QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QWidget
 
-from kappaskin.frames import Estimate, Touch
+from kappaskin.frames import Contact, Estimate
 from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.line import Line
 
@@ -96,15 +96,15 @@ def _short(count: int) -> str:
     return f"{count / 1e3:.0f} k" if count < 999_500 else f"{count / 1e6:.1f} M"
 
 
-def _contact(touch: Touch) -> str:
-    if not touch.present:
+def _contact(contact: Contact) -> str:
+    if not contact.present:
         return "none"
-    x, y = touch.position * 1e3
-    if touch.near_rim:
+    x, y = contact.position * 1e3
+    if contact.near_rim:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, near rim"
-    if not touch.single:
+    if not contact.single:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, spread"
-    sd = float(np.max(touch.position_sd)) * 1e3
+    sd = float(np.max(contact.position_sd)) * 1e3
     return f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.2f} mm"
 
 
@@ -117,10 +117,10 @@ def _age(age: float, sd: float) -> str:
     return f"{age:.0f} ms" if sd < _TINY else _with_error(age, sd, 0 if sd >= 1 else 1, "ms")
 
 
-def _force(touch: Touch) -> str:
-    if abs(touch.force) >= 1:
-        return _with_error(touch.force, touch.force_sd, 3, "N")
-    return _with_error(touch.force * 1e3, touch.force_sd * 1e3, 1, "mN")
+def _force(contact: Contact) -> str:
+    if abs(contact.force) >= 1:
+        return _with_error(contact.force, contact.force_sd, 3, "N")
+    return _with_error(contact.force * 1e3, contact.force_sd * 1e3, 1, "mN")
 
 
 class Readouts(QWidget):
@@ -201,10 +201,10 @@ class Readouts(QWidget):
             for key in ("contact", "force", "depth", "error", "rms"):
                 self._write(key, NONE)
             return
-        touch = estimate.touch
-        self._write("contact", _contact(touch))
-        self._write("force", _force(touch))
-        depth, sd = touch.displacement * 1e3, touch.displacement_sd * 1e3
+        contact = estimate.contact
+        self._write("contact", _contact(contact))
+        self._write("force", _force(contact))
+        depth, sd = contact.displacement * 1e3, contact.displacement_sd * 1e3
         digits = 3 if sd < _FINE else 2
         self._write("depth", _with_error(depth, sd, digits, "mm"))
         error, rms = estimate.error_at_load * 1e3, estimate.error_rms * 1e3

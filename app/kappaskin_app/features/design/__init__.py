@@ -6,7 +6,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
 
-class Design:
+class DesignFeature:
     name = "design"
 
     def install(self, shell: MainWindow) -> None:

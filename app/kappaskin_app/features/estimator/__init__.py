@@ -5,7 +5,7 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.window import MainWindow
 
 
-class Estimator:
+class EstimatorFeature:
     name = "estimator"
 
     def install(self, shell: MainWindow) -> None:

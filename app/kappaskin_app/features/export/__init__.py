@@ -19,7 +19,7 @@ from kappaskin_app.shell.window import MainWindow
 _PYTHON = "A script that does what the window does now: source, scene, setup; it prints the contact"
 
 
-class Export:
+class ExportFeature:
     name = "export"
 
     def install(self, shell: MainWindow) -> None:

@@ -45,8 +45,8 @@ def estimates(seconds):
 
 if __name__ == "__main__":  # the engine is a process of its own, which reads this file too
     for e in estimates(seconds=5.0):
-        x, y = 1e3 * e.touch.position
-        force, deepest = 1e3 * e.touch.force, 1e3 * abs(e.surface).max()
+        x, y = 1e3 * e.contact.position
+        force, deepest = 1e3 * e.contact.force, 1e3 * abs(e.surface).max()
         print(
             f"{e.device_time:9.3f} s  contact {x:6.2f}, {y:6.2f} mm  force {force:7.1f} mN  "
             f"deepest {deepest:6.3f} mm  noise {e.noise:.3f} 1/m"

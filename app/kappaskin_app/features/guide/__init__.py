@@ -10,7 +10,7 @@ from kappaskin_app.shell.finder.things import Thing
 from kappaskin_app.shell.window import MainWindow
 
 
-class Guide:
+class GuideFeature:
     name = "guide"
 
     def install(self, shell: MainWindow) -> None:

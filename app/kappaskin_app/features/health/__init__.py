@@ -7,7 +7,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
 
-class Health:
+class HealthFeature:
     name = "health"
 
     def install(self, shell: MainWindow) -> None:

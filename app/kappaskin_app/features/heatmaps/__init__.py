@@ -18,7 +18,7 @@ from kappaskin_app.theme import Theme
 _EACH = 0.06  # s between two drawings
 
 
-class Heatmaps:
+class HeatmapsFeature:
     name = "heatmaps"
 
     def install(self, shell: MainWindow) -> None:

@@ -14,7 +14,7 @@ from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.window import MainWindow
 
 
-class Lessons:
+class LessonsFeature:
     name = "lessons"
 
     def install(self, shell: MainWindow) -> None:

@@ -9,7 +9,7 @@ from kappaskin_app.shell.parts import HELP, SOURCE
 from kappaskin_app.shell.window import MainWindow
 
 
-class Log:
+class LogFeature:
     name = "log"
 
     def install(self, shell: MainWindow) -> None:

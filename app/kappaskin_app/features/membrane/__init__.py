@@ -10,7 +10,7 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.window import MainWindow
 
 
-class Membrane:
+class MembraneFeature:
     name = "membrane"
 
     def install(self, shell: MainWindow) -> None:

@@ -3,15 +3,9 @@
 from PySide6.QtCore import QObject, Signal
 from pyvistaqt import QtInteractor
 
-from kappaskin_app.features.membrane.camera import (
-    DIRECTIONS,
-    FROM_THE_LEFT,
-    camera_of,
-    fit_camera,
-    place_camera,
-)
+from kappaskin_app.features.membrane.camera import DIRECTIONS, camera_of, fit_camera, place_camera
 from kappaskin_app.features.membrane.sides import Sides
-from kappaskin_app.shell.drawn_skin import NO_SKIN
+from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, NO_SKIN
 
 
 class Gaze(QObject):

@@ -240,7 +240,7 @@ class MembraneView(QWidget):
         for marks in (self.out, self.asked):
             marks.follow(skin, self.lift)
         self._follow_pointed()
-        put_upright(self._contact, skin, estimate.touch.position)
+        put_upright(self._contact, skin, estimate.contact.position)
         if self._box.shares != WHOLE:
             self._box.cut(self.plotter.actors.values())  # some may be new
         known = math.isfinite(estimate.taken)

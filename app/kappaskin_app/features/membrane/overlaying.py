@@ -75,24 +75,24 @@ class Overlaying:
         self.band.show(self._membrane.skin, sd, times)
 
     def _show_frame(self, estimate: Estimate, settings: Settings, times: float) -> None:
-        touch = estimate.touch
-        if not (settings.show_frame and touch.present):
+        contact = estimate.contact
+        if not (settings.show_frame and contact.present):
             self.frame.hide()
             return
         bars, slopes = self._colouring.error_bars(estimate), None
         if bars is not None:
-            slopes = times * bars.of_slopes(touch.position, estimate.noise)
+            slopes = times * bars.of_slopes(contact.position, estimate.noise)
         angle = float(estimate.geometry.angle)
         membrane = self._membrane
-        self.frame.show(membrane.skin, touch.position, angle, slopes, membrane.lift)
+        self.frame.show(membrane.skin, contact.position, angle, slopes, membrane.lift)
 
     def _of_found(self, estimate: Estimate) -> PlacedObject | None:
         """What was found of late, where the contact is now."""
-        what, touch = self._what, estimate.touch
-        if what is None or not touch.present or time.monotonic() - self._found_at > _OLD:
+        what, contact = self._what, estimate.contact
+        if what is None or not contact.present or time.monotonic() - self._found_at > _OLD:
             return None
         patch = self._membrane.skin.patch
-        return placed_object(what, touch.position, max(patch.a, patch.b))
+        return placed_object(what, contact.position, max(patch.a, patch.b))
 
     def _of_scene(self, estimate: Estimate) -> PlacedObject | None:
         """The rigid object of the scene that is played, where it is now."""

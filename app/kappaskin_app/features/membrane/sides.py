@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from kappaskin_app.features.membrane.camera import Direction
 from kappaskin_app.features.membrane.unlit import UNLIT, pixels
-from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
+from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin
 from kappaskin_app.theme import grown
 
 _LETTERS = 15  # px

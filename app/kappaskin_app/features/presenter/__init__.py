@@ -7,7 +7,7 @@ from kappaskin_app.shell.parts import VIEW
 from kappaskin_app.shell.window import MainWindow
 
 
-class Presenter:
+class PresenterFeature:
     name = "presenter"
 
     def install(self, shell: MainWindow) -> None:

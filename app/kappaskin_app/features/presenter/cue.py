@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kappaskin.contact import ContactObject
-from kappaskin.frames import Estimate, Touch
+from kappaskin.frames import Contact, Estimate
 
 _95 = 1.96  # standard deviations that a 95 % interval reaches
 _ROUND = ("sphere", "cylinder")  # the kinds that have a radius
@@ -15,10 +15,10 @@ _MOST = 10.0  # times the force of the point load that explains it best that an 
 
 @dataclass(frozen=True)
 class Found:
-    """What was found to touch the skin a moment ago, and the `touch` there was then."""
+    """What was found to touch the skin a moment ago, and the `contact` there was then."""
 
     what: ContactObject
-    touch: Touch
+    contact: Contact
 
 
 @dataclass(frozen=True)
@@ -60,26 +60,26 @@ def cue_of(estimate: Estimate, found: Found | None = None) -> Cue | None:
     lies at one of the ends. An object explains both, but is found a few times a second only: how
     much more than a point load it bore a moment ago corrects the point load of now.
     """
-    touch = estimate.touch
-    if not touch.present:
+    contact = estimate.contact
+    if not contact.present:
         return None
-    force, force_95 = touch.force, touch.force_95
-    place, place_95 = touch.position, float(np.max(touch.position_95))
-    if found is not None and 0 < found.what.force / found.touch.force < _MOST:
-        more = touch.force / found.touch.force
+    force, force_95 = contact.force, contact.force_95
+    place, place_95 = contact.position, float(np.max(contact.position_95))
+    if found is not None and 0 < found.what.force / found.contact.force < _MOST:
+        more = contact.force / found.contact.force
         force, force_95 = more * found.what.force, abs(more) * found.what.force_95
-        if not touch.single:
+        if not contact.single:
             place, place_95 = found.what.position, float(np.max(found.what.position_95))
-    elif not touch.single:
+    elif not contact.single:
         force_95 = place_95 = math.nan
-    displacement, displacement_95 = touch.displacement, touch.displacement_95
-    if not touch.single:
+    displacement, displacement_95 = contact.displacement, contact.displacement_95
+    if not contact.single:
         displacement, displacement_95 = float(np.nanmax(np.abs(estimate.surface))), math.nan
     x, y = (float(value) for value in place)
     kind, length = (found.what.kind, found.what.length) if found is not None else ("", math.nan)
     return Cue(
         *(force, force_95, displacement, displacement_95, (x, y), place_95),
-        *(kind, length, _roundness(estimate, found), touch.near_rim),
+        *(kind, length, _roundness(estimate, found), contact.near_rim),
     )
 
 

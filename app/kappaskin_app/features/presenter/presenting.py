@@ -126,7 +126,7 @@ class Presenting(QObject):
 
     def find(self, what: ContactObject, within: Estimate) -> None:
         """Take up what was found to touch the skin `within` an estimate."""
-        self._found = Found(what, within.touch) if what.probability else None
+        self._found = Found(what, within.contact) if what.probability else None
         self._found_at = time.monotonic()
 
     def receive(self, _: Estimate) -> None:

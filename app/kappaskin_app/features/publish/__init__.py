@@ -6,7 +6,7 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.window import MainWindow
 
 
-class Publish:
+class PublishFeature:
     name = "publish"
 
     def install(self, shell: MainWindow) -> None:

@@ -19,7 +19,7 @@ from kappaskin_app.shell.session import RECORDED
 from kappaskin_app.shell.window import MainWindow
 
 
-class Recording:
+class RecordingFeature:
     name = "recording"
 
     def install(self, shell: MainWindow) -> None:

@@ -25,7 +25,7 @@ from kappaskin_app.shell.window import MainWindow
 _MILLIMETRE = 1e-3  # m, the unit of what is drawn for a printer
 
 
-class Scene:
+class SceneFeature:
     name = "scene"
 
     def install(self, shell: MainWindow) -> None:

@@ -11,7 +11,7 @@ from kappaskin_app.shell.window import MainWindow
 _EACH = 1.0  # s between two looks at what a region buys
 
 
-class Sensor:
+class SensorFeature:
     name = "sensor"
 
     def install(self, shell: MainWindow) -> None:

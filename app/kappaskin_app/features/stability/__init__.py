@@ -10,7 +10,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
 
-class Stability:
+class StabilityFeature:
     name = "stability"
 
     def install(self, shell: MainWindow) -> None:

@@ -5,7 +5,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
 
-class Traces:
+class TracesFeature:
     name = "traces"
 
     def install(self, shell: MainWindow) -> None:

@@ -121,7 +121,7 @@ class SurfaceWriter(ABC):
         """What a file says of the surface of one frame, as JSON."""
         estimate = frame.estimate
         numbers = {"time": frame.at, "sequence": estimate.sequence, "setup": estimate.generation}
-        force = estimate.touch.force
+        force = estimate.contact.force
         return self.info.json(**numbers, force=force if math.isfinite(force) else None)
 
     @abstractmethod

@@ -15,7 +15,7 @@ from kappaskin.bases import Basis
 from kappaskin.contact import ContactObject, ObjectFinder, PointContact
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator, Fit, predicted_sd, stacked_fits
-from kappaskin.frames import Array, Touch, Truth
+from kappaskin.frames import Array, Contact, Truth
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects
 from kappaskin.scenes.effects import Hysteresis
@@ -107,7 +107,7 @@ class FrameBlock:
         return fitted - self.true @ self.scene.basis.at(points).T
 
     @cached_property
-    def touches(self) -> list[Touch]:
+    def contacts(self) -> list[Contact]:
         """The contact that is found in each frame."""
         find = _contact_finder(self.estimator, self.scene.plate, self.scene.edge)
         return [find(K, fit) for K, fit in zip(self.curvature, self.fits, strict=True)]
@@ -115,8 +115,8 @@ class FrameBlock:
     def objects(self) -> Generator[ContactObject]:
         """The object that is recognised in each frame."""
         find = _object_finder(self.estimator, self.scene.plate, self.scene.edge)
-        for K, fit, touch in zip(self.curvature, self.fits, self.touches, strict=True):
-            yield find(K, float(fit.noise), touch)
+        for K, fit, contact in zip(self.curvature, self.fits, self.contacts, strict=True):
+            yield find(K, float(fit.noise), contact)
 
 
 def _times(scene: Scene, frames: int) -> Array:
@@ -173,19 +173,19 @@ def _at_load(block: FrameBlock) -> Array:
 
 
 def _contact(block: FrameBlock) -> Array:
-    found = np.array([touch.position for touch in block.touches])
+    found = np.array([contact.position for contact in block.contacts])
     return np.hypot(*(found - block.contact).T)
 
 
 def _force(block: FrameBlock) -> Array:
     """As a share of the largest force in the block."""
-    found, true = np.array([touch.force for touch in block.touches]), block.forces()
+    found, true = np.array([contact.force for contact in block.contacts]), block.forces()
     largest = np.abs(true).max()
     return np.abs(found - true) / (largest if largest else np.nan)
 
 
 def _found(block: FrameBlock) -> Array:
-    return np.array([float(touch.present) for touch in block.touches])
+    return np.array([float(contact.present) for contact in block.contacts])
 
 
 def _radius_of(block: FrameBlock) -> float:
