@@ -138,14 +138,16 @@ def test_ctrl_k_finds_every_kind_of_thing_in_the_window(
     file.write_text(scene_file("demo").read_text(encoding="utf-8"), encoding="utf-8")
     window.opening.note(tmp_path / "gone.mcap")
     window.opening.note(file)
-    (gone,) = [thing for thing in things_in(window) if thing.title == "Open gone.mcap"]
+    (gone,) = [
+        thing for thing in things_in(window, window.menus.things) if thing.title == "Open gone.mcap"
+    ]
     assert gone.why_not == "not there any more: moved or deleted"
     do("own fing")
     until(lambda: getattr(window.history.settings.written, "file", None) == file)
     do("play scene coin")
     until(lambda: window.session.source == "sim:" and window.display.badge.state == "SIM")
     assert window.history.settings.written.file.stem == "coin"
-    names = [thing.name for thing in things_in(window)]
+    names = [thing.name for thing in things_in(window, window.menus.things)]
     assert len(set(names)) == len(names)
     entries = window.actions_by_name.entries.values()
     asked = {f"action:{entry.name}" for entry in entries if entry.action.menu() is None}

@@ -125,7 +125,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert "Press it now" in page.words.text()
     asked = window.testing.test.asked
     x, y = window.session.scene.layout.positions[asked]
-    wishes, at = window.requests, window.session.estimate.contact.position
+    wishes, at = window.editing, window.session.estimate.contact.position
 
     wishes.grab(*at)
     wishes.drag(float(x), float(y))

@@ -268,7 +268,7 @@ def test_windows_line_ends_are_read_too() -> None:
 def test_figures_without_an_estimate_are_settings_and_nothing_else() -> None:
     from kappaskin import Status
 
-    found = Watch().figures(Settings(), Status(), None)
+    found = Watch().figures(Settings(), Status(), {})
     assert set(found) == set(KINDS)
     assert found["functions_x"] == 8.0
     assert math.isnan(found["error_rms"])

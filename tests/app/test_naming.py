@@ -52,7 +52,7 @@ def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until, m
 def test_a_skin_that_objects_cannot_be_told_on_says_so(window, until):
     window.history.change("Elements", -1, elements_x=50, elements_y=50)
 
-    until(lambda: "at most 2000 elements to tell objects by" in window.display.foot.object.text())
+    until(lambda: "at most 2000 elements" in window.display.foot.object.text())
 
 
 @pytest.mark.fails_inside

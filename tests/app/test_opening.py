@@ -82,7 +82,10 @@ def test_what_cannot_be_opened_says_why_and_is_not_listed(
     for file, why in (
         (tmp_path / "gone.toml", "cannot be read"),
         (calibration, "skin.toml"),
-        (tmp_path / "notes.txt", "expected a recording (.mcap .part), a scene"),
+        (
+            tmp_path / "notes.txt",
+            "expected a recording (.mcap .part), a calibration (.toml), a scene",
+        ),
     ):
         window.opening.open(file)
         assert why in window.statusBar().currentMessage()

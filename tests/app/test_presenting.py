@@ -121,7 +121,7 @@ def test_no_hand_presses_the_skin_out_of_the_picture(demo, until, qtbot) -> None
         qtbot.keyClick(pad, Qt.Key.Key_PageUp)
     until(lambda: not pad.holding)
     assert 0.5 < demo.session.scene.stimuli[0].what.force < 0.8
-    until(lambda: demo.badge.state == "SIM")
+    until(lambda: demo.display.badge.state == "SIM")
     until(lambda: demo.presenting.cue and 0.5 < demo.presenting.cue.force < 0.8)
 
 
@@ -189,7 +189,7 @@ def test_a_recording_that_stands_is_felt_where_it_stands(opened, recording, unti
 
 def test_nothing_that_touches_is_said_to_be_nothing(demo, until) -> None:
     text = demo.history.settings.written.text
-    demo.wishes.write(text[: text.index("[[touch]]")])
+    demo.editing.write(text[: text.index("[[touch]]")])
     until(lambda: demo.presenting.stage.force.note == "nothing felt")
     until(lambda: not demo.presenting.stage.operator.isVisible())
 
@@ -228,7 +228,7 @@ def test_a_scene_that_is_refused_says_so_beside_the_pad_until_it_is_taken_back(
 ) -> None:
     told, things = demo.presenting.stage.operator.told, demo.presenting.stage.operator.things
     until(lambda: things.button(0).isVisible())
-    demo.wishes.write(demo.history.settings.written.text.replace("radius", "radios"))
+    demo.editing.write(demo.history.settings.written.text.replace("radius", "radios"))
     until(lambda: "expected radius" in told.words()[1].text)
     assert "Ctrl+Z" in told.words()[1].text
     assert told.words()[1].fits

@@ -38,6 +38,7 @@ class Docks:
         self._keys: dict[str, str] = {}
         self._above: dict[str, str] = {}
         self._right: list[str] = []
+        self._also: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> Dock:
         return self._docks[name]
@@ -78,8 +79,13 @@ class Docks:
         dock.setWidget(widget)
         self._window.addDockWidget(area, dock)
 
-    def put_below(self, name: str, title: str, widget: QWidget, key: str) -> None:
-        """Have a widget below the skin, hidden until it is asked for with `key`."""
+    def put_below(self, name: str, title: str, widget: QWidget, key: str, menu: str = "") -> None:
+        """Have a widget below the skin, hidden until it is asked for with `key`.
+
+        It is also asked for in a `menu`, besides that of all docks.
+        """
+        if menu:
+            self._also[name] = menu
         before = self.below
         area = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
         area.setFrameShape(QScrollArea.Shape.NoFrame)
@@ -119,6 +125,8 @@ class Docks:
             )
             action.setCheckable(True)
             dock.visibilityChanged.connect(action.setChecked)
+        for name, other in self._also.items():
+            actions.repeat(f"dock-{name}", other)
 
     def _turn(self, name: str) -> None:
         """Show a dock, before the other in its place; hide one that is seen."""

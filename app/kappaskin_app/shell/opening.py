@@ -80,7 +80,6 @@ class Opening(QObject):
         self.menu = QMenu(window)
         self.menu.setToolTipsVisible(True)
         self.menu.aboutToShow.connect(guarded(self._list))
-        session.reported.connect(guarded(self.follow))
         self.drops = Drops(window, self)
 
     def add(self, kind: Kind) -> None:

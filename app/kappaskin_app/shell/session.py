@@ -216,8 +216,7 @@ class Session(QObject):
         if setup != self.asked:
             if self.inside and setup.calibration and not self.asked.calibration:
                 # A calibration follows the loops of a skin from rest on: these effects start anew.
-                self.engine.play(replace(self.scene, effects=()))
-                self.engine.play(played(self.scene))
+                self.engine.restart_effects()
             self.asked = setup
             self.engine.set_up(setup)
 

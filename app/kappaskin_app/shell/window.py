@@ -82,6 +82,8 @@ class MainWindow(Parts):
             part.told.connect(guarded(self.tell))
 
     def _finish(self, source: str, handed: ResumeInfo | None, already: bool) -> None:
+        # After features, who may use a file then.
+        self.session.reported.connect(guarded(self.opening.follow))
         self.panels.build()
         self.menus.finish()
         self.layouts.begin()

@@ -20,6 +20,7 @@ from kappaskin.live.requests import (
     Note,
     Requested,
     RequestSender,
+    RestartEffects,
     Seek,
     StepFrames,
     TakeTare,
@@ -191,6 +192,10 @@ class Engine:
         Playback(at or 0.0, 0.0, speed)  # or refused here
         after = self._requested.looped if looped is None else looped
         self._requests.act(Seek(at, speed, looped), speed=speed, looped=after)
+
+    def restart_effects(self) -> None:
+        """Let what spoils the readings of a simulated sensor start anew, as from rest."""
+        self._requests.act(RestartEffects())
 
     def step(self, frames: int) -> None:
         """Pause a recording, so many `frames` further on, or back if negative."""

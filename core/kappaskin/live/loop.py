@@ -22,7 +22,7 @@ from kappaskin.live.health_monitor import LiveHealthMonitor
 from kappaskin.live.pipelines import ComparedPipeline, PipelineHost, PipelineStatus
 from kappaskin.live.recorder import LiveRecorder
 from kappaskin.live.region_tracking import SerialTracking, SimulatedTracking, track_region
-from kappaskin.live.requests import Action, Note, Seek, StepFrames, TakeTare, Update
+from kappaskin.live.requests import Action, Note, RestartEffects, Seek, StepFrames, TakeTare, Update
 from kappaskin.live.resume import RequestReceiver
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, STREAMING, WAITING, Status
@@ -125,6 +125,9 @@ class EngineLoop:
             case TakeTare():
                 streams = self._status.state == STREAMING
                 self._tare.begin(self._status.sensor if streams else None)
+            case RestartEffects() if requested.scene is not None:
+                self._play(replace(requested.scene, effects=()))
+                self._play(requested.scene)
             case Note():
                 self._add_event(Event(time.monotonic(), "note", request.text))
             case _:

@@ -61,7 +61,12 @@ class Note:
     text: str
 
 
-Action = Seek | StepFrames | TakeTare | Note
+@dataclass(frozen=True)
+class RestartEffects:
+    """Let what spoils the readings of a simulated sensor start anew, as from rest."""
+
+
+Action = Seek | StepFrames | TakeTare | Note | RestartEffects
 """What is to be done once, as opposed to settings that last."""
 
 

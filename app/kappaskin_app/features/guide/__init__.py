@@ -7,6 +7,7 @@ from kappaskin_app.features.guide.pages import Page, page_called, pages
 from kappaskin_app.features.guide.panel import GuidePanel
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.finder.things import Thing
+from kappaskin_app.shell.parts import HELP
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -15,7 +16,7 @@ class GuideFeature:
 
     def install(self, shell: MainWindow) -> None:
         self._shell, self.guide = shell, GuidePanel()
-        shell.docks.put_below("guide", "Guide", self.guide, "Ctrl+F1")
+        shell.docks.put_below("guide", "Guide", self.guide, "Ctrl+F1", HELP)
         shell.read_wanted.connect(guarded(lambda name: self.read(page_called(name))))
         shell.theme_changed.connect(guarded(self.guide.show_theme))
         shell.menus.things.append(self._things)
