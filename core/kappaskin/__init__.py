@@ -63,22 +63,21 @@ if TYPE_CHECKING:
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
-        {
-            "bases": "SineBasis basis_for",
-            "calibration": "Calibration Tare load_calibration",
-            "contact": "IntrinsicContact ObjectFinder PointContact local_geometry",
-            "errors": "RankDeficient Refusal SourceError",
-            "estimation": (
-                "Bayes Fast FiniteSlopeLeastSquares LeastSquares Region Robust Tracking "
-                "estimator_for place_elements predicted_sd"
-            ),
-            "frames": "Contact Estimate Event Frame",
-            "live": "Engine Status",
-            "mechanics": "DiscLoad GaussianLoad LineLoad Plate PointLoad RectangleLoad",
-            "pipeline": "Pipeline Setup",
-            "recording": "Recording setup_from_text",
-            "scenes": "Scene Simulator Stimulus load_scene planned read_scene write_scene",
-            "sensing": "Sensor SensorLayout Transduction",
-            "skin": "Disk Patch Polygon",
-        },
+        ("bases", "SineBasis basis_for"),
+        ("calibration", "Calibration Tare load_calibration"),
+        ("contact", "IntrinsicContact ObjectFinder PointContact local_geometry"),
+        ("errors", "RankDeficient Refusal SourceError"),
+        (
+            "estimation",
+            "Bayes Fast FiniteSlopeLeastSquares LeastSquares Region Robust Tracking "
+            "estimator_for place_elements predicted_sd",
+        ),
+        ("frames", "Contact Estimate Event Frame"),
+        ("live", "Engine Status"),
+        ("mechanics", "DiscLoad GaussianLoad LineLoad Plate PointLoad RectangleLoad"),
+        ("pipeline", "Pipeline Setup"),
+        ("recording", "Recording setup_from_text"),
+        ("scenes", "Scene Simulator Stimulus load_scene planned read_scene write_scene"),
+        ("sensing", "Sensor SensorLayout Transduction"),
+        ("skin", "Disk Patch Polygon"),
     )

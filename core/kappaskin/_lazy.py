@@ -1,20 +1,20 @@
 """Packages whose names are imported when they are first asked for."""
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 
 def lazy_names(
-    package: str, modules: Mapping[str, str]
+    package: str, *modules: tuple[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """`__getattr__`, `__dir__` and `__all__` of `package`.
 
-    `modules` says which names, separated by spaces, come from which module of the package. A name
-    that was asked for once is found without this from then on.
+    Each of the `modules` comes with its names, separated by spaces. A name that was asked for once
+    is found without this from then on.
     """
-    module_of = {name: module for module, names in modules.items() for name in names.split()}
+    module_of = {name: module for module, names in modules for name in names.split()}
 
     def find(name: str) -> Any:
         if name not in module_of:
