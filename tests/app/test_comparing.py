@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Setup
-from kappaskin_app.features.compare.comparing import Figure, Pair, other_setup
+from kappaskin_app.features.compare.comparing import ComparedFigure, Pair, other_setup
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
@@ -54,9 +54,9 @@ def test_every_figure_has_its_error_bar(window: MainWindow, pairs: list[Pair], u
 
 
 def test_a_difference_has_the_errors_of_both() -> None:
-    figure = Figure("x", "mm", 1, (1.0, 0.3), (3.0, 0.4))
+    figure = ComparedFigure("x", "mm", 1, (1.0, 0.3), (3.0, 0.4))
     assert figure.difference == (2.0, pytest.approx(0.5))
-    unknown = Figure("x", "mm", 1, (math.nan, math.nan), (3.0, 0.4))
+    unknown = ComparedFigure("x", "mm", 1, (math.nan, math.nan), (3.0, 0.4))
     assert math.isnan(unknown.difference[0])
 
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 from kappaskin.scenes import scene_file
 from kappaskin_app.shell.finder.finder import Finder
 from kappaskin_app.shell.finder.matching import score
-from kappaskin_app.shell.finder.things import Thing, things_in
+from kappaskin_app.shell.finder.things import FinderEntry, things_in
 from kappaskin_app.shell.window import MainWindow
 
 WORDS = st.text("abc- ", min_size=1, max_size=12)
@@ -58,9 +58,9 @@ def finder(qtbot) -> Finder:
     parent.resize(800, 600)
     done: list[str] = []
     things = [
-        Thing("a", "Tare", "Source menu", lambda: done.append("a"), "Ctrl+0"),
-        Thing("b", "Record", "Recording menu", lambda: done.append("b")),
-        Thing(
+        FinderEntry("a", "Tare", "Source menu", lambda: done.append("a"), "Ctrl+0"),
+        FinderEntry("b", "Record", "Recording menu", lambda: done.append("b")),
+        FinderEntry(
             "c", "Faster", "Recording menu", lambda: done.append("c"), "", "no recording is played"
         ),
     ]

@@ -7,7 +7,8 @@ from PySide6.QtCore import Qt
 from kappaskin import Patch, SensorLayout, Status, load_scene
 from kappaskin.calibration import PressPhase
 from kappaskin.estimation import FAULTS
-from kappaskin.health import Finding, Health
+from kappaskin.health import Health
+from kappaskin.health.findings import Finding
 from kappaskin_app.features.health.map_testing import MapTesting
 from kappaskin_app.features.health.panel import HealthPanel
 from kappaskin_app.features.heatmaps.heatmap import Heatmap

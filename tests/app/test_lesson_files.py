@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from kappaskin import Refusal
 from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, WORD, expression
 from kappaskin_app.features.lessons.figures import KINDS, SETTINGS, Watch
-from kappaskin_app.features.lessons.lesson import UNITS, Number, Task, whole
+from kappaskin_app.features.lessons.lesson import UNITS, LessonTask, NumberAnswer, whole
 from kappaskin_app.features.lessons.progress import Answer, Progress, judged, number_in
 from kappaskin_app.features.lessons.reading import DOCKS, READY, lesson_of, read_lesson
 from kappaskin_app.features.lessons.setting import SETTABLE, checked_setting
@@ -65,7 +65,7 @@ def test_what_an_answer_is_right_by_says_no_to_a_plain_window(file: Path) -> Non
         name: "" for name, kind in KINDS.items() if kind == WORD
     }
     for step in read_lesson(file).steps:
-        if step.question is not None and isinstance(step.question.how, Task):
+        if step.question is not None and isinstance(step.question.how, LessonTask):
             assert not step.question.how.check(nothing_seen), step.title
 
 
@@ -221,7 +221,7 @@ def test_a_number_is_right_within_its_tolerance_in_its_unit() -> None:
 
 def test_nothing_is_judged_by_a_number_that_is_not_there() -> None:
     question = lesson(f"{ASK}number = 'noise'\ntolerance = 1").steps[0].question
-    assert isinstance(question.how, Number)
+    assert isinstance(question.how, NumberAnswer)
     with pytest.raises(Refusal, match="wait"):
         judged(question, "1", FIGURES, Answer())
 

@@ -9,7 +9,13 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QDockWidget, QFileDialog
 
-from kappaskin_app.features.lessons.lesson import UNITS, Choice, Number, Question, Task
+from kappaskin_app.features.lessons.lesson import (
+    UNITS,
+    ChoiceAnswer,
+    LessonTask,
+    NumberAnswer,
+    Question,
+)
 from kappaskin_app.features.lessons.progress import DONE
 from kappaskin_app.features.lessons.reading import DOCKS, READOUTS
 from kappaskin_app.features.lessons.setting import SETTABLE
@@ -22,15 +28,15 @@ def take(window: MainWindow, name: str) -> None:
     window.teaching.take(next(file for file in window.teaching.taken if name in file))
 
 
-def number_seen(window: MainWindow, how: Number) -> float:
+def number_seen(window: MainWindow, how: NumberAnswer) -> float:
     return float(how.expected(window.teaching.figures()))
 
 
-def given(window: MainWindow, how: Choice | Number | Task, right: bool) -> str:
+def given(window: MainWindow, how: ChoiceAnswer | NumberAnswer | LessonTask, right: bool) -> str:
     """What a person gives as a right answer, or as a wrong one."""
-    if isinstance(how, Choice):
+    if isinstance(how, ChoiceAnswer):
         return str(how.right if right else (how.right + 1) % len(how.options))
-    if isinstance(how, Number):
+    if isinstance(how, NumberAnswer):
         off = 0.0 if right else 20 * how.tolerance
         return repr((number_seen(window, how) + off) / UNITS[how.unit])
     return DONE
@@ -39,14 +45,14 @@ def given(window: MainWindow, how: Choice | Number | Task, right: bool) -> str:
 def answer_wrongly_then_rightly(window: MainWindow, question: Question, until) -> None:
     teaching, how = window.teaching, question.how
     feedback = window.lesson.step.asking.feedback
-    if isinstance(how, Number):
+    if isinstance(how, NumberAnswer):
         until(lambda: math.isfinite(number_seen(window, how)))
-    if isinstance(how, Task):
+    if isinstance(how, LessonTask):
         until(lambda: not how.check(teaching.figures()))
     teaching.answer(given(window, how, right=False))
     assert not teaching.progress.answer.right
     assert question.hint in feedback.text()
-    if isinstance(how, Task):
+    if isinstance(how, LessonTask):
         teaching.show_how()
         until(lambda: how.check(teaching.figures()))
     teaching.answer(given(window, how, right=True))

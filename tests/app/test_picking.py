@@ -7,7 +7,8 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 
 from kappaskin import Status, load_scene
-from kappaskin.health import Finding, Health
+from kappaskin.health import Health
+from kappaskin.health.findings import Finding
 from kappaskin_app.features.membrane.sight import Sight
 from kappaskin_app.features.traces.facts import facts
 from kappaskin_app.features.traces.past import SECONDS, Past

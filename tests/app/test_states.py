@@ -5,7 +5,8 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Status, load_scene
-from kappaskin.health import Finding, Health
+from kappaskin.health import Health
+from kappaskin.health.findings import Finding
 from kappaskin.recording import Replay
 from kappaskin_app.shell.badge import Badge, colour_of, origin
 from kappaskin_app.shell.states import state_of

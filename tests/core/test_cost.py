@@ -32,17 +32,15 @@ from kappaskin.studies import (
     Refused,
     Setting,
     accuracy_verdict,
-    cheapest,
     cost_rows,
-    costs,
     costs_text,
     frontier,
     parse_length,
     settings_to_try,
     write_plot,
 )
-from kappaskin.studies.cost.bench import Bench
-from kappaskin.studies.cost.settings import ALIKE
+from kappaskin.studies.cost.bench import Bench, costs
+from kappaskin.studies.cost.settings import ALIKE, cheapest
 from kappaskin.studies.paper import fingertip_scene, table_1
 
 pytestmark = pytest.mark.slow

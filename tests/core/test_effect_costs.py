@@ -26,12 +26,12 @@ from kappaskin.studies import (
     EffectCost,
     Refused,
     Setting,
-    costs,
     effect_costs,
     effect_rows,
     effects_text,
     usual_setting,
 )
+from kappaskin.studies.cost.bench import costs
 
 pytestmark = pytest.mark.slow
 

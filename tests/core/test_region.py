@@ -20,7 +20,8 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.estimation import Scanner, contact_bound, scan_tradeoff
+from kappaskin.estimation import Scanner, scan_tradeoff
+from kappaskin.estimation.region import contact_bound
 from kappaskin.sensing import SECOND_GENERATION
 
 NOISE = 0.231

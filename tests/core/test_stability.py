@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, RankDeficient, SensorLayout, SineBasis, basis_for
-from kappaskin.estimation import METHODS, AsPrinted, singular_values
+from kappaskin.estimation import METHODS, singular_values
 from kappaskin.estimation.fit import DenseUncertainty
+from kappaskin.estimation.least_squares import AsPrinted
 from kappaskin.studies import run_stability
 from kappaskin.studies.stability.gallery import CaseKind, gallery
 from kappaskin.studies.stability.reference import least_squares, reference_of

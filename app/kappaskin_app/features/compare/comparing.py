@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Figure:
+class ComparedFigure:
     """One number of A and of B, each (value, standard deviation), in the unit that it is shown."""
 
     label: str
@@ -47,11 +47,11 @@ class Pair:
             return None
         return self.b.surface - self.a.surface
 
-    def figures(self) -> list[Figure]:
+    def figures(self) -> list[ComparedFigure]:
         """What both say of the contact."""
         pairs = zip(readouts(self.a), readouts(self.b), strict=True)
         return [
-            Figure(a.label, a.unit, a.digits, (a.value, a.sd), (b.value, b.sd))
+            ComparedFigure(a.label, a.unit, a.digits, (a.value, a.sd), (b.value, b.sd))
             for a, b in pairs
             if a.label in _COMPARED
         ]

@@ -8,7 +8,7 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.contact.naming import Naming
 from kappaskin_app.features.contact.numbers import NumbersPanel
-from kappaskin_app.features.contact.readouts import Health, Readouts
+from kappaskin_app.features.contact.readouts import Readouts, StreamFigures
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
@@ -54,7 +54,7 @@ class ContactFeature:
         recent = [] if display.old else display.ages()
         counts = status.accounting
         self.readouts.show_health(
-            Health(
+            StreamFigures(
                 status.rate,
                 len(recent),
                 float(np.median(recent)) if recent else float("nan"),

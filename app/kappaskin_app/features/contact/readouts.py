@@ -18,7 +18,7 @@ NONE = "\N{EN DASH}"
 
 
 @dataclass(frozen=True)
-class Health:
+class StreamFigures:
     """How live the view is: `rate` in frames/s, `drawn` in pictures/s, `age` in s.
 
     `age_sd` in s is the standard deviation of the age, infinite where it is only the least.
@@ -189,7 +189,7 @@ class Readouts(QWidget):
             for (key, number), name in zip(self._numbers.items(), self._names, strict=True)
         }
 
-    def show_health(self, health: Health) -> None:
+    def show_health(self, health: StreamFigures) -> None:
         self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
         self._write("age", _age(1e3 * health.age, 1e3 * health.age_sd))
         also = ((health.skipped, "skipped"), (health.discarded, "B"))

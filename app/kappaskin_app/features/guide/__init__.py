@@ -6,7 +6,7 @@ from functools import partial
 from kappaskin_app.features.guide.pages import Page, page_called, pages
 from kappaskin_app.features.guide.panel import GuidePanel
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.finder.things import Thing
+from kappaskin_app.shell.finder.things import FinderEntry
 from kappaskin_app.shell.parts import HELP
 from kappaskin_app.shell.window import MainWindow
 
@@ -26,10 +26,10 @@ class GuideFeature:
         self._shell.docks.reveal("guide")
         self.guide.read(page, heading)
 
-    def _things(self) -> Iterator[Thing]:
+    def _things(self) -> Iterator[FinderEntry]:
         for page in pages():
             for heading in ("", *page.headings):
                 name = f"guide:{page.file.stem}{'#' if heading else ''}{heading}"
                 place = f"Guide, {page.title}" if heading else "Guide"
                 read = partial(self.read, page, heading)
-                yield Thing(name, heading or page.title, place, read)
+                yield FinderEntry(name, heading or page.title, place, read)

@@ -6,7 +6,7 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QWidget
 
 from kappaskin_app.features.lessons.panel import LessonPanel
-from kappaskin_app.features.lessons.pointing import Pointing
+from kappaskin_app.features.lessons.pointing import ControlPointer
 from kappaskin_app.features.lessons.reading import DOCKS
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
@@ -25,7 +25,7 @@ class LessonsFeature:
             *(shell.history, session, shell.display, shell),
             *(session.request_source, self._seen),
         )
-        self.pointing = Pointing(self._forms, self._places, docks.reveal, shell)
+        self.pointing = ControlPointer(self._forms, self._places, docks.reveal, shell)
         self.lesson.attend(self.teaching)
         docks["lesson"].closed.connect(guarded(self.teaching.leave))
         self.teaching.pointed.connect(guarded(self.pointing.point))

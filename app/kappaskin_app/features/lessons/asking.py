@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.features.lessons.lesson import Choice, Number, Question, Task
+from kappaskin_app.features.lessons.lesson import ChoiceAnswer, LessonTask, NumberAnswer, Question
 from kappaskin_app.features.lessons.progress import DONE, Answer
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import well_behaved
@@ -60,11 +60,11 @@ class Asking(QWidget):
         self._stack.setContentsMargins(0, 6, 0, 0)
         self._stack.addWidget(self.text)
         match question.how:
-            case Choice(options=options):
+            case ChoiceAnswer(options=options):
                 self._add_options(options)
-            case Number(unit=unit):
+            case NumberAnswer(unit=unit):
                 self._add_number(unit)
-            case Task():
+            case LessonTask():
                 self.check.setToolTip("Look at what the window shows, and say whether it is so.")
         row = in_a_row(self.check, self.show_how)
         row.addStretch(1)
@@ -96,12 +96,12 @@ class Asking(QWidget):
 
     def _give(self, *_: object) -> None:
         match self._question.how:
-            case Choice():
+            case ChoiceAnswer():
                 chosen = self.options.checkedId()
                 self.answered.emit("" if chosen < 0 else str(chosen))
-            case Number():
+            case NumberAnswer():
                 self.answered.emit(self.number.text())
-            case Task():
+            case LessonTask():
                 self.answered.emit(DONE)
 
     def show_answer(self, answer: Answer, message: str) -> None:
@@ -111,7 +111,7 @@ class Asking(QWidget):
         self.number.setEnabled(not answer.told)
         for option in self.options.buttons():
             option.setEnabled(not answer.told)
-        task = isinstance(self._question.how, Task)
+        task = isinstance(self._question.how, LessonTask)
         self.show_how.setVisible(task and answer.told and not answer.right)
         self.feedback.setText(self._said())
         self.feedback.setVisible(bool(self.feedback.text()))

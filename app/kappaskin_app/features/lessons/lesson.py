@@ -8,7 +8,7 @@ from kappaskin.scenes import scene_file
 from kappaskin_app.features.lessons.expression import Expression
 from kappaskin_app.shell.settings import SceneSettings
 from kappaskin_app.shell.settings.sensor import Scanning
-from kappaskin_app.shell.settings.shown import Fit, View
+from kappaskin_app.shell.settings.shown import EstimatorSettings, View
 from kappaskin_app.shell.simulation import written
 from kappaskin_app.shell.skins import SHAPES
 
@@ -32,14 +32,14 @@ UNITS = {
 
 _PLAIN = {
     field.name: field.default
-    for kind in (SceneSettings, Fit, Scanning, View)
+    for kind in (SceneSettings, EstimatorSettings, Scanning, View)
     for field in fields(kind)
     if field.name != "theme"
 } | {"calibration": None, "tare": None}
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChoiceAnswer:
     """One of several `options` is `right`, counted from 0."""
 
     options: tuple[str, ...]
@@ -47,7 +47,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Number:
+class NumberAnswer:
     """A number within `tolerance` of what is `expected`, both in SI units, asked in `unit`."""
 
     expected: Expression
@@ -56,7 +56,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Task:
+class LessonTask:
     """Something to do, done when `check` holds of what the window shows; `solution` does it."""
 
     check: Expression
@@ -68,7 +68,7 @@ class Question:
     """What is asked, with a `hint` after a wrong answer and an explanation at the end."""
 
     text: str
-    how: Choice | Number | Task
+    how: ChoiceAnswer | NumberAnswer | LessonTask
     hint: str
     explain: str
 

@@ -50,7 +50,7 @@ class _Ring(QWidget):
         painter.drawRoundedRect(inner, 2 * _AROUND, 2 * _AROUND)
 
 
-class Pointing(QObject):
+class ControlPointer(QObject):
     """Finds what a lesson points at among `forms` and `others`, and brings it to be seen.
 
     `show_dock` brings a dock to the front, by its name.

@@ -5,7 +5,14 @@ from dataclasses import dataclass, field, replace
 
 from kappaskin.errors import Refusal
 from kappaskin_app.features.lessons.expression import Figures
-from kappaskin_app.features.lessons.lesson import UNITS, Choice, Lesson, Number, Question, Task
+from kappaskin_app.features.lessons.lesson import (
+    UNITS,
+    ChoiceAnswer,
+    Lesson,
+    LessonTask,
+    NumberAnswer,
+    Question,
+)
 
 DONE = "done"
 """What is given as the answer to a task: that it is done."""
@@ -36,21 +43,21 @@ class Answer:
 def judged(question: Question, given: str, figures: Figures, before: Answer) -> Answer:
     """The answer that is `given` now; a `Refusal` where it is none that could be judged."""
     right = _right(question.how, given, figures)
-    words = question.how.options[int(given)] if isinstance(question.how, Choice) else given
-    if isinstance(question.how, Number):
+    words = question.how.options[int(given)] if isinstance(question.how, ChoiceAnswer) else given
+    if isinstance(question.how, NumberAnswer):
         words = f"{given.strip()} {question.how.unit}".strip()
     return replace(before, given=words, tries=before.tries + 1, right=right)
 
 
-def _right(how: Choice | Number | Task, given: str, figures: Figures) -> bool:
+def _right(how: ChoiceAnswer | NumberAnswer | LessonTask, given: str, figures: Figures) -> bool:
     match how:
-        case Choice(right=right):
+        case ChoiceAnswer(right=right):
             if not given:
                 raise Refusal("Choose one of the answers first.")
             return int(given) == right
-        case Task(check=check):
+        case LessonTask(check=check):
             return bool(check(figures))
-        case Number(expected=expected, tolerance=tolerance, unit=unit):
+        case NumberAnswer(expected=expected, tolerance=tolerance, unit=unit):
             there = float(expected(figures))
             if not math.isfinite(there):
                 raise Refusal("The window shows no such number yet: wait a moment.")

@@ -16,12 +16,12 @@ from kappaskin_app.features.lessons.figures import KINDS
 from kappaskin_app.features.lessons.lesson import (
     UNITS,
     Button,
-    Choice,
+    ChoiceAnswer,
     Lesson,
-    Number,
+    LessonTask,
+    NumberAnswer,
     Question,
     Step,
-    Task,
 )
 from kappaskin_app.features.lessons.setting import SETTABLE, checked_setting
 
@@ -152,7 +152,7 @@ def _question(table: "_Table") -> Question:
     others = _question_keys(table) - _QUESTION_KEYS - _WAYS[ways[0]]
     if others:
         raise table.refusal(min(others), f"only {', '.join(sorted(_WAYS[ways[0]]))} beside it")
-    how: Callable[[_Table], Choice | Number | Task] = {
+    how: Callable[[_Table], ChoiceAnswer | NumberAnswer | LessonTask] = {
         "choices": _choice,
         "number": _number,
         "check": _task,
@@ -162,14 +162,14 @@ def _question(table: "_Table") -> Question:
     )
 
 
-def _choice(table: "_Table") -> Choice:
+def _choice(table: "_Table") -> ChoiceAnswer:
     options = table.get("choices", list)
     if not 2 <= len(options) <= 6 or not all(isinstance(one, str) for one in options):
         raise table.refusal("choices", "2 to 6 answers, each in quotes")
-    return Choice(tuple(options), table.within("right", 1, len(options)) - 1)
+    return ChoiceAnswer(tuple(options), table.within("right", 1, len(options)) - 1)
 
 
-def _number(table: "_Table") -> Number:
+def _number(table: "_Table") -> NumberAnswer:
     said = table.said["number"]
     text = said if isinstance(said, str) else repr(table.real("number"))
     unit = table.get("unit", str, "")
@@ -178,12 +178,12 @@ def _number(table: "_Table") -> Number:
     tolerance = table.real("tolerance")
     if not tolerance > 0:
         raise table.refusal("tolerance", "a number above zero, in SI units")
-    return Number(table.asked("number", text, NUMBER), tolerance, unit)
+    return NumberAnswer(table.asked("number", text, NUMBER), tolerance, unit)
 
 
-def _task(table: "_Table") -> Task:
+def _task(table: "_Table") -> LessonTask:
     check = table.asked("check", table.get("check", str), TRUTH)
-    return Task(check, table.settings("solution"))
+    return LessonTask(check, table.settings("solution"))
 
 
 @dataclass(frozen=True)

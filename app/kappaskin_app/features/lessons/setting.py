@@ -7,11 +7,11 @@ from kappaskin.errors import Refusal
 from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of
 from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Several, Switch
 from kappaskin_app.shell.settings.sensor import Scanning
-from kappaskin_app.shell.settings.shown import Fit, View
+from kappaskin_app.shell.settings.shown import EstimatorSettings, View
 
 _OWN = ("theme", "show_start")  # matters of taste
 _LISTS = ("dead_elements", "region_elements")
-_KINDS = (SceneSettings, Fit, Scanning, View)
+_KINDS = (SceneSettings, EstimatorSettings, Scanning, View)
 SETTABLE = {
     field.name
     for kind in _KINDS

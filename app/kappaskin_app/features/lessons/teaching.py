@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin_app.features.lessons.figures import Watch
-from kappaskin_app.features.lessons.lesson import Task, whole
+from kappaskin_app.features.lessons.lesson import LessonTask, whole
 from kappaskin_app.features.lessons.progress import Progress
 from kappaskin_app.features.lessons.reading import READY, read_lesson
 from kappaskin_app.features.lessons.sheet import sheet
@@ -184,7 +184,7 @@ class Teaching(QObject):
     def show_how(self) -> None:
         """Do what was to be done."""
         question = None if self.progress is None else self.progress.question
-        if question is not None and isinstance(question.how, Task):
+        if question is not None and isinstance(question.how, LessonTask):
             self._history.change("Show how it is done", -1, **question.how.solution)
 
     def hand_in(self, student: str) -> None:

@@ -11,7 +11,7 @@ _KEPT = 1000
 
 
 @dataclass(frozen=True)
-class Line:
+class LogLine:
     """What was logged at `time` (s since 1970), how grave it is, its first line and all of it."""
 
     time: float
@@ -34,7 +34,7 @@ class Logged(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
         self.setFormatter(logging.Formatter("%(message)s"))
-        self.lines: deque[Line] = deque(maxlen=_KEPT)
+        self.lines: deque[LogLine] = deque(maxlen=_KEPT)
         self.count = 0
         self._level = log.level
         log.setLevel(logging.INFO)  # what is said in passing too
@@ -49,7 +49,7 @@ class Logged(logging.Handler):
         error = record.exc_info[1] if record.exc_info else None
         if error is not None:
             text += f": {type(error).__name__}: {error}".partition("\n")[0]
-        self.lines.append(Line(record.created, record.levelno, text, whole))
+        self.lines.append(LogLine(record.created, record.levelno, text, whole))
         self.count += 1
 
     def clear(self) -> None:

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.features.log.logged import Line, Logged
+from kappaskin_app.features.log.logged import Logged, LogLine
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import LIGHT, Theme
 
@@ -37,7 +37,7 @@ class LogPanel(QWidget):
     def __init__(self, logged: Logged, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._logged, self._seen, self._theme = logged, -1, LIGHT
-        self._lines: list[Line] = []
+        self._lines: list[LogLine] = []
         self.level, self.nothing = QComboBox(), QLabel(_NOTHING)
         for words, level in _LEVELS:
             self.level.addItem(words, level)
@@ -77,7 +77,7 @@ class LogPanel(QWidget):
         for button in (self.copy, self.clear):
             button.setEnabled(bool(self._lines))
 
-    def _item(self, line: Line, text: str) -> QTableWidgetItem:
+    def _item(self, line: LogLine, text: str) -> QTableWidgetItem:
         item = QTableWidgetItem(text)
         item.setToolTip(line.whole)
         if line.level >= logging.WARNING:

@@ -23,11 +23,11 @@ from kappaskin_app.features.membrane.drag import LoadDrag
 from kappaskin_app.features.membrane.gaze import Gaze
 from kappaskin_app.features.membrane.loads import DrawnLoads, put_upright
 from kappaskin_app.features.membrane.marks import Marks
-from kappaskin_app.features.membrane.pointing import Pointing
+from kappaskin_app.features.membrane.pointing import SurfacePointer
 from kappaskin_app.features.membrane.sides import Sides
 from kappaskin_app.features.membrane.surface import Surface
 from kappaskin_app.features.membrane.unlit import UNLIT, pixels
-from kappaskin_app.features.membrane.written import Written
+from kappaskin_app.features.membrane.written import Caption
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.drawn_skin import MM, DrawnSkin, Indices
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
@@ -64,7 +64,9 @@ class MembraneView(QWidget):
         self.plotter.renderer.SetUseOIT(False)
         self._make_actors()
         self._make_lights()
-        self.pointing = Pointing(self.plotter)  # after the drag: of filters the last goes first
+        self.pointing = SurfacePointer(
+            self.plotter
+        )  # after the drag: of filters the last goes first
         self.drag = LoadDrag(self.plotter)
         self.gaze = Gaze(self.plotter, self.sides)
         # After VTK has its new size.
@@ -107,7 +109,7 @@ class MembraneView(QWidget):
             pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
         )
         self.sides = Sides(plotter)
-        self._caption = Written(plotter, _LETTERS, 0.98, "top")
+        self._caption = Caption(plotter, _LETTERS, 0.98, "top")
         self.caption: Any = self._caption.text
         self.alarm = Alarm(plotter)
 

@@ -12,7 +12,7 @@ _STILL = 4.0  # px that the mouse may move while it clicks
 _LOOKS = 30  # ms between two looks at where it points
 
 
-class Pointing(QObject):
+class SurfacePointer(QObject):
     """Watches the mouse over a plotter; places are (x, y) on the `skin` in m.
 
     `moved` brings None where it points beside the skin.

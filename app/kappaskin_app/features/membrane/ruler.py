@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from kappaskin.skin import Distances
 from kappaskin_app.features.membrane.unlit import UNLIT, pixels
-from kappaskin_app.features.membrane.written import Written
+from kappaskin_app.features.membrane.written import Caption
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.theme import WANTED, Theme
 
@@ -34,7 +34,7 @@ class Ruler:
         self._ends_actor = plotter.add_mesh(
             self._ends, style="points", point_size=pixels(plotter, 11), color=WANTED, **UNLIT
         )
-        self._words = Written(plotter, _LETTERS, 0.03)
+        self._words = Caption(plotter, _LETTERS, 0.03)
         self.text: Any = self._words.text
         self.fit = self._words.fit
         self.hide()

@@ -18,7 +18,7 @@ def room_for(plotter: Any, px: float) -> int:
     return max(int(room), _LEAST)
 
 
-class Written:
+class Caption:
     """Says something from `height` of the picture of a `plotter` on, in letters of `px`."""
 
     def __init__(self, plotter: Any, px: float, height: float, vertical: str = "bottom") -> None:

@@ -9,7 +9,7 @@ from kappaskin.scenes import Indenter, Scene
 
 
 @dataclass(frozen=True)
-class Thing:
+class DemoObject:
     """An object that a simulated finger may press: what its button and its tooltip say."""
 
     title: str
@@ -28,18 +28,18 @@ class Thing:
 
 
 THINGS = (
-    Thing("Ball 40 mm", "A ball of 40 mm radius.", {"what": "sphere", "radius": 0.04}),
-    Thing("Ball 60 mm", "A ball of 60 mm radius.", {"what": "sphere", "radius": 0.06}),
-    Thing("Ball 80 mm", "A ball of 80 mm radius.", {"what": "sphere", "radius": 0.08}),
-    Thing(
+    DemoObject("Ball 40 mm", "A ball of 40 mm radius.", {"what": "sphere", "radius": 0.04}),
+    DemoObject("Ball 60 mm", "A ball of 60 mm radius.", {"what": "sphere", "radius": 0.06}),
+    DemoObject("Ball 80 mm", "A ball of 80 mm radius.", {"what": "sphere", "radius": 0.08}),
+    DemoObject(
         "Pipe 150 mm",
         "A pipe of 150 mm radius and 50 mm length that lies along x.",
         {"what": "cylinder", "radius": 0.15, "length": 0.05},
     ),
-    Thing(
+    DemoObject(
         "Edge",
         "The edge of a box, 40 mm long, along x.",
         {"what": "wedge", "angle": math.pi / 2, "length": 0.04, "width": 0.02},
     ),
-    Thing("Point", "A point: it has no radius.", {"what": "point"}),
+    DemoObject("Point", "A point: it has no radius.", {"what": "point"}),
 )

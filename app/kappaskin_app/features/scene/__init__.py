@@ -14,7 +14,7 @@ from kappaskin_app.features.scene.staging import Staging
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
-from kappaskin_app.shell.finder.things import Thing, enter
+from kappaskin_app.shell.finder.things import FinderEntry, enter
 from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
@@ -94,16 +94,18 @@ class SceneFeature:
         self._shell.opening.note(file)
         self._shell.tell(f"{file.name} touches the skin, its numbers taken as millimetres")
 
-    def _things(self) -> Iterator[Thing]:
+    def _things(self) -> Iterator[FinderEntry]:
         """The pages of the panel, and the ready scenes, to be found."""
         pages = self.scene
         for page in (pages.gallery, pages.editor, pages.effects):
             index = pages.indexOf(page)
             title = plain(pages.tabText(index))
             why_not = "" if pages.isTabEnabled(index) else "no scene is played"
-            yield Thing(
+            yield FinderEntry(
                 f"page:{title}", f"Scene: {title}", "Scene", partial(enter, page), "", why_not
             )
         for name, card in pages.gallery.items.items():
             play = partial(self.staging.play, scene_file(name))
-            yield Thing(f"scene:{name}", f"Play the scene {card.text()}", "Scene, Gallery", play)
+            yield FinderEntry(
+                f"scene:{name}", f"Play the scene {card.text()}", "Scene, Gallery", play
+            )

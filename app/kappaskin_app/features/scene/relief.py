@@ -22,7 +22,7 @@ _STILL = 1e-6  # m that a touch has to go to leave a path
 
 
 @dataclass(frozen=True, eq=False)
-class Marks:
+class ReliefMarks:
     """Places (k, 3) in mm on the drawn skin, and its outward unit normals (k, 3) there."""
 
     points: Array
@@ -43,10 +43,10 @@ class Relief:
     normals: Array
     faces: Indices
     share: Array
-    elements: Marks
-    bearing: Marks
-    paths: tuple[Marks, ...]
-    outlines: tuple[Marks, ...]
+    elements: ReliefMarks
+    bearing: ReliefMarks
+    paths: tuple[ReliefMarks, ...]
+    outlines: tuple[ReliefMarks, ...]
     arrows: Array
 
 
@@ -89,23 +89,23 @@ def _drawn(skin: DrawnSkin, surface: Array) -> tuple[Array, Array]:
     return share, -min(depth, skin.deepest) * share
 
 
-def _marks(skin: DrawnSkin, positions: Array) -> Marks:
+def _marks(skin: DrawnSkin, positions: Array) -> ReliefMarks:
     from scipy.ndimage import map_coordinates  # a tenth of a second that the first picture has not
 
     rest, out = skin.at_rest(positions)
     ny, nx = skin.height.shape
     x, y = (positions / (skin.patch.a, skin.patch.b) * (nx - 1, ny - 1)).T
     height = map_coordinates(skin.height, [y, x], order=1, mode="nearest") + _LIFT * skin.size
-    return Marks(rest + out * height[:, None], skin.shading()[skin.nearest(positions)])
+    return ReliefMarks(rest + out * height[:, None], skin.shading()[skin.nearest(positions)])
 
 
-def _rod(bearing: Marks) -> tuple[Marks, ...]:
+def _rod(bearing: ReliefMarks) -> tuple[ReliefMarks, ...]:
     """The straight line between the two places farthest apart where a rigid object bears."""
     if len(bearing.points) < 2:
         return ()
     apart = np.linalg.norm(bearing.points[:, None] - bearing.points, axis=-1)
     ends = np.array(np.unravel_index(np.argmax(apart), apart.shape))
-    return (Marks(bearing.points[ends], bearing.out[ends]),)
+    return (ReliefMarks(bearing.points[ends], bearing.out[ends]),)
 
 
 def _arrows(skin: DrawnSkin, places: Array, pulled: bool) -> Array:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPen, QPolygonF
 
-from kappaskin_app.features.scene.relief import Marks, Relief
+from kappaskin_app.features.scene.relief import Relief, ReliefMarks
 from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, Theme
 
@@ -73,7 +73,7 @@ class _Eye:
         flat = (points - self._middle) @ self._axes.T
         return self._shift + self._scale * flat / self.away(points)[..., None]
 
-    def facing(self, marks: Marks) -> list[QPointF]:
+    def facing(self, marks: ReliefMarks) -> list[QPointF]:
         """Where those marks are seen that are on a side that faces it."""
         return _points(self.sees(marks.points)[marks.out @ self.towards > 0])
 

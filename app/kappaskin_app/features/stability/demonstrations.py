@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from kappaskin_app.shell.settings import SceneSettings, Settings
-from kappaskin_app.shell.settings.shown import Fit
+from kappaskin_app.shell.settings.shown import EstimatorSettings
 from kappaskin_app.shell.skins import SHAPES
 
-_PLAIN = {f.name: f.default for kind in (SceneSettings, Fit) for f in fields(kind)}
+_PLAIN = {f.name: f.default for kind in (SceneSettings, EstimatorSettings) for f in fields(kind)}
 
 
 @dataclass(frozen=True)

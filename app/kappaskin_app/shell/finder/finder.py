@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.finder.listing import Listing, clearable, row
 from kappaskin_app.shell.finder.matching import best, score
-from kappaskin_app.shell.finder.things import Thing
+from kappaskin_app.shell.finder.things import FinderEntry
 
 _KEPT = 12  # of what was done last, which comes first
 _RECENT = 3.0  # points more of what was done last, less of what was before
@@ -28,11 +28,11 @@ _NOTHING = "Nothing here is called so: try fewer letters."
 class Finder(QDialog):
     """Finds one of what `things` tells, and does it; `recent` are the names of the last ones."""
 
-    def __init__(self, things: Callable[[], list[Thing]], parent: QWidget) -> None:
+    def __init__(self, things: Callable[[], list[FinderEntry]], parent: QWidget) -> None:
         super().__init__(parent, Qt.WindowType.Dialog | Qt.WindowType.FramelessWindowHint)
         self.setObjectName("finder")
         self.setWindowTitle("Find a command")
-        self._window, self._ask, self._things = parent, things, list[Thing]()
+        self._window, self._ask, self._things = parent, things, list[FinderEntry]()
         self.recent: list[str] = []
         self.line, self.hint = QLineEdit(), QLabel(_HINT)
         self.list = Listing(self.line)
@@ -74,7 +74,7 @@ class Finder(QDialog):
         self.activateWindow()
         self.line.setFocus()
 
-    def found(self) -> list[Thing]:
+    def found(self) -> list[FinderEntry]:
         """What the letters typed may mean, the best first."""
         query = self.line.text()
         if not query.strip():
@@ -86,7 +86,7 @@ class Finder(QDialog):
         things = {thing.name: thing for thing in self._things}
         return [things[name] for name in best(points)]
 
-    def _last_first(self) -> list[Thing]:
+    def _last_first(self) -> list[FinderEntry]:
         ages = {name: age for age, name in enumerate(self.recent)}
         return sorted(self._things, key=lambda thing: ages.get(thing.name, _KEPT))
 
@@ -98,7 +98,7 @@ class Finder(QDialog):
     def _do(self) -> None:
         """Do what is chosen; what cannot be done says why in its row."""
         thing = self.list.chosen()
-        if not isinstance(thing, Thing):
+        if not isinstance(thing, FinderEntry):
             return
         if thing.why_not:
             self.hint.setText(f"{thing.title}: {thing.why_not}.")
@@ -113,7 +113,7 @@ class Finder(QDialog):
             self.close()  # who clicks elsewhere has left it
 
 
-def _row(thing: Thing) -> QTreeWidgetItem:
+def _row(thing: FinderEntry) -> QTreeWidgetItem:
     """A thing as it is listed: grey, with why, where it cannot be done."""
     texts = thing.title, thing.why_not or thing.place, thing.keys
     return row(texts, thing, grey=bool(thing.why_not))

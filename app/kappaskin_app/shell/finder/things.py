@@ -20,7 +20,7 @@ _NOT_NOW = "not with what is chosen now"
 
 
 @dataclass(frozen=True)
-class Thing:
+class FinderEntry:
     """Something to find and do: what it is called, where it stands, and why it cannot be done."""
 
     name: str
@@ -31,10 +31,10 @@ class Thing:
     why_not: str = ""
 
 
-Things = Callable[[], Iterable[Thing]]
+Things = Callable[[], Iterable[FinderEntry]]
 
 
-def things_in(window: Parts, others: Iterable[Things]) -> list[Thing]:
+def things_in(window: Parts, others: Iterable[Things]) -> list[FinderEntry]:
     """All that can be found in the window now, with what `others` tell."""
     return [
         *_actions(window),
@@ -83,10 +83,10 @@ def _where(widget: QWidget) -> str:
     return around.windowTitle()
 
 
-def _actions(window: Parts) -> Iterator[Thing]:
+def _actions(window: Parts) -> Iterator[FinderEntry]:
     for name, entry in window.actions_by_name.entries.items():
         if entry.action.menu() is None:
-            yield Thing(
+            yield FinderEntry(
                 f"action:{name}",
                 plain(entry.action.text()),
                 f"{plain(entry.menu)} menu",
@@ -96,10 +96,10 @@ def _actions(window: Parts) -> Iterator[Thing]:
             )
 
 
-def _panels(window: Parts) -> Iterator[Thing]:
+def _panels(window: Parts) -> Iterator[FinderEntry]:
     for panel in window.findChildren(Panel):
         title = panel.title()
-        yield Thing(f"panel:{title}", f"{title} panel", _where(panel), partial(enter, panel))
+        yield FinderEntry(f"panel:{title}", f"{title} panel", _where(panel), partial(enter, panel))
 
 
 def enter(panel: QWidget) -> None:
@@ -110,13 +110,13 @@ def enter(panel: QWidget) -> None:
         reveal(first)
 
 
-def _settings(window: Parts) -> Iterator[Thing]:
+def _settings(window: Parts) -> Iterator[FinderEntry]:
     for form in window.findChildren(Form):
         for editor in form.editors():
             yield from _setting(window, form, editor)
 
 
-def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[Thing]:
+def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[FinderEntry]:
     """The setting that `editor` is for, and each value of a choice."""
     name = editor.objectName()
     how, place = ask_of(name), f"{_where(form)}, {form.title()}"
@@ -124,12 +124,14 @@ def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[Thing]:
     if not editor.isEnabled():
         why_not = form.message.text() or _NOT_NOW
     title = how.label if how.label == form.title() else f"{form.title()}: {how.label}"
-    yield Thing(f"setting:{name}", title, place, partial(reveal, editor), "", why_not)
+    yield FinderEntry(f"setting:{name}", title, place, partial(reveal, editor), "", why_not)
     if isinstance(how, Choice):
         for value, words in how.options:
             refused = why_not or _refused(editor, value)
             wish = partial(window.requests.set, name, value)
-            yield Thing(f"setting:{name}={value}", f"{title}: {words}", place, wish, "", refused)
+            yield FinderEntry(
+                f"setting:{name}={value}", f"{title}: {words}", place, wish, "", refused
+            )
 
 
 def _refused(box: QWidget, value: str) -> str:
@@ -140,15 +142,15 @@ def _refused(box: QWidget, value: str) -> str:
     return ""
 
 
-def _files(window: Parts) -> Iterator[Thing]:
+def _files(window: Parts) -> Iterator[FinderEntry]:
     for file in window.opening.last_ones():
         why_not = "" if file.is_file() else "not there any more: moved or deleted"
         act = partial(window.opening.open, file)
-        yield Thing(f"file:{file}", f"Open {file.name}", f"{file.parent}", act, "", why_not)
+        yield FinderEntry(f"file:{file}", f"Open {file.name}", f"{file.parent}", act, "", why_not)
 
 
-def _layouts(window: Parts) -> Iterator[Thing]:
+def _layouts(window: Parts) -> Iterator[FinderEntry]:
     for name in window.layouts.own:
-        yield Thing(
+        yield FinderEntry(
             f"layout:{name}", name, "Layout menu, Your own", partial(window.layouts.choose, name)
         )

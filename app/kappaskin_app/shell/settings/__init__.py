@@ -19,7 +19,7 @@ from kappaskin_app.shell.settings.load import SIZES as SIZES
 from kappaskin_app.shell.settings.load import SPREAD_CASES as SPREAD_CASES
 from kappaskin_app.shell.settings.load import TABLE_1_CASES as TABLE_1_CASES
 from kappaskin_app.shell.settings.load import TWO_ENDED as TWO_ENDED
-from kappaskin_app.shell.settings.load import Load, Noise
+from kappaskin_app.shell.settings.load import LoadSettings, Noise
 from kappaskin_app.shell.settings.looked import Looked
 from kappaskin_app.shell.settings.publishing import Sending as Sending
 from kappaskin_app.shell.settings.reading import Reading
@@ -31,19 +31,29 @@ from kappaskin_app.shell.settings.sensor import Spoils as Spoils
 from kappaskin_app.shell.settings.shown import COLOURS as COLOURS
 from kappaskin_app.shell.settings.shown import METHOD_NAMES as METHOD_NAMES
 from kappaskin_app.shell.settings.shown import METHOD_SHORT as METHOD_SHORT
-from kappaskin_app.shell.settings.shown import Fit as Fit
+from kappaskin_app.shell.settings.shown import EstimatorSettings as EstimatorSettings
 from kappaskin_app.shell.settings.shown import View
 from kappaskin_app.shell.settings.skin import Skin
 from kappaskin_app.shell.settings.telling import told
 
 
 @dataclass(frozen=True)
-class SceneSettings(Skin, Load, Noise, Electronics, Spoils, Own):
+class SceneSettings(Skin, LoadSettings, Noise, Electronics, Spoils, Own):
     """Those that make the simulated scene."""
 
 
 @dataclass(frozen=True)
-class Settings(SceneSettings, Fit, View, Looked, Reading, Scanning, Sending, Compared, Designed):
+class Settings(
+    SceneSettings,
+    EstimatorSettings,
+    View,
+    Looked,
+    Reading,
+    Scanning,
+    Sending,
+    Compared,
+    Designed,
+):
     """Everything a person may change, in SI units; a change is a new `Settings`.
 
     `calibration` and `tare` are in use whenever the sensor that they are of is connected.
@@ -54,7 +64,7 @@ class Settings(SceneSettings, Fit, View, Looked, Reading, Scanning, Sending, Com
 
 
 _WORDS = {"written": "the scene's text", "camera": "the view"}
-Kind = type[SceneSettings | Fit | View | Scanning | Sending | Designed]
+Kind = type[SceneSettings | EstimatorSettings | View | Scanning | Sending | Designed]
 
 
 def part(settings: Settings, kind: Kind) -> tuple[Any, ...]:

@@ -35,7 +35,7 @@ def _size(default: float, label: str, tip: str) -> Any:
 
 
 @dataclass(frozen=True)
-class Load:
+class LoadSettings:
     """The load in SI units; a free one has its place on the skin and its force."""
 
     load_case: str = asked(

@@ -35,7 +35,7 @@ METHOD_SHORT = {name: words.split(",")[0].split(" (")[0] for name, words in METH
 
 
 @dataclass(frozen=True)
-class Fit:
+class EstimatorSettings:
     """The functions that the shape is made of, and how they are fitted."""
 
     functions_x: int = asked(

@@ -5,12 +5,18 @@ from typing import Any
 
 from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Switch, Text
 from kappaskin_app.shell.settings.compared import Compared
-from kappaskin_app.shell.settings.load import Load, Noise
+from kappaskin_app.shell.settings.load import LoadSettings, Noise
 from kappaskin_app.shell.settings.publishing import Sending
 from kappaskin_app.shell.settings.sensor import Scanning
 
 _ARROW = "\N{RIGHTWARDS ARROW}"
-_PANELS = {Load: "load", Noise: "noise", Scanning: "scan", Sending: "publish", Compared: "B"}
+_PANELS = {
+    LoadSettings: "load",
+    Noise: "noise",
+    Scanning: "scan",
+    Sending: "publish",
+    Compared: "B",
+}
 """Where a label says too little without its panel."""
 _LONGEST = 30  # characters of a text
 
