@@ -6,7 +6,7 @@ import pytest
 
 from kappaskin_app.features.compare.panel import OtherForm
 from kappaskin_app.features.design.panel import DesignForm
-from kappaskin_app.features.guide.pages import page_called
+from kappaskin_app.features.guide.panel import page_called
 from kappaskin_app.shell.about import DOCKS as ABOUT_DOCKS
 from kappaskin_app.shell.about import PAGES as ABOUT_PAGES
 from kappaskin_app.shell.about import PANELS as ABOUT_PANELS

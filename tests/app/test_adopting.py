@@ -11,9 +11,14 @@ from kappaskin.live import ResumeInfo
 from kappaskin.live.requests import Requested
 from kappaskin.recording import RecordingStatus
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.resume import Entrusting, settings_left, words
+from kappaskin_app.shell.recovery import (
+    Entrusting,
+    settings_in,
+    settings_left,
+    settings_text,
+    words,
+)
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings_text import settings_in, settings_text
 from kappaskin_app.shell.window import MainWindow
 
 BEFORE = Settings(

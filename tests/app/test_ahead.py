@@ -9,9 +9,8 @@ import pytest
 
 from kappaskin import Refusal, read_scene
 from kappaskin.scenes import scene_file
-from kappaskin_app.shell.cache import Memo
-from kappaskin_app.shell.loads import tried
-from kappaskin_app.shell.scene_making import Ahead
+from kappaskin_app.shell.loads import Memo, tried
+from kappaskin_app.shell.session import Ahead
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import (
     plate_of,

@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QVBoxLayout, QWidget
 
 from kappaskin_app.shell.banner import Offer, Offered
-from kappaskin_app.shell.layouts.file import KeptFile
+from kappaskin_app.shell.layouts.kept import KeptFile
 from kappaskin_app.shell.recovery import Last, Recovering
 from kappaskin_app.shell.window import MainWindow
 

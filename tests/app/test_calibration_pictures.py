@@ -9,9 +9,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from kappaskin import Patch, SensorLayout
 from kappaskin.scenes import schedule
-from kappaskin_app.features.calibration.cylinder import CylinderView
-from kappaskin_app.features.calibration.loop_plot import Loop, LoopPlot
-from kappaskin_app.features.calibration.pass_map import PassMap
+from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
 from kappaskin_app.theme import letters
 from kappaskin_app.widgets.parts import Heading
 

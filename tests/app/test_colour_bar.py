@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QColor
 
-from kappaskin_app.shell.shades import HEALTH
+from kappaskin_app.shell.colouring import HEALTH
 from kappaskin_app.theme import DIVERGING
 from kappaskin_app.widgets.colour_bar import ColourBar
 

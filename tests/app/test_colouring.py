@@ -11,12 +11,11 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Patch, SensorLayout
 from kappaskin.estimation import FAULTS
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
-from kappaskin_app.features.membrane.element_cells import ElementCells
-from kappaskin_app.shell.scale import Ranges
+from kappaskin_app.features.membrane.surface import ElementCells
+from kappaskin_app.shell.colouring import HEALTH, HEALTH_COLOURS, SHADES, Ranges
+from kappaskin_app.shell.form import SeveralButton
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import COLOURS
-from kappaskin_app.shell.several import SeveralButton
-from kappaskin_app.shell.shades import HEALTH, HEALTH_COLOURS, SHADES
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import SATURATED
 

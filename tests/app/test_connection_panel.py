@@ -11,9 +11,8 @@ from PySide6.QtWidgets import QLineEdit
 
 from kappaskin import Event, Status, load_scene
 from kappaskin.sources import Port
-from kappaskin_app.features.connection import plugs
-from kappaskin_app.features.connection.panel import ConnectionPanel
-from kappaskin_app.features.connection.plugs import Plugs
+from kappaskin_app.features.connection import panel as plugs
+from kappaskin_app.features.connection.panel import ConnectionPanel, Plugs
 from kappaskin_app.features.log.events import Happenings
 
 SKIN = Port("/dev/ttyACM0", "Fingertip of ten by ten elements", "Kappa Ltd", "SN-4711", (1, 2))

@@ -5,7 +5,7 @@ import pytest
 from PySide6.QtGui import QColor
 
 from kappaskin_app.theme import SERIES
-from kappaskin_app.widgets.curve_plot import Curve, CurvePlot, as_seen
+from kappaskin_app.widgets.plots import Curve, CurvePlot, as_seen
 
 
 def test_one_reading_among_five_thousand_is_seen(qtbot) -> None:

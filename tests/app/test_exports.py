@@ -12,7 +12,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import Refusal
-from kappaskin_app.features.export.exporting import ExportDialog
+from kappaskin_app.features.export.exports import ExportDialog
 from kappaskin_app.shell.pictures import save_view
 from kappaskin_app.shell.window import MainWindow
 

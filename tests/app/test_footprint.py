@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kappaskin import DiscLoad, GaussianLoad, LineLoad, PointLoad, RectangleLoad
-from kappaskin_app.shell.footprint import footprint
+from kappaskin_app.shell.loads import footprint
 
 LOADS = [
     LineLoad(0.01, 0.09, 0.09, 0.01),

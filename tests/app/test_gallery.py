@@ -7,8 +7,7 @@ from PySide6.QtCore import Qt
 
 from kappaskin import load_scene
 from kappaskin.scenes import SCENES
-from kappaskin_app.features.scene.card import PICTURE, PLAYING
-from kappaskin_app.features.scene.gallery import ORDER, GalleryPanel, in_order
+from kappaskin_app.features.scene.gallery import ORDER, PICTURE, PLAYING, GalleryPanel, in_order
 from kappaskin_app.theme import DARK, LIGHT
 
 

@@ -7,8 +7,7 @@ from PySide6.QtCore import QUrl
 from PySide6.QtGui import QColor, QFont, QImage
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.features.guide.pages import FOLDER, page_called, pages
-from kappaskin_app.features.guide.panel import GuidePanel
+from kappaskin_app.features.guide.panel import FOLDER, GuidePanel, page_called, pages
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK, LIGHT, palette
 

@@ -9,10 +9,10 @@ from kappaskin.calibration import PressPhase
 from kappaskin.estimation import FAULTS
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
-from kappaskin_app.features.health.map_testing import MapTesting
 from kappaskin_app.features.health.panel import HealthPanel
+from kappaskin_app.features.health.press import MapTesting
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
-from kappaskin_app.shell.shades import SHADES
+from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK
 

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Patch, SensorLayout
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
-from kappaskin_app.shell.shades import SHADES
+from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.theme import DARK, DIVERGING
 
 TINT = SHADES["xx"].tint(1.0)

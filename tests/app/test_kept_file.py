@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
-from kappaskin_app.shell.layouts.file import KeptFile
-from kappaskin_app.shell.layouts.kept import Kept, from_text, to_text
+from kappaskin_app.shell.layouts.kept import Kept, KeptFile, from_text, to_text
 from kappaskin_app.shell.layouts.layout import READY
 
 HOSTILE = (

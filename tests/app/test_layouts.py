@@ -10,10 +10,19 @@ from PySide6.QtWidgets import QLabel, QMainWindow, QTabWidget
 
 from kappaskin import Refusal
 from kappaskin_app.shell.docks import Docks
-from kappaskin_app.shell.layouts.arranging import arrange, layout_of
 from kappaskin_app.shell.layouts.keeping import clamped
 from kappaskin_app.shell.layouts.kept import Kept, from_text, to_text
-from kappaskin_app.shell.layouts.layout import AREAS, BELOW, DOCKS, FLOATING, READY, Layout, Place
+from kappaskin_app.shell.layouts.layout import (
+    AREAS,
+    BELOW,
+    DOCKS,
+    FLOATING,
+    READY,
+    Layout,
+    Place,
+    arrange,
+    layout_of,
+)
 from kappaskin_app.shell.window import MainWindow
 
 SHARES = st.integers(50, 600).map(lambda share: share / 1000)

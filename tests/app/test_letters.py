@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin.skin import Distances
 from kappaskin_app.features.contact.readouts import StreamFigures
-from kappaskin_app.shell.title import Title
+from kappaskin_app.shell.docks import Title
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import grown
 from kappaskin_app.widgets.line import Line

@@ -6,8 +6,7 @@ import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.features.log.logged import Logged
-from kappaskin_app.features.log.panel import LogPanel
+from kappaskin_app.features.log.panel import Logged, LogPanel
 from kappaskin_app.guard import log
 
 

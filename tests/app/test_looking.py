@@ -5,8 +5,8 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 
 from kappaskin.skin import Distances
-from kappaskin_app.features.membrane.ruler import told
-from kappaskin_app.features.membrane.sight import Sight
+from kappaskin_app.features.membrane.annotations import told
+from kappaskin_app.features.membrane.camera import Sight
 from kappaskin_app.shell.window import MainWindow
 
 

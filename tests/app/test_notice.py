@@ -8,7 +8,7 @@ import pytest
 from kappaskin import Pipeline, Setup, Simulator, load_scene
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Contact
-from kappaskin_app.shell.notice import Notice, warnings
+from kappaskin_app.shell.status_bar import Notice, warnings
 from kappaskin_app.theme import DARK, LIGHT
 
 INSIDE = Contact(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)

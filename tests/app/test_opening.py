@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin.scenes import scene_file
 from kappaskin_app.features.calibration import is_calibration
-from kappaskin_app.shell.touching import may_choose
+from kappaskin_app.shell.loads import may_choose
 from kappaskin_app.shell.window import MainWindow
 
 TETRAHEDRON = np.array([[0, 0, 0], [20, 0, 10], [-10, 17, 10], [-10, -17, 10]])

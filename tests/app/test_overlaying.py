@@ -5,7 +5,7 @@ import pytest
 
 from kappaskin import Patch, load_scene
 from kappaskin.mechanics import PlacedObject
-from kappaskin_app.features.membrane.sheet import underside
+from kappaskin_app.features.membrane.overlays import underside
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.shell.window import MainWindow
 

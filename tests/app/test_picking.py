@@ -9,11 +9,10 @@ from PySide6.QtCore import QPoint, Qt
 from kappaskin import Status, load_scene
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
-from kappaskin_app.features.membrane.sight import Sight
-from kappaskin_app.features.traces.facts import facts
-from kappaskin_app.features.traces.past import SECONDS, Past
+from kappaskin_app.features.membrane.camera import Sight
+from kappaskin_app.features.traces.picking import SECONDS, Past, facts
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.widgets.curve_plot import Curve, CurvePlot
+from kappaskin_app.widgets.plots import Curve, CurvePlot
 
 
 def pixel_of(window: MainWindow, element: int) -> QPoint:

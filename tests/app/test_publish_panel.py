@@ -13,7 +13,7 @@ from kappaskin.publish import Latency, PublishStatus, TargetStatus
 from kappaskin.publish.publishing import Receiver
 from kappaskin_app.features.publish.panel import PublishPanel
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.widgets.columns import scrolled
+from kappaskin_app.widgets.layout import scrolled
 
 FINE = TargetStatus("udp://127.0.0.1:9870", receivers=(Receiver("udp://127.0.0.1:9870", 12345, 6),))
 DEAD = Receiver("udp://robot:1", 0, 7, "nobody receives there")

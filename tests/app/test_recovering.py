@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin_app.shell.recovery import Last, Recovering, Running, crashed
+from kappaskin_app.shell.recovery import Last, Recovering, Running, crashed, settings_text
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings_text import settings_text
 from kappaskin_app.shell.window import MainWindow
 
 LAST = Last(Settings(functions_x=5), "sim:circle", "there.mcap")

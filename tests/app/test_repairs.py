@@ -8,7 +8,7 @@ import pytest
 
 from kappaskin import Event, Recording
 from kappaskin.recording import Recorder
-from kappaskin_app.features.recording.repairs import RepairDialog
+from kappaskin_app.features.recording.recorder import RepairDialog
 from kappaskin_app.shell.window import MainWindow
 
 

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin_app.shell.scale import Ranges, SteadyRange
-from kappaskin_app.widgets.numbers import round_up
+from kappaskin_app.shell.colouring import Ranges, SteadyRange
+from kappaskin_app.widgets.text import round_up
 
 
 @given(st.floats(1e-9, 1e9))

@@ -9,8 +9,8 @@ from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, Tolerance, 
 from kappaskin.sensing import SECOND_GENERATION
 from kappaskin_app.features.sensor.panel import RegionPanel
 from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings.skin import SHAPES
 from kappaskin_app.shell.simulation import region_of, scene_of, with_consequences
-from kappaskin_app.shell.skins import SHAPES
 
 
 def test_the_default_gages_spoil_nothing_but_the_noise():

@@ -22,6 +22,7 @@ from kappaskin.scenes import scene_file
 from kappaskin_app.shell.loads import dragged
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.load import LOAD_CASES, SPREAD_CASES
+from kappaskin_app.shell.settings.skin import SHAPES
 from kappaskin_app.shell.simulation import (
     is_table_1,
     plate_of,
@@ -29,7 +30,6 @@ from kappaskin_app.shell.simulation import (
     with_consequences,
     written,
 )
-from kappaskin_app.shell.skins import SHAPES
 
 CASES = [case for case, _ in LOAD_CASES]
 READY = ["circle", "centre", "off-centre", "line"]

@@ -9,9 +9,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.launch import _all_stays
-from kappaskin_app.shell.layouts.file import KeptFile
 from kappaskin_app.shell.layouts.glance import theme_in
-from kappaskin_app.shell.layouts.kept import Kept
+from kappaskin_app.shell.layouts.kept import Kept, KeptFile
 from kappaskin_app.shell.splash import Splash
 from kappaskin_app.theme import DARK, LIGHT, Theme
 

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 from kappaskin import Refusal, SensorLayout, SineBasis
 from kappaskin.estimation import singular_values
 from kappaskin_app.features.stability.demonstrations import DEMONSTRATIONS
-from kappaskin_app.features.stability.seeing import MOST, Spectrum
+from kappaskin_app.features.stability.observability import MOST, Spectrum
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import scene_of
 from kappaskin_app.shell.window import MainWindow

@@ -8,16 +8,15 @@ import sys
 import pytest
 from PySide6.QtGui import QFontMetricsF
 
-from kappaskin_app.features.presenter.banner import REMEDIES
+from kappaskin_app.features.presenter.boards import REMEDIES, age_in_words
 from kappaskin_app.features.presenter.cue import Cue, Roundness
 from kappaskin_app.features.presenter.pad import Hand
 from kappaskin_app.features.presenter.stage import Stage
-from kappaskin_app.features.presenter.strip import age_in_words
 from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.theme import THEMES
-from kappaskin_app.widgets.clock import Clock
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.lettering import CAPTION, PRIMARY
+from kappaskin_app.widgets.timeline import Clock
 
 CAPITAL = 55  # px: 15 mm on a screen of 24 inches, to be read from three metres
 LONGEST = Cue(

@@ -8,8 +8,7 @@ from kappaskin import Status, load_scene
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
 from kappaskin.recording import Replay
-from kappaskin_app.shell.badge import Badge, colour_of, origin
-from kappaskin_app.shell.states import state_of
+from kappaskin_app.shell.badge import Badge, colour_of, origin, state_of
 from kappaskin_app.theme import LIGHT
 
 NOW = 100.0

@@ -5,7 +5,7 @@ import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.features.contact.table import ELEMENTS, FACTS
+from kappaskin_app.features.contact.numbers import ELEMENTS, FACTS
 from kappaskin_app.shell.window import MainWindow
 
 

@@ -16,7 +16,7 @@ from kappaskin import Recording
 from kappaskin.live import LONGEST_NOTE
 from kappaskin.recording import RecordingStatus
 from kappaskin.recording.writing import RecordingFile
-from kappaskin_app.features.recording.recording_mark import RecordingMark, duration_of, size_of
+from kappaskin_app.features.recording.recorder import RecordingMark, duration_of, size_of
 from kappaskin_app.shell.folders import newest, proposed, recordings_folder, unfinished
 from kappaskin_app.shell.window import MainWindow
 

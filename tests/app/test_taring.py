@@ -12,8 +12,7 @@ from kappaskin import Setup, Status, Tare, load_scene
 from kappaskin.calibration import Drift, TareStore
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live.tare_taking import TareStatus
-from kappaskin_app.features.calibration.tare import TarePanel, drift_words, warmth
-from kappaskin_app.features.calibration.taring import Taring, ago
+from kappaskin_app.features.calibration.tare import TarePanel, Taring, ago, drift_words, warmth
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
 

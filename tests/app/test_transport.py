@@ -9,10 +9,9 @@ from PySide6.QtWidgets import QApplication, QToolTip
 
 from kappaskin import Event
 from kappaskin.recording import Replay
-from kappaskin_app.features.recording.landmarks import minutes
-from kappaskin_app.features.recording.transport import SPEEDS, Transport
+from kappaskin_app.features.recording.transport import SPEEDS, Transport, minutes
 from kappaskin_app.theme import DARK, LIGHT
-from kappaskin_app.widgets.glyphs import GLYPHS, icon
+from kappaskin_app.widgets.timeline import GLYPHS, icon
 
 LEFT, KEYS = Qt.MouseButton.LeftButton, Qt.Key
 EVENTS = (Event(2.0, "note", "here"), Event(2.01, "tare", "taken"), Event(8.0, "gap", "back"))

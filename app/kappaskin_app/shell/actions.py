@@ -9,8 +9,7 @@ from PySide6.QtWidgets import QMainWindow, QMenu
 
 from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.keytips import KeyTips
-from kappaskin_app.shell.tips import tip_of
+from kappaskin_app.shell.tips import KeyTips, tip_of
 
 WITHIN = " > "
 """Between the title of a menu and that of one in it."""

@@ -4,9 +4,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from kappaskin.live import Status
+from kappaskin_app.guard import guarded
 
 _MOMENT = 0.3  # s that needs no words
 
@@ -66,3 +67,33 @@ class Tasks(QObject):
         """End what is told of."""
         if self.task is not None and self.task.cancel is not None:
             self.task.cancel()
+
+
+_EVERY = 40  # ms between two
+
+
+class Newest(QObject):
+    """Does what it is given at once, and what follows at most 25 times a second."""
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._waiting: Callable[[], None] | None = None
+        self._timer = QTimer(self, singleShot=True, interval=_EVERY)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(guarded(self._go_on))
+
+    def __call__(self, act: Callable[[], None]) -> None:
+        """Do this, unless something newer comes before it may be done."""
+        self._waiting = act
+        if not self._timer.isActive():
+            self._go_on()
+
+    def _go_on(self) -> None:
+        act, self._waiting = self._waiting, None
+        if act is not None:
+            self._timer.start()
+            act()
+
+    def forget(self) -> None:
+        """Do no more of what was given."""
+        self._waiting = None
+        self._timer.stop()

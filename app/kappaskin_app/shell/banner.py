@@ -9,7 +9,7 @@ from PySide6.QtGui import QCursor, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QPushButton, QToolButton, QWidget
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.widgets.flow import Flow
+from kappaskin_app.widgets.layout import Flow
 
 
 @dataclass(frozen=True)

@@ -18,14 +18,11 @@ from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.shell.centre import Centre
-from kappaskin_app.shell.colouring import Colouring
+from kappaskin_app.shell.colouring import SHADES, Colouring, Ranges
 from kappaskin_app.shell.header import Header
-from kappaskin_app.shell.notice import Notice, warnings
-from kappaskin_app.shell.scale import Ranges
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.shades import SHADES
-from kappaskin_app.shell.status_bar import StatusBar
+from kappaskin_app.shell.status_bar import Notice, StatusBar, warnings
 from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.widgets.tint import Tint
 

@@ -1,15 +1,72 @@
-"""Panels around the skin of a window: beside it, and below it one in the place of another."""
+"""Docks around the skin of a window: beside it, and below it one in the place of another."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QWidget
+from PySide6.QtWidgets import (
+    QDockWidget,
+    QHBoxLayout,
+    QMainWindow,
+    QScrollArea,
+    QStyle,
+    QToolButton,
+    QWidget,
+)
 
+from kappaskin_app.guard import guarded
 from kappaskin_app.shell.about import DOCKS
 from kappaskin_app.shell.actions import Actions
-from kappaskin_app.shell.title import Title
-from kappaskin_app.widgets.columns import heighten
+from kappaskin_app.widgets.layout import heighten
+from kappaskin_app.widgets.line import Line
+
+
+@contextmanager
+def drawn_once(widget: QWidget) -> Iterator[None]:
+    """Draw nothing of `widget` until the end.
+
+    The 3-D view is else drawn anew with every size it has in between, 15 to 40 ms each.
+    """
+    before = widget.updatesEnabled()
+    widget.setUpdatesEnabled(False)
+    try:
+        yield
+    finally:
+        widget.setUpdatesEnabled(before)
+
+
+class Title(QWidget):
+    """Stands for Qt's own title of a `dock`, whose letters stay as they were when it was made.
+
+    The dock itself answers to the mouse, which drags it or, pressed twice, lets it float.
+    """
+
+    def __init__(self, dock: QDockWidget) -> None:
+        super().__init__(dock)
+        self.words = Line(dock.windowTitle())
+        self.words.setToolTip(dock.toolTip())
+        row, icons = QHBoxLayout(self), QStyle.StandardPixmap
+        row.setContentsMargins(6, 1, 4, 1)
+        row.setSpacing(2)
+        row.addWidget(self.words, 1)
+        self.float = self._button(icons.SP_TitleBarNormalButton, "Let it float, or put it back")
+        self.float.clicked.connect(guarded(lambda *_: dock.setFloating(not dock.isFloating())))
+        self.close_ = self._button(icons.SP_TitleBarCloseButton, "Close")
+        self.close_.clicked.connect(guarded(lambda *_: dock.close()))
+        for button in (self.float, self.close_):
+            row.addWidget(button)
+
+    def _button(self, icon: QStyle.StandardPixmap, words: str) -> QToolButton:
+        button = QToolButton()
+        button.setIcon(self.style().standardIcon(icon))
+        button.setAutoRaise(True)
+        button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the menus have both for the keyboard
+        button.setToolTip(words)
+        button.setAccessibleName(f"{self.words.text()}: {words.lower()}")
+        return button
+
 
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _HEIGHTS = {"scene": 0.38, "compare": 0.36, "design": 0.4, "guide": 0.5}

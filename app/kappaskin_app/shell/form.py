@@ -1,4 +1,4 @@
-"""Editors for settings, made from what `settings` says of each."""
+"""Forms: editors for settings, made from what the settings say of each."""
 
 import math
 import re
@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import QEvent, QLocale, QObject, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QPaintEvent, QStandardItemModel, QValidator
+from PySide6.QtGui import (
+    QAction,
+    QKeyEvent,
+    QKeySequence,
+    QMouseEvent,
+    QPaintEvent,
+    QStandardItemModel,
+    QValidator,
+)
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -15,6 +23,7 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QLabel,
     QLineEdit,
+    QMenu,
     QSizePolicy,
     QSpinBox,
     QStyle,
@@ -25,11 +34,100 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.live import Status
-from kappaskin_app.shell.keys import for_the_window
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch, Text
-from kappaskin_app.shell.several import SeveralButton
+
+_ITS = QKeySequence.StandardKey
+_LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine)  # the last is Ctrl+K to an editor
+
+
+def for_the_window(event: QEvent) -> bool:
+    """Whether an editor is asked if it takes a key that is the window's: undo, redo, Ctrl+K."""
+    return (
+        event.type() == QEvent.Type.ShortcutOverride
+        and isinstance(event, QKeyEvent)
+        and any(event.matches(key) for key in _LEFT)
+    )
+
+
+_NONE = "None"
+_TICKS = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
+
+
+class SeveralButton(QToolButton):
+    """Says how many are chosen; `chosen` brings the values, in the order that they are offered.
+
+    The Down key takes one more, Up one less.
+    """
+
+    chosen = Signal(tuple)
+
+    def __init__(self, options: tuple[tuple[str, str], ...], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._options = options
+        self.setMenu(_OpenMenu(self))
+        self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.ticks = {value: self._tick(words) for value, words in options}
+        self.show_chosen(())
+
+    def _tick(self, words: str) -> QAction:
+        tick = self.menu().addAction(words)
+        tick.setCheckable(True)
+        tick.toggled.connect(self._tell)
+        return tick
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        on = [tick for tick in self.ticks.values() if tick.isChecked()]
+        off = [tick for tick in self.ticks.values() if not tick.isChecked()]
+        if event.key() == Qt.Key.Key_Down and off:
+            off[0].setChecked(True)
+        elif event.key() == Qt.Key.Key_Up and on:
+            on[-1].setChecked(False)
+        else:
+            super().keyPressEvent(event)
+
+    def _values(self) -> tuple[str, ...]:
+        return tuple(value for value, tick in self.ticks.items() if tick.isChecked())
+
+    def _tell(self) -> None:
+        self._write()
+        self.chosen.emit(self._values())
+
+    def show_chosen(self, values: tuple[str, ...]) -> None:
+        for value, tick in self.ticks.items():
+            with QSignalBlocker(tick):
+                tick.setChecked(value in values)
+        self._write()
+
+    def _write(self) -> None:
+        values = self._values()
+        first = dict(self._options)[values[0]] if values else _NONE
+        more = f" and {len(values) - 1} more" if len(values) > 1 else ""
+        self.setText(first + more)
+
+
+class _OpenMenu(QMenu):
+    """A menu in which a tick is set without closing it."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        pressed = isinstance(event, QMouseEvent) and event.type() == QEvent.Type.MouseButtonRelease
+        typed = (
+            isinstance(event, QKeyEvent)
+            and event.type() == QEvent.Type.KeyPress
+            and event.key() in _TICKS
+        )
+        action = self.activeAction()
+        if (pressed or typed) and action is not None:
+            action.toggle()
+            return True
+        return super().eventFilter(watched, event)
+
 
 _AT_FIRST = Settings()
 _BEGUN = re.compile(r"[+-]?\d*\.?(\d*|\d+e[+-]?)", re.IGNORECASE)  # what may become a number

@@ -1,15 +1,54 @@
-"""Menus: the order in which they stand, the shell's own actions, the finder and the shortcuts."""
+"""Menus: the shell's own actions, undo and redo, the finder and the shortcuts."""
 
+from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QUndoStack
 
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.finder.finder import Finder
 from kappaskin_app.shell.finder.sheet import CheatSheet
 from kappaskin_app.shell.finder.things import Things, things_in
 from kappaskin_app.shell.parts import EDIT, FILE, HELP, VIEW, Parts
-from kappaskin_app.shell.undoing import Undoing
+from kappaskin_app.shell.tips import tip_of
 from kappaskin_app.shell.welcome import Welcome
+
+_LONGEST = 60  # characters of a step in a menu
+
+
+class Undoing(QObject):
+    """Keeps the actions on `stack` true; `settle` first brings in what a person has just done."""
+
+    def __init__(
+        self, stack: QUndoStack, settle: Callable[[], object], actions: Actions, menu: str
+    ) -> None:
+        super().__init__(stack)
+        self._stack, self._settle, self._actions = stack, settle, actions
+        actions.add("undo", menu, "&Undo", self._undo, "Ctrl+Z")
+        actions.add("redo", menu, "&Redo", self._redo, "Ctrl+Shift+Z")
+        stack.indexChanged.connect(guarded(self._show))
+        self._show()
+
+    def _undo(self) -> None:
+        self._settle()
+        self._stack.undo()
+
+    def _redo(self) -> None:
+        self._settle()
+        self._stack.redo()
+
+    def _show(self, *_: object) -> None:
+        for name, text in (("undo", self._stack.undoText()), ("redo", self._stack.redoText())):
+            word, action = name.capitalize(), self._actions[name]
+            cut = (
+                text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}\N{HORIZONTAL ELLIPSIS}"
+            )
+            action.setText(f"&{word}: {cut.replace('&', '&&')}" if text else f"&{word}")
+            action.setToolTip(f"{word}: {text}" if text else tip_of(name, word))
+            self._actions.allow(name, "" if text else f"there is nothing to {name}")
+
 
 DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, files"

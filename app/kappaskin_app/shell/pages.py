@@ -10,7 +10,7 @@ from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import Theme
-from kappaskin_app.widgets.columns import scrolled
+from kappaskin_app.widgets.layout import scrolled
 
 _Some = TypeVar("_Some", bound=Panel)
 LIVE, SKIN, SENSOR, CALIBRATE = "&Live", "S&kin", "Se&nsor", "C&alibrate"

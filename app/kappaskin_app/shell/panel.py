@@ -17,7 +17,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.about import PAGES, PANELS
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import LIGHT, Theme
-from kappaskin_app.widgets.columns import scroll_to
+from kappaskin_app.widgets.layout import scroll_to
 
 _GROWN = 20  # ms after which the page of a panel that grew has grown too
 

@@ -1,24 +1,118 @@
-"""What a window is at, kept in a file while it is open: what is left of one is of a crash."""
+"""Recovery: settings as text, recordings that outlive a window, and what a crash left."""
 
 import json
 import os
 import platform
 import time
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 from PySide6.QtCore import QLockFile, QObject
 
 from kappaskin.errors import Refusal
-from kappaskin.live import Status
+from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.banner import Offered
+from kappaskin_app.shell.history import History
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings_text import OF_SENSORS, settings_in, settings_text
+from kappaskin_app.shell.settings.load import Written
+from kappaskin_app.shell.simulation import settings_for
+
+VERSION = 1
+OF_SENSORS = ("calibration", "tare")
+"""They belong to a sensor, and have files of their own."""
+_BEGUN = Settings()
+
+
+def settings_text(settings: Settings) -> str:
+    """JSON of all settings but those that belong to a sensor."""
+    said = {f.name: getattr(settings, f.name) for f in fields(settings)}
+    written = said["written"]
+    said["written"] = written and {"text": written.text, "file": str(written.file)}
+    for name in OF_SENSORS:
+        del said[name]
+    return json.dumps({"version": VERSION, "settings": said}, indent=1)
+
+
+def settings_in(text: str) -> Settings:
+    """The settings that a text says; the ready ones for what it does not say."""
+    try:
+        found = json.loads(text)
+        version, said = found["version"], dict(found["settings"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise Refusal(
+            f"expected settings as JSON, got {text!r:.40}; choose another file"
+        ) from error
+    if version != VERSION:
+        raise Refusal(
+            f"expected settings of version {VERSION}, got {version!r:.20}; update Kappaskin"
+        )
+    known = [f.name for f in fields(Settings) if f.name not in OF_SENSORS]
+    return Settings(**{name: _value(name, said[name]) for name in known if name in said})
+
+
+def _value(name: str, value: Any) -> Any:
+    """What a setting is from what JSON made of it."""
+    was = getattr(_BEGUN, name)
+    if name == "written":
+        try:
+            return value and Written(str(value["text"]), Path(value["file"]))
+        except (TypeError, KeyError) as error:
+            raise Refusal(
+                f"{name}: expected text and file, got {value!r:.40}; leave it out"
+            ) from error
+    if isinstance(was, tuple) and isinstance(value, list):
+        return tuple(value)
+    if isinstance(was, float) and type(value) is int:
+        return float(value)
+    if type(value) is not type(was):
+        raise Refusal(f"{name}: expected {type(was).__name__}, got {value!r:.40}; leave it out")
+    return value
+
+
+class Entrusting:
+    """Leaves the settings with the engine, which may outlive the window while it records."""
+
+    def __init__(self, history: History, engine: Engine) -> None:
+        self._history, self._engine = history, engine
+        self._left: Settings | None = None
+
+    def follow(self, status: Status) -> None:
+        settings = self._history.settings
+        if status.recording.active and settings is not self._left:
+            self._left = settings
+            self._engine.entrust(settings_text(settings).encode())
+
+
+def settings_left(left: ResumeInfo) -> Settings:
+    """The settings of the window that is gone; those to begin with where they cannot be read."""
+    setup = left.requested.setup
+    try:
+        settings = settings_in(left.requested.entrusted.decode(errors="replace"))
+    except Refusal:
+        return settings_for(left.requested.source or "")
+    return replace(settings, calibration=setup.calibration, tare=setup.tare)
+
+
+def words(left: ResumeInfo, wanted: str) -> str:
+    """What a person should know of what was `left`, who `wanted` this source."""
+    file, source = Path(left.requested.recording or "").name, left.requested.source
+    told = f"The recording {file}{_of(source)} {left.lasted}."
+    if wanted == (source or "sim:"):
+        return told
+    return f"{told} You asked for {wanted}: Connect goes there, and the recording goes on with it."
+
+
+def _of(source: str | None) -> str:
+    if source is None:
+        return ""
+    return " of the simulated skin" if source.startswith("sim:") else f" of {source}"
+
 
 _FILES = "window-*.json"
 _EVERY = 1.0  # s between two looks at what is to be kept

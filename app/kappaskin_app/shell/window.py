@@ -13,11 +13,11 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.layouts.keeping import Keeping
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
-from kappaskin_app.shell.resume import settings_left
+from kappaskin_app.shell.recovery import settings_left
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import settings_for
 from kappaskin_app.theme import THEMES, Theme, bar_palette, letters, palette
-from kappaskin_app.widgets.columns import widen
+from kappaskin_app.widgets.layout import widen
 
 _PACKED = 80  # of a picture: packs a fifth less well than Qt does, in half the time
 

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
 
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
 from kappaskin_app.widgets.lettering import read_from_afar
-from kappaskin_app.widgets.numbers import in_digits
+from kappaskin_app.widgets.text import in_digits
 from kappaskin_app.widgets.tint import Tint
 
 _COLOURS, _GAP = 22, 4  # px of the bar without its numbers, and right of them

@@ -12,7 +12,7 @@ from kappaskin_app.features.accuracy.costing import in_words
 from kappaskin_app.shell.effects import called
 from kappaskin_app.shell.settings.shown import METHOD_NAMES
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.widgets.amounts import duration, length
+from kappaskin_app.widgets.text import duration, length
 
 
 def test_every_method_and_basis_is_measured_and_what_is_refused_is_not_drawn(

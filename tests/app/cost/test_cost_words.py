@@ -7,8 +7,8 @@ import pytest
 from kappaskin.estimation import METHODS
 from kappaskin_app.features.accuracy.costing import Frontier
 from kappaskin_app.shell.settings.shown import METHOD_NAMES
-from kappaskin_app.widgets.amounts import duration, length
-from kappaskin_app.widgets.log_axis import LogAxis
+from kappaskin_app.widgets.plots import LogAxis
+from kappaskin_app.widgets.text import duration, length
 
 
 def test_every_method_has_a_name_that_people_read() -> None:

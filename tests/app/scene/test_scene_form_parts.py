@@ -15,8 +15,7 @@ from PySide6.QtWidgets import QComboBox, QToolButton
 from kappaskin.scenes import PARTS, read_scene
 from kappaskin.scenes.effects import EFFECTS
 from kappaskin_app.features.scene.scene_form.form import SceneForm
-from kappaskin_app.features.scene.scene_form.section import Addition, Section
-from kappaskin_app.features.scene.scene_form.sections import sections_of
+from kappaskin_app.features.scene.scene_form.sections import Addition, Section, sections_of
 from kappaskin_app.features.scene.scene_text import changes
 
 from .conftest import TEXTS, TOUCHED, said_by

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QComboBox, QFileDialog
 from kappaskin import read_scene
 from kappaskin.scenes import scene_file
 from kappaskin.scenes.effects import EFFECTS
-from kappaskin_app.features.scene.card import PLAYING
+from kappaskin_app.features.scene.gallery import PLAYING
 from kappaskin_app.shell.settings import Settings
 
 from .conftest import EDIT, EFFECTS_PAGE, GALLERY, plays

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin.scenes import scene_file
-from kappaskin_app.shell.touching import touches_at
+from kappaskin_app.shell.loads import touches_at
 
 from .conftest import EDIT, EFFECTS_PAGE, plays
 

@@ -15,10 +15,10 @@ from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import OFF, ON, PLANNED, forced
 from kappaskin_app.features.scene.scene_text.places import shifted
 from kappaskin_app.shell.history import History
+from kappaskin_app.shell.loads import GrabbedStimulus, touches_at
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.scene import Written
-from kappaskin_app.shell.touching import GrabbedStimulus, touches_at
+from kappaskin_app.shell.settings.load import Written
 
 READY = [name for name in SCENES if load_scene(name).stimuli]
 

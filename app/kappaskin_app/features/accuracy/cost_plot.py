@@ -11,8 +11,8 @@ from kappaskin.studies import Cost
 from kappaskin_app.features.accuracy.costing import Frontier, in_words
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import LIGHT, SERIES, Theme
-from kappaskin_app.widgets.amounts import duration, length
-from kappaskin_app.widgets.log_axis import LogAxis
+from kappaskin_app.widgets.plots import LogAxis
+from kappaskin_app.widgets.text import duration, length
 
 _TOP = 10.0
 _BESIDE = 28.0  # px left of the words of the legend

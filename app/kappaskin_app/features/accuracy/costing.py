@@ -26,7 +26,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.shell.simulation import NO_ELEMENTS, elements_of, scene_of_sensor
-from kappaskin_app.widgets.amounts import duration, length
+from kappaskin_app.widgets.text import duration, length
 
 FUNCTIONS = (4, 6, 8, 12)
 """Functions along each side that are tried."""

@@ -17,12 +17,12 @@ from kappaskin.studies import Cost, Refused
 from kappaskin_app.features.accuracy.cost_plot import CostPlot
 from kappaskin_app.features.accuracy.costing import Costing, Frontier, gives, in_words
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.effects_table import EffectsTable
+from kappaskin_app.shell.effects import EffectsTable
 from kappaskin_app.theme import LIGHT, Theme, grown, slider_style
-from kappaskin_app.widgets.amounts import NONE, duration, length
 from kappaskin_app.widgets.line import Line
-from kappaskin_app.widgets.log_axis import LogAxis
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
+from kappaskin_app.widgets.plots import LogAxis
+from kappaskin_app.widgets.text import NONE, duration, length
 
 _STEPS = 200  # of the slider
 _WORDS, _EFFECTS = 350, 376  # px wide

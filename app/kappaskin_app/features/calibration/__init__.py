@@ -6,10 +6,8 @@ from pathlib import Path
 from kappaskin.calibration import TareStore, tare_folder
 from kappaskin.errors import Refusal
 from kappaskin_app.features.calibration.calibrating import Calibrating
-from kappaskin_app.features.calibration.in_use import InUsePanel
-from kappaskin_app.features.calibration.panel import CalibratePanel
-from kappaskin_app.features.calibration.tare import TarePanel
-from kappaskin_app.features.calibration.taring import Taring
+from kappaskin_app.features.calibration.panel import CalibratePanel, InUsePanel
+from kappaskin_app.features.calibration.tare import TarePanel, Taring
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import CALIBRATE, LIVE

@@ -18,14 +18,13 @@ from kappaskin.live import PipelineStatus, Status
 from kappaskin.sensing import Sensor
 from kappaskin_app.features.compare.comparing import Comparing, Pair
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.colouring import SteadyRange
 from kappaskin_app.shell.form import Form
-from kappaskin_app.shell.scale import SteadyRange
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Theme, grown
-from kappaskin_app.widgets.columns import scrolled
+from kappaskin_app.widgets.layout import fit_rows, scrolled
 from kappaskin_app.widgets.parts import button, number, sentence
-from kappaskin_app.widgets.rows import fit_rows
 from kappaskin_app.widgets.surface_map import SurfaceMap
 
 _ASKS = (

@@ -1,8 +1,7 @@
 """Connection: which source is read."""
 
 from kappaskin.live import ResumeInfo
-from kappaskin_app.features.connection.panel import ConnectionPanel
-from kappaskin_app.features.connection.plugs import Plugs
+from kappaskin_app.features.connection.panel import ConnectionPanel, Plugs
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import SOURCE

@@ -1,10 +1,12 @@
-"""Where the readings come from."""
+"""The connection panel: where the readings come from, and the ports there are."""
 
 import time
+from concurrent.futures import Future, ThreadPoolExecutor
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
+    QApplication,
     QComboBox,
     QHBoxLayout,
     QLabel,
@@ -16,11 +18,55 @@ from PySide6.QtWidgets import (
 from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
-from kappaskin.sources import Port
+from kappaskin.sources import Port, serial_ports
+from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import well_behaved
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.widgets.amounts import COMMAND, day
 from kappaskin_app.widgets.parts import said
+from kappaskin_app.widgets.text import COMMAND, day
+
+_EVERY = 1000  # ms between two looks
+_SOON = 50  # ms until what was found is taken
+
+
+class Plugs(QObject):
+    """Looks for ports each second while `watched` can be seen and used; `found` brings them."""
+
+    found = Signal(list)
+
+    def __init__(self, watched: QWidget, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._watched = watched
+        self._thread = ThreadPoolExecutor(1, "port-finder")  # some systems take a second
+        self._looking: Future[list[Port]] | None = None
+        self._timer = QTimer(self, interval=_EVERY)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(guarded(self._look_if_seen))
+        self._timer.start()
+
+    def _look_if_seen(self) -> None:
+        if self._watched.isVisible() and QApplication.activeWindow() is not None:
+            self.look()
+
+    def look(self) -> None:
+        """Look now, unless that is being done."""
+        if self._looking is None:
+            self._looking = self._thread.submit(serial_ports)
+            QTimer.singleShot(_SOON, self, guarded(self._take))
+
+    def _take(self) -> None:
+        if self._looking is None:
+            return
+        if not self._looking.done():
+            QTimer.singleShot(_SOON, self, guarded(self._take))
+            return
+        done, self._looking = self._looking, None
+        self.found.emit(done.result())
+
+    def close(self) -> None:
+        self._timer.stop()
+        self._looking = None
+        self._thread.shutdown(wait=True, cancel_futures=True)
+
 
 _SIMULATED = ("sim:", "Simulated skin")
 _TIP = (

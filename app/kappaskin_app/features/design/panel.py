@@ -18,13 +18,13 @@ from kappaskin_app.shell.form import Form, well_behaved
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.shell.settings.designed import Designed
-from kappaskin_app.shell.skins import SHAPES
+from kappaskin_app.shell.settings.skin import SHAPES
 from kappaskin_app.theme import SEQUENTIAL, Theme
-from kappaskin_app.widgets.columns import row, scrolled
-from kappaskin_app.widgets.curve_plot import Curve, CurvePlot
-from kappaskin_app.widgets.numbers import round_up
+from kappaskin_app.widgets.layout import row, scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
+from kappaskin_app.widgets.plots import Curve, CurvePlot
 from kappaskin_app.widgets.surface_map import SurfaceMap
+from kappaskin_app.widgets.text import round_up
 
 _NAMES = tuple(field for field in Designed.__dataclass_fields__)
 _LENGTHS = ("side_x", "side_y", "base_radius", "rim_radius")

@@ -4,8 +4,8 @@ from PySide6.QtWidgets import QWidget
 
 from kappaskin.bases import edges_of
 from kappaskin.live import Status
+from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.form import Form
-from kappaskin_app.shell.states import in_use
 
 
 class BasisPanel(Form):

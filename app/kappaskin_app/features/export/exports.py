@@ -1,5 +1,6 @@
-"""What leaves the window as a file: recordings, pictures of its views, films."""
+"""What leaves the window as a file: recordings as tables, pictures of views, films."""
 
+import math
 import time
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -8,18 +9,155 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFileDialog, QLineEdit, QWidget
 
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
-from kappaskin_app.features.export.exporting import ExportDialog
+from kappaskin.pipeline import Setup
+from kappaskin.recording import Exported, ExportRequest, ExportTask
 from kappaskin_app.features.export.filming import Filmed, Filming
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
 from kappaskin_app.shell.centre import Centre
 from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view, write_png
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.work_dialog import ended
+from kappaskin_app.shell.work_dialog import (
+    WorkDialog,
+    beside,
+    choosing,
+    ended,
+    named,
+    path_in,
+    says_kind,
+)
+
+_LONGEST = 1e6  # s
+_RECORDINGS = "Recording (*.mcap)"
+_FORMATS = (
+    "Table, every program reads it (*.csv);;Table for NumPy (*.npz);;Table in HDF5 (*.h5);;"
+    "Surface for ParaView, PyVista (*.vtp);;Series of surfaces for ParaView (*.pvd);;"
+    "Surface for CAD (*.stl)"
+)
+_EXPLAINED = {
+    "recording": "The recording to write from; it is only read.",
+    "to": "The file to write; its ending says in which format.",
+    "settings": "Fit as it was recorded, or all of it with the settings in use now.",
+    "begin": "The first frame that is written, in s since the recording began.",
+    "until": "The last frame that is written, in s since the recording began.",
+    "every": "The time between two surfaces, or rows, in s; 0 writes every frame.",
+    "at": "The moment whose surface is written, in s since the recording began.",
+}
+"""What each field asks for."""
+
+
+class ExportDialog(WorkDialog):
+    """Asks what of a recording is to be written where, and writes it."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Export a recording", "&Export", self._begun, self._told, parent)
+        self.setObjectName("export")
+        self.recording, self.to = QLineEdit(), QLineEdit()
+        self.settings = QComboBox()
+        self.settings.addItems(["As they were recorded", "As they are now"])
+        self.begin, self.until = _seconds("the beginning"), _seconds("the end")
+        self.every, self.at = _seconds("every frame"), _seconds("")
+        self.export_button = self.begin_button
+        self.choose_recording = choosing(self._choose_recording)
+        self.choose_file = choosing(self._choose_file)
+        self._setup = Setup()
+        self._files: tuple[Path, ...] = ()
+        self._lay_out()
+        self.to.textChanged.connect(guarded(lambda *_: self._allow()))
+        self.recording.textChanged.connect(guarded(lambda *_: self._allow()))
+        self.every.valueChanged.connect(guarded(lambda *_: self._allow()))
+        self._allow()
+
+    def _lay_out(self) -> None:
+        form = self.form
+        for words, line, button in (
+            ("&Recording", self.recording, self.choose_recording),
+            ("&File", self.to, self.choose_file),
+        ):
+            form.addRow(named(words, line), beside(line, button))
+        form.addRow("&Settings", self.settings)
+        form.addRow("Fr&om", self.begin)
+        form.addRow("&Until", self.until)
+        form.addRow("E&very", self.every)
+        form.addRow("&At", self.at)
+        for name, tip in _EXPLAINED.items():
+            getattr(self, name).setToolTip(tip)
+        self._add_buttons()
+
+    def ask_of(self, source: str, at: float, setup: Setup) -> None:
+        """Ask what of the recording that is replayed, if one is, `at` s of it, is to be written."""
+        if not self.busy:
+            self._setup = setup
+            if source.startswith("replay:"):
+                self.recording.setText(source.removeprefix("replay:"))
+                self.at.setValue(at)
+        self.ask()
+        (self.to if self.recording.text() else self.recording).setFocus()
+
+    def _choose_recording(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self, "Export a recording", "", _RECORDINGS)
+        if name:
+            self.recording.setText(name)
+
+    def _choose_file(self) -> None:
+        name, kind = QFileDialog.getSaveFileName(self, "Export to", "", _FORMATS)
+        if name:
+            path, ending = Path(name), kind.rpartition("*")[2].rstrip(")")
+            self.to.setText(str(path if says_kind(path) else ended(name, ending)))
+
+    @property
+    def _at_once(self) -> bool:
+        """Whether one moment is wanted, and not a span."""
+        suffix = Path(self.to.text()).suffix.lower()
+        return suffix == ".vtp" or (suffix == ".stl" and not self.every.value())
+
+    def _allow(self) -> None:
+        super()._allow()
+        busy = self.busy
+        one, suffix = self._at_once, Path(self.to.text()).suffix.lower()
+        for widget in (self.begin, self.until):
+            widget.setEnabled(not busy and not one)
+        self.every.setEnabled(not busy and suffix != ".vtp")
+        self.at.setEnabled(not busy and one)
+        choose = self.choose_recording, self.choose_file
+        for widget in (self.recording, self.to, self.settings, *choose):
+            widget.setEnabled(not busy)
+        both = bool(self.recording.text().strip() and self.to.text().strip())
+        self.begin_button.setEnabled(both and not busy)
+
+    @property
+    def wanted(self) -> ExportRequest:
+        """What is asked for; a `Refusal` where that makes no file."""
+        setup = self._setup if self.settings.currentIndex() else None
+        files = path_in(self.recording), path_in(self.to)
+        if self._at_once:
+            return ExportRequest(*files, at=self.at.value(), setup=setup)
+        until = self.until.value() or math.inf
+        return ExportRequest(*files, self.begin.value(), until, self.every.value(), setup=setup)
+
+    def _begun(self) -> ExportTask:
+        exporting = ExportTask(self.wanted)
+        self._files = exporting.files
+        return exporting
+
+    def _told(self, result: object) -> str:
+        words = result.words if isinstance(result, Exported) else ""
+        return f"Written: {', '.join(map(str, self._files))} ({words})"
+
+
+def _seconds(nothing: str) -> QDoubleSpinBox:
+    """A field for s, whose least value is called `nothing`."""
+    field = QDoubleSpinBox()
+    field.setRange(0.0, _LONGEST)
+    field.setDecimals(3)
+    field.setSuffix(" s")
+    field.setSpecialValueText(nothing)
+    return field
+
 
 _MENU = "E&xport"
 _FILM = "Film (*.mp4)"

@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from kappaskin_app.features.guide.pages import Page, page_called, pages
-from kappaskin_app.features.guide.panel import GuidePanel
+from kappaskin_app.features.guide.panel import GuidePanel, Page, page_called, pages
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.finder.things import FinderEntry
 from kappaskin_app.shell.parts import HELP

@@ -1,5 +1,11 @@
 """The guide to read: its pages listed, the text of one, and the way back."""
 
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
 from PySide6.QtCore import QEvent, QSignalBlocker, Qt, QTimer, QUrl
 from PySide6.QtGui import (
     QBrush,
@@ -19,10 +25,39 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QHBoxLayout, QListWidget, QTextBrowser, QVBoxLayout, QWidget
 
-from kappaskin_app.features.guide.pages import Page, pages
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.widgets.parts import button, in_a_row
+
+FOLDER = Path(str(files("kappaskin_resources"))) / "guide"
+_LISTED = re.compile(r"^\d+\. \[([^\]]+)\]\(([\w-]+\.md)\)", re.MULTILINE)
+_HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of the guide, and the headings in it."""
+
+    title: str
+    file: Path
+    headings: tuple[str, ...]
+
+
+def page_called(name: str) -> Page:
+    """The page in the file of this name, without its suffix."""
+    return next(page for page in pages() if page.file.stem == name)
+
+
+@cache
+def pages() -> tuple[Page, ...]:
+    """The contents, and each page that they list."""
+    contents = FOLDER / "README.md"
+    listed = _LISTED.findall(contents.read_text("utf-8"))
+    return tuple(
+        Page(title, FOLDER / name, tuple(_HEADING.findall((FOLDER / name).read_text("utf-8"))))
+        for title, name in [("Contents", contents.name), *listed]
+    )
+
 
 _PRINTED = ("text", "output")  # fences around what a command prints
 _WIDEST = 88  # of the text, in letters M: longer lines are hard to follow

@@ -1,8 +1,7 @@
 """Health of the channels, and a test of their map."""
 
-from kappaskin_app.features.health.map_testing import MapTesting
 from kappaskin_app.features.health.panel import HealthPanel
-from kappaskin_app.features.health.resting import Resting
+from kappaskin_app.features.health.press import MapTesting, Resting
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 

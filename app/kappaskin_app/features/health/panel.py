@@ -14,12 +14,11 @@ from PySide6.QtWidgets import (
 
 from kappaskin.health import Health
 from kappaskin.live import Status
-from kappaskin_app.features.health.map_testing import MapTesting
-from kappaskin_app.features.health.press import PressPage
+from kappaskin_app.features.health.press import MapTesting, PressPage
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import Theme
+from kappaskin_app.widgets.layout import fit_rows
 from kappaskin_app.widgets.parts import sentence, text_label
-from kappaskin_app.widgets.rows import fit_rows
 
 _COLUMNS = ("Element", "Channel", "What", "Since", "Figure")
 _TIP = (

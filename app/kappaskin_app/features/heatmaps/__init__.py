@@ -8,8 +8,8 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.heatmaps.maps import Maps
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.colouring import locked_at
 from kappaskin_app.shell.display import Display, Shown, of_row
-from kappaskin_app.shell.scale import locked_at
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import COLOURS
 from kappaskin_app.shell.window import MainWindow

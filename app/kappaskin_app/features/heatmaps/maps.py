@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QScrollArea, QWidget
 
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
-from kappaskin_app.shell.shades import SHADES
+from kappaskin_app.shell.colouring import SHADES
 
 _COLUMN = 3  # that are seen well one below the other
 _NARROWEST = (270, 360)  # px of one column, and of two

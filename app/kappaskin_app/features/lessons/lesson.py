@@ -9,8 +9,8 @@ from kappaskin_app.features.lessons.expression import Expression
 from kappaskin_app.shell.settings import SceneSettings
 from kappaskin_app.shell.settings.sensor import Scanning
 from kappaskin_app.shell.settings.shown import EstimatorSettings, View
+from kappaskin_app.shell.settings.skin import SHAPES
 from kappaskin_app.shell.simulation import written
-from kappaskin_app.shell.skins import SHAPES
 
 UNITS = {
     "": 1.0,

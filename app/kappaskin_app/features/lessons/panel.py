@@ -11,9 +11,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.features.lessons.ending import EndPage
-from kappaskin_app.features.lessons.listing import ListPage
-from kappaskin_app.features.lessons.step import StepPage
+from kappaskin_app.features.lessons.pages import EndPage, ListPage, StepPage
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import Theme

@@ -1,9 +1,8 @@
 """Log, events on the line, errors and the report."""
 
+from kappaskin_app.features.log.errors import Mishaps
 from kappaskin_app.features.log.events import Happenings
-from kappaskin_app.features.log.logged import Logged
-from kappaskin_app.features.log.mishaps import Mishaps
-from kappaskin_app.features.log.panel import LogPanel
+from kappaskin_app.features.log.panel import Logged, LogPanel
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.parts import HELP, SOURCE
 from kappaskin_app.shell.window import MainWindow

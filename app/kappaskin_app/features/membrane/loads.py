@@ -8,10 +8,10 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from kappaskin.mechanics import Load
-from kappaskin_app.features.membrane.drag import ARROW
-from kappaskin_app.features.membrane.unlit import UNLIT, pixels
+from kappaskin_app.features.membrane.annotations import UNLIT, pixels
+from kappaskin_app.features.membrane.mouse import ARROW
 from kappaskin_app.shell.drawn_skin import DrawnSkin
-from kappaskin_app.shell.footprint import footprint
+from kappaskin_app.shell.loads import footprint
 
 Array = NDArray[np.float64]
 

@@ -1,18 +1,34 @@
-"""How the skin is looked at: actions for its colours, its height and the camera."""
+"""How the skin is viewed: settings, and actions for colours, height and camera."""
 
 from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtWidgets import QWidget
 
 from kappaskin_app.features.membrane.camera import DIRECTIONS
 from kappaskin_app.features.membrane.skin_view import SkinView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
 from kappaskin_app.shell.display import Display
+from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.requests import Requests
 from kappaskin_app.shell.settings.shown import COLOURS
+
+
+class ViewPanel(Form):
+    """Asks for colours, height and what is drawn beside the skin."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        names = (
+            *("colour_by", "colour_from", "maps", "one_range"),
+            *("exaggeration", "show_elements", "show_truth", "show_directions", "show_band"),
+            *("show_frame", "show_object", "show_pressed", "from_x", "to_x", "from_y", "to_y"),
+            *("from_z", "to_z", "theme", "letters", "show_start"),
+        )
+        super().__init__("View", names, parent)
+
 
 _MENU = "Sk&in"
 _COLOURS = f"{_MENU}{WITHIN}&Colour"

@@ -6,8 +6,8 @@ from PySide6.QtCore import QObject, Signal
 
 from kappaskin.frames import Estimate
 from kappaskin.skin import Patch, distances
+from kappaskin_app.features.membrane.annotations import Ruler
 from kappaskin_app.features.membrane.membrane import MembraneView
-from kappaskin_app.features.membrane.ruler import Ruler
 
 Array = NDArray[np.float64]
 Places = tuple[tuple[float, float], ...] | None

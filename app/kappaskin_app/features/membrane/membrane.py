@@ -17,17 +17,11 @@ from pyvistaqt import QtInteractor
 from kappaskin.frames import Estimate
 from kappaskin.mechanics import Load
 from kappaskin.sensing import Sensor
-from kappaskin_app.features.membrane.alarm import Alarm
-from kappaskin_app.features.membrane.box import WHOLE, Box, Shares
-from kappaskin_app.features.membrane.drag import LoadDrag
-from kappaskin_app.features.membrane.gaze import Gaze
+from kappaskin_app.features.membrane.annotations import UNLIT, Alarm, Caption, Marks, Sides, pixels
+from kappaskin_app.features.membrane.camera import Gaze
 from kappaskin_app.features.membrane.loads import DrawnLoads, put_upright
-from kappaskin_app.features.membrane.marks import Marks
-from kappaskin_app.features.membrane.pointing import SurfacePointer
-from kappaskin_app.features.membrane.sides import Sides
-from kappaskin_app.features.membrane.surface import Surface
-from kappaskin_app.features.membrane.unlit import UNLIT, pixels
-from kappaskin_app.features.membrane.written import Caption
+from kappaskin_app.features.membrane.mouse import LoadDrag, SurfacePointer
+from kappaskin_app.features.membrane.surface import WHOLE, Box, Shares, Surface
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.drawn_skin import MM, DrawnSkin, Indices
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme

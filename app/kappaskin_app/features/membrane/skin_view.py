@@ -11,15 +11,14 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.membrane.measuring import Measuring
 from kappaskin_app.features.membrane.membrane import MembraneView
-from kappaskin_app.features.membrane.overlaying import Overlaying
+from kappaskin_app.features.membrane.overlays import Overlaying
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.colouring import SHADES, locked_at
 from kappaskin_app.shell.display import Display, Shown, of_row
-from kappaskin_app.shell.scale import locked_at
+from kappaskin_app.shell.loads import touches_at
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.shades import SHADES
-from kappaskin_app.shell.touching import touches_at
 from kappaskin_app.theme import DIVERGING, Theme
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.tint import Tint

@@ -1,15 +1,88 @@
-"""The skin's surface as it is drawn: its shape, and colours of its points or of its elements."""
+"""The skin's surface as it is drawn: shape, colours, and the box that cuts it."""
 
 from typing import Any
 
 import numpy as np
 import pyvista as pv
+import scipy
 from numpy.typing import NDArray
+from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPlaneCollection
 
 from kappaskin.sensing import SensorLayout
-from kappaskin_app.features.membrane.element_cells import ElementCells
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.theme import Colours, Theme
+
+_PIXELS = 384  # along each side, of cells that are no rectangles of a regular grid
+
+
+class ElementCells:
+    """A picture that lies on the skin; written in place, and not at all while it is not seen."""
+
+    def __init__(self) -> None:
+        self.texture: Any = None
+        self._which: NDArray[np.intp] = np.empty(0, np.intp)
+
+    def meet(self, layout: SensorLayout) -> None:
+        """Lay out the cells of another skin: each pixel shows its nearest element."""
+        if layout.shape:
+            width, height = layout.shape
+            self._which = np.arange(len(layout))
+        else:
+            width = height = _PIXELS
+            x, y = layout.patch.cell_centres(width, height)
+            pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+            self._which = np.asarray(scipy.spatial.KDTree(layout.positions).query(pixels)[1])
+        self._image: Any = pv.ImageData(dimensions=(width, height, 1))
+        self._image.point_data["rgb"] = np.zeros((width * height, 3), np.uint8)
+        self.pixels = self._image.point_data["rgb"]
+        self.texture = pv.Texture(self._image)
+        self.texture.interpolate = False
+        self.texture.repeat = False
+
+    def show(self, rgb: Colours) -> None:
+        """Colour each element by its own of `rgb` (P, 3)."""
+        self.pixels[:] = rgb[self._which]
+        self._image.Modified()
+        self.texture.Modified()
+
+
+Shares = tuple[float, float, float, float, float, float]
+
+WHOLE: Shares = (0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
+"""Nothing is cut away."""
+_EDGE = 1e-3  # of the box: a skin that is drawn just as deep as it may be is not cut there
+
+
+class Box:
+    """Six planes across x, y and the height; they hold for every actor that it was told to cut."""
+
+    def __init__(self) -> None:
+        self._planes = [vtkPlane() for _ in range(6)]
+        self._all, self._none = vtkPlaneCollection(), vtkPlaneCollection()
+        for number, plane in enumerate(self._planes):
+            self._all.AddItem(plane)
+            inward = [0.0, 0.0, 0.0]
+            inward[number // 2] = 1.0 if number % 2 == 0 else -1.0
+            plane.SetNormal(*inward)
+        self.shares = WHOLE
+
+    def show(self, skin: DrawnSkin) -> None:
+        """Stand where the skin is, from and to these shares of it along x, y and the height."""
+        low, high = (np.repeat(side, 2) for side in skin.bounds)
+        places = low + np.array(self.shares) * (high - low)
+        outwards = np.tile([-_EDGE, _EDGE], 3) * (high - low)
+        for number, place in enumerate(places + outwards):
+            origin = [0.0, 0.0, 0.0]
+            origin[number // 2] = float(place)
+            self._planes[number].SetOrigin(*origin)
+
+    def cut(self, actors: Any) -> None:
+        """Cut all `actors` that have a mapper, or let them be whole again."""
+        wanted = self._none if self.shares == WHOLE else self._all
+        for actor in actors:
+            mapper = getattr(actor, "mapper", None)
+            if mapper is not None and mapper.GetClippingPlanes() is not wanted:
+                mapper.SetClippingPlanes(wanted)
 
 
 class Surface:

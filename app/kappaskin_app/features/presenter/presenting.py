@@ -10,21 +10,19 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
 from kappaskin.contact import ContactObject
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.presenter.banner import REMEDIES
+from kappaskin_app.features.presenter.boards import REMEDIES, age_in_words
 from kappaskin_app.features.presenter.cue import Cue, Found, cue_of
-from kappaskin_app.features.presenter.objects import THINGS
-from kappaskin_app.features.presenter.pad import Hand
+from kappaskin_app.features.presenter.pad import THINGS, Hand
 from kappaskin_app.features.presenter.sound import Sound
 from kappaskin_app.features.presenter.stage import Stage
-from kappaskin_app.features.presenter.strip import age_in_words
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, SIM, origin
 from kappaskin_app.shell.banner import Offer
 from kappaskin_app.shell.display import Display
-from kappaskin_app.shell.drawn_once import drawn_once
+from kappaskin_app.shell.docks import drawn_once
+from kappaskin_app.shell.loads import may_choose, touches_at
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.touching import may_choose, touches_at
 from kappaskin_app.theme import Theme
 
 TIP = "Fill the screen with what is felt, to be read from three metres; Escape leaves"

@@ -6,14 +6,17 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
-from kappaskin_app.features.presenter.banner import Banner
-from kappaskin_app.features.presenter.board import Board
+from kappaskin_app.features.presenter.boards import (
+    NONE,
+    Banner,
+    Board,
+    Figure,
+    ForceBar,
+    RoundView,
+    Strip,
+)
 from kappaskin_app.features.presenter.cue import Cue, Roundness
-from kappaskin_app.features.presenter.figure import NONE, Figure
-from kappaskin_app.features.presenter.force_bar import ForceBar
-from kappaskin_app.features.presenter.operator import Operator
-from kappaskin_app.features.presenter.round_view import RoundView
-from kappaskin_app.features.presenter.strip import Strip
+from kappaskin_app.features.presenter.pad import Operator
 from kappaskin_app.theme import LIGHT, Theme
 
 _HEIGHT, _WIDTH = 1080.0, 1920.0  # of the picture that a unit is a pixel of

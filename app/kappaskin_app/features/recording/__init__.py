@@ -5,16 +5,15 @@ from pathlib import Path
 
 from kappaskin.live import ResumeInfo
 from kappaskin_app.features.recording.panel import RecordingPanel
-from kappaskin_app.features.recording.recording_mark import RecordingMark
-from kappaskin_app.features.recording.replaying import Replaying
-from kappaskin_app.features.recording.taping import Taping
+from kappaskin_app.features.recording.playback import Replaying
+from kappaskin_app.features.recording.recorder import RecordingMark, Taping
 from kappaskin_app.features.recording.transport import Transport
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.folders import newest, recordings_folder
 from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
-from kappaskin_app.shell.resume import Entrusting
+from kappaskin_app.shell.recovery import Entrusting
 from kappaskin_app.shell.session import RECORDED
 from kappaskin_app.shell.window import MainWindow
 

@@ -5,14 +5,13 @@ from pathlib import Path
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
-from kappaskin_app.features.recording.recording_mark import duration_of, size_of
-from kappaskin_app.features.recording.replaying import Replaying
-from kappaskin_app.features.recording.taping import Taping
+from kappaskin_app.features.recording.playback import Replaying
+from kappaskin_app.features.recording.recorder import Taping, duration_of, size_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.widgets.amounts import COMMAND
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import button, in_a_row, sentence
+from kappaskin_app.widgets.text import COMMAND
 
 _RECORD = "Write all that comes in to a file, or end that (Ctrl+Shift+R)."
 _NOTE = "Write down what happened just now, in the recording too (Ctrl+Shift+N)."

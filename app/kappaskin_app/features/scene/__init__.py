@@ -9,17 +9,17 @@ from kappaskin.scenes import scene_file
 from kappaskin_app.features.scene.editing import SceneEditing
 from kappaskin_app.features.scene.load_panel import LoadPanel, NoisePanel
 from kappaskin_app.features.scene.panel import ScenePanel
-from kappaskin_app.features.scene.planning import Planning
+from kappaskin_app.features.scene.plan import Planning
 from kappaskin_app.features.scene.staging import Staging
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
 from kappaskin_app.shell.finder.things import FinderEntry, enter
+from kappaskin_app.shell.loads import may_choose, touches_at
 from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import FILE
-from kappaskin_app.shell.touching import may_choose, touches_at
 from kappaskin_app.shell.window import MainWindow
 
 _MILLIMETRE = 1e-3  # m, the unit of what is drawn for a printer

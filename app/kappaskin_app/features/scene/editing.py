@@ -12,12 +12,11 @@ from kappaskin_app.features.scene.scene_text.places import instead, pressed, shi
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.effects import called
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.loads import dragged
+from kappaskin_app.shell.loads import GrabbedStimulus, dragged, most_times
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings.scene import Written
+from kappaskin_app.shell.settings.load import Written
 from kappaskin_app.shell.simulation import OWN, text_of
-from kappaskin_app.shell.touching import GrabbedStimulus, most_times
 
 
 class SceneEditing:

@@ -1,17 +1,193 @@
-"""The scene that is played: chosen from pictures, edited as forms and as text, planned."""
+"""The scene panel: chosen from pictures, edited as forms and as text, planned."""
 
 import re
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QColor,
+    QFocusEvent,
+    QFontDatabase,
+    QHideEvent,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+    QShowEvent,
+    QTextCharFormat,
+    QTextFormat,
+)
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QPlainTextEdit,
+    QSplitter,
+    QTabWidget,
+    QTextEdit,
+    QVBoxLayout,
+    QWidget,
+)
 
-from kappaskin_app.features.scene.effects import EffectsPanel
 from kappaskin_app.features.scene.gallery import GalleryPanel
+from kappaskin_app.features.scene.plan import EffectsPanel
 from kappaskin_app.features.scene.scene_form.form import SceneForm
-from kappaskin_app.features.scene.source import SceneText
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.form import for_the_window
 from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.widgets.parts import button, text_label
+
+_PAUSE = 300  # ms without a key before what is typed counts
+_ROOM = 6  # px beside the numbers
+
+
+class _Numbers(QWidget):
+    """The numbers of the lines, left of them."""
+
+    def __init__(self, text: "SceneText") -> None:
+        super().__init__(text)
+        self._text = text
+
+    def sizeHint(self) -> QSize:
+        return QSize(self._text.numbers_width(), 0)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        self._text.paint_numbers(self, event)
+
+
+class SceneText(QPlainTextEdit):
+    """A text editor that leaves undoing to the window; `edited` brings the text after a pause."""
+
+    edited = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("scene-text")
+        self.setAccessibleName("The scene as text")
+        self.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self.setUndoRedoEnabled(False)
+        self.setTabChangesFocus(True)
+        self._numbers, self._theme, self._wrong = _Numbers(self), LIGHT, 0
+        self._showing, self._known = False, ""
+        self._pause = QTimer(self, singleShot=True, interval=_PAUSE)  # pyright: ignore[reportCallIssue]
+        self._pause.timeout.connect(guarded(self.tell))
+        self.textChanged.connect(guarded(self._typed))
+        self.blockCountChanged.connect(self._make_room)
+        self.updateRequest.connect(self._scroll_numbers)
+        self._make_room()
+
+    def show_text(self, text: str) -> None:
+        """Show a text that came from elsewhere; the place that is worked at stays in sight.
+
+        What is being typed stays over the text that it is typed into, and goes with another one.
+        """
+        if self._pause.isActive() and text == self._known:
+            return
+        self._pause.stop()
+        self._known = text
+        if text == self.toPlainText():
+            return
+        place, bars = (
+            self.textCursor().position(),
+            (self.verticalScrollBar(), self.horizontalScrollBar()),
+        )
+        scrolled = [bar.value() for bar in bars]
+        self._showing = True
+        self.setPlainText(text)
+        self._showing = False
+        cursor = self.textCursor()
+        cursor.setPosition(min(place, len(text)))
+        self.setTextCursor(cursor)
+        for bar, value in zip(bars, scrolled, strict=True):
+            bar.setValue(value)
+
+    def tell(self) -> None:
+        """Bring what was typed, without waiting for the pause to be over."""
+        self._pause.stop()
+        self._known = self.toPlainText()
+        self.edited.emit(self._known)
+
+    def show_wrong(self, line: int) -> None:
+        """Mark a line, counted from one, as the one where the scene cannot be; none with 0."""
+        if line != self._wrong:
+            self._wrong = line
+            self._mark()
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self._mark()
+
+    def _typed(self) -> None:
+        if not self._showing:
+            self._pause.start()
+
+    def _mark(self) -> None:
+        marks: list[QTextEdit.ExtraSelection] = []
+        block = self.document().findBlockByNumber(self._wrong - 1)
+        if self._wrong and block.isValid():
+            mark, colour = QTextEdit.ExtraSelection(), QColor(self._theme.bad)
+            colour.setAlphaF(0.25)
+            how = QTextCharFormat()
+            how.setBackground(colour)
+            how.setProperty(QTextFormat.Property.FullWidthSelection, True)
+            mark.format, mark.cursor = how, self.textCursor()  # pyright: ignore[reportAttributeAccessIssue]
+            mark.cursor.setPosition(block.position())  # pyright: ignore[reportAttributeAccessIssue]
+            marks.append(mark)
+        self.setExtraSelections(marks)
+        self._numbers.update()
+
+    def event(self, event: QEvent) -> bool:
+        if for_the_window(event):
+            if self._pause.isActive():
+                self.tell()  # or what was just typed would come after it was undone
+            event.ignore()
+            return True
+        return super().event(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if self._pause.isActive():
+            self.tell()  # or what is changed elsewhere would be changed in the text before
+
+    # The numbers.
+
+    def numbers_width(self) -> int:
+        digits = len(str(self.blockCount()))
+        return 2 * _ROOM + digits * self.fontMetrics().horizontalAdvance("9")
+
+    def _make_room(self) -> None:
+        self.setViewportMargins(self.numbers_width(), 0, 0, 0)
+
+    def _scroll_numbers(self, rect: QRect, dy: int) -> None:
+        if dy:
+            self._numbers.scroll(0, dy)
+        else:
+            self._numbers.update(0, rect.y(), self._numbers.width(), rect.height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        around = self.contentsRect()
+        self._numbers.setGeometry(
+            around.left(), around.top(), self.numbers_width(), around.height()
+        )
+
+    def paint_numbers(self, where: QWidget, event: QPaintEvent) -> None:
+        """For the strip of numbers only: paint those of the lines in sight."""
+        painter = QPainter(where)
+        painter.fillRect(event.rect(), QColor(self._theme.window))
+        painter.setFont(self.font())
+        block, offset = self.firstVisibleBlock(), self.contentOffset()
+        height = self.fontMetrics().height()
+        while block.isValid():
+            top = round(self.blockBoundingGeometry(block).translated(offset).top())
+            if top > event.rect().bottom():
+                break
+            number = block.blockNumber() + 1
+            painter.setPen(
+                QColor(self._theme.alert if number == self._wrong else self._theme.faint)
+            )
+            area = QRect(0, top, where.width() - _ROOM, height)
+            painter.drawText(area, Qt.AlignmentFlag.AlignRight, str(number))
+            block = block.next()
+
 
 _LINE = re.compile(r"\bline (\d+)")
 _FORM = 420  # px: the forms, at least

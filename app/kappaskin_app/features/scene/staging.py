@@ -12,7 +12,7 @@ from kappaskin.scenes import SCENES as READY
 from kappaskin.scenes import Scene, scene_file
 from kappaskin_app.features.scene.editing import SceneEditing
 from kappaskin_app.features.scene.panel import ScenePanel
-from kappaskin_app.features.scene.planning import Planning
+from kappaskin_app.features.scene.plan import Planning
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.history import History

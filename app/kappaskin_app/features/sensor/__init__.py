@@ -2,8 +2,14 @@
 
 import time
 
-from kappaskin_app.features.sensor.panel import ElectronicsPanel, RegionPanel, SpoilsPanel
-from kappaskin_app.features.sensor.skin import ElementsPanel, ShapePanel, SupportPanel
+from kappaskin_app.features.sensor.panel import (
+    ElectronicsPanel,
+    ElementsPanel,
+    RegionPanel,
+    ShapePanel,
+    SpoilsPanel,
+    SupportPanel,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.pages import SENSOR, SKIN
 from kappaskin_app.shell.window import MainWindow

@@ -3,9 +3,9 @@
 import math
 from functools import partial
 
-from kappaskin_app.features.stability.demonstrating import Demonstrating
+from kappaskin_app.features.stability.demonstrations import Demonstrating
+from kappaskin_app.features.stability.observability import Seeing
 from kappaskin_app.features.stability.panel import StabilityPanel
-from kappaskin_app.features.stability.seeing import Seeing
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 

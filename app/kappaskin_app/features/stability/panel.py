@@ -13,12 +13,11 @@ from PySide6.QtWidgets import (
 
 from kappaskin.live import Status
 from kappaskin_app.features.stability.demonstrations import DEMONSTRATIONS
-from kappaskin_app.features.stability.mode_map import ModeMap
-from kappaskin_app.features.stability.seeing import Seeing
-from kappaskin_app.features.stability.spectrum import SpectrumPlot
+from kappaskin_app.features.stability.observability import Seeing
+from kappaskin_app.features.stability.plots import ModeMap, SpectrumPlot
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.states import in_use
 from kappaskin_app.theme import Theme, grown
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 

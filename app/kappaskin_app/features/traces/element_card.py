@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWi
 
 from kappaskin.frames import COMPONENTS
 from kappaskin_app.theme import Theme
-from kappaskin_app.widgets.curve_plot import Curve, CurvePlot
+from kappaskin_app.widgets.plots import Curve, CurvePlot
 
 Array = NDArray[np.float64]
 

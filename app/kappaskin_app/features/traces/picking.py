@@ -1,15 +1,18 @@
-"""Elements that are pointed at, and picked to be told all about."""
+"""The picked element: its facts, its readings of the last seconds, and traces."""
 
+import math
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
+from kappaskin.calibration import Calibration
 from kappaskin.estimation import amplitude_spectrum
-from kappaskin.frames import Estimate
+from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.live import Status
+from kappaskin.sensing import Sensor
 from kappaskin_app.features.traces.element_card import ElementCard, Traces
-from kappaskin_app.features.traces.facts import facts, title
-from kappaskin_app.features.traces.past import SECONDS, Past
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
@@ -17,6 +20,115 @@ from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import Theme
+
+Array = NDArray[np.float64]
+
+SECONDS = 10.0
+"""How far back it reaches."""
+_LEAST = 0.002  # s between two that are kept
+_ROUNDING = 1e-6  # of a step: frames at just that rate are all kept
+_LARGEST = 24e6  # bytes: of a large skin they are kept farther apart
+
+
+class Past:
+    """Readings as they come, written round and round."""
+
+    def __init__(self) -> None:
+        self.forget(0)
+
+    def forget(self, elements: int) -> None:
+        """Begin anew with so many `elements`."""
+        self._least = max(_LEAST, SECONDS * 12 * elements / _LARGEST)
+        count = round(SECONDS / self._least) + 1
+        self._times = np.full(count, np.nan)
+        self._read: NDArray[np.float32] = np.empty((count, 3, elements), np.float32)
+        self._next, self._last = 0, -np.inf
+
+    def take(self, times: Array, readings: Array) -> None:
+        """Keep `readings` (T, 3, P) in 1/m at `times` (T,) in s, those not too near to another."""
+        elements = readings.shape[2]
+        for at, read in zip(times.tolist(), readings, strict=True):
+            if elements != self._read.shape[2] or at < self._last:
+                self.forget(elements)  # another sensor, or one that began anew
+            if at - self._last >= (1 - _ROUNDING) * self._least:
+                self._times[self._next], self._read[self._next] = at, read
+                self._next, self._last = (self._next + 1) % len(self._times), at
+
+    def of(self, elements: list[int]) -> tuple[Array, Array]:
+        """Times (T,) in s before the newest, upwards, and readings (T, 3, k) of k `elements`."""
+        order = np.roll(np.arange(len(self._times)), -self._next)
+        order = order[self._times[order] > self._last - SECONDS]
+        read = self._read[order[:, None], :, np.asarray(elements, np.intp)]
+        return self._times[order] - self._last, read.swapaxes(1, 2).astype(float)
+
+
+_PM, _DASH = "\N{PLUS-MINUS SIGN}", "\N{EN DASH}"
+_HEADS = ("", "reads [1/m]", "fit leaves [1/m]", "gain", "offset [1/m]", "channel", "health")
+
+
+def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> str:
+    """A table in HTML of the three channels of an element."""
+    rows = [_row(element, number, sensor, status, estimate) for number in range(3)]
+    cells = ["".join(f"<th align='left'>{head}&nbsp;&nbsp;</th>" for head in _HEADS)]
+    cells += ["".join(f"<td>{cell}&nbsp;&nbsp;</td>" for cell in row) for row in rows]
+    return (
+        "<table style='white-space: nowrap'>"
+        + "".join(f"<tr>{row}</tr>" for row in cells)
+        + "</table>"
+    )
+
+
+def title(element: int, sensor: Sensor, moved: float, moved_sd: float) -> str:
+    """Which element it is, where, and how far in mm the skin `moved` there."""
+    x, y = 1e3 * sensor.layout.positions[element]
+    sure = f" {_PM} {moved_sd:.3f}" if math.isfinite(moved_sd) else ""
+    return _signed(
+        f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; the skin moved in by "
+        f"{moved:.3f}{sure} mm there"
+    )
+
+
+def _row(
+    element: int, number: int, sensor: Sensor, status: Status, estimate: Estimate
+) -> tuple[str, ...]:
+    channel = number * len(sensor.layout) + element
+    name = COMPONENTS[number]
+    found = [f for f in status.health.findings if f.channel == channel]
+    health = "; ".join(f"{f.kind}: {f.figure}" for f in found) or "well"
+    read, left = estimate.curvature[number, element], estimate.residual[number, element]
+    return (
+        f"<b>{name}</b>",
+        f"{_number(read, '+z.2f')} {_PM} {_number(estimate.noise, '.2f')}",
+        _number(left, "+z.2f"),
+        *_calibrated(status.setup.calibration, channel),
+        str(_converted(sensor, channel)),
+        "dead: the device says so" if sensor.layout.lacking[number, element] else health,
+    )
+
+
+def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str]:
+    if calibration is None:
+        return "1 (nominal)", "0 (nominal)"
+    c = calibration
+    return (
+        f"{_number(c.gain[channel], '.3f')} {_PM} {_number(c.gain_sd[channel], '.3f')}",
+        f"{_number(c.offset[channel], '+z.2f')} {_PM} {_number(c.offset_sd[channel], '.2f')}",
+    )
+
+
+def _converted(sensor: Sensor, channel: int) -> int:
+    """The number on the wire of what reads this channel."""
+    wired = sensor.channel_map
+    return channel if wired is None else int(np.flatnonzero(wired == channel)[0])
+
+
+def _number(value: float, digits: str) -> str:
+    return _signed(f"{value:{digits}}") if math.isfinite(value) else _DASH
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", "\N{MINUS SIGN}")
+
 
 _PLOTS = 0.1  # s between two drawings of the plots
 _WORDS = 0.25  # s between two readings of the facts

@@ -1,22 +1,148 @@
-"""The line in which a person types a few letters, and below it what they may mean."""
+"""The finder: whatever the window can do, found by a few letters of its name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
+from PySide6.QtGui import QFontMetrics, QKeyEvent
 from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
     QDialog,
     QFrame,
+    QHeaderView,
+    QKeySequenceEdit,
     QLabel,
     QLineEdit,
+    QToolButton,
+    QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
     QWidget,
 )
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.finder.listing import Listing, clearable, row
-from kappaskin_app.shell.finder.matching import best, score
 from kappaskin_app.shell.finder.things import FinderEntry
+
+_BEGINS, _FOLLOWS, _SKIPS = 8, 5, 0.2  # points of a letter that begins a word, or has its neighbour
+_WHOLE = 4  # points more where the text begins so
+_FAR = 0.3  # of the best one's points, below which it is not what was meant
+_ELSEWHERE = 0.4  # of the points, for what is found only in where a thing stands
+
+
+def score(query: str, text: str, place: str = "") -> float:
+    """Points of `text`, which stands at `place`, for all words of `query`; 0 where one misses.
+
+    The words may come in any order, their letters only in theirs.
+    """
+    points = [_best(word, text, place) for word in query.lower().split()]
+    if not points:
+        return 1.0
+    return sum(points) - 0.01 * len(text) if min(points) > 0 else 0.0
+
+
+def best(points: Mapping[str, float]) -> list[str]:
+    """Those that were meant, the best first; of equal ones in the order given."""
+    least = _FAR * max(points.values(), default=0.0)
+    return sorted((name for name in points if points[name] > least), key=lambda name: -points[name])
+
+
+def _best(word: str, text: str, place: str) -> float:
+    return max(_points(word, text.lower()), _ELSEWHERE * _points(word, place.lower()))
+
+
+@lru_cache(maxsize=20_000)
+def _points(word: str, text: str) -> float:
+    """Points of the best way to find the letters of `word` in `text`; 0 where there is none."""
+    letters = iter(text)
+    if not all(letter in letters for letter in word):
+        return 0.0
+    # best[j]: of the letters so far, the last of them at j.
+    best = {at: _at(text, at) for at, letter in enumerate(text) if letter == word[0]}
+    for letter in word[1:]:
+        best = {
+            at: max(
+                _step(text, before, at) + points for before, points in best.items() if before < at
+            )
+            for at in range(min(best) + 1, len(text))
+            if text[at] == letter
+        }
+    most = max(best.values(), default=0.0)
+    return max(most, 0.1) + _WHOLE * text.startswith(word)
+
+
+def _at(text: str, at: int) -> float:
+    begins = at == 0 or not text[at - 1].isalnum()
+    return 1.0 + _BEGINS * begins
+
+
+def _step(text: str, before: int, at: int) -> float:
+    """Points of a letter at `at` after one at `before`."""
+    skipped = at - before - 1
+    return max(_at(text, at), 1.0 + _FOLLOWS * (skipped == 0)) - _SKIPS * skipped
+
+
+_LED = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+_ROOM = 5  # px between two rows
+
+
+def clearable(editor: QLineEdit | QKeySequenceEdit) -> None:
+    """Give an `editor` a button that clears it, and the button a name."""
+    editor.setClearButtonEnabled(True)
+    for made in editor.findChildren(QToolButton):
+        made.setAccessibleName("Clear")
+
+
+class Listing(QTreeWidget):
+    """Rows of three texts each; the arrows in `line` lead it."""
+
+    def __init__(self, line: QLineEdit, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setColumnCount(3)
+        self.setHeaderHidden(True)
+        self.setRootIsDecorated(False)
+        self.setUniformRowHeights(True)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        header, how = self.header(), QHeaderView.ResizeMode
+        header.setStretchLastSection(False)
+        for column, mode in enumerate((how.Stretch, how.Interactive, how.ResizeToContents)):
+            header.setSectionResizeMode(column, mode)
+        line.installEventFilter(self)
+
+    def show_rows(self, rows: list[QTreeWidgetItem]) -> None:
+        """List these, the first of them chosen."""
+        self.clear()
+        self.addTopLevelItems(rows)
+        if rows:
+            self.setCurrentItem(rows[0])
+
+    def chosen(self) -> object:
+        """What the chosen row is of; None where there is none."""
+        row = self.currentItem()
+        return row.data(0, Qt.ItemDataRole.UserRole) if row is not None else None
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if not isinstance(event, QKeyEvent) or event.type() != QEvent.Type.KeyPress:
+            return False
+        leads = event.key() in _LED
+        if leads:
+            self.keyPressEvent(event)
+        return leads
+
+
+def row(texts: tuple[str, str, str], of: object, grey: bool = False) -> QTreeWidgetItem:
+    """A row of what it is `of`, with the second text fainter, and all of it where it is `grey`."""
+    made = QTreeWidgetItem(list(texts))
+    made.setData(0, Qt.ItemDataRole.UserRole, of)
+    made.setSizeHint(0, QSize(0, QFontMetrics(QApplication.font()).height() + _ROOM))
+    faint = QApplication.palette().placeholderText()
+    for column in range(2):
+        made.setToolTip(column, texts[column])
+        if grey or column:
+            made.setForeground(column, faint)
+    return made
+
 
 _KEPT = 12  # of what was done last, which comes first
 _RECENT = 3.0  # points more of what was done last, less of what was before

@@ -14,7 +14,7 @@ from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import ask_of
 from kappaskin_app.shell.settings.asks import Choice
-from kappaskin_app.widgets.columns import scroll_to
+from kappaskin_app.widgets.layout import scroll_to
 
 _NOT_NOW = "not with what is chosen now"
 

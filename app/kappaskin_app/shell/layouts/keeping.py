@@ -8,8 +8,7 @@ from PySide6.QtCore import QObject, QRect
 from PySide6.QtGui import QGuiApplication
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.layouts.file import KeptFile
-from kappaskin_app.shell.layouts.kept import Kept
+from kappaskin_app.shell.layouts.kept import Kept, KeptFile
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
 

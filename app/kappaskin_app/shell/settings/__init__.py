@@ -19,12 +19,9 @@ from kappaskin_app.shell.settings.load import SIZES as SIZES
 from kappaskin_app.shell.settings.load import SPREAD_CASES as SPREAD_CASES
 from kappaskin_app.shell.settings.load import TABLE_1_CASES as TABLE_1_CASES
 from kappaskin_app.shell.settings.load import TWO_ENDED as TWO_ENDED
-from kappaskin_app.shell.settings.load import LoadSettings, Noise
-from kappaskin_app.shell.settings.looked import Looked
+from kappaskin_app.shell.settings.load import LoadSettings, Noise, Own
+from kappaskin_app.shell.settings.load import Written as Written
 from kappaskin_app.shell.settings.publishing import Sending as Sending
-from kappaskin_app.shell.settings.reading import Reading
-from kappaskin_app.shell.settings.scene import Own
-from kappaskin_app.shell.settings.scene import Written as Written
 from kappaskin_app.shell.settings.sensor import Electronics as Electronics
 from kappaskin_app.shell.settings.sensor import Scanning as Scanning
 from kappaskin_app.shell.settings.sensor import Spoils as Spoils
@@ -32,7 +29,7 @@ from kappaskin_app.shell.settings.shown import COLOURS as COLOURS
 from kappaskin_app.shell.settings.shown import METHOD_NAMES as METHOD_NAMES
 from kappaskin_app.shell.settings.shown import METHOD_SHORT as METHOD_SHORT
 from kappaskin_app.shell.settings.shown import EstimatorSettings as EstimatorSettings
-from kappaskin_app.shell.settings.shown import View
+from kappaskin_app.shell.settings.shown import Looked, Reading, View
 from kappaskin_app.shell.settings.skin import Skin
 from kappaskin_app.shell.settings.telling import told
 

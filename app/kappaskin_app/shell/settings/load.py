@@ -1,9 +1,26 @@
-"""What presses on the simulated skin, and what noise its readings have."""
+"""Settings of the scene: a written one, or what presses on the simulated skin."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from kappaskin_app.shell.settings.asks import MILLIMETRES, PER_METRE, Choice, Range, asked
+
+
+@dataclass(frozen=True)
+class Written:
+    """The TOML `text` of a scene; it is called as `file` is, and what it names lies beside that."""
+
+    text: str
+    file: Path
+
+
+@dataclass(frozen=True)
+class Own:
+    """The scene that is `written`, or none: then the panels say what is simulated."""
+
+    written: Written | None = None
+
 
 TABLE_1_CASES = ("centre", "off-centre", "line")
 LOAD_CASES = (

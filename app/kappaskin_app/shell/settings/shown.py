@@ -1,9 +1,40 @@
-"""What the shape is fitted with, and how it is shown."""
+"""Settings of the estimator and of the view."""
 
 from dataclasses import dataclass
 
 from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch, asked
 from kappaskin_app.shell.settings.skin import EDGE_NAMES
+
+
+@dataclass(frozen=True)
+class Looked:
+    """The direction `look`, in which all of the skin is seen; once turned by hand, the `camera`.
+
+    Its numbers are the view's own; none of them where it was not turned.
+    """
+
+    look: str = "left"
+    camera: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How large the window's letters are."""
+
+    letters: float = asked(
+        100.0,
+        Range(
+            "Letters",
+            "How large the window's letters are, of what the system asks for. Where the panels "
+            "have no room for larger ones, they scroll.",
+            80,
+            200,
+            10,
+            1.0,
+            "%",
+        ),
+    )
+
 
 COLOURS = (
     ("displacement", "Displacement"),

@@ -1,15 +1,213 @@
-"""Scene form: editors of what the text of a scene says; every edit makes a new text."""
+"""The forms of a scene: a box for each section, and the text that they make."""
 
 import tomllib
+from collections.abc import Callable
 from itertools import pairwise
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QApplication, QFrame, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtGui import QAction, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QFrame,
+    QGridLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QScrollArea,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
-from kappaskin_app.features.scene.scene_form.box import SectionBox
-from kappaskin_app.features.scene.scene_form.section import Change, Section
-from kappaskin_app.features.scene.scene_form.sections import sections_of
+from kappaskin_app.features.scene.scene_form.editors import Editor, editor_for
+from kappaskin_app.features.scene.scene_form.sections import (
+    Addition,
+    Change,
+    Row,
+    Section,
+    sections_of,
+)
+from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import Place
+from kappaskin_app.guard import guarded
+
+_BUTTON, _EDGE = 20, 9  # px: the size of a small button, and how far in the last one stands
+_NO_ARROW = "QToolButton::menu-indicator { image: none; }"
+
+Request = Callable[[Change], None]
+_ADDING = "Choose from a list what is added to the scene; its text shows it at once."
+
+
+class SectionBox(QGroupBox):
+    """Shows a section; `request` is told of every change of the text that a person makes."""
+
+    def __init__(self, section: Section, request: Request) -> None:
+        super().__init__(section.title)
+        self._request, self.section = request, section
+        self.editors: dict[Place, Editor] = {}
+        self.stops: list[QWidget] = []
+        self.labels: list[QLabel] = []
+        self.grid = QGridLayout(self)
+        self.grid.setColumnStretch(1, 1)
+        self.grid.setVerticalSpacing(5)
+        self.grid.setHorizontalSpacing(10)
+        self.grid.setContentsMargins(*((8, 6, 8, 8) if section.title else (8, 0, 8, 0)))
+        self._fill(section)
+        self._corner = self._buttons(section) if section.title else QWidget()
+        self._corner.setParent(self)
+        if not (section.rows or section.sections or section.adding):
+            usual = QLabel("As usual")
+            usual.setEnabled(False)
+            self.grid.addWidget(usual, 0, 0)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._corner.adjustSize()
+        self._corner.move(QPoint(self.width() - self._corner.width() - _EDGE, -1))
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        if self.title():  # else there is only a button, which needs no frame
+            super().paintEvent(event)
+
+    def show_section(self, section: Section) -> None:
+        """Show other values of the same structure."""
+        self.section = section
+        for row in section.all_rows():
+            self.editors[row.place].show(row.value)
+
+    def _fill(self, section: Section) -> None:
+        for row in section.rows:
+            self._add_row(row)
+        for part in section.sections:
+            if not part.step:
+                self._add_across(self._heading(part))
+                self._fill(part)
+        if steps := [part for part in section.sections if part.step]:
+            self._add_across(self._steps(steps))
+        if section.adding:
+            self.grid.addWidget(
+                self._menu_button(f"+ {section.adding}", section.tip or _ADDING, section.more),
+                *(self.grid.rowCount(), 0, 1, 2),
+                Qt.AlignmentFlag.AlignLeft,
+            )
+
+    def _add_across(self, widget: QWidget) -> None:
+        self.grid.addWidget(widget, self.grid.rowCount(), 0, 1, 2)
+
+    def _add_row(self, row: Row) -> None:
+        editor = self._editor(row)
+        label = QLabel(row.key.label)
+        label.setToolTip(row.key.explained)
+        label.setBuddy(editor.stops[0])
+        self.labels.append(label)
+        at = self.grid.rowCount()
+        self.grid.addWidget(label, at, 0)
+        across = QHBoxLayout()
+        across.addWidget(editor.widget, 1000)  # first: what is as wide as it may be leaves the rest
+        across.addStretch(1)
+        self.grid.addLayout(across, at, 1)
+
+    def _editor(self, row: Row, small: bool = False) -> Editor:
+        editor = editor_for(
+            row, lambda value: self._request(lambda t: row.changed(t, value)), small
+        )
+        for number, stop in enumerate(editor.stops, 1):
+            which = f", {number} of {len(editor.stops)}" if len(editor.stops) > 1 else ""
+            stop.setAccessibleName(stop.accessibleName() or f"{row.key.label}{which}")
+        self.editors[row.place] = editor
+        self.stops += editor.stops
+        return editor
+
+    def _heading(self, part: Section) -> QWidget:
+        heading = QWidget()
+        across = QHBoxLayout(heading)
+        across.setContentsMargins(0, 4, 0, 0)
+        label = QLabel(part.title)
+        font = label.font()
+        font.setBold(True)
+        label.setFont(font)
+        label.setToolTip(part.tip)
+        across.addWidget(label)
+        across.addStretch(1)
+        across.addWidget(self._buttons(part))
+        return heading
+
+    def _steps(self, steps: list[Section]) -> QWidget:
+        """One step after the other, each in a line; how it eases stands below."""
+        holder = QWidget()
+        grid = QGridLayout(holder)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(4)
+        grid.setVerticalSpacing(3)
+        for column, stretch in enumerate((0, 2, 5)):
+            grid.setColumnStretch(column, stretch)
+        for step in steps:
+            line = grid.rowCount()
+            for column, row in enumerate(step.rows):
+                below, across = divmod(column, 3)
+                grid.addWidget(self._editor(row, small=True).widget, line + below, across)
+            grid.addWidget(self._buttons(step), line, 3, Qt.AlignmentFlag.AlignRight)
+        return holder
+
+    def _buttons(self, section: Section) -> QWidget:
+        holder = QWidget()
+        across = QHBoxLayout(holder)
+        across.setContentsMargins(0, 0, 0, 0)
+        across.setSpacing(0)
+        if section.offers:
+            across.addWidget(self._menu_button("+", "Add a value", section.offers))
+        if section.removable:
+            across.addWidget(self._removing(section.place))
+        return holder
+
+    def _removing(self, place: Place) -> QToolButton:
+        button = _tool("\N{MULTIPLICATION SIGN}", "Remove", place)
+        button.clicked.connect(
+            guarded(lambda: self._request(lambda text: changes.remove(text, place)))
+        )
+        self.stops.append(button)
+        return button
+
+    def _menu_button(self, text: str, tip: str, offers: tuple[Addition, ...]) -> QToolButton:
+        button = _tool(text, tip, ("add",))
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        button.setMenu(self._menu(offers, button))
+        button.setEnabled(bool(offers))
+        self.stops.append(button)
+        return button
+
+    def _menu(self, offers: tuple[Addition, ...], parent: QWidget) -> QMenu:
+        menu = QMenu(parent)
+        menu.setToolTipsVisible(True)
+        for offer in offers:
+            if offer.inside:
+                inside = self._menu(offer.inside, menu)
+                inside.setTitle(offer.words)
+                menu.addMenu(inside)
+                continue
+            # Not the one that `addAction` makes: PySide may take it for an object of another kind
+            # that was there before.
+            action = QAction(offer.words, menu)
+            menu.addAction(action)
+            action.setToolTip(offer.tip)
+            action.triggered.connect(guarded(lambda *_, o=offer: self._request(o.change)))
+        return menu
+
+
+def _tool(text: str, tip: str, place: Place) -> QToolButton:
+    button = QToolButton()
+    button.setText(text)
+    button.setToolTip(tip)
+    button.setAutoRaise(len(text) == 1)
+    button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    button.setStyleSheet(_NO_ARROW)
+    if len(text) == 1:
+        button.setFixedSize(_BUTTON, _BUTTON)
+    button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+    return button
+
 
 _LABEL = 14  # digits that a label has room for at least
 

@@ -1,15 +1,126 @@
-"""The sections that a scene's text calls for, from the schema of scene files."""
+"""The text of a scene as sections: parts with rows, and what may be added."""
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from kappaskin.scenes import PARTS, Key, instead_of
-from kappaskin_app.features.scene.scene_form.kinds import kind_of
-from kappaskin_app.features.scene.scene_form.section import Addition, Change, Row, Section
 from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import Place
 from kappaskin_app.shell.effects import called, explained
+
+MOST_WHOLE = 2**31 - 1  # that a box for whole numbers can hold
+MOST = 1e12  # of any number shown in a box
+
+
+def kind_of(value: Any, key: Key) -> str:
+    """By what a value is edited of which `key` declares what it may be.
+
+    That is a choice, text, literal, switch, number, whole, numbers, wholes or pairs; or a count of
+    numbers or whole ones, as in "2 number".
+    """
+    if isinstance(value, str):
+        plain = "literal" if "\n" in value else "text"
+        return "choice" if key.choices else plain
+    if isinstance(value, bool):
+        return "switch"
+    if isinstance(value, list):
+        return _kind_of_list(value, key)
+    return _kind_of_number(value, key.real) if _is_number(value) else "literal"
+
+
+def _is_number(value: Any) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and math.isfinite(value)
+
+
+def _kind_of_number(value: float, real: bool) -> str:
+    if isinstance(value, int) and not real:
+        return "whole" if abs(value) <= MOST_WHOLE else "literal"
+    return "number" if abs(value) <= MOST else "literal"
+
+
+def _kind_of_list(value: list[Any], key: Key) -> str:
+    """That of its numbers with their count, unless they are many, or their number may change."""
+    if value and all(isinstance(one, list) and all(map(_is_number, one)) for one in value):
+        return "pairs"
+    if not all(map(_is_number, value)):
+        return "literal"
+    if key.listed or len(value) not in (2, 3):
+        return "numbers" if key.real else "wholes"
+    each = {_kind_of_number(one, key.real) for one in value}
+    return f"{len(value)} {each.pop()}" if len(each) == 1 else "numbers"
+
+
+Change = Callable[[str], str]
+"""A text to a text."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One value at a `place`; `kind` says by what it is edited, `usual` how large it often is.
+
+    The value of one of a `part` says of which kind that part is.
+    """
+
+    place: Place
+    kind: str
+    key: Key
+    value: Any
+    usual: Any = None
+    part: str = ""
+
+    def changed(self, text: str, value: Any) -> str:
+        """The text with another value here."""
+        if self.part:
+            return changes.change_kind(text, self.place, self.part, value)
+        return changes.put(text, self.place, value)
+
+
+@dataclass(frozen=True)
+class Addition:
+    """Something that may be put in, in words; or others `inside`."""
+
+    words: str
+    tip: str
+    change: Change = str
+    inside: "tuple[Addition, ...]" = ()
+
+
+@dataclass(frozen=True)
+class Section:
+    """A titled part of a scene: rows, then parts of its own, and what may be added or removed.
+
+    `offers` are further rows, `more` further parts, which a button called `adding` offers. A step
+    is shown in one line.
+    """
+
+    title: str
+    place: Place
+    rows: tuple[Row, ...] = ()
+    sections: "tuple[Section, ...]" = ()
+    offers: tuple[Addition, ...] = ()
+    adding: str = ""
+    more: tuple[Addition, ...] = ()
+    removable: bool = False
+    step: bool = False
+    tip: str = ""
+
+    @property
+    def structure(self) -> tuple[Any, ...]:
+        """All but the values: what its editors are made from."""
+        return (
+            *(self.title, self.place, self.adding),
+            tuple((row.place, row.kind, row.key) for row in self.rows),
+            tuple(section.structure for section in self.sections),
+            tuple(offer.words for offer in (*self.offers, *self.more)),
+        )
+
+    def all_rows(self) -> tuple[Row, ...]:
+        """Its own rows, then those of its parts."""
+        return (*self.rows, *(row for section in self.sections for row in section.all_rows()))
+
 
 _ELECTRONICS = ("bridge", "multiplexer", "amplifier", "converter")
 _ORDER = ("step", "seconds", "by", "to", "times", "ease")

@@ -1,0 +1,344 @@
+"""Pages of a calibration: what to ask, what to do next, and what came of it."""
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QFormLayout,
+    QGridLayout,
+    QLabel,
+    QLineEdit,
+    QProgressBar,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin.calibration import Procedure
+from kappaskin.errors import Refusal
+from kappaskin.frames import COMPONENTS
+from kappaskin.scenes import ADVICE, CylinderStep, schedule
+from kappaskin_app.features.calibration.calibrating import Calibrating, Result, parsed_radii
+from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
+from kappaskin_app.guard import guarded
+from kappaskin_app.widgets.parts import (
+    ELLIPSIS,
+    EQUATION_8,
+    Heading,
+    button,
+    in_a_row,
+    named,
+    number,
+    seconds_box,
+    text_label,
+)
+
+
+class Start(QWidget):
+    """Asks with which cylinders, and how long on each."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.radii = QLineEdit()
+        self.radii.setObjectName("radii")
+        self.radii.setToolTip(
+            "Radii in mm of the cylinders that you have, in any order; at least three."
+        )
+        self.seconds = seconds_box(
+            "seconds", 0.1, 1.0, "How long the readings of a step are averaged."
+        )
+        self.hold = seconds_box(
+            "hold",
+            0.0,
+            0.0,
+            "Above zero, the skin first stays so long on the smallest cylinder, which shows how "
+            "the glue creeps.",
+        )
+        self.hold.setSpecialValueText("none")
+        self.plan = text_label()
+        self.begin = button("Begin", "begin", "Begin with the flat table.")
+        form = QFormLayout()
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
+        form.setVerticalSpacing(5)
+        for words, editor in (
+            ("Radii, mm", self.radii),
+            ("Time on each", self.seconds),
+            ("First hold", self.hold),
+        ):
+            label = QLabel(words)
+            label.setBuddy(editor)
+            label.setToolTip(editor.toolTip())
+            form.addRow(label, editor)
+        around = QVBoxLayout(self)
+        around.setContentsMargins(0, 0, 0, 0)
+        around.addLayout(form)
+        around.addWidget(self.plan)
+        around.addWidget(text_label(ADVICE))
+        around.addWidget(self.begin)
+        self.radii.returnPressed.connect(self.begin.click)
+
+    def show_plan(self, strip: bool) -> None:
+        """Say what the cylinders come to."""
+        try:
+            steps = schedule(parsed_radii(self.radii.text()), self.hold.value(), strip)
+        except Refusal as refusal:
+            text = str(refusal)
+        else:
+            total = sum(max(self.seconds.value(), step.hold) for step in steps)
+            ways = "along x" if strip else "along x, along y and along the diagonal"
+            text = (
+                f"{len(steps)} steps: bent {ways}; on each face from large to small radii and "
+                f"back, flat between. {_duration(total)} of readings."
+            )
+        if text != self.plan.text():
+            self.plan.setText(text[:1].upper() + text[1:])
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} minutes"
+
+
+_BENT = {"x": "bent along x", "y": "bent along y", "diagonal": "bent along the diagonal"}
+_WAYS = {
+    "there": "on the way there",
+    "back": "on the way back",
+    "first": "first of all, to wipe out its past",
+}
+
+
+class Steps(QWidget):
+    """Says which step is next, and what the last one read."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.number = QLabel()
+        self.bar = QProgressBar(textVisible=False)  # pyright: ignore[reportCallIssue]
+        self.bar.setFixedHeight(8)
+        self.bar.setToolTip("Steps that are done, and how far this one is.")
+        self.what = Heading(1.5)
+        self.how = text_label()
+        self.drawing = CylinderView()
+        self.take = button(
+            "Take", "take", "Take what the skin reads now, and go on (Enter, Space, Ctrl+Shift+K)."
+        )
+        self.redo = button("Take the last one again", "redo", "Go back by one step.")
+        self.cancel = button("Cancel", "cancel", "End here, and forget what was taken.")
+        self.all = button(
+            "Take all",
+            "take-all",
+            "Go through all steps unattended: the simulated skin lays itself on each cylinder.",
+        )
+        self.read = QGridLayout()
+        self.read.setVerticalSpacing(2)
+        self.heading = text_label()
+        self.cells = [[QLabel() for _ in range(3)] for _ in COMPONENTS]
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        heads = (
+            ("", ""),
+            ("read", EQUATION_8 + "The median of the elements."),
+            ("cylinder", "The curvature 1/R of the cylinder, as this component has it."),
+            ("noise", "Standard deviation of one frame, the median of the elements."),
+        )
+        for column, (words, tip) in enumerate(heads):
+            head = QLabel(f"<i>{words}</i>")
+            head.setToolTip(tip)
+            self.read.addWidget(head, 0, column, Qt.AlignmentFlag.AlignRight)
+        for row, name in enumerate(COMPONENTS, 1):
+            self.read.addWidget(QLabel(name), row, 0)
+            for column, cell in enumerate(self.cells[row - 1], 1):
+                self.read.addWidget(cell, row, column, Qt.AlignmentFlag.AlignRight)
+        around = QVBoxLayout(self)
+        around.setContentsMargins(0, 0, 0, 0)
+        for widget in (self.number, self.bar, self.what, self.how, self.drawing, self.take):
+            around.addWidget(widget)
+        around.addWidget(self.all)
+        around.addLayout(in_a_row(self.redo, self.cancel))
+        around.addWidget(self.heading)
+        around.addLayout(self.read)
+
+    def show_step(self, now: Calibrating, procedure: Procedure, step: CylinderStep | None) -> None:
+        done, total = len(procedure.taken), len(procedure.steps)
+        self.bar.setRange(0, 100 * total)
+        self.bar.setValue(round(100 * (done + now.share)))
+        self.redo.setEnabled(bool(done) and not now.computing)
+        self.take.setEnabled(not now.computing)
+        self.all.setEnabled(not now.computing)
+        self.all.setText("Go on step by step" if now.unattended else "Take all")
+        self.take.setText(f"Taking{ELLIPSIS}" if now.taking else "Take")
+        if step is None:
+            self.number.setText(f"{total} of {total} taken")
+            self.what.setText(f"Computing the calibration{ELLIPSIS}")
+            self.how.setText("")
+        else:
+            self.number.setText(f"Step {step.number} of {total}")
+            self.what.setText(_what(step))
+            self.how.setText(_how(step))
+            self.drawing.show_step(step, procedure.sensor.layout.patch)
+        self._show_read(procedure)
+
+    def _show_read(self, procedure: Procedure) -> None:
+        if not procedure.taken:
+            self.heading.setText("")
+            for cell in (cell for row in self.cells for cell in row):
+                cell.setText("\N{EN DASH}")
+            return
+        taken = procedure.taken[-1]
+        missing = int(np.isnan(taken.mean).sum())
+        lost = f"; {missing} channels dead or on a rail" if missing else ""
+        self.heading.setText(
+            f"Step {taken.step.number} read, in {taken.frames} frames{lost} (1/m):"
+        )
+        parts = zip(taken.mean.reshape(3, -1), taken.noise.reshape(3, -1), strict=True)
+        for row, (mean, noise) in enumerate(parts):
+            values = (_median(mean), float(taken.step.curvature[row]))
+            texts = [number(value, "+.1f") for value in values] + [number(_median(noise), ".2f")]
+            for cell, text in zip(self.cells[row], texts, strict=True):
+                cell.setText(text)
+
+
+def _what(step: CylinderStep) -> str:
+    return "Flat table" if step.flat else f"Cylinder of {1e3 * step.radius:g} mm"
+
+
+def _how(step: CylinderStep) -> str:
+    if step.flat:
+        return "Nothing pressing on the skin.\n"
+    face = "inner face on it" if step.face > 0 else "outer face on it"
+    if step.hold:
+        return f"{_BENT[step.along]}, {face}: press Take, then lay it on; it stays {step.hold:g} s"
+    return f"{_BENT[step.along]}, {face},\n{_WAYS[step.way]}"
+
+
+def _median(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else float("nan")
+
+
+_WORST = 5
+
+
+class Outcome(QWidget):
+    """Says how good the calibration is, channel by channel."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.passed = Heading(1.3)
+        self.errors = text_label(
+            tip="Root mean square of what is left of the cylinders' curvature; widest difference "
+            "between the way there and the way back. Both first with the line of each gage pair "
+            "alone (section 5 of the paper), then with the loops undone too."
+        )
+        self.map, self.plot, self.channel = PassMap(), LoopPlot(), text_label()
+        self.worst = text_label(tip="Click one to see its readings.")
+        self.worst.setTextInteractionFlags(
+            Qt.TextInteractionFlag.LinksAccessibleByMouse
+            | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
+        )
+        self.use = button(
+            "Use",
+            "use",
+            "Correct the readings by it from now on (Ctrl+Z undoes). Loops are followed from a "
+            "skin at rest: bend a real one back and forth first, less and less.",
+        )
+        self.save = button(f"Save{ELLIPSIS}", "save", "Write it to a file.")
+        self.leave = button("New", "leave", "Begin another one; what is not saved is forgotten.")
+        around = QVBoxLayout(self)
+        around.setContentsMargins(0, 0, 0, 0)
+        around.addWidget(self.passed)
+        around.addWidget(self.errors)
+        around.addLayout(in_a_row(self.use, self.save, self.leave))
+        for widget in (self.map, self.channel, self.plot, self.worst):
+            around.addWidget(widget)
+        self.map.chosen.connect(guarded(self.show_channel))
+        self.worst.linkActivated.connect(guarded(lambda link: self.show_channel(int(link))))
+        self._result: Result | None = None
+        self._link, self._worst = "", []
+
+    def show_result(self, result: Result) -> None:
+        if result is self._result:
+            return
+        self._result = result
+        report, layout = result.report, result.sensor.layout
+        passed, total = int(report.passed.sum()), len(report.passed)
+        self.passed.setText(f"{passed} of {total} channels pass")
+        good = report.passed
+        before, after = (
+            float(np.sqrt(np.mean(lines.rms[good] ** 2))) for lines in (report.line, report.fitted)
+        )
+        wide, left = (float(gaps[:, good].max()) for gaps in (report.gaps, report.gaps_left))
+        self.errors.setText(
+            "<table cellspacing=0 cellpadding=1>"
+            "<tr><td></td><td align=right><i>&nbsp;line alone</i></td>"
+            "<td align=right><i>&nbsp;&nbsp;loops undone</i></td></tr>"
+            f"<tr><td>Residual, RMS</td><td align=right>{before:.2f}</td>"
+            f"<td align=right>{after:.2f} 1/m</td></tr>"
+            f"<tr><td>Widest loop</td><td align=right>{wide:.2f}</td>"
+            f"<td align=right>{left:.2f} 1/m</td></tr></table>"
+        )
+        failures = dict(report.calibration.failures)
+        order = np.argsort(np.where(good, -report.fitted.left_out, -np.inf), kind="stable")
+        worst = [int(channel) for channel in order[:_WORST]]
+        self._worst = worst
+        self._show_worst()
+        self.map.show_channels(layout, failures, [self._told(c) for c in range(total)])
+        self.show_channel(worst[0])
+
+    def _show_worst(self) -> None:
+        if self._result is None:
+            return
+        report = self._result.report
+        elements, failures = len(report.passed) // 3, dict(report.calibration.failures)
+        lines = [
+            f'<a href="{c}" style="color: {self._link}">{named(c, elements)}</a>: '
+            + failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m")
+            for c in self._worst
+        ]
+        self.worst.setText("<br>".join(["Worst:", *lines]))
+
+    def show_colour(self, link: str) -> None:
+        """The colour of what can be clicked."""
+        self._link = link
+        self._show_worst()
+
+    def _told(self, channel: int) -> str:
+        """A channel in words."""
+        if self._result is None:
+            return ""
+        report = self._result.report
+        fit, why = report.fitted, dict(report.calibration.failures).get(channel)
+        name = named(channel, len(report.passed) // 3)
+        if why:
+            return f"{name} fails: {why}"
+        return (
+            f"{name}: gain {fit.gain[channel]:.3f}, offset "
+            f"{number(float(fit.offset[channel]), '+.2f')} 1/m, error "
+            f"{fit.left_out[channel]:.2f} 1/m"
+        )
+
+    def show_channel(self, channel: int) -> None:
+        if self._result is None:
+            return
+        self.map.show_channel(channel)
+        self.channel.setText(self._told(channel))
+        self.plot.show_loop(_loop(self._result, channel))
+
+
+def _loop(result: Result, channel: int) -> Loop:
+    """What `channel` read wherever its component was bent, or all was flat.
+
+    Without the steps that only wipe out the past.
+    """
+    sweep, report = result.sweep, result.report
+    applied = sweep.curvature[:, channel // (len(report.passed) // 3)]
+    flat = np.array([step.flat for step in sweep.steps])
+    counts = np.array([step.way != "first" for step in sweep.steps])
+    used = np.flatnonzero(counts & (flat | (applied != 0)))
+    steps = [sweep.steps[k] for k in used]
+    return Loop(
+        applied[used],
+        sweep.readings[used, channel],
+        np.array([step.back for step in steps]),
+        np.diff(used, prepend=-2) > 1,
+        float(report.fitted.gain[channel]),
+        float(report.fitted.offset[channel]),
+    )

@@ -1,0 +1,495 @@
+"""Pictures of a calibration: the skin on its cylinder, a channel's loop, who passed."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QHelpEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+    QPen,
+    QPolygonF,
+)
+from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
+
+from kappaskin.frames import COMPONENTS
+from kappaskin.scenes import CylinderStep
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
+from kappaskin_app.theme import LIGHT, Theme
+
+_POINTS = 61  # of the skin's line
+_MOST_WRAPPED = math.pi  # rad: the rest of a long skin hangs down straight
+_CYLINDER_HIGH = 102  # px of the drawings without the words above and below them
+_LONGEST = "outer face down"
+_THICK = 5.0  # px, of each face
+_BENDS = {"x": (1.0, 0.0), "y": (0.0, 1.0), "diagonal": (math.sqrt(0.5), math.sqrt(0.5))}
+
+
+class CylinderView(QWidget):
+    """Draws where the skin of a patch is to lie; the radius is to the scale of the skin."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._step: CylinderStep | None = None
+        self._patch, self._theme = Patch(0.1, 0.1), LIGHT
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setToolTip(
+            "Left: the skin on its cylinder, seen along the axis and to scale; the thick line is "
+            "the outer face, which objects touch. Right: from above, with the axis dashed."
+        )
+
+    def sizeHint(self) -> QSize:
+        return QSize(280, _CYLINDER_HIGH + 2 * self.fontMetrics().height())
+
+    def minimumSizeHint(self) -> QSize:
+        high, wide = self.sizeHint().height(), self.fontMetrics().horizontalAdvance(_LONGEST)
+        return QSize(max(220, high + wide + 16), high)
+
+    def show_step(self, step: CylinderStep, patch: Patch) -> None:
+        if step is not self._step or patch is not self._patch:
+            self._step, self._patch = step, patch
+            self.update()
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        if self._step is None:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        height = float(self.height())
+        above = QRectF(self.width() - height + 4, 4, height - 8, height - 8)
+        self._paint_side(painter, QRectF(2, 2, above.left() - 14, height - 4), self._step)
+        metrics = painter.fontMetrics()
+        beside, below = metrics.horizontalAdvance("y") + 5, metrics.height() - 3
+        self._paint_above(painter, above.adjusted(beside, 4, -4, -below), self._step)
+
+    # From the side.
+
+    def _paint_side(self, painter: QPainter, area: QRectF, step: CylinderStep) -> None:
+        theme = self._theme
+        high = painter.fontMetrics().height()
+        painter.save()
+        painter.setClipRect(area)
+        along_x, along_y = _BENDS[step.along]
+        length = 1e3 * min(
+            self._patch.a / along_x if along_x > 1e-9 else math.inf,
+            self._patch.b / along_y if along_y > 1e-9 else math.inf,
+        )
+        per_mm = 0.62 * area.width() / length
+        top = QPointF(area.center().x(), area.top() + high + 15)
+        if step.flat:
+            ground = QRectF(area.left(), top.y() + _THICK, area.width(), area.height())
+            painter.fillRect(ground, QColor(theme.line))
+        else:
+            radius = 1e3 * step.radius * per_mm
+            painter.setPen(QPen(QColor(theme.faint), 1))
+            painter.setBrush(QColor(theme.line))
+            painter.drawEllipse(QPointF(top.x(), top.y() + _THICK + radius), radius, radius)
+        inward = step.face * _THICK / 2
+        line = _draped(length * per_mm, 1e3 * step.radius * per_mm + _THICK)
+        for offset, colour, width in (
+            (inward, theme.faint, 2.0),
+            (-inward, theme.accent, _THICK),
+        ):
+            pen = QPen(QColor(colour), width)
+            pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+            painter.strokePath(_shifted(line, top, offset), pen)
+        painter.setPen(QColor(theme.accent))
+        words = "outer face up" if step.face > 0 else "outer face down"
+        painter.drawText(area, Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignHCenter, words)
+        painter.setPen(QColor(theme.text))
+        size = "table" if step.flat else f"{1e3 * step.radius:g} mm"
+        at = QRectF(area.left(), area.bottom() - 2 * high - 4, area.width(), 2 * high)
+        painter.drawText(at, Qt.AlignmentFlag.AlignCenter, size)
+        painter.restore()
+
+    # From above.
+
+    def _paint_above(self, painter: QPainter, area: QRectF, step: CylinderStep) -> None:
+        theme = self._theme
+        per_m = min(area.width() / self._patch.a, area.height() / self._patch.b)
+        width, height = self._patch.a * per_m, self._patch.b * per_m
+        skin = QRectF(0, 0, width, height)
+        skin.moveCenter(area.center())
+        painter.setPen(QPen(QColor(theme.text), 1))
+        painter.setBrush(QColor(theme.base))
+        painter.drawRect(skin)
+        flags = Qt.AlignmentFlag.AlignCenter
+        painter.setPen(QColor(theme.faint))
+        line, wide = painter.fontMetrics().height(), painter.fontMetrics().horizontalAdvance("y")
+        painter.drawText(QRectF(skin.left(), skin.bottom() + 1, width, line), flags, "x")
+        y_at = QRectF(skin.left() - wide - 4, skin.top(), wide + 2, height)
+        painter.drawText(y_at, flags, "y")
+        if step.flat:
+            painter.drawText(skin, flags, "flat")
+            return
+        dx, dy = _BENDS[step.along]
+        self._paint_axis(painter, skin, dx, dy, 1e3 * step.radius * per_m / 1e3)
+        _paint_arrow(painter, skin, dx, -dy, QColor(theme.accent))
+
+    def _paint_axis(
+        self, painter: QPainter, skin: QRectF, dx: float, dy: float, radius: float
+    ) -> None:
+        """The cylinder below the skin, and its axis, across the direction of bending."""
+        painter.save()
+        painter.setClipRect(skin)
+        painter.translate(skin.center())
+        painter.rotate(-math.degrees(math.atan2(dy, dx)))
+        far = skin.width() + skin.height()
+        cylinder = QColor(self._theme.line)
+        painter.fillRect(QRectF(-radius, -far, 2 * radius, 2 * far), cylinder)
+        painter.setPen(QPen(QColor(self._theme.faint), 1.5, Qt.PenStyle.DashLine))
+        painter.drawLine(QPointF(0, -far), QPointF(0, far))
+        painter.restore()
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(QPen(QColor(self._theme.text), 1))
+        painter.drawRect(skin)
+
+
+def _draped(length: float, radius: float) -> list[tuple[QPointF, QPointF]]:
+    """Points of a line of `length` over a circle below the origin, with the normals there, up."""
+    wrapped = min(length / 2, _MOST_WRAPPED / 2 * radius)
+    found: list[tuple[QPointF, QPointF]] = []
+    for k in range(_POINTS):
+        s = length * (k / (_POINTS - 1) - 0.5)
+        on = max(-wrapped, min(wrapped, s))
+        if math.isinf(radius):
+            found.append((QPointF(s, 0.0), QPointF(0.0, -1.0)))
+            continue
+        angle, rest = on / radius, abs(s) - abs(on)
+        side = math.copysign(1.0, s)
+        out = QPointF(math.sin(angle), -math.cos(angle))
+        along = QPointF(side * math.cos(angle), side * math.sin(angle))
+        at = QPointF(radius * out.x(), radius * (1 + out.y()))
+        found.append((at + along * rest, out))
+    return found
+
+
+def _shifted(line: list[tuple[QPointF, QPointF]], to: QPointF, down: float) -> QPainterPath:
+    points = [to + at - out * down for at, out in line]
+    path = QPainterPath(points[0])
+    for point in points[1:]:
+        path.lineTo(point)
+    return path
+
+
+def _paint_arrow(painter: QPainter, skin: QRectF, dx: float, dy: float, colour: QColor) -> None:
+    """An arrow with two heads through the middle, along the direction of bending."""
+    half = 0.34 * min(skin.width() / max(abs(dx), 1e-9), skin.height() / max(abs(dy), 1e-9))
+    along, across, middle = QPointF(dx, dy), QPointF(-dy, dx), skin.center()
+    painter.setPen(QPen(colour, 2.5))
+    painter.drawLine(middle - along * half, middle + along * half)
+    painter.setBrush(colour)
+    painter.setPen(Qt.PenStyle.NoPen)
+    for way in (1.0, -1.0):
+        tip = middle + along * (way * (half + 5))
+        back = tip - along * (way * 11)
+        painter.drawPolygon(QPolygonF([tip, back + across * 5.5, back - across * 5.5]))
+
+
+Array = NDArray[np.float64]
+
+_TOP, _RIGHT = 8.0, 10.0
+_HIGH = 158  # px of the plot without the words below it
+_APART = 6.0  # px between two numbers
+_AXES = "read (up) on applied, 1/m"
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """Readings (n,) on curvatures `applied` (n,), both in 1/m, in the order they were taken.
+
+    `back` (n,) tells the way to larger radii; a new round begins where `begins` (n,) says so.
+    """
+
+    applied: Array
+    read: Array
+    back: NDArray[np.bool_]
+    begins: NDArray[np.bool_]
+    gain: float
+    offset: float
+
+
+class LoopPlot(QWidget):
+    """Draws a `Loop`: filled points on the way there, open ones on the way back."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._loop: Loop | None = None
+        self._theme = LIGHT
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setToolTip(
+            "Nominal curvature as Eq. 8 reads it, 4 V / (V_in GF (t_s + t_g) G), over that of the "
+            "cylinder. Dashed: the line of the calibration. Filled points: to smaller radii; "
+            "open ones: back. What lies between the two ways is hysteresis."
+        )
+
+    def sizeHint(self) -> QSize:
+        return QSize(280, _HIGH + 2 * self.fontMetrics().height())
+
+    def minimumSizeHint(self) -> QSize:
+        wide = self.fontMetrics().horizontalAdvance(_AXES) + 4
+        return QSize(max(220, wide), self.sizeHint().height())
+
+    def show_loop(self, loop: Loop) -> None:
+        self._loop = loop
+        self.update()
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        loop, theme = self._loop, self._theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if loop is None or not np.isfinite(loop.read).any():
+            area = self._area(0.0)
+            painter.fillRect(area, QColor(theme.base))
+            painter.setPen(QColor(theme.faint))
+            painter.drawText(area, Qt.AlignmentFlag.AlignCenter, "No readings")
+            return
+        most = 1.08 * max(
+            float(np.abs(loop.applied).max()), float(np.nanmax(np.abs(loop.read))), 1e-9
+        )
+        ticks = _ticks(most)
+        widest = max(map(self.fontMetrics().horizontalAdvance, ticks.values()))
+        area = self._area(widest)
+        painter.fillRect(area, QColor(theme.base))
+
+        def at(x: float, y: float) -> QPointF:
+            return QPointF(
+                area.center().x() + x / most * area.width() / 2,
+                area.center().y() - y / most * area.height() / 2,
+            )
+
+        self._paint_axes(painter, area, most, ticks, widest)
+        painter.setClipRect(area.adjusted(-4, -4, 4, 4))
+        if math.isfinite(loop.gain):
+            painter.setPen(QPen(QColor(theme.faint), 1.5, Qt.PenStyle.DashLine))
+            ends = (at(x, loop.offset + loop.gain * x) for x in (-most, most))
+            painter.drawLine(*ends)
+        accent = QColor(theme.accent)
+        painter.setPen(QPen(accent, 1))
+        rounds = np.split(np.arange(len(loop.read)), np.flatnonzero(loop.begins)[1:])
+        points = [at(x, y) for x, y in zip(loop.applied, loop.read, strict=True)]
+        good = np.isfinite(loop.read)
+        for turn in rounds:
+            painter.drawPolyline(QPolygonF([points[k] for k in turn if good[k]]))
+        for k in np.flatnonzero(good):
+            painter.setBrush(QColor(theme.base) if loop.back[k] else accent)
+            painter.drawEllipse(points[k], 2.6, 2.6)
+
+    def _area(self, widest: float) -> QRectF:
+        """Where the loop is drawn, beside numbers that are so many px wide."""
+        below = 2 * self.fontMetrics().height() + 2
+        return QRectF(self.rect()).adjusted(widest + 6, _TOP, -_RIGHT, -below)
+
+    def _paint_axes(
+        self, painter: QPainter, area: QRectF, most: float, ticks: dict[float, str], widest: float
+    ) -> None:
+        theme, flags = self._theme, Qt.AlignmentFlag
+        line = painter.fontMetrics().height()
+        painter.setPen(QPen(QColor(theme.line), 1))
+        painter.drawRect(area)
+        step = _round(most) / most / 2
+        # Every so many of them, so that no two lie over each other.
+        beside = math.ceil((widest + _APART) / (step * area.width()))
+        above = math.ceil(line / (step * area.height()))
+        for number, (value, words) in enumerate(ticks.items(), -(len(ticks) // 2)):
+            x = area.center().x() + value / most * area.width() / 2
+            y = area.center().y() - value / most * area.height() / 2
+            painter.setPen(QPen(QColor(theme.line), 1))
+            painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
+            painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
+            painter.setPen(QColor(theme.faint))
+            if not number % above:
+                box = QRectF(0, y - line / 2, area.left() - 4, line)
+                painter.drawText(box, flags.AlignRight | flags.AlignVCenter, words)
+            if not number % beside:
+                box = QRectF(x - widest, area.bottom() + 1, 2 * widest, line)
+                painter.drawText(box, flags.AlignCenter, words)
+        below = QRectF(0, self.height() - line - 1, self.width(), line)
+        painter.drawText(below, flags.AlignCenter, _AXES)
+
+
+def _ticks(most: float) -> dict[float, str]:
+    """Round values on both sides of zero up to `most`, and how they are written."""
+    step = _round(most)
+    values = (np.arange(-math.floor(most / step), math.floor(most / step) + 1) * step).tolist()
+    return {value: f"{value:g}".replace("-", "\N{MINUS SIGN}") for value in values}
+
+
+def _round(most: float) -> float:
+    """A distance of ticks that gives two to four on each side."""
+    power = 10.0 ** math.floor(math.log10(most / 2))
+    return next(m * power for m in (5.0, 2.0, 1.0) if m * power <= most / 2)
+
+
+_MAP_HIGH = 91  # px of each map
+_WIDEST = "xx: 100 pass"  # of the titles, more or less
+_GAP = 8
+_TIP = "Which channels passed. Click one, or use the arrow keys, to see its readings below."
+_SHARE = 0.86  # of the distance between elements that a square fills
+_WAYS = {
+    Qt.Key.Key_Left: (-1.0, 0.0),
+    Qt.Key.Key_Right: (1.0, 0.0),
+    Qt.Key.Key_Up: (0.0, 1.0),
+    Qt.Key.Key_Down: (0.0, -1.0),
+}
+
+
+class PassMap(QWidget):
+    """Three small maps, xx, yy and xy; `chosen` tells of channel component * P + element."""
+
+    chosen = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._layout: SensorLayout | None = None
+        self._failures: dict[int, str] = {}
+        self._tips: list[str] = []
+        self._channel, self._spacing, self._theme = 0, 0.0, LIGHT
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Channels that passed")
+
+    def sizeHint(self) -> QSize:
+        return QSize(280, _MAP_HIGH + self._title)
+
+    def minimumSizeHint(self) -> QSize:
+        wide = 3 * self.fontMetrics().horizontalAdvance(_WIDEST) + 2 * _GAP
+        return QSize(wide, _MAP_HIGH + self._title)
+
+    def show_channels(
+        self, layout: SensorLayout, failures: dict[int, str], tips: list[str]
+    ) -> None:
+        """Show which channels failed, and `tips` in words for each of all."""
+        self._layout, self._failures, self._tips = layout, failures, tips
+        self._spacing = _spacing(layout)
+        self.update()
+
+    def show_channel(self, channel: int) -> None:
+        self._channel = channel
+        self.update()
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        self.update()
+
+    @property
+    def _title(self) -> int:
+        """The px above each map."""
+        return self.fontMetrics().height() + 2
+
+    def _squares(self, component: int) -> list[QRectF]:
+        """Where each element is drawn in the map of a component."""
+        layout = self._layout
+        if layout is None:
+            return []
+        width = (self.width() - 2 * _GAP) / 3
+        height = self.height() - self._title - 2
+        a, b = layout.patch.a, layout.patch.b
+        scale = min((width - 2) / a, height / b)
+        left = component * (width + _GAP) + (width - scale * a) / 2
+        bottom = self._title + (height + scale * b) / 2
+        side = max(_SHARE * self._spacing * scale, 2.0)
+        return [
+            QRectF(left + x * scale - side / 2, bottom - y * scale - side / 2, side, side)
+            for x, y in layout.positions
+        ]
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        layout, theme = self._layout, self._theme
+        if layout is None:
+            return
+        painter = QPainter(self)
+        width, elements = (self.width() - 2 * _GAP) / 3, len(layout)
+        for c, name in enumerate(COMPONENTS):
+            painter.setPen(QColor(theme.text))
+            title = QRectF(c * (width + _GAP), 0, width, self._title - 2)
+            failed = sum(1 for channel in self._failures if channel // elements == c)
+            passed = f"{name}: {elements - failed} pass" if failed else f"{name}: all pass"
+            painter.drawText(title, Qt.AlignmentFlag.AlignCenter, passed)
+            for element, square in enumerate(self._squares(c)):
+                self._paint_channel(painter, square, c * elements + element)
+        if self._channel < 3 * elements:
+            component, element = divmod(self._channel, elements)
+            painter.setPen(QPen(QColor(theme.text), 3 if self.hasFocus() else 2))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRect(self._squares(component)[element].adjusted(-1, -1, 1, 1))
+
+    def _paint_channel(self, painter: QPainter, square: QRectF, channel: int) -> None:
+        """A full square where it passed, a crossed one where not: not told by colour alone."""
+        theme = self._theme
+        if channel not in self._failures:
+            painter.fillRect(square, QColor(theme.good))
+            return
+        painter.fillRect(square, QColor(theme.bad))
+        painter.setPen(QPen(QColor("#ffffff"), 1))
+        painter.drawLine(square.topLeft(), square.bottomRight())
+        painter.drawLine(square.bottomLeft(), square.topRight())
+
+    def _channel_at(self, at: QPointF) -> int:
+        if self._layout is not None:
+            for c in range(3):
+                for element, square in enumerate(self._squares(c)):
+                    if square.adjusted(-1, -1, 1, 1).contains(at):
+                        return c * len(self._layout) + element
+        return -1
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        if (channel := self._channel_at(event.position())) >= 0:
+            self.chosen.emit(channel)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        way = _WAYS.get(Qt.Key(event.key()))
+        if way is None or self._layout is None:
+            super().keyPressEvent(event)
+            return
+        self.chosen.emit(self._next(*way))
+
+    def _next(self, dx: float, dy: float) -> int:
+        """The nearest element that way, or the same in the next map where there is none."""
+        layout = self._layout
+        if layout is None:
+            return self._channel
+        component, element = divmod(self._channel, len(layout))
+        away = layout.positions - layout.positions[element]
+        ahead = away @ [dx, dy]
+        off = np.abs(away @ [dy, dx])
+        cost = np.where(ahead > 1e-9, ahead + 2 * off, np.inf)
+        if np.isfinite(cost).any():
+            return component * len(layout) + int(np.argmin(cost))
+        if not dx:
+            return self._channel
+        return (component + int(dx)) % 3 * len(layout) + element
+
+    def event(self, event: QEvent) -> bool:
+        if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
+            channel = self._channel_at(QPointF(event.pos()))
+            text = self._tips[channel] if 0 <= channel < len(self._tips) else _TIP
+            QToolTip.showText(event.globalPos(), text, self)
+            return True
+        return super().event(event)
+
+
+def _spacing(layout: SensorLayout) -> float:
+    """What separates the two nearest elements, in m, along x or y."""
+    positions = layout.positions
+    if len(positions) < 2:
+        return 0.3 * min(layout.patch.a, layout.patch.b)
+    apart = np.max(np.abs(positions[:, None] - positions[None]), axis=-1)
+    np.fill_diagonal(apart, np.inf)
+    return max(float(apart.min()), 0.02 * layout.patch.a)

@@ -1,0 +1,177 @@
+"""The mouse on the skin: what it points at, and loads that it drags."""
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent
+from pyvistaqt import QtInteractor
+
+from kappaskin_app.features.membrane.camera import Sight
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.drawn_skin import NO_SKIN
+
+Array = NDArray[np.float64]
+
+ARROW = 0.22  # from a load's tip to its tail, as a share of the skin's size
+_NEAR = 14.0  # pixels around an arrow within which the mouse takes hold of it
+
+
+class LoadDrag(QObject):
+    """Watches the mouse over a plotter; positions are (x, y) on the skin in m.
+
+    `handles` (k, 2) are where loads are drawn on the `skin`. Escape gives up a drag.
+    """
+
+    grabbed = Signal(float, float)
+    dragged = Signal(float, float)
+    released = Signal()
+    given_up = Signal()
+
+    def __init__(self, plotter: QtInteractor) -> None:
+        super().__init__(plotter)
+        self._plotter, self._sight = plotter, Sight(plotter)
+        self.skin = NO_SKIN
+        self.handles: Array = np.empty((0, 2))
+        self._pressed = self._dragging = False
+        self._slip, self._held = np.zeros(2), np.zeros(2)
+        plotter.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind, left = event.type(), Qt.MouseButton.LeftButton
+        if kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+            escapes = isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape
+            # For the window: VTK's own keys turn on stereo or wireframe for good.
+            event.setAccepted(escapes and self._dragging)
+            if escapes:
+                self._give_up()
+            return True
+        if isinstance(event, QMouseEvent):
+            presses = (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick)
+            if kind in presses and event.button() == left:
+                return self._grab(event.position())
+            if kind == QEvent.Type.MouseMove:
+                return self._move(event.position())
+            if kind == QEvent.Type.MouseButtonRelease and self._pressed:
+                self._release()
+                return True
+        return False
+
+    def _ends(self, handle: Array) -> tuple[Array, Array]:
+        """Widget pixels (2,) of the tip and the tail of the arrow at `handle`."""
+        points, out = self.skin.place(handle[None])
+        tail = points[0] + out[0] * ARROW * self.skin.size
+        return self._sight.to_screen(points[0]), self._sight.to_screen(tail)
+
+    def _handle_near(self, at: QPointF) -> Array | None:
+        """The handle (2,) in m whose arrow is drawn near `at`."""
+        for handle in self.handles:
+            tip, tail = self._ends(handle)
+            along = tail - tip
+            point = np.array([at.x(), at.y()])
+            share = np.clip((point - tip) @ along / max(along @ along, 1.0), 0, 1)
+            if np.linalg.norm(point - tip - share * along) < _NEAR:
+                return handle
+        return None
+
+    def _grab(self, at: QPointF) -> bool:
+        handle = self._handle_near(at)
+        if handle is None:
+            return False
+        self._pressed = self._dragging = True
+        self._plotter.setFocus(Qt.FocusReason.MouseFocusReason)  # for Escape
+        self._held = handle
+        self._slip = handle - self._seen_at(at, handle)
+        self.grabbed.emit(*handle)
+        return True
+
+    def _release(self) -> None:
+        self._pressed = False
+        if self._dragging:
+            self._dragging = False
+            self.released.emit()
+
+    def _give_up(self) -> None:
+        if self._dragging:
+            self._dragging = False
+            self.given_up.emit()
+
+    def _move(self, at: QPointF) -> bool:
+        if not self._pressed:
+            over = self._handle_near(at) is not None
+            shape = Qt.CursorShape.OpenHandCursor if over else Qt.CursorShape.ArrowCursor
+            self._plotter.setCursor(shape)
+            return False
+        self._plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
+        if self._dragging:
+            held = self._held
+            if len(self.handles):  # the skin sinks as the load moves on it: stay at its height
+                held = self.handles[np.argmin(np.linalg.norm(self.handles - held, axis=1))]
+            self._held = self._seen_at(at, held) + self._slip
+            self.dragged.emit(*self._held)
+        return True
+
+    def _seen_at(self, at: QPointF, handle: Array) -> Array:
+        """What lies under `at` of the skin as high as it is drawn at `handle`, (2,) in m."""
+        near, far = self._sight.line(at)
+        return self.skin.seen_at(near, far, float(self.skin.height_at(handle[None])[0]), handle)
+
+    def on_screen(self) -> QPointF | None:
+        """Where in the plotter the first load's arrow ends, None without a load."""
+        if not len(self.handles):
+            return None
+        return QPointF(*self._ends(self.handles[0])[0])
+
+
+_STILL = 4.0  # px that the mouse may move while it clicks
+_LOOKS = 30  # ms between two looks at where it points
+
+
+class SurfacePointer(QObject):
+    """Watches the mouse over a plotter; places are (x, y) on the `skin` in m.
+
+    `moved` brings None where it points beside the skin.
+    """
+
+    clicked = Signal(float, float)
+    moved = Signal(object)
+
+    def __init__(self, plotter: QtInteractor) -> None:
+        super().__init__(plotter)
+        self.skin, self._sight = NO_SKIN, Sight(plotter)
+        self._pressed_at: QPointF | None = None
+        self._moved_to: QPointF | None = None
+        self._looked = QTimer(self, interval=_LOOKS, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._looked.timeout.connect(guarded(self._look))
+        plotter.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        kind, left = event.type(), Qt.MouseButton.LeftButton
+        if kind == QEvent.Type.Leave:
+            self._moved_to = None
+            self.moved.emit(None)
+        if isinstance(event, QMouseEvent):
+            at = event.position()
+            if kind == QEvent.Type.MouseButtonPress:
+                self._pressed_at = at if event.button() == left else None
+            elif kind == QEvent.Type.MouseButtonRelease:
+                self._release(at)
+            elif kind == QEvent.Type.MouseMove and not event.buttons():
+                self._moved_to = at
+                if not self._looked.isActive():
+                    self._look()
+        return False
+
+    def _release(self, at: QPointF) -> None:
+        pressed, self._pressed_at = self._pressed_at, None
+        if pressed is None or (at - pressed).manhattanLength() > _STILL:
+            return
+        place = self.skin.hit(*self._sight.line(at))
+        if place is not None:
+            self.clicked.emit(*place.tolist())
+
+    def _look(self) -> None:
+        """Tell where the mouse is, unless it was told: also where it stops right after a look."""
+        at, self._moved_to = self._moved_to, None
+        if at is not None:
+            self._looked.start()
+            self.moved.emit(self.skin.hit(*self._sight.line(at)))

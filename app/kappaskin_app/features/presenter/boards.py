@@ -1,0 +1,428 @@
+"""Boards of the presenter: figures, bars and words that are read from afar."""
+
+import math
+from dataclasses import replace
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from kappaskin_app.features.presenter.cue import Roundness
+from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, colour_of
+from kappaskin_app.shell.colouring import SteadyRange
+from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.widgets.lettering import (
+    CAPTION,
+    CENTRE,
+    LEFT,
+    PRIMARY,
+    RIGHT,
+    SECONDARY,
+    Words,
+    letters,
+    shrunk,
+    width_of,
+)
+
+
+class Board(QWidget):
+    """Paints what `words` lays out; `unit` is the px of this screen for one of 1080 px of height.
+
+    A screen of 24 inches is read alike whether it has 720 px, 1080 px or twice as many: letters
+    grow with the picture.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.unit, self.theme = 1.0, LIGHT
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+
+    def words(self) -> list[Words]:
+        """What is written, and where."""
+        return []
+
+    def draw(self, painter: QPainter) -> None:
+        """What lies below the words."""
+
+    def show_unit(self, unit: float) -> None:
+        self.unit = unit
+        self.update()
+
+    def fix_height(self, units: float) -> None:
+        """Be so many units high."""
+        # Ignored, a layout would give it no height beside what stretches.
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.setFixedHeight(round(units * self.unit))
+
+    def show_theme(self, theme: Theme) -> None:
+        self.theme = theme
+        self.update()
+
+    def letters(self, capital: float, bold: bool = False) -> QFont:
+        """Letters whose capitals are so many units high."""
+        return letters(self.font(), capital * self.unit, bold)
+
+    def line(self, text: str, font: QFont, x: float, baseline: float, width: float) -> Words:
+        """One line that begins at `x` and stands on `baseline`, smaller if `width` asks for it."""
+        metrics = QFontMetricsF(font)
+        top, height = baseline - metrics.ascent(), metrics.height()
+        align = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom
+        return shrunk(Words(text, font, QRectF(x, top, width, height), align=align))
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        self.draw(painter)
+        for words in self.words():
+            painter.setPen(QColor(self.ink(words)))
+            words.paint(painter)
+
+    def ink(self, words: Words) -> str:
+        """The colour that the words have."""
+        return self.theme.faint if words.faint else self.theme.text
+
+    def fill(self, painter: QPainter, place: QRectF, colour: str, radius: float = 0.0) -> None:
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(colour))
+        painter.drawRoundedRect(place, radius, radius)
+
+    def clear(self, colour: str, strength: float) -> QColor:
+        """A `colour` that what lies below shows through, from 0 to 1 strong."""
+        made = QColor(colour)
+        made.setAlphaF(strength)
+        return made
+
+    @property
+    def middle(self) -> QPointF:
+        return QRectF(self.rect()).center()
+
+
+STRIP_HEIGHT = 112.0  # units
+_PAD = 28.0  # units beside the word
+
+
+class Strip(Board):
+    """Shows the badge's word in its colour, the source's name, and the age of the data."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.state, self.source, self.age = OFF, "", ""
+        self.edge = 0.0  # px kept free on both sides
+
+    def show_unit(self, unit: float) -> None:
+        super().show_unit(unit)
+        self.fix_height(STRIP_HEIGHT)
+
+    def show_state(self, state: str, source: str, age: str) -> None:
+        if (state, source, age) != (self.state, self.source, self.age):
+            self.state, self.source, self.age = state, source, age
+            self.setAccessibleName(f"{state}, {source}, {age}")
+            self.update()
+
+    @property
+    def badge(self) -> QRectF:
+        """Where the word stands."""
+        wide = width_of(self.letters(PRIMARY, bold=True), self.state)
+        gap = 8 * self.unit
+        return QRectF(self.edge, gap, wide + 2 * _PAD * self.unit, self.height() - 2 * gap)
+
+    def draw(self, painter: QPainter) -> None:
+        self.fill(painter, self.badge, colour_of(self.state, self.theme), 10 * self.unit)
+
+    def ink(self, words: Words) -> str:
+        return "#ffffff" if words.text == self.state else super().ink(words)
+
+    def words(self) -> list[Words]:
+        badge, large = self.badge, self.letters(PRIMARY, bold=True)
+        shown = [Words(self.state, large, badge, align=CENTRE)]
+        wide = width_of(large, self.age) + 2
+        age = QRectF(self.width() - wide - self.edge, 0, wide, self.height())
+        shown.append(Words(self.age, large, age, align=RIGHT))
+        left = badge.right() + _PAD * self.unit
+        place = QRectF(left, 0, max(age.left() - left - _PAD * self.unit, 1.0), self.height())
+        shown.append(shrunk(Words(self.source, self.letters(SECONDARY), place, align=LEFT)))
+        return shown
+
+
+def age_in_words(seconds: float, least: bool = False) -> str:
+    """An age as it is read at a glance; `least` where it may be more."""
+    if not math.isfinite(seconds):
+        return ""
+    more = "\N{GREATER-THAN OR EQUAL TO}\N{THIN SPACE}" if least else ""
+    if seconds < 1:
+        return f"{more}{1e3 * seconds:.0f} ms old"
+    if seconds < 120:
+        return f"{seconds:.0f} s old"
+    return f"{seconds / 60:.0f} min old" if seconds < 7200 else f"{seconds / 3600:.0f} h old"
+
+
+REMEDIES = {
+    LOST: "Check the cable and the power. It goes on by itself when the device is back; "
+    "Ctrl+Return connects anew, Ctrl+M simulates instead.",
+    STALE: "Wait a moment. If it lasts: check the cable, then press Ctrl+Return to connect anew.",
+    WAITING: "Wait: the first reading is on its way. If it lasts, press Esc and look under "
+    "Connection.",
+    OFF: "Ctrl+Return connects the source that is chosen, Ctrl+M simulates. To choose another, "
+    "press Esc.",
+    GAP: "Nothing came here when it was recorded. Wait, or press Ctrl+P if it is paused: it plays "
+    "past this. Ctrl+] goes to the next event.",
+}
+"""What to do in each state in which nothing new is shown."""
+
+_BANNER_MARGIN = 36.0  # units
+_WHY = 0.45  # of the height below the word that the reason has at most
+_TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
+
+
+class Banner(Board):
+    """Says since when nothing comes, why, and what to do about it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.state, self.since, self.why = OFF, "", ""
+
+    def show_trouble(self, state: str, since: str, why: str) -> None:
+        if (state, since, why) != (self.state, self.since, self.why):
+            self.state, self.since, self.why = state, since, why
+            self.setAccessibleName(f"{state} {since}: {why} {self.remedy}")
+            self.update()
+
+    @property
+    def remedy(self) -> str:
+        return REMEDIES.get(self.state, "")
+
+    def draw(self, painter: QPainter) -> None:
+        self.fill(painter, QRectF(self.rect()), colour_of(self.state, self.theme), 10 * self.unit)
+
+    def ink(self, words: Words) -> str:
+        return "#ffffff"
+
+    def words(self) -> list[Words]:
+        """The word, the reason in at most its share of the height, and the remedy below it."""
+        edge = _BANNER_MARGIN * self.unit
+        inside = QRectF(self.rect()).adjusted(edge, edge, -edge, -edge)
+        head, rest = 2 * PRIMARY * self.unit, inside.height() - 2 * PRIMARY * self.unit
+        title = f"{self.state} {self.since}".strip()
+        shown, share = [self._lines(title, PRIMARY, inside.adjusted(0, 0, 0, -rest))], 0.0
+        if self.why:
+            share = _WHY * rest
+            why = self._lines(self.why, SECONDARY, inside.adjusted(0, head, 0, share - rest))
+            shown.append(why)
+            share = min(why.needed.height() + SECONDARY * self.unit, share)
+        below = inside.adjusted(0, head + share, 0, 0)
+        shown.append(self._lines(self.remedy, 1.2 * SECONDARY, below))
+        return shown
+
+    def _lines(self, text: str, capital: float, place: QRectF) -> Words:
+        font = self.letters(capital, bold=capital != SECONDARY)
+        return shrunk(Words(text, font, place, align=_TOP, lines=True))
+
+
+NONE = "\N{EN DASH}"
+FIGURE_HEIGHT = 142.0  # units
+_GAP = 26.0
+
+
+class Figure(Board):
+    """A name above a large value, and beside it in smaller letters a note."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.name, self.value, self.note = name, NONE, ""
+
+    def show_figure(self, value: str, note: str = "", name: str = "") -> None:
+        name = name or self.name
+        if (name, value, note) != (self.name, self.value, self.note):
+            self.name, self.value, self.note = name, value, note
+            self.setAccessibleName(f"{name}: {value} {note}".strip())
+            self.update()
+
+    def show_unit(self, unit: float) -> None:
+        super().show_unit(unit)
+        self.fix_height(FIGURE_HEIGHT)
+
+    def words(self) -> list[Words]:
+        """The value is never made smaller for the sake of the note."""
+        caption, large = self.letters(CAPTION), self.letters(PRIMARY, bold=True)
+        wide, base = float(self.width()), self.height() - QFontMetricsF(large).descent()
+        value = self.line(self.value, large, 0.0, base, wide)
+        name = self.line(self.name, caption, 0.0, CAPTION * self.unit * 1.3, wide)
+        shown = [replace(name, faint=True), value]
+        at = width_of(value.font, self.value) + _GAP * self.unit
+        if self.note and at < wide:
+            shown.append(self.line(self.note, self.letters(SECONDARY), at, base, wide - at))
+        return shown
+
+
+HEIGHT = 104.0  # units
+_BAR = 46.0  # units that the bar is high
+_LEAST = 0.2  # N at the end of the scale at least
+_THIN = 3.0  # px of the band at least: an error bar too small to be seen is still there
+
+
+class ForceBar(Board):
+    """Shows how large a force is, to the left the sign does not matter: a pull is as long."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._range = SteadyRange(_LEAST)
+        self.force = self.force_95 = math.nan
+
+    def show_unit(self, unit: float) -> None:
+        super().show_unit(unit)
+        self.fix_height(HEIGHT)
+
+    def show_force(self, force: float, force_95: float, now: float) -> None:
+        """A force in N with its 95 % half width, at `now` in s; NaN of none."""
+        self.force, self.force_95 = abs(force), force_95
+        self._range.follow(self.force + (force_95 if math.isfinite(force_95) else 0.0), now)
+        self.update()
+
+    @property
+    def scale(self) -> QRectF:
+        """Where the whole scale is, the last number with its half beside its end."""
+        side = width_of(self.letters(CAPTION), "0.00 N") / 2
+        return QRectF(0, 0, max(self.width() - side, 1.0), _BAR * self.unit)
+
+    @property
+    def share(self) -> float:
+        """How much of the scale the force is; NaN of none."""
+        return self.force / self._range.limit
+
+    def at(self, force: float) -> float:
+        """Where in px a force in N is on the scale, its end for more."""
+        return self.scale.width() * min(max(force / self._range.limit, 0.0), 1.0)
+
+    def band(self) -> tuple[float, float]:
+        """Where in px the error bar begins and ends."""
+        off = self.force_95 if math.isfinite(self.force_95) else 0.0
+        low, high = self.at(self.force - off), self.at(self.force + off)
+        short = max(_THIN - (high - low), 0.0) / 2
+        return low - short, high + short
+
+    def draw(self, painter: QPainter) -> None:
+        scale, theme = self.scale, self.theme
+        self.fill(painter, scale, theme.base, 4)
+        if math.isfinite(self.force):
+            self.fill(painter, QRectF(0, 0, self.at(self.force), scale.height()), theme.accent)
+            low, high = self.band()
+            band = QRectF(low, 0, high - low, scale.height())
+            painter.fillRect(band, self.clear(theme.text, 0.55))
+        painter.setBrush(QColor(0, 0, 0, 0))
+        painter.setPen(QPen(QColor(theme.faint), max(1.0, 2 * self.unit)))
+        painter.drawRect(scale)
+        for share in (0.0, 0.5, 1.0):
+            x = share * scale.width()
+            painter.drawLine(QPointF(x, scale.bottom()), QPointF(x, scale.bottom() + 8 * self.unit))
+
+    def words(self) -> list[Words]:
+        font, scale = self.letters(CAPTION), self.scale
+        top, shown = scale.bottom() + 8 * self.unit, list[Words]()
+        for share in (0.0, 0.5, 1.0):
+            text = f"{share * self._range.limit:g}{' N' if share == 1 else ''}"
+            wide = width_of(font, text) + 2
+            x = min(max(share * scale.width() - wide / 2, 0.0), self.width() - wide)
+            place = QRectF(x, top, wide, self.height() - top)
+            shown.append(Words(text, font, place, align=CENTRE))
+        return shown
+
+
+_LEAST_RADIUS, _MOST = 0.02, 0.2  # m of radius that fill the picture: a larger circle leaves it
+_MARGIN = 0.04  # of the picture's height
+_SCALE_BAR = 0.3  # of the picture's width that the scale bar takes at most
+_SHARP = 0.6  # of the picture's height that an edge is drawn high
+
+
+class RoundView(Board):
+    """The circles all touch the skin where the object does: the band lies between two of them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._range = SteadyRange(_LEAST_RADIUS)
+        self.roundness: Roundness | None = None
+        self.edge = False
+        self.setMinimumHeight(60)
+
+    def show_roundness(self, roundness: Roundness | None, edge: bool, now: float) -> None:
+        """A radius at `now` in s, or an edge, or nothing."""
+        self.roundness, self.edge = roundness, edge
+        if roundness is not None:
+            known = [r for r in (roundness.radius, *roundness.between) if 0 < r < math.inf]
+            self._range.follow(min(max(known, default=_LEAST_RADIUS), _MOST), now)
+        self.update()
+
+    @property
+    def per_metre(self) -> float:
+        """Pixels per metre: the largest circle of late fills the height."""
+        return self.height() * (1 - 2 * _MARGIN) / (2 * self._range.limit)
+
+    @property
+    def bar(self) -> float:
+        """The length in m of the scale bar: a round one."""
+        most = _SCALE_BAR * self.width() / self.per_metre
+        return next(
+            b for b in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0) if b <= most
+        )
+
+    @property
+    def foot(self) -> QPointF:
+        """Where the object touches the skin."""
+        return QPointF(self.width() / 2, self.height() * (1 - _MARGIN))
+
+    def circle(self, radius: float) -> QRectF:
+        """Where a circle of `radius` in m is drawn."""
+        r, foot = radius * self.per_metre, self.foot
+        return QRectF(foot.x() - r, foot.y() - 2 * r, 2 * r, 2 * r)
+
+    def draw(self, painter: QPainter) -> None:
+        theme, foot = self.theme, self.foot
+        painter.setClipRect(self.rect())
+        if self.roundness is not None:
+            self._draw_round(painter, self.roundness)
+        elif self.edge:
+            self._draw_edge(painter)
+        pen = QPen(QColor(theme.text), max(2.0, 4 * self.unit))
+        painter.setPen(pen)
+        painter.drawLine(
+            QPointF(0.16 * self.width(), foot.y()), QPointF(0.84 * self.width(), foot.y())
+        )
+        bar = self._bar_place
+        painter.drawLine(bar.bottomLeft(), bar.bottomRight())
+        for x in (bar.left(), bar.right()):
+            painter.drawLine(QPointF(x, bar.bottom() - 8 * self.unit), QPointF(x, bar.bottom()))
+
+    def _draw_round(self, painter: QPainter, round_: Roundness) -> None:
+        theme, (low, high) = self.theme, round_.between
+        band = QPainterPath()
+        band.addRect(QRectF(0, 0, self.width(), self.foot.y())) if high == math.inf else (
+            band.addEllipse(self.circle(high))
+        )
+        inner = QPainterPath()
+        inner.addEllipse(self.circle(low))
+        painter.fillPath(band.subtracted(inner), self.clear(theme.accent, 0.45))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        width = max(2.0, 4 * self.unit)
+        if math.isfinite(round_.radius):
+            painter.setPen(QPen(QColor(theme.accent), width))
+            painter.drawEllipse(self.circle(round_.radius))
+        elif high < math.inf:
+            painter.setPen(QPen(QColor(theme.accent), width, Qt.PenStyle.DashLine))
+            painter.drawEllipse(self.circle(high))
+
+    def _draw_edge(self, painter: QPainter) -> None:
+        foot, high = self.foot, _SHARP * self.height()
+        painter.setPen(QPen(QColor(self.theme.accent), max(2.0, 4 * self.unit)))
+        for side in (-1, 1):
+            painter.drawLine(foot, QPointF(foot.x() + side * high, foot.y() - high))
+
+    @property
+    def _bar_place(self) -> QRectF:
+        high = 2 * CAPTION * self.unit
+        return QRectF(2, 0, self.bar * self.per_metre, high)
+
+    def words(self) -> list[Words]:
+        place = self._bar_place
+        place.setWidth(0.5 * self.width())
+        place.setHeight(place.height() - 6 * self.unit)
+        text = f"{1e3 * self.bar:g} mm"
+        return [Words(text, self.letters(CAPTION), place, align=LEFT)]

@@ -1,0 +1,351 @@
+"""Recordings as a person opens, plays and scrubs them, with the settings recorded in them."""
+
+import time
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from kappaskin.errors import Damaged, Refusal
+from kappaskin.frames import Event
+from kappaskin.live import Status
+from kappaskin.pipeline import Setup
+from kappaskin.recording import Replay
+from kappaskin_app.features.recording.recorded import Peeking, Recorded, told_of
+from kappaskin_app.features.recording.transport import SPEEDS, Transport
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.background import Newest
+from kappaskin_app.shell.folders import recordings_folder
+from kappaskin_app.shell.history import History
+from kappaskin_app.shell.session import RECORDED, Session
+
+FILES = "Recording (*.mcap *.mcap.part)"
+_MENU = "&Recording"
+_ARRIVES = 0.4  # s after which what was asked of the engine shows in its status
+_HERE = 1e-4  # s: an event so near is where the replay is
+_DOTS = "\N{HORIZONTAL ELLIPSIS}"
+
+
+class Replaying(QObject):
+    """Opens recordings, and has the engine play them as `transport` asks.
+
+    `opened` names the source that is played, `told` says what came of a wish, `changed` that
+    `message` did: what a person should know about the recording, `alarming` where it is bad news;
+    `damaged` is the one that a repair may help then, and `offered` tells that there is one.
+    """
+
+    opened = Signal(str)
+    told = Signal(str)
+    changed = Signal()
+    offered = Signal()
+
+    def __init__(
+        self, history: History, session: Session, transport: Transport, window: QWidget
+    ) -> None:
+        super().__init__(window)
+        self._history, self._session, self._transport = history, session, transport
+        self._window = window
+        self.seen: Recorded | None = None
+        self.message, self.alarming = "", False
+        self.damaged: Path | None = None
+        self.speed, self._looped, self._goes = 1.0, False, True
+        self._replay: Replay | None = None
+        self._sought: float | None = None
+        self._sought_at, self._steps = 0.0, 0
+        self._begins = False  # once the settings are in use, from the beginning on
+        self._before: dict[str, object] = {}
+        self._changes: list[Event] = []
+        self._peeking = Peeking(self)
+        self._send, self._folder = Newest(self), recordings_folder()
+        self._actions: Actions | None = None
+        self._wire()
+
+    def _wire(self) -> None:
+        transport, session = self._transport, self._session
+        transport.sought.connect(guarded(self.seek))
+        transport.course.sliderReleased.connect(guarded(self._let_go))
+        transport.step_wanted.connect(guarded(self.step))
+        transport.jump_wanted.connect(guarded(self.jump))
+        transport.play_wanted.connect(guarded(self.go))
+        transport.speed_wanted.connect(guarded(self.play_at))
+        transport.loop_wanted.connect(guarded(self.loop))
+        self._peeking.found.connect(guarded(self._play))
+        self._peeking.refused.connect(guarded(self._refuse))
+        session.turning.connect(guarded(self._leave))
+        session.reported.connect(guarded(self.follow))
+
+    def add_actions(self, actions: Actions) -> None:
+        """Register what a person can do."""
+        self._actions = actions
+        tip = "Play a recording as if it were live; one may also be dropped on the window"
+        add = partial(actions.add, menu=_MENU)
+        add("open-recording", text=f"&Open{_DOTS}", act=self.open, shortcut="Ctrl+Shift+O", tip=tip)
+        for name, text, act, shortcut in (
+            ("replay-forward", "One frame &forward", partial(self.step, 1), "Ctrl+."),
+            ("replay-back", "One frame &back", partial(self.step, -1), "Ctrl+,"),
+            ("replay-next", "Ne&xt event", partial(self.jump, 1), "Ctrl+]"),
+            ("replay-previous", "&Previous event", partial(self.jump, -1), "Ctrl+["),
+            ("replay-faster", "F&aster", partial(self._faster, 1), "Ctrl+Shift+Up"),
+            ("replay-slower", "S&lower", partial(self._faster, -1), "Ctrl+Shift+Down"),
+            ("replay-loop", "Begin ane&w at the end", self._turn_loop, "Ctrl+Shift+L"),
+            ("replay-settings", "Settings as recorded &here", self.use_recorded, ""),
+        ):
+            add(name, text=text, act=act, shortcut=shortcut)
+        self._show_actions()
+
+    # Opening.
+
+    def open(self) -> None:
+        """Ask for a file, and play it."""
+        folder = str(self._folder)
+        file, _ = QFileDialog.getOpenFileName(self._window, "Open a recording", folder, FILES)
+        if file:
+            self.open_file(Path(file))
+
+    def open_file(self, path: Path) -> None:
+        """Look into the file at `path`, beside the window, and play it if it is a recording."""
+        self._look(path.absolute(), connects=True)
+
+    def takes(self, source: str) -> bool:
+        """Open what `source` names, if that is a recording; whether it is."""
+        if source.startswith(RECORDED):
+            self.open_file(Path(source.removeprefix(RECORDED).strip()))
+        return source.startswith(RECORDED)
+
+    def adopt(self, source: str) -> None:
+        """Take over a recording that the engine plays already."""
+        if source.startswith(RECORDED):
+            self._look(Path(source.removeprefix(RECORDED).strip()), connects=False)
+
+    def _look(self, path: Path, connects: bool) -> None:
+        self.told.emit(f"Reading {path.name}{_DOTS}")
+        self._peeking.look(path, connects)
+
+    @property
+    def reading(self) -> bool:
+        """Whether a file is looked into."""
+        return self._peeking.busy
+
+    def stop_reading(self) -> None:
+        """Play what was played before instead."""
+        self._peeking.stop()
+        self.told.emit("Cancelled; it is not opened")
+
+    def _refuse(self, path: Path, refusal: Refusal) -> None:
+        damaged = path if isinstance(refusal, Damaged) else None
+        self._say(str(refusal), alarming=True, damaged=damaged)
+        self.told.emit(str(refusal))
+
+    def _play(self, found: Recorded, connects: bool) -> None:
+        source = f"{RECORDED}{found.path}"
+        if connects:
+            self._session.connect_to(source)
+        self.seen, self._changes = found, found.changes()
+        self._goes, self._begins, self._sought = True, True, None
+        self.speed, self._looped = 1.0, False
+        self._folder = found.path.parent
+        self._session.engine.seek(0.0, 0.0, False)  # until the settings are in use
+        now = self._history.settings
+        self._before = {"calibration": now.calibration, "tare": now.tare}
+        self._use(found.setup_at(0.0))
+        self._say(told_of(found), damaged=None if found.whole else found.path)
+        self.opened.emit(source)
+        self.told.emit(self.message or f"Playing {found.path.name}, with the settings recorded")
+
+    def _use(self, setup: Setup | None) -> None:
+        """Compute as recorded, as one change that may be undone."""
+        if setup is None or self.seen is None:
+            return
+        self._session.base = setup
+        self._history.change(
+            f"Settings of {self.seen.path.name}",
+            -1,
+            functions_x=setup.Ni,
+            functions_y=setup.Nj,
+            method=setup.method,
+            fit_edge=setup.edge,
+            calibration=setup.calibration,
+            tare=setup.tare,
+        )
+
+    def use_recorded(self) -> None:
+        """Compute with the settings that were in use where the replay is."""
+        if self.seen is not None:
+            self._use(self.seen.setup_at(self.time))
+
+    def _leave(self) -> None:
+        """Before another source: calibration and tare are the live sensor's again."""
+        if self.seen is None:
+            return
+        self.seen, self._changes, self._session.base = None, [], None
+        self._send.forget()
+        self._say("")
+        self._history.change("Calibration and tare as before", -1, **self._before)
+
+    # Playing.
+
+    @property
+    def time(self) -> float:
+        """Where the replay is in s, or will be once what was asked for is done."""
+        if self._sought is not None:
+            return self._sought
+        return self._replay.at if self._replay else 0.0
+
+    @property
+    def playing(self) -> bool:
+        """Whether it goes on: not at the end."""
+        return self._goes and not self._over
+
+    @property
+    def _over(self) -> bool:
+        replay = self._replay
+        return replay is not None and not self._looped and self.time >= replay.length
+
+    @property
+    def events(self) -> list[Event]:
+        """What happened in the recording, with its changes of settings, in order."""
+        told = list(self._replay.events) if self._replay else []
+        return sorted(told + self._changes, key=lambda event: event.time)
+
+    def toggle(self) -> None:
+        """Go on, or stand."""
+        self.go(not self.playing)
+
+    def go(self, on: bool) -> None:
+        """Go on, from the beginning where it is over, or stand."""
+        if self._replay is None:
+            return
+        anew = on and self._over
+        self._goes = on
+        if anew:
+            self.seek(0.0)
+        else:
+            self._manner()
+
+    def play_at(self, speed: float) -> None:
+        """Be so many times as fast as it was."""
+        self.speed = speed
+        self._manner()
+
+    def _faster(self, by: int) -> None:
+        index = SPEEDS.index(self.speed) + by
+        self.play_at(SPEEDS[min(max(index, 0), len(SPEEDS) - 1)])
+
+    def loop(self, looped: bool) -> None:
+        """Begin anew at the end, or end there."""
+        self._looped = looped
+        self._manner()
+
+    def _turn_loop(self) -> None:
+        self.loop(not self._looped)
+
+    @property
+    def _pace(self) -> float:
+        held = self._transport.course.isSliderDown()
+        return self.speed if self._goes and not held else 0.0
+
+    def _manner(self) -> None:
+        """Let the engine go on from where it is, as is chosen now."""
+        if self._replay is None:
+            return
+        if self._sought is not None:
+            self._send(self._go_there)
+        else:
+            self._session.engine.seek(None, self._pace, self._looped)
+        self._show()
+
+    def seek(self, at: float) -> None:
+        """Go to `at` s, and stand there while the mouse holds the handle."""
+        if self._replay is None:
+            return
+        self._begins = False  # or what a person wishes meanwhile would be overruled
+        self._sought, self._sought_at, self._steps = at, time.monotonic(), 0
+        self._send(self._go_there)
+        self._show()
+
+    def _go_there(self) -> None:
+        if self._sought is not None:
+            self._sought_at = time.monotonic()
+            self._session.engine.seek(self._sought, self._pace, self._looped)
+
+    def _let_go(self) -> None:
+        """Go on from where the handle was let go."""
+        self.seek(self._transport.course.time)
+
+    def step(self, frames: int) -> None:
+        """Stand so many frames further on, or back."""
+        if self._replay is None:
+            return
+        self._goes, self._begins, self._sought = False, False, None
+        self._steps += frames
+        self._send(self._go_by)
+        self._show()
+
+    def _go_by(self) -> None:
+        steps, self._steps = self._steps, 0
+        if steps:
+            self._session.engine.step(steps)
+
+    def jump(self, way: int) -> None:
+        """Go to the event after, or before, where the replay is."""
+        here, times = self.time, [event.time for event in self.events]
+        ahead = [at for at in times if at > here + _HERE]
+        behind = [at for at in times if at < here - max(_HERE, 0.5 * self._pace)]
+        found = ahead[:1] if way > 0 else behind[-1:]
+        if found and self._replay is not None:
+            self.seek(min(max(found[0], 0.0), self._replay.length))
+
+    # News.
+
+    def follow(self, status: Status) -> None:
+        """Take note of where the engine is in the recording."""
+        self._replay = replay = status.replay if self._session.replaying else None
+        if replay is not None and self._begins and not status.computing:
+            self.seek(0.0)
+        if replay is not None and self._sought is not None:
+            passed = status.reported - self._sought_at  # by what the engine told, however slow
+            there = 0 <= replay.at - self._sought <= passed * self._pace + 1e-6
+            if there or passed > _ARRIVES:
+                self._sought = None
+        self._look_for_damage(status)
+        self._transport.show_recording(replay, self.events)
+        self._show()
+        self._show_actions()
+        self._show_title(replay)
+
+    def _look_for_damage(self, status: Status) -> None:
+        """Take note of why the engine let go of the recording."""
+        why, found = status.message, self.seen
+        if status.state != "lost" or found is None or why == self.message:
+            return
+        if str(found.path) in why:
+            helps = "`kappaskin repair`" in why and found.path.exists()
+            self._say(why, alarming=True, damaged=found.path if helps else None)
+
+    def _show(self) -> None:
+        self._transport.show_time(self.time, self.playing)
+        self._transport.show_manner(self.speed, self._looped)
+
+    def _show_actions(self) -> None:
+        if self._actions is not None:
+            why_not = "" if self._replay is not None else "no recording is played"
+            for name in self._actions.entries:
+                if name.startswith("replay-"):
+                    self._actions.allow(name, why_not)
+
+    def _show_title(self, replay: Replay | None) -> None:
+        title = "Kappaskin" if replay is None or self.seen is None else self.seen.title(replay)
+        if title != self._window.windowTitle():
+            self._window.setWindowTitle(title)
+
+    def _say(self, message: str, alarming: bool = False, damaged: Path | None = None) -> None:
+        self.message, self.alarming, self.damaged = message, alarming, damaged
+        self.changed.emit()
+        if damaged is not None:
+            self.offered.emit()
+
+    def close(self) -> None:
+        self._send.forget()
+        self._peeking.close()

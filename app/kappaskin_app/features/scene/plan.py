@@ -1,0 +1,239 @@
+"""The plan of a scene: which effects it calls for, measured in the background."""
+
+from typing import Any
+
+from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QHeaderView,
+    QLabel,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin._processes import BackgroundProcess
+from kappaskin.errors import Refusal
+from kappaskin.live import Status
+from kappaskin.scenes import EffectSelection, Scene
+from kappaskin.scenes.effects import EFFECTS
+from kappaskin.studies import plan_updates
+from kappaskin_app.features.scene.scene_text.changes import OFF, ON, PLANNED
+from kappaskin_app.shell.effects import called, explained
+from kappaskin_app.shell.session import Session
+from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.widgets.text import duration
+
+
+class Planning(QObject):
+    """Has every effect of the scene sized and timed; `changed` tells when there is news.
+
+    `rows` are what `plan_updates` told last, of `scene` or, while `waiting`, of the one before it;
+    `refusal` says why there are none.
+    """
+
+    changed = Signal()
+
+    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self.scene: Scene | None = None
+        self.rows: list[dict[str, Any]] = []
+        self.refusal = ""
+        self._measuring: BackgroundProcess[list[dict[str, Any]]] | None = None
+        self._watched = False
+
+    @property
+    def waiting(self) -> bool:
+        """Whether not everything is known yet of the scene that is played."""
+        return self._measuring is not None
+
+    def watch(self, watched: bool) -> None:
+        """Plan while somebody looks, and only then."""
+        self._watched = watched
+        if watched:
+            if self.refusal:
+                self.scene = None  # it may have been cancelled: begin anew
+            self.follow(self._session.status)
+        elif self._measuring is not None:
+            self._end(self._measuring)
+            self.scene = None  # to be begun anew
+
+    def follow(self, _: Status) -> None:
+        """Take up what was measured meanwhile; begin anew when another scene is played."""
+        if not self._watched:
+            return
+        if self._measuring is not None:
+            self._take_up(self._measuring)
+        elif self._session.inside and self._session.scene is not self.scene:
+            self.scene, self.refusal = self._session.scene, ""
+            self._measuring = BackgroundProcess("kappaskin-plan", plan_updates, self.scene)
+            self.changed.emit()
+
+    def cancel(self) -> None:
+        """Plan this scene no more, until somebody looks again."""
+        if self._measuring is not None:
+            self.rows, self.refusal = [], "Cancelled; it is planned when this is shown again."
+            self._end(self._measuring)
+
+    def close(self) -> None:
+        self.watch(False)
+
+    def _take_up(self, measuring: BackgroundProcess[list[dict[str, Any]]]) -> None:
+        try:
+            for rows in measuring.poll():
+                self.rows = rows
+                self.changed.emit()
+        except Refusal as refusal:
+            self.rows, self.refusal = [], str(refusal)
+        if measuring.done:
+            self._end(measuring)
+
+    def _end(self, measuring: BackgroundProcess[list[dict[str, Any]]]) -> None:
+        measuring.close()
+        self._measuring = None
+        self.changed.emit()
+
+
+_COLUMNS = ("Effect", "Simulated", "Kept", "Size", "If left out", "Time", "Why")
+_TIPS = (
+    "What spoils a reading.",
+    "Leave it to the plan, or force it on or off while the scene goes on.",
+    "Whether it is simulated.",
+    "How large it is in this scene, without a unit; its tooltip tells the formula.",
+    "By how much readings change at most when it is left out, as a share of the scene's peak "
+    "curvature.",
+    "What it takes for each frame, measured on this machine.",
+    "Why it is kept or left out.",
+)
+_HOWS = ((PLANNED, "As planned"), (ON, "On"), (OFF, "Off"))
+_EFFECT, _FORCE, _KEPT, _SIZE, _ERROR, _TIME, _WHY = range(len(_COLUMNS))
+
+
+class EffectsPanel(QWidget):
+    """A table of the effects; `forced` says which is to be on, off or as planned."""
+
+    forced = Signal(str, str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.summary = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.table = QTableWidget(0, len(_COLUMNS))
+        self.table.setObjectName("effects")
+        self.table.setAccessibleName("Effects of the scene")
+        for column, (title, tip) in enumerate(zip(_COLUMNS, _TIPS, strict=True)):
+            item = QTableWidgetItem(title)
+            item.setToolTip(tip)
+            self.table.setHorizontalHeaderItem(column, item)
+        self.table.verticalHeader().hide()
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.table.setShowGrid(False)
+        self.table.setTabKeyNavigation(False)
+        header = self.table.horizontalHeader()
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setStretchLastSection(True)
+        self.forces: dict[str, QComboBox] = {}
+        self._cells: list[list[QTableWidgetItem]] = []
+        self._rows: list[dict[str, Any]] = []
+        self._choice, self._theme = EffectSelection(), LIGHT
+        stack = QVBoxLayout(self)
+        stack.addWidget(self.summary)
+        stack.addWidget(self.table, 1)
+
+    def show_plan(self, rows: list[dict[str, Any]], choice: EffectSelection) -> None:
+        """Show what `plan_rows` tells of a scene of which `choice` says what is simulated."""
+        there = [row for row in rows if row["microseconds"] is not None]
+        absent = [row for row in rows if row["microseconds"] is None]
+        names = [row["effect"] for row in (*there, *absent)]
+        if names != list(self.forces):
+            self._lay_out(names)
+        self._rows, self._choice = [*there, *absent], choice
+        for number, row in enumerate(self._rows):
+            self._fill(number, row)
+        self._summarise(there)
+
+    def show_waiting(self, words: str) -> None:
+        """Say why the table is not that of the scene that is played."""
+        self.summary.setText(words)
+
+    def show_theme(self, theme: Theme) -> None:
+        self._theme = theme
+        for number, row in enumerate(self._rows):
+            self._fill(number, row)
+
+    def _lay_out(self, names: list[str]) -> None:
+        """A row for each effect, in this order."""
+        self.table.setRowCount(0)
+        self.table.setRowCount(len(names))
+        self.forces = {}
+        self._cells = [[QTableWidgetItem() for _ in _COLUMNS] for _ in names]
+        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        for number, name in enumerate(names):
+            for column, item in enumerate(self._cells[number]):
+                if column in (_SIZE, _ERROR, _TIME):
+                    item.setTextAlignment(right)
+                self.table.setItem(number, column, item)
+            box = QComboBox()
+            box.setObjectName(f"force-{name}")
+            box.setAccessibleName(f"{called(name)}, simulated")
+            for value, words in _HOWS:
+                box.addItem(words, value)
+            box.activated.connect(lambda _, name=name: self._force(name))
+            self.table.setCellWidget(number, _FORCE, box)
+            self.forces[name] = box
+
+    def _force(self, name: str) -> None:
+        self.forced.emit(name, self.forces[name].currentData())
+
+    def _fill(self, number: int, row: dict[str, Any]) -> None:
+        name, there = row["effect"], row["microseconds"] is not None
+        self._show_force(name, there)
+        size = f"Size: {row['formula']}."
+        cells = {
+            _EFFECT: (called(name), explained(name)),
+            _KEPT: ("kept" if row["kept"] else "left out" if there else "", ""),
+            _SIZE: (f"{row['size']:.2g}" if there else "", size),
+            _ERROR: (_share(row["error"]) if there else "", _TIPS[_ERROR]),
+            _TIME: (duration(row["microseconds"] * 1e-6) if there else "", _TIPS[_TIME]),
+            _WHY: (row["why"], row["why"]),
+        }
+        colour = QColor(self._theme.text if row["kept"] else self._theme.faint)
+        for column, (text, tip) in cells.items():
+            item = self._cells[number][column]
+            item.setText(text)
+            item.setToolTip(tip)
+            item.setForeground(colour)
+
+    def _show_force(self, name: str, there: bool) -> None:
+        box, choice = self.forces[name], self._choice
+        how = ON if name in choice.on else OFF if name in choice.off else PLANNED
+        with QSignalBlocker(box):
+            box.setCurrentIndex(box.findData(how))
+        free = there and not EFFECTS[name].authored
+        box.setEnabled(free)
+        box.setToolTip(
+            _TIPS[_FORCE]
+            if free
+            else "A failure is there when the scene says so: take it out in the editor."
+            if there
+            else "There is nothing of it in this scene: add it in the editor."
+        )
+
+    def _summarise(self, there: list[dict[str, Any]]) -> None:
+        kept = [row for row in there if row["kept"]]
+        left = sum(row["error"] for row in there if not row["kept"])
+        taken, all_ = (1e-6 * sum(row["microseconds"] for row in rows) for rows in (kept, there))
+        self.summary.setText(
+            f"{len(kept)} of {len(there)} effects are simulated: {duration(taken)} a frame, where "
+            f"all would take {duration(all_)}. What is left out changes readings by at most "
+            f"{_share(left)} of the peak curvature; {_share(self._choice.accuracy)} may be."
+        )
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.2g}\N{NO-BREAK SPACE}%"

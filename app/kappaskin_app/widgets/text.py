@@ -1,0 +1,53 @@
+"""Numbers, lengths, times and dates as people read them."""
+
+import math
+import re
+from datetime import datetime
+
+NONE = "\N{EN DASH}"
+COMMAND = re.compile("`([^`]+)`")
+"""What a message tells to type."""
+_LENGTHS = ((1e-6, 1e-3, "mm"), (1e-9, 1e-6, "\N{MICRO SIGN}m"), (0.0, 1e-9, "nm"))
+_TIMES = ((1.0, 1.0, "s"), (1e-3, 1e-3, "ms"), (0.0, 1e-6, "\N{MICRO SIGN}s"))
+
+
+def length(metres: float) -> str:
+    """Two digits and the unit; a dash for what is not known."""
+    return _said(metres, _LENGTHS)
+
+
+def duration(seconds: float) -> str:
+    """Two digits and the unit; a dash for what is not known."""
+    return _said(seconds, _TIMES)
+
+
+def _said(value: float, units: tuple[tuple[float, float, str], ...]) -> str:
+    if not math.isfinite(value):
+        return NONE
+    # As it will be rounded: 999.7 us are 1 ms.
+    value = float(f"{value:.1e}")
+    scale, unit = next((scale, unit) for least, scale, unit in units if value >= least * 0.999999)
+    shown = value / scale
+    digits = max(0, 1 - math.floor(math.log10(shown))) if shown > 0 else 0
+    return f"{shown:.{digits}f} {unit}"
+
+
+def day(time: float) -> str:
+    """A time in s since 1970 to the minute."""
+    return f"{datetime.fromtimestamp(time):%Y-%m-%d %H:%M}"
+
+
+def round_up(value: float) -> float:
+    """The least of 1, 1.5, 2, 3, 5, 7 times a power of ten that is at least `value`."""
+    if not value > 0:
+        return 0.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(m * power for m in (1, 1.5, 2, 3, 5, 7, 10) if m * power >= value * (1 - 1e-12))
+
+
+def in_digits(value: float, span: float) -> str:
+    """A number of a scale, with the digits that tell it from another a hundredth of `span` off."""
+    if not span > 0:
+        return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+    rounded = round(value, max(0, 2 - math.floor(math.log10(span)))) + 0.0  # no minus before a zero
+    return f"{rounded:g}".replace("-", "\N{MINUS SIGN}")
