@@ -33,7 +33,7 @@ class Welcome(QObject):
         super().__init__(parent)
         self._offer, self._history, self._session = offer, history, session
         self._offering = False
-        self._ways: list[Offered] = []
+        self._ways: dict[int, Offered] = {}
         self._last = [
             Offered("Recentl&y opened", "What was opened or recorded last.", recent),
             Offered(
@@ -45,9 +45,9 @@ class Welcome(QObject):
         session.source_changed.connect(guarded(lambda *_: self._end()))
         history.stack.indexChanged.connect(guarded(lambda *_: self._end()))
 
-    def add(self, words: str, tip: str, act: Callable[[], object]) -> None:
-        """Offer this too."""
-        self._ways.append(Offered(words, tip, act))
+    def add(self, place: int, words: str, tip: str, act: Callable[[], object]) -> None:
+        """Offer this too, at this `place` among all."""
+        self._ways[place] = Offered(words, tip, act)
 
     def begin(self) -> None:
         """Offer all where a person wants it, and has not begun with something already."""
@@ -59,7 +59,8 @@ class Welcome(QObject):
         """Offer all, unless something else is offered."""
         if not self._offer.isVisible():
             self._offering = True
-            self._offer.show_offer("To begin:", _TIP, [*self._ways, *self._last], _LASTS)
+            ways = [self._ways[place] for place in sorted(self._ways)]
+            self._offer.show_offer("To begin:", _TIP, [*ways, *self._last], _LASTS)
 
     def _end(self) -> None:
         if self._offering:

@@ -26,6 +26,7 @@ class ConnectionFeature:
         add("disconnect", SOURCE, "&Disconnect", session.disconnect_from, "Ctrl+D")
         add("ports", SOURCE, "Re&fresh ports", self.plugs.look, "F5")
         shell.menus.welcome.add(
+            2,
             "Connec&t a sensor",
             "Choose the port of a real sensor under Connection, and connect it.",
             lambda: self._show(shell),

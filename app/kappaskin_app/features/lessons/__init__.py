@@ -34,6 +34,7 @@ class LessonsFeature:
         for part in (self.lesson, self.pointing):
             shell.theme_changed.connect(guarded(part.show_theme))
         shell.menus.welcome.add(
+            3,
             "&Begin a lesson",
             "Eleven of ten to fifteen minutes: from what a gage feels to mending a sensor.",
             lambda: docks.reveal("lesson"),

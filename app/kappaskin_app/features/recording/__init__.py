@@ -66,6 +66,7 @@ class RecordingFeature:
         opening.drops.take_key = self.transport.take_key
         shell.tasks.add("Reading the recording", lambda: replaying.reading, replaying.stop_reading)
         shell.menus.welcome.add(
+            4,
             f"&Play a recording{DOTS}",
             "Show what was recorded; a file dropped on the window does too.",
             replaying.open,

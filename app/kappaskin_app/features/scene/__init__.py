@@ -69,6 +69,7 @@ class SceneFeature:
         add("open-scene", FILE, f"&Open scene{DOTS}", staging.open, "Ctrl+O")
         add("save-scene", FILE, f"Save scene &as{DOTS}", staging.save, "Ctrl+Shift+S")
         shell.menus.welcome.add(
+            1,
             f"&Open a scene{DOTS}",
             "Simulate what a file says (Ctrl+O); ready ones with pictures: Scene (F2).",
             staging.open,
