@@ -334,7 +334,7 @@ def test_a_recording_that_begins_without_the_device_goes_through_what_was_comput
 ):
     device, reader = streaming
     source = reader.source
-    side = SimpleNamespace(pipeline=Pipeline(source.sensor, Setup(nx=5, ny=5)), left=None)
+    side = SimpleNamespace(pipeline=Pipeline(source.sensor, Setup(nx=5, ny=5)), excluded=None)
     with closing(LiveRecorder()) as keeping:
         if earlier:
             keeping.begin(tmp_path / "earlier.mcap", source, side)

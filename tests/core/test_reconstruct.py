@@ -330,7 +330,7 @@ def test_what_is_no_archive_is_refused(tmp_path, case: str) -> None:
 def test_nothing_in_a_file_is_ever_executed(tmp_path) -> None:
     class Trap:
         def __reduce__(self) -> tuple[Any, ...]:
-            return (Path.contact, (tmp_path / "sprung",))
+            return (Path.touch, (tmp_path / "sprung",))
 
     np.savez(tmp_path / "trap.npz", **GOOD | {"sigma": np.array([Trap()], object)})
     with pytest.raises(Refusal, match="cannot be read as NPZ"):

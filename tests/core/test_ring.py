@@ -61,8 +61,8 @@ def test_an_estimate_comes_back_as_written(ring, writer) -> None:
     assert got is not None
     assert np.array_equal(numbers(got), numbers(estimate), equal_nan=True)
     assert np.array_equal(got.fresh, estimate.fresh)
-    assert [np.shape(getattr(got, f.name)) for f in fields(got) if f.name != "touch"] == [
-        np.shape(getattr(estimate, f.name)) for f in fields(got) if f.name != "touch"
+    assert [np.shape(getattr(got, f.name)) for f in fields(got) if f.name != "contact"] == [
+        np.shape(getattr(estimate, f.name)) for f in fields(got) if f.name != "contact"
     ]
     assert type(got.sequence) is int
     assert type(got.noise) is float
@@ -200,10 +200,10 @@ def all_of(number: float) -> Estimate:
     estimate = estimate_of(pipeline_of(Setup(8, 8, 129, 129)))
     parts = {f.name: np.full(np.shape(getattr(estimate, f.name)), number) for f in fields(estimate)}
     pair, matrix = np.full(2, number), np.full((2, 2), number)
-    touch = Contact(pair, pair, number, number, number, number, int(number), True, False)
+    contact = Contact(pair, pair, number, number, number, number, int(number), True, False)
     square = np.full((3, 3), number)
     geometry = LocalGeometry(square[0], square, matrix, matrix, pair, square)
-    return Estimate(**parts | {"touch": touch, "geometry": geometry})
+    return Estimate(**parts | {"contact": contact, "geometry": geometry})
 
 
 @pytest.mark.slow

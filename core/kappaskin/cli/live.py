@@ -8,11 +8,10 @@ from cyclopts import Parameter
 
 from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
 from kappaskin.errors import Refusal
-from kappaskin.publish import TargetStatus
 
 if TYPE_CHECKING:
     from kappaskin.live import Engine, Status
-    from kappaskin.publish import Latency
+    from kappaskin.publish import Latency, TargetStatus
 
 _EVERY = 1.0  # s between two lines
 _POLL = 0.05  # s

@@ -10,12 +10,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin.calibration import TareMeasurement
 from kappaskin.cli.common import FAILED, Switch, check_time, print_json, stops
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
-    from kappaskin.calibration import Rest, Tare
+    from kappaskin.calibration import Rest, Tare, TareMeasurement
     from kappaskin.sensing import Sensor
     from kappaskin.sources import Source
 

@@ -17,7 +17,7 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.load import Written
 from kappaskin_app.shell.simulation import OWN, region_of
 
-_NAMES = ("Region", "Setup", "load_scene", "planned", "read_scene", "setup_from")
+_NAMES = ("Region", "Setup", "load_scene", "planned", "read_scene", "setup_from_text")
 _SCRIPT = Template('''\
 """What Kappaskin's window shows, from Python."""
 
@@ -120,7 +120,7 @@ def _setup(setup: Setup, folder: Path) -> tuple[str, Mapping[str, bytes]]:
     if not files:
         return _made(setup, ("Ni", "Nj", "method")), files
     read = f"lambda name: Path({_said(str(folder))}, name).read_bytes()"
-    return f"setup_from(\n    {text!r},\n    {read},\n)", files
+    return f"setup_from_text(\n    {text!r},\n    {read},\n)", files
 
 
 def _scene(session: Session, settings: Settings) -> str:
