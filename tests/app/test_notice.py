@@ -24,7 +24,7 @@ def suspecting(**why: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("touch", "strained", "words"),
+    ("contact", "strained", "words"),
     [
         (INSIDE, 0, ""),
         (NEAR, 0, "Contact too near the rim to trust"),
