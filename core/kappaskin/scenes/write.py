@@ -155,7 +155,7 @@ def _cylinders(laid: Presentation, patch: Patch) -> dict[str, Any]:
     if laid.steps != usual:
         raise Refusal(
             "expected cylinders in the order of a schedule, which is what a scene file can tell, "
-            f"got {len(laid.steps)} other steps; take those of kappaskin.schedule"
+            f"got {len(laid.steps)} other steps; take those of kappaskin.scenes.schedule"
         )
     values = {"radii": list(radii)} if radii != RADII else {}
     return {**({"hold": float(hold)} if hold else {}), **values, "dwell": float(laid.dwell)}
