@@ -13,7 +13,7 @@ from kappaskin import Event, Status, load_scene
 from kappaskin.sources import Port
 from kappaskin_app.features.connection import panel as plugs
 from kappaskin_app.features.connection.panel import ConnectionPanel, Plugs
-from kappaskin_app.features.log.events import Happenings
+from kappaskin_app.features.log.events import EventLog
 
 SKIN = Port("/dev/ttyACM0", "Fingertip of ten by ten elements", "Kappa Ltd", "SN-4711", (1, 2))
 BOARD = Port("/dev/ttyUSB0", "CP2102N", "Silicon Labs", "beef", (3, 4), opened=False)
@@ -147,7 +147,7 @@ def test_ports_are_looked_for_beside_the_window_and_only_while_the_list_is_seen(
 
 
 def test_the_last_events_are_listed_newest_first_and_each_is_told_once(qtbot):
-    window = Happenings()
+    window = EventLog()
     qtbot.addWidget(window)
     told = []
     window.told.connect(told.append)
@@ -170,7 +170,7 @@ def test_the_last_events_are_listed_newest_first_and_each_is_told_once(qtbot):
 
 
 def test_events_that_came_together_are_all_listed(qtbot):
-    window = Happenings()
+    window = EventLog()
     qtbot.addWidget(window)
     now = time.monotonic()
     window.follow(Status().after([Event(now, "met", "a"), Event(now, "gap", "b")]))
@@ -180,7 +180,7 @@ def test_events_that_came_together_are_all_listed(qtbot):
 
 
 def test_what_happened_twice_at_once_is_listed_twice_and_told_once(qtbot):
-    window = Happenings()
+    window = EventLog()
     qtbot.addWidget(window)
     told = []
     window.told.connect(told.append)

@@ -55,7 +55,7 @@ def plug(tmp_path):
 
 
 def kinds(window):
-    lines = window.happenings.list.toPlainText().splitlines()
+    lines = window.event_log.list.toPlainText().splitlines()
     return [line.split()[1].rstrip(":") for line in lines]
 
 
@@ -110,18 +110,18 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     # The engine killed: it is started again, and said. LOST may be over before it is drawn.
     os.kill(window.session.engine.pid, signal.SIGKILL)
     until(lambda: kinds(window)[:4] == ["met", "engine", "other", "gone"])
-    assert "ended unexpectedly and was started again" in window.happenings.list.toPlainText()
+    assert "ended unexpectedly and was started again" in window.event_log.list.toPlainText()
     until(lambda: window.display.badge.state == "LIVE")
     assert not message.isVisible()
 
     # What happened can be read, by key or by a click on the badge.
     qtbot.keyClick(window, Qt.Key.Key_F4)
-    assert window.happenings.isVisible()
-    qtbot.keyClick(window.happenings, Qt.Key.Key_Escape)
-    assert not window.happenings.isVisible()
+    assert window.event_log.isVisible()
+    qtbot.keyClick(window.event_log, Qt.Key.Key_Escape)
+    assert not window.event_log.isVisible()
     qtbot.mouseClick(window.display.badge, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
-    assert window.happenings.isVisible()
-    window.happenings.close()
+    assert window.event_log.isVisible()
+    window.event_log.close()
 
     # What is read from elsewhere has no other device in its place.
     assert "Another device" in window.display.notice.warning

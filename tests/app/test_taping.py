@@ -88,7 +88,7 @@ def test_a_note_goes_into_the_recording_and_the_list(
     assert dialog.findChild(QLineEdit).maxLength() == LONGEST_NOTE
     dialog.setTextValue("  another object  ")
     dialog.accept()
-    until(lambda: "note:  another object" in window.happenings.list.toPlainText())
+    until(lambda: "note:  another object" in window.event_log.list.toPlainText())
     window.taping.write_down("   ")
     window.actions_by_name["record"].trigger()
     until(lambda: not window.taping.recording)

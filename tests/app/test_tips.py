@@ -48,7 +48,7 @@ def tip_of(control: QWidget) -> str:
 
 
 def test_every_action_and_every_control_explains_itself(window: MainWindow) -> None:
-    for action in ("export", "report", "happenings"):
+    for action in ("export", "report", "event_log"):
         window.actions_by_name[action].trigger()
     controls = [c for kind in (*_ASKS, *_SHOWS) for c in window.findChildren(kind)]
     asked = [c for c in controls if not isinstance(c, QScrollBar) and not within_another(c)]
@@ -63,6 +63,6 @@ def test_every_action_and_every_control_explains_itself(window: MainWindow) -> N
     told = [(name, entry.action) for name, entry in entries]
     silent += [name for name, a in told if not explains(a.toolTip(), a.text())]
     silent += [name for name, a in told if a.isEnabled() and not explains(a.statusTip(), a.text())]
-    for dialog in (window.exports.dialog, window.mishaps.report, window.happenings):
+    for dialog in (window.exports.dialog, window.errors.report, window.event_log):
         dialog.close()
     assert silent == []

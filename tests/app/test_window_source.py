@@ -76,7 +76,7 @@ def test_a_killed_engine_is_started_again_and_what_was_chosen_simulated(
 ) -> None:
     window.history.change("Point", -1, load_case="point", x=0.03, y=0.06)
     os.kill(window.session.engine.pid, 9)
-    until(lambda: "was started again" in window.happenings.list.toPlainText())
+    until(lambda: "was started again" in window.event_log.list.toPlainText())
     until(lambda: window.display.badge.state == "SIM")
     until(lambda: window.session.estimate.true_contact.tolist() == [0.03, 0.06])
     drawn = len(window.membrane.ages)

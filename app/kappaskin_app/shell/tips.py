@@ -23,7 +23,7 @@ _TIPS: Mapping[str, str] = {
     "disconnect": "Take no more readings; the last ones stay, marked as old",
     "tare": "Let what every element reads now be its zero: \u03ba = reading \u2212 zero",
     "ports": "Look again which serial ports there are; they come and go by themselves too",
-    "happenings": "When a device came, went, lost messages or began anew, newest first",
+    "event_log": "When a device came, went, lost messages or began anew, newest first",
     "replay-forward": "Pause, and show the next frame of the recording",
     "replay-back": "Pause, and show the frame before in the recording",
     "replay-next": "Go to the next note, gap or change of settings in the recording",

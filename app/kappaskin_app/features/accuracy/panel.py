@@ -151,7 +151,7 @@ class CostPanel(QWidget):
         return beside
 
     def attend(self, costing: Costing) -> None:
-        """Show what `costing` measures, and tell it what a person wishes."""
+        """Show what `costing` measures, and pass on what the user requests."""
         self._costing = costing
         costing.changed.connect(guarded(self._show))
         self.plot.chosen.connect(guarded(costing.choose))

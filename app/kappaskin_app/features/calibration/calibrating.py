@@ -110,7 +110,7 @@ class Calibrating(QObject):
             return 0.0
         return min(1.0, max(0.0, (self._heard - self._begun) / self._wanted()))
 
-    # What a person wishes.
+    # Requests of the user.
 
     def begin(self, radii: tuple[float, ...], seconds: float, hold: float = 0.0) -> None:
         """Begin with cylinders of `radii` in m, and take `seconds` of each step's readings."""

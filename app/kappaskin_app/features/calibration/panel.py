@@ -115,7 +115,7 @@ class CalibratePanel(Panel):
         self.start.radii.textChanged.connect(self._plan)
 
     def attend(self, calibrating: Calibrating) -> None:
-        """Show how `calibrating` goes, and tell it what a person wishes."""
+        """Show how `calibrating` goes, and pass on what the user requests."""
         self._calibrating = calibrating
         start, steps, outcome = self.start, self.steps, self.outcome
         calibrating.changed.connect(guarded(self._show))

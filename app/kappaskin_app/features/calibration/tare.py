@@ -60,7 +60,7 @@ class Taring(QObject):
         """Whether a recording is read, or is to be: what is in use with it is no sensor's now."""
         return (self._engine.source or "").startswith(RECORDED)
 
-    # What a person wishes.
+    # Requests of the user.
 
     def tare(self) -> None:
         """Take what is read now as the zero, unless the skin is loaded or moves."""
@@ -189,7 +189,7 @@ class TarePanel(Panel):
         self._tell()
 
     def attend(self, taring: Taring) -> None:
-        """Show how `taring` goes, and tell it what a person wishes."""
+        """Show how `taring` goes, and pass on what the user requests."""
         self._taring = taring
         self.take.clicked.connect(guarded(lambda *_: taring.tare()))
         self.undo.clicked.connect(guarded(lambda *_: taring.undo()))

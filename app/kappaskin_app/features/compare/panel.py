@@ -104,7 +104,7 @@ class ComparePanel(QWidget):
         return table
 
     def attend(self, comparing: Comparing) -> None:
-        """Show what `comparing` brings, and tell it what a person wishes."""
+        """Show what `comparing` brings, and pass on what the user requests."""
         comparing.compared.connect(guarded(self.show_pair))
         self.form.swap.clicked.connect(guarded(lambda *_: comparing.swap()))
 

@@ -141,7 +141,7 @@ class DesignPanel(QWidget):
         around.addLayout(right, 3)
 
     def attend(self, designing: Designing) -> None:
-        """Show what `designing` brings, and tell it what a person wishes."""
+        """Show what `designing` brings, and pass on what the user requests."""
         self._designing = designing
         designing.changed.connect(guarded(self._show))
         self.simulate.clicked.connect(guarded(lambda *_: designing.simulate()))

@@ -73,7 +73,7 @@ class HealthPanel(QWidget):
         return table
 
     def attend(self, testing: MapTesting) -> None:
-        """Show how `testing` goes, and tell it what a person wishes."""
+        """Show how `testing` goes, and pass on what the user requests."""
         self.press.attend(testing)
 
     def show_status(self, status: Status, inside: bool) -> None:

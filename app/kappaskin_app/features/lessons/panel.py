@@ -19,7 +19,7 @@ from kappaskin_app.widgets.parts import button
 
 
 class LessonPanel(QWidget):
-    """Shows what `Teaching` knows and tells it what a person wishes; `seen` when it is shown."""
+    """Shows what `Teaching` knows and passes on what the user requests; `seen` when it is shown."""
 
     seen = Signal()
 
@@ -60,7 +60,7 @@ class LessonPanel(QWidget):
         self._taking.hide()
 
     def attend(self, teaching: Teaching) -> None:
-        """Show how `teaching` goes, and tell it what a person wishes."""
+        """Show how `teaching` goes, and pass on what the user requests."""
         self._teaching = teaching
         teaching.changed.connect(guarded(self._show))
         self.seen.connect(guarded(teaching.look))

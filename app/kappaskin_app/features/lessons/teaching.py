@@ -44,7 +44,7 @@ class Teaching(QObject):
     """Knows the lessons, by file, and how far each is; `changed` tells when that is another.
 
     `progress` is that of the lesson that is taken, None while none is; `message` says why an answer
-    could not be judged, or a file not be read. `told` says what came of a wish, `pointed` at what
+    could not be judged, or a file not be read. `told` reports what a request did, `pointed` at what
     to point, `taken_up` that a lesson which was left is taken again. It is told how to `connect`
     to a source, and gets pictures of what is seen.
     """
@@ -85,7 +85,7 @@ class Teaching(QObject):
             self.taken = {str(file): Progress(read_lesson(file)) for file in READY}
             self.changed.emit()
 
-    # What a person wishes.
+    # Requests of the user.
 
     def open(self) -> None:
         """Ask for a file, and take the lesson in it."""

@@ -1,7 +1,7 @@
 """Log, events on the line, errors and the report."""
 
-from kappaskin_app.features.log.errors import Mishaps
-from kappaskin_app.features.log.events import Happenings
+from kappaskin_app.features.log.errors import Errors
+from kappaskin_app.features.log.events import EventLog
 from kappaskin_app.features.log.panel import Logged, LogPanel
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.parts import HELP, SOURCE
@@ -14,18 +14,18 @@ class LogFeature:
     def install(self, shell: MainWindow) -> None:
         session, display = shell.session, shell.display
         self.logged = Logged()
-        self.log, self.happenings = LogPanel(self.logged), Happenings(shell)
-        self.mishaps = Mishaps(shell, self.happenings)
+        self.log, self.event_log = LogPanel(self.logged), EventLog(shell)
+        self.errors = Errors(shell, self.event_log)
         shell.docks.put_below("log", "Log", self.log, "Ctrl+Alt+G")
-        display.foot.add(self.mishaps.count)
-        session.reported.connect(guarded(self.happenings.follow))
+        display.foot.add(self.errors.count)
+        session.reported.connect(guarded(self.event_log.follow))
         session.reported.connect(guarded(lambda *_: self.log.look()))
-        display.badge.clicked.connect(guarded(self.happenings.open_list))
-        self.happenings.told.connect(guarded(shell.tell))
-        for part in (self.log, self.mishaps):
+        display.badge.clicked.connect(guarded(self.event_log.open_list))
+        self.event_log.told.connect(guarded(shell.tell))
+        for part in (self.log, self.errors):
             shell.theme_changed.connect(guarded(part.show_theme))
-        show = self.happenings.open_list
-        shell.actions_by_name.add("happenings", SOURCE, "E&vent log", show, "F4")
-        self.mishaps.add_actions(shell.actions_by_name, HELP)
-        shell.closing.connect(guarded(self.mishaps.close))
+        show = self.event_log.open_list
+        shell.actions_by_name.add("event_log", SOURCE, "E&vent log", show, "F4")
+        self.errors.add_actions(shell.actions_by_name, HELP)
+        shell.closing.connect(guarded(self.errors.close))
         shell.closed.connect(guarded(self.logged.close))

@@ -19,7 +19,7 @@ from kappaskin.cli.system import examine
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin_app import guard
-from kappaskin_app.features.log.events import Happenings
+from kappaskin_app.features.log.events import EventLog
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.folders import recordings_folder
@@ -179,10 +179,10 @@ _TIP = (
 )
 
 
-class Mishaps(QObject):
+class Errors(QObject):
     """Counts what a `window` caught: `count` shows it, `report` saves what helps to mend it."""
 
-    def __init__(self, window: "MainWindow", events: Happenings) -> None:
+    def __init__(self, window: "MainWindow", events: EventLog) -> None:
         super().__init__(window)
         self._window, self.events = window, events
         self.failures = 0

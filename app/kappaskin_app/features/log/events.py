@@ -22,14 +22,14 @@ _KEPT = 64
 _NOTHING = "Nothing yet. Here stands when a device came, went, lost messages or began anew."
 
 
-class Happenings(QDialog):
+class EventLog(QDialog):
     """Lists the last events, newest first; `told` brings each new one in words."""
 
     told = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setObjectName("happenings")
+        self.setObjectName("event_log")
         self.setWindowTitle("What happened")
         self.resize(720, 320)
         self._happened = 0

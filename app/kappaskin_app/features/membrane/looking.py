@@ -50,7 +50,7 @@ _DIGITS = 9  # actions that may have a digit for a shortcut
 
 
 class Looking:
-    """Turns what a person asks of the `display` into wishes, or moves the camera."""
+    """Turns what a person asks of the `display` into requests, or moves the camera."""
 
     def __init__(
         self, history: History, requests: Requests, display: Display, view: SkinView

@@ -48,7 +48,7 @@ class RecordingPanel(Panel):
         self.repair.clicked.connect(guarded(self._ask_for_repair))
 
     def attend(self, taping: Taping, replaying: Replaying) -> None:
-        """Show how both go, and tell them what a person wishes."""
+        """Show how both go, and pass on what the user requests."""
         self._taping, self._replaying = taping, replaying
         self.record.clicked.connect(guarded(lambda *_: taping.turn()))
         self.note.clicked.connect(guarded(lambda *_: taping.note()))

@@ -31,7 +31,7 @@ _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 class Replaying(QObject):
     """Opens recordings, and has the engine play them as `transport` asks.
 
-    `opened` names the source that is played, `told` says what came of a wish, `changed` that
+    `opened` names the source that is played, `told` reports the result of a request, `changed` that
     `message` did: what a person should know about the recording, `alarming` where it is bad news;
     `damaged` is the one that a repair may help then, and `offered` tells that there is one.
     """
@@ -260,7 +260,7 @@ class Replaying(QObject):
         """Go to `at` s, and stand there while the mouse holds the handle."""
         if self._replay is None:
             return
-        self._begins = False  # or what a person wishes meanwhile would be overruled
+        self._begins = False  # or what the user requests meanwhile would be overruled
         self._sought, self._sought_at, self._steps = at, time.monotonic(), 0
         self._send(self._go_there)
         self._show()

@@ -207,7 +207,7 @@ class Taping(QObject):
         tip = "Write down what happened just now, in the recording too"
         actions.add("note", _MENU, "&Note\N{HORIZONTAL ELLIPSIS}", self.note, "Ctrl+Shift+N", tip)
 
-    # What a person wishes.
+    # Requests of the user.
 
     def turn(self) -> None:
         """Ask for a file and record to it, or end that."""

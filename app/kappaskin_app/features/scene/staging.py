@@ -25,7 +25,7 @@ _PLANNING = "Each effect is sized and timed\N{HORIZONTAL ELLIPSIS}"
 
 
 class Staging(QObject):
-    """Shows in `panel`, `timeline` and plan what is played; `told` says what came of a wish."""
+    """Shows in `panel`, `timeline` and plan what is played; `told` reports what a request did."""
 
     told = Signal(str)
 

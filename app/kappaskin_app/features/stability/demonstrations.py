@@ -140,7 +140,7 @@ class Demonstrating:
             return
         demonstration, gesture, settings = self._begun
         if self._history.settings != settings:
-            self._begun = None  # something else was wished meanwhile
+            self._begun = None  # something else was requested meanwhile
             return
         there = status.sensor is not None and status.sensor.plate.patch == patch_of(settings)
         if there and status.slot is not None and not status.computing:

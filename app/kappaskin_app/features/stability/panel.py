@@ -110,7 +110,7 @@ class StabilityPanel(QWidget):
         self.on_skin.toggled.connect(guarded(lambda *_: self.shown.emit()))
 
     def attend(self, seeing: Seeing) -> None:
-        """Show what `seeing` computes, and tell it which shape a person wishes to look at."""
+        """Show what `seeing` computes, and pass on which shape the user chooses."""
         self._seeing = seeing
         seeing.changed.connect(guarded(self._show))
         self.plot.chosen.connect(guarded(seeing.choose))

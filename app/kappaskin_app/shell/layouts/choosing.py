@@ -260,7 +260,7 @@ class Layouts(QObject):
         self.leave_full_screen()
         arrange(self._window, self._docks, self._panels, layout)
 
-    # What a person wishes.
+    # Requests of the user.
 
     def choose(self, name: str) -> None:
         """Arrange the window as the layout of this name, as a step that can be undone."""

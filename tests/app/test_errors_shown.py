@@ -65,15 +65,15 @@ def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
     window.plugs.found.connect(guard.guarded(lambda *_: fail()))
     window.plugs.found.emit([])
     window.plugs.found.emit([])
-    assert window.mishaps.count.text() == "2 failures"
-    assert window.mishaps.count.isVisible()
+    assert window.errors.count.text() == "2 failures"
+    assert window.errors.count.isVisible()
     window.tell("in passing")
     window.display.foot.activity.show_work("Counting: 1 s", True)
     for _ in range(5):
         QApplication.processEvents()
     assert not window.display.notice.isVisible()  # or the two would stand over each other
-    assert "failure:  Something went wrong: no such thing" in window.happenings.list.toPlainText()
-    window.mishaps.count.click()
+    assert "failure:  Something went wrong: no such thing" in window.event_log.list.toPlainText()
+    window.errors.count.click()
     until(lambda: window.log.table.rowCount() >= 4)
     texts = [window.log.table.item(row, 2).text() for row in range(window.log.table.rowCount())]
     assert any("RuntimeError: no such thing" in text for text in texts)
@@ -86,7 +86,7 @@ def test_a_report_holds_readings_only_if_that_is_ticked(
     window: MainWindow, tmp_path: Path, until, ticked: bool
 ) -> None:
     window.actions_by_name["report"].trigger()
-    dialog = window.mishaps.report
+    dialog = window.errors.report
     assert not dialog.readings.isChecked()
     dialog.to.setText(str(tmp_path / "report.zip"))
     dialog.readings.setChecked(ticked)
@@ -124,9 +124,10 @@ def test_a_report_names_no_home_folder_and_takes_the_log_along(tmp_path: Path) -
 
 
 def test_a_home_folder_is_not_named_where_a_text_has_to_escape_it(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(Path, "home", lambda: Path("/home/j\u00fcrgen"))
+    home = tmp_path / "j\u00fcrgen"
+    monkeypatch.setattr(Path, "home", lambda: home)
     path = tmp_path / "report.zip"
-    doctor = {"python": "/home/j\u00fcrgen/bin/python"}
+    doctor = {"python": str(home / "bin" / "python")}
     finished(Reporting(path, Told({}), tmp_path, lambda: doctor))
     with zipfile.ZipFile(path) as report:
         assert json.loads(report.read("doctor.json")) == {"python": "~/bin/python"}
