@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import sys
+import tomllib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -111,11 +112,10 @@ def _application() -> "QApplication":
 
 
 def _splash(kept: Path) -> "Splash":
-    from kappaskin_app.shell.layouts.glance import theme_in
     from kappaskin_app.shell.splash import Splash
     from kappaskin_app.theme import LIGHT, THEMES
 
-    splash = Splash(THEMES.get(theme_in(kept), LIGHT))
+    splash = Splash(THEMES.get(_theme_in(kept), LIGHT))
     splash.show()
     splash.say("Loading the library")
     return splash
@@ -189,9 +189,22 @@ def launch(
 
 
 def _kept_file() -> Path:
-    from kappaskin_app.shell.layouts.glance import config_file
+    """Where this user's window is kept."""
+    import platformdirs
 
-    return config_file()
+    return platformdirs.user_config_path("kappaskin", appauthor=False) / "window.toml"
+
+
+def _theme_in(path: Path) -> str:
+    """The name of the theme that is kept at `path`; empty where none can be read.
+
+    What is wrong with the file is told by who reads all of it.
+    """
+    try:
+        with path.open("rb") as file:
+            return str(tomllib.load(file)["window"]["theme"])
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return ""
 
 
 def _logbook() -> "Logbook | None":

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QCheckBox, QLabel, QLineEdit, QWidget
 from kappaskin import Status
 from kappaskin.publish import Latency, PublishStatus, TargetStatus
 from kappaskin.publish.publishing import Receiver
-from kappaskin_app.features.publish.panel import PublishPanel
+from kappaskin_app.features.publish import PublishPanel
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.widgets.layout import scrolled
 

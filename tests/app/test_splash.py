@@ -8,8 +8,7 @@ from PySide6.QtGui import QGuiApplication, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.launch import _all_stays
-from kappaskin_app.shell.layouts.glance import theme_in
+from kappaskin_app.launch import _all_stays, _theme_in
 from kappaskin_app.shell.layouts.kept import Kept, KeptFile
 from kappaskin_app.shell.splash import Splash
 from kappaskin_app.theme import DARK, LIGHT, Theme
@@ -79,11 +78,11 @@ def test_it_is_in_the_colours_of_its_theme(qapp: QApplication, theme: Theme) -> 
 
 def test_the_theme_that_is_kept_is_told_and_the_file_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "window.toml"
-    assert theme_in(path) == ""
+    assert _theme_in(path) == ""
     KeptFile(path).write(Kept(theme="dark"))
-    assert theme_in(path) == "dark"
+    assert _theme_in(path) == "dark"
     path.write_text("no TOML")
-    assert theme_in(path) == ""
+    assert _theme_in(path) == ""
     assert [file.name for file in tmp_path.iterdir()] == ["window.toml"]
 
 

@@ -1,6 +1,11 @@
 """The estimator: method and basis."""
 
-from kappaskin_app.features.estimator.panel import BasisPanel
+from PySide6.QtWidgets import QWidget
+
+from kappaskin.bases import edges_of
+from kappaskin.live import Status
+from kappaskin_app.shell.badge import in_use
+from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.window import MainWindow
 
@@ -10,3 +15,16 @@ class EstimatorFeature:
 
     def install(self, shell: MainWindow) -> None:
         self.basis = shell.panels.add(LIVE, BasisPanel())
+
+
+class BasisPanel(Form):
+    """Asks for Ni x Nj and the edge, and says why a choice was not taken."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Basis", ("functions_x", "functions_y", "method", "fit_edge"), parent)
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        if status.sensor is not None:
+            self.offer("fit_edge", ("", *edges_of(status.sensor.layout.patch)))
+        computing = "Computing\N{HORIZONTAL ELLIPSIS}"
+        self.show_message(computing if status.computing else in_use(status))

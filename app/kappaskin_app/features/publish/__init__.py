@@ -1,9 +1,25 @@
-"""Estimates published to other programs."""
+"""Estimates published to other programs: who receives them, and what each one gets."""
 
-from kappaskin_app.features.publish.panel import PublishPanel
+import math
+import time
+
+from PySide6.QtWidgets import QWidget
+
+from kappaskin.live import Status
+from kappaskin.publish import TargetStatus
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.widgets.parts import ELLIPSIS, text_label
+
+_NAMES = ("send_udp", "udp_to", "serve_foxglove", "foxglove_at")
+_EVERY = 0.5  # s between two looks at the counts
+_TIP = (
+    "Messages sent to each receiver, and those dropped because it did not take them at once or "
+    "nobody receives there. It never holds the readings up."
+)
+_LATE = "From the arrival of a frame's bytes until it was sent: what 99 of 100 take at most."
 
 
 class PublishFeature:
@@ -12,3 +28,52 @@ class PublishFeature:
     def install(self, shell: MainWindow) -> None:
         self.publish = shell.panels.add(LIVE, PublishPanel())
         shell.session.unsent.connect(guarded(self.publish.show_refusal))
+
+
+class PublishPanel(Form):
+    """Asks for receivers; says what each of them gets, and why one gets nothing."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("Publish", _NAMES, parent)
+        self.counts, self.late = text_label(tip=_TIP), text_label(tip=_LATE)
+        for label in (self.counts, self.late):
+            label.hide()
+            self.body.addWidget(label)
+        self._refusal, self._next = "", 0.0
+
+    def show_refusal(self, refusal: str) -> None:
+        """Say why nothing is published as asked; nothing to say when it is."""
+        self._refusal = f"Nothing is sent: {refusal}" if refusal else ""
+        self._next = 0.0
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        now, news = time.monotonic(), status.publishing
+        if now < self._next:
+            return
+        self._next = now + _EVERY
+        late = news.latency.whole
+        lines = [line for target in news.targets for line in _words(target)]
+        told = f"99 % within {1e3 * late:.1f} ms" if math.isfinite(late) else ""
+        for label, text in ((self.counts, "\n".join(lines)), (self.late, told)):
+            if text != label.text():
+                label.setText(text)
+            label.setVisible(bool(text))
+        refused = [target.refusal for target in news.targets if target.refusal]
+        self.show_message("\n".join(f"{why}." for why in [self._refusal, *refused] if why))
+
+
+def _words(target: TargetStatus) -> list[str]:
+    """A target in words, and each of its clients; nothing where its refusal says it all."""
+    if target.refusal:
+        return []
+    if target.opening:
+        return [f"{target.target}: looking for it{ELLIPSIS}"]
+    serving = target.target.startswith("foxglove")
+    name = target.target.removeprefix("udp://").removeprefix("foxglove://")
+    lines = [f"{name}, {len(target.receivers)} connected" if serving else name]
+    for receiver in target.receivers:
+        who = f"{receiver.name}: " if serving else ""
+        trouble = f", {receiver.trouble}" if receiver.trouble else ""
+        counts = f"{receiver.sent:,} sent, {receiver.dropped:,} dropped"
+        lines.append(f"    {who}{counts}{trouble}")
+    return lines
