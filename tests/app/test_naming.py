@@ -18,7 +18,7 @@ def _estimate(*loads):
 def test_the_curvature_at_a_contact_is_told_with_its_error_bars():
     words = curved(_estimate(PointLoad(0.05, 0.05, 0.15)))
 
-    assert words.startswith("skin there curves by \N{MINUS SIGN}")
+    assert words.startswith("principal curvatures \N{MINUS SIGN}")
     assert words.endswith("1/m")
     assert words.count("\N{PLUS-MINUS SIGN}") == 2
 
@@ -33,7 +33,7 @@ def test_the_window_says_what_touches_the_skin(window, until):
     assert len(window.session.scene.loads) == 2
 
     until(lambda: window.display.foot.object.text().startswith("edge, 20 mm long, axis "))
-    assert "skin there curves" in window.display.foot.object.text()
+    assert "principal curvatures" in window.display.foot.object.text()
 
     window.session.disconnect_from()
     until(lambda: not window.display.foot.object.text())

@@ -222,7 +222,7 @@ class TarePanel(Panel):
         """Which tare is in use, in words."""
         tare = self._tare
         if tare is None:
-            return "None: every element reads from a zero of its own."
+            return "Not tared."
         stored = self._taring is not None and tare == self._taring.stored
         return f"{'Stored: taken' if stored else 'Taken'} {when(tare)}" + warmth(
             tare.temperature, self._status.temperature

@@ -13,13 +13,13 @@ _LEARNING = "computing what objects read like on this skin\N{HORIZONTAL ELLIPSIS
 
 
 def curved(estimate: Estimate) -> str:
-    """How the skin curves at the contact, in words; empty without one."""
+    """The principal curvatures of the skin at the contact, in words; empty without one."""
     geometry = estimate.geometry
     if not estimate.contact.present:
         return ""
     (one, other), (sd, other_sd) = geometry.principal, geometry.principal_sd
     words = (
-        f"skin there curves by {one:+z.1f} \N{PLUS-MINUS SIGN} {sd:.1f} and "
+        f"principal curvatures {one:+z.1f} \N{PLUS-MINUS SIGN} {sd:.1f} and "
         f"{other:+z.1f} \N{PLUS-MINUS SIGN} {other_sd:.1f} 1/m"
     )
     return words.replace("-", "\N{MINUS SIGN}")
