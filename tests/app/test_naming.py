@@ -40,13 +40,13 @@ def test_the_window_says_what_touches_the_skin(window, until):
 
 
 def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until, monkeypatch):
-    until(lambda: "curves" in window.display.foot.object.text())
+    until(lambda: "curvatures" in window.display.foot.object.text())
     made, seen = naming.ObjectFinder, threading.Event()
     monkeypatch.setattr(naming, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
     window.requests.set("shape", "cylinder")
     until(lambda: "computing what objects read like" in window.display.foot.object.text())
     seen.set()
-    until(lambda: "curves" in window.display.foot.object.text())
+    until(lambda: "curvatures" in window.display.foot.object.text())
 
 
 def test_a_skin_that_objects_cannot_be_told_on_says_so(window, until):
@@ -59,7 +59,7 @@ def test_a_skin_that_objects_cannot_be_told_on_says_so(window, until):
 def test_what_fails_once_is_told_once_and_the_next_estimate_is_named(
     window, until, monkeypatch
 ) -> None:
-    until(lambda: "curves" in window.display.foot.object.text())
+    until(lambda: "curvatures" in window.display.foot.object.text())
     told: list[str] = []
     window.statusBar().messageChanged.connect(lambda text: text and told.append(text))
 
