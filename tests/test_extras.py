@@ -25,7 +25,7 @@ ASKS = {
     "compare": ["compare"],
     "foxglove": ["publish", "sim:", "--seconds", "30", "--foxglove", "127.0.0.1:8765"],
 }
-"""What asks for each extra; `film` the window alone does, see tests/app/test_exports.py."""
+"""What asks for each extra; `film` the app alone does: features/export/test_exports.py."""
 
 BARRED = """
 import sys

@@ -136,7 +136,7 @@ def test_every_control_can_be_used(window: MainWindow, nothing_chosen, until) ->
 
 
 def test_all_of_vtk_that_was_loaded_meanwhile_is_in_the_bundle(others_vtk: set[str]) -> None:
-    contents = Path(__file__).parents[2] / "packaging" / "bundle" / "contents.py"
+    contents = Path(__file__).parents[3] / "packaging" / "bundle" / "contents.py"
     bundled = {f"vtk{part}" for part in runpy.run_path(str(contents))["VTK"]}
 
     assert "vtkRenderingCore" in bundled

@@ -13,7 +13,7 @@ from kappaskin._toml import table
 from kappaskin.scenes import PARTS, Indenter, instead_of, load_scene, read_scene
 from kappaskin.scenes.effects import EFFECTS
 
-GUIDE = runpy.run_path(str(Path(__file__).parents[1] / "guide_keys.py"))
+GUIDE = runpy.run_path(str(Path(__file__).parents[2] / "guide_keys.py"))
 FROM_ELSEWHERE = {"patch", "transduction", "rigid", "a", "b", "strip", "vertices", "heights"}
 FROM_ELSEWHERE |= {"faces"}
 """Fields that a scene tells by other keys, or by a file."""
