@@ -40,7 +40,7 @@ def test_every_page_is_listed_under_its_own_title() -> None:
 def test_a_link_leads_on_and_back_leads_back(shown: GuidePanel) -> None:
     shown.text.setSource(shown.text.source().resolved(QUrl("calibrate.md")))
     assert shown.contents.currentItem().text() == "Calibrate"
-    assert "What is left" in shown.text.toPlainText()
+    assert "Remaining errors" in shown.text.toPlainText()
     assert shown.back.isEnabled()
     shown.back.click()
     assert shown.contents.currentItem().text() == "Contents"
