@@ -197,7 +197,7 @@ def test_the_figure_holds_the_name_and_the_window(
         monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, file=file: (str(file), ""))
         window.lesson.end.save.click()
     picture = QImage(str(files["png"]))
-    assert picture.text("Title") == "What a curvature gage feels"
+    assert picture.text("Title") == "What a curvature gage measures"
     assert picture.text("Description").startswith("Ada <Lovelace>: kappaskin ")
     assert picture.width() == 1000
     assert picture.height() > 600
