@@ -26,7 +26,7 @@ def tables(
     Parameters
     ----------
     method
-        How the coefficients are found, as in `kappaskin reconstruct`.
+        The estimator, as in `kappaskin reconstruct`.
     basis
         Number of functions along x and y; on the fingertip of Table 2 those along the arc.
     json

@@ -38,8 +38,8 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
 
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
     PlotJuggler and the tools of ROS 2 open. It is called OUT.part until it is complete;
-    `kappaskin repair` restores one that never was. Exit code 1 if recording ended by itself, as on
-    a full disk, or if no readings came.
+    `kappaskin repair` restores an incomplete one. Exit code 1 if the recording ended early, as on a
+    full disk, or if no readings arrived.
 
     Example: `kappaskin record sim: press.mcap --seconds 10`
 
@@ -142,7 +142,7 @@ def _ended(engine: "Engine") -> "Status":
 def info(file: Path, *, json: Switch = False) -> None:
     """Show what a recording contains: time, duration, devices, settings, events.
 
-    An unfinished recording is shown up to where it breaks off.
+    An unfinished recording is shown up to its last complete message.
 
     Example: `kappaskin info press.mcap`
 
@@ -231,10 +231,10 @@ _NOTHING = 3
 
 
 def repair(file: Path, *, out: Path) -> int:
-    """Save every whole message of a damaged or unfinished recording to a new file.
+    """Save every complete message of a damaged or unfinished recording to a new file.
 
-    Any MCAP file will do. Exit code 0 if nothing was lost, 1 if some of the file could not be read,
-    3 if nothing of it could.
+    Works for any MCAP file. Exit code 0 if nothing was lost, 1 if part of the file could not be
+    read, 3 if nothing could be read.
 
     Example: `kappaskin repair press.mcap.part --out press.mcap`
 
@@ -316,9 +316,9 @@ def reconstruct(
 
     READINGS is an NPZ with `size` (2,) m, `positions` (P, 2) m, `curvature` (T, 3, P) or (3, P) in
     1/m with NaN for a missing reading, and optionally `sigma` in 1/m and `radius` in m, the base
-    radius along x (infinite when flat). A `size` (1,) with `positions` (P, 1) is a strip, of whose
-    curvature only xx is read. An `outline` (V, 2) m is that of a polygon, one number the radius of
-    a disk; with a `rigidity` in N m, forces are computed too.
+    radius along x (infinite when flat). A `size` (1,) with `positions` (P, 1) is a strip, for
+    which only curvature xx is used. An `outline` in m is a polygon (V, 2) or the radius of a disk.
+    With a `rigidity` in N m, forces are computed too.
 
     Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`
 
@@ -333,14 +333,14 @@ def reconstruct(
     grid
         Number of points of the surface along x and y; none when left out.
     edge
-        How the skin is held: hinged, sliding, clamped or elastic.
+        The boundary condition: hinged, sliding, clamped or elastic.
     method
-        How the coefficients are found: least-squares, as-printed, direct, fast, bayes,
-        finite-slope, tracking or robust.
+        The estimator: least-squares, as-printed, direct, fast, bayes, finite-slope, tracking or
+        robust.
     contact
         Write the contact of each frame too, and the skin's geometry there.
     objects
-        Write the contact and what it is: plane, cylinder, sphere or edge; some 50 ms a frame.
+        Write the contact and the object: plane, cylinder, sphere or edge; some 50 ms a frame.
     """
     from kappaskin.pipeline import reconstruct as reconstructed
 

@@ -49,8 +49,8 @@ def calibrate(
 ) -> int:
     """Calibrate a sensor against cylinders of known radius.
 
-    Asks for one cylinder after the other and waits for Enter; a simulated source lays itself on
-    them. The exit code is 1 when some channel failed: the file is written without that channel.
+    Asks for one cylinder after the other and waits for Enter; a simulated source needs no help.
+    The exit code is 1 if a channel failed: the file is written without that channel.
 
     Example: `kappaskin calibrate /dev/ttyACM0 --out skin.toml --radii 100,50,33,25,20`
 
@@ -63,12 +63,12 @@ def calibrate(
     radii
         Radii of the cylinders in millimetres; those that the sensor can read when left out.
     seconds
-        How long the readings on each cylinder are averaged.
+        Averaging time on each cylinder, in seconds.
     hold
         Seconds on the smallest cylinder to measure creep; without it creep is not measured.
     dwell
-        Do not wait for Enter: the device moves by itself and stays on each cylinder so many
-        seconds.
+        Do not wait for Enter: a device that moves automatically stays on each cylinder for this
+        many seconds.
     json
         Print one JSON object with every channel instead of a summary.
     """
@@ -187,10 +187,10 @@ def _print_tare(taken: "Tare", before: "Tare | None") -> None:
 def press(
     source: str, *, quick: Switch = False, patience: float = 20.0, json: Switch = False
 ) -> int:
-    """Verify the channel map: press one element after the other and see which one answers.
+    """Verify the channel map: press one element after the other and see which one responds.
 
-    Asks for one element after the other and detects by itself when it is pressed and released; a
-    simulated source presses by itself. The exit code is 1 when the map is not confirmed.
+    Asks for one element after the other and detects when it is pressed and released; a simulated
+    source needs no help. The exit code is 1 if the map is not confirmed.
 
     Example: `kappaskin press /dev/ttyACM0 --quick`
 
@@ -202,7 +202,7 @@ def press(
         On a grid, press two elements in each row and column only: enough to see whether rows,
         columns or components are exchanged, but not every pair of elements.
     patience
-        Seconds to wait for an answer before the next element is asked for.
+        Seconds to wait for a response before asking for the next element.
     json
         Print one JSON object with every press and the map that was found.
     """
@@ -240,11 +240,11 @@ _WAIT = 0.1  # s
 
 
 def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> int:
-    """Print what a device sends as readable lines, to bring it up.
+    """Print the messages of a device as readable lines, for bring-up.
 
     Every message with its sequence number, time and content (of scans, ten a second), every gap and
-    every byte that was discarded, and a summary at the end (Ctrl+C). Exit code 1 if no message
-    came, or the line broke.
+    every discarded byte, and a summary at the end (Ctrl+C). Exit code 1 if no message arrived, or
+    the connection was lost.
 
     Example: `kappaskin monitor /dev/ttyACM0`
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def plan(scene: str = "", *, json: Switch = False) -> None:
-    """Show which effects a scene needs at the accuracy that it asks for, and why.
+    """Show which effects a scene needs at its requested accuracy, and why.
 
     Example: `kappaskin plan tapping`
 
@@ -46,8 +46,8 @@ def plan(scene: str = "", *, json: Switch = False) -> None:
 def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None) -> None:
     """Simulate a scene into an NPZ file.
 
-    It has `counts` and `curvature` (T, 3, P), the `truth` (T, Ni, Nj) in m, `time` (T,) in s, the
-    `contact` (T, 2) in m, NaN where nothing touches or a frame was lost, and the `plan` as JSON.
+    It contains `counts` and `curvature` (T, 3, P), the `truth` (T, Ni, Nj) in m, `time` (T,) in s,
+    the `contact` (T, 2) in m, NaN without a contact or for a dropped frame, and the `plan` as JSON.
     The same seed gives the same bytes.
 
     Example: `kappaskin simulate tapping --frames 1000 --out taps.npz`
@@ -57,9 +57,9 @@ def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = 
     scene
         The name of a ready scene, or a file that ends in .toml; the default one when left out.
     frames
-        How many frames.
+        Number of frames.
     seed
-        The seed of all that is random; the scene's own when left out.
+        The seed of the random numbers; the scene's when left out.
     out
         The file to write.
     """
@@ -119,11 +119,11 @@ def cost(
     plot: Path | None = None,
     json: Switch = False,
 ) -> int:
-    """Measure what accuracy costs: error, time and memory of every method and setting.
+    """Measure the cost of accuracy: error, time and memory of every method and setting.
 
     Takes about a minute. Bases, elements, precisions and channels are combined with each method;
-    marked are the settings that no other one beats in both error and time. A second table shows
-    what each effect of the scene costs, and what leaving it out does to the shape.
+    the settings that no other one beats in both error and time are marked. A second table shows
+    the cost of each effect of the scene, and the error of the shape without it.
 
     Example: `kappaskin cost --within 0.02mm --plot cost.svg`
 
@@ -169,10 +169,10 @@ def cost(
 
 
 def compare(*, json: Switch = False) -> None:
-    """Run the same work through what one would use instead: error, time and memory side by side.
+    """Compare with other software on the same problems: error, time and memory side by side.
 
-    NumPy's and SciPy's least squares and scikit-fem's finite elements, each set as well as it can
-    be. Needs `kappaskin[compare]`; takes some seconds.
+    NumPy's and SciPy's least squares and scikit-fem's finite elements, each configured as well as
+    possible. Needs `kappaskin[compare]`; takes some seconds.
 
     Example: `kappaskin compare --json`
 
@@ -192,7 +192,7 @@ def stability(
     json: Switch = False,
     long: Switch = False,
 ) -> None:
-    """Run hard cases through every method that claims them, and judge each answer.
+    """Run hard cases through every method that supports them, and check each result.
 
     Example: `kappaskin stability --json`
 
@@ -211,7 +211,7 @@ def stability(
 
 
 def regions(*, json: Switch = False) -> None:
-    """Measure what scanning a region of interest buys and costs, on a contact that moves.
+    """Measure the gain and the cost of scanning a region of interest, on a moving contact.
 
     Example: `kappaskin regions --json`
 
@@ -232,12 +232,12 @@ _LOG_EVERY = 10.0  # s between two lines of progress in a log
 def study(
     file: str, *, workers: Whole | None = None, scheduler: str = "", out: Path | None = None
 ) -> int:
-    """Compute a design study: how good a sensor would be, before it is built.
+    """Compute a design study: the accuracy of a sensor before it is built.
 
     A study is a scene with tables [[vary]] of values to sweep, [[draw]] of values to draw at
     random, and [measure] and [stop]. Every result is a file of its own in the folder: a study that
-    was stopped goes on where it was, and a changed one computes only what changed. The exit code is
-    1 where some of it failed.
+    was stopped resumes, and after a change only the changed parts are computed. The exit code is
+    1 if some of it failed.
 
     Example: `kappaskin study paper-elements --workers 2 --out elements`
 
@@ -246,7 +246,7 @@ def study(
     file
         The name of a ready study, or a file that ends in .toml.
     workers
-        How many processes compute; as many as there are cores when left out.
+        Number of worker processes; the number of cores when left out.
     scheduler
         The address of a Dask scheduler whose workers compute, such as tcp://10.0.0.5:8786; needs
         kappaskin[dask] here and there.
@@ -276,7 +276,7 @@ def study(
 def report(folder: Path) -> None:
     """Make a page of a study's results: report.html, with a CSV and an SVG of each figure.
 
-    The page needs no network and states all that it takes to repeat the study. Results that are
+    The page needs no network and states everything needed to repeat the study. Results that are
     not computed yet are listed as missing.
 
     Example: `kappaskin report elements`

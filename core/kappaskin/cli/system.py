@@ -110,7 +110,7 @@ def doctor(port: str = "", *, json: Switch = False) -> int:
     Parameters
     ----------
     port
-        The port or URL to look at; this machine when left out.
+        The port or URL to examine; this machine when left out.
     json
         Print one JSON object instead of text.
     """
@@ -178,10 +178,10 @@ def _tell_machine(json: bool) -> None:
 
 
 def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> int:
-    """Inflict faults on the line to a device, and report what became of each.
+    """Inject faults into the line to a device, and report the outcome of each.
 
-    A relay before the device spoils what passes: noise, cuts, floods, unplugged cables. Exit code 1
-    if a drill fails. Close the app first: the port is used.
+    A relay before the device corrupts the traffic: noise, cuts, floods, unplugged cables. Exit code
+    1 if a drill fails. Close the app first: the drill needs the port.
 
     Example: `kappaskin drill /dev/ttyACM0`
 
@@ -192,7 +192,7 @@ def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> in
     json
         Print one JSON list of rows instead of a table.
     long
-        Run each for longer: 100 times unplugged, ten seconds of noise.
+        Run each drill for longer: 100 times unplugged, ten seconds of noise.
     """
     try:
         from kappaskin.studies import drills_text, run_drills
