@@ -12,8 +12,8 @@ from kappaskin.scenes import PARTS, Key
 PAGE = Path(__file__).parents[1] / "resources" / "kappaskin_resources" / "guide" / "scenes.md"
 HEADING = "## Every key"
 _OPENING = """
-Lengths are in metres in a file, whatever unit the window shows. A key without a usual value must
-be said, or another one in its stead: a force or a displacement, a force or a depth.
+Lengths in a file are in metres, whatever unit the window shows. A key without a default is
+required, or its alternative: a force or a displacement, a force or a depth.
 """
 _PLACES = {
     "scene": "At the top",
@@ -56,7 +56,7 @@ def _table(name: str, of_kinds: bool = False) -> str:
             for key in _known(name, kind):
                 rows.setdefault(_row(key, part.key(key, kind)), []).append(kind)
     there = any(rows.values())
-    head = ("key", *(("of",) if there else ()), "value", "unit", "usual", "what it is")
+    head = ("key", *(("of",) if there else ()), "value", "unit", "default", "meaning")
     lines = [_line(head), "|---" * len(head) + "|"]
     for row, kinds in rows.items():
         of = (_of(kinds, list(part.kinds)),) if there else ()
@@ -81,7 +81,7 @@ def _of(kinds: list[str], every: list[str]) -> str:
 
 
 def _row(name: str, key: Key) -> tuple[str, ...]:
-    return f"`{name}`", _value(key), key.unit.name, _usual(key.default), f"{key.label}. {key.tip}"
+    return f"`{name}`", _value(key), key.unit.name, _default(key.default), f"{key.label}. {key.tip}"
 
 
 def _value(key: Key) -> str:
@@ -109,7 +109,7 @@ def _kind(kind: Any) -> str:
     return "list of pairs" if get_origin(first) is tuple else f"list of {_kind(first)}s"
 
 
-def _usual(default: Any) -> str:
+def _default(default: Any) -> str:
     match default:
         case None | () | "":
             return "none"

@@ -60,30 +60,30 @@ SCENE = Part(
         "format": Key("Format", "The format of the file: 1.", kind=int, offered=False),
         "title": Key(
             "Title",
-            "What lists of scenes call it; the name of the file when left out.",
+            "The name in lists of scenes; the name of the file when left out.",
             example="A scene",
         ),
-        "text": Key("Text", "What there is to see.", offered=False),
+        "text": Key("Text", "Description of the scene.", offered=False),
         "rate": Key(
             "Frame rate",
-            "How many frames the sensor sends.",
+            "Frames per second that the sensor sends.",
             Unit.same("frames/s"),
             limits=Within(1e-3, 1e6, "frames/s"),
         ),
         "seed": Key(
             "Seed",
-            "Another number draws other noise; the same one draws the same again.",
+            "Start of the random numbers; the same seed gives the same noise.",
             limits=Within(0, 2**64, whole=True),
         ),
         "accuracy": Key(
             "Accuracy",
-            "Effects that change readings by less are left out: a share of the peak curvature.",
+            "Effects that change readings by less are omitted; as a share of the peak curvature.",
             least=0.0,
             most=1.0,
         ),
         "reference": Key(
             "Functions",
-            "Along x and along y: of what the true shape is made. A strip has one along y.",
+            "Basis functions of the true shape along x and y. A strip has one along y.",
             least=1,
         ),
     },
@@ -95,7 +95,7 @@ SKIN = Part(
     {
         "shape": Key(
             "Shape",
-            "The outline. A strip is held at its two ends along x and alike all along y.",
+            "The outline. A strip is held at its two ends along x; its shape is constant along y.",
             kind=str,
             default="rectangle",
         ),
@@ -105,7 +105,7 @@ SKIN = Part(
         "rim_radius": Key("Radius", "Radius of the disk.", _MM, 0.0, kind=float),
         "outline": Key(
             "Corners",
-            "x, y of one corner after the other.",
+            "x, y of each corner, in order.",
             _MM,
             kind=tuple[tuple[float, float], ...],
         ),
@@ -114,45 +114,45 @@ SKIN = Part(
         ),
         "edge": Key(
             "Edge",
-            "How the skin is held along its rim. Hinged: it turns freely there; sliding: the ends "
-            "of a bent one slide; clamped: it cannot turn; elastic: the rim gives.",
+            "Boundary condition along the rim. Hinged: the skin rotates freely; sliding: the ends "
+            "of a bent skin slide; clamped: no rotation; elastic: the rim rests on springs.",
             choices=tuple((edge, edge.capitalize()) for edge in EDGES),
         ),
         "rigidity": Key(
             "Rigidity",
-            "How stiff the skin is against bending.",
+            "Bending stiffness of the skin.",
             Unit.same("N m"),
             limits=Within(1e-12, 1e6, "N m", or_zero=True),
         ),
         "tension": Key(
             "Tension",
-            "How strongly it is stretched, like a drum head.",
+            "Tension of the skin, as of a drum head.",
             Unit.same("N/m"),
             limits=Within(1e-9, 1e6, "N/m", or_zero=True),
             example=10.0,
         ),
         "foundation": Key(
             "Foam",
-            "Foam below: its pressure per displacement.",
+            "Foam below the skin: its pressure per displacement.",
             Unit.same("N/m^3", "N/m\N{SUPERSCRIPT THREE}"),
             limits=Within(1e-9, 1e12, "N/m^3", or_zero=True),
             example=1e4,
         ),
         "fluid": Key(
             "Fluid below",
-            "It keeps its volume: pressed in here, the skin bulges there.",
+            "A fluid of constant volume: pressed in at one point, the skin bulges elsewhere.",
             example=True,
         ),
-        "poisson": Key("Poisson's ratio", "Matters where an edge gives or the skin is bent."),
+        "poisson": Key("Poisson's ratio", "Matters for elastic edges and bent skins."),
         "rim_stiffness": Key(
             "Rim stiffness",
-            "Of the springs below an elastic rim.",
+            "Stiffness of the springs below an elastic rim.",
             Unit.same("N/m^2", "N/m\N{SUPERSCRIPT TWO}"),
             limits=Within(1e-9, 1e12, "N/m^2", or_zero=True),
         ),
         "axial_stiffness": Key(
             "Axial stiffness",
-            "Of a bent skin that stretches along its axis.",
+            "Stiffness against stretching along the axis of a bent skin.",
             Unit.same("N/m"),
             limits=Within(1e-9, 1e12, "N/m", or_zero=True),
             example=1e4,
@@ -184,21 +184,25 @@ ELEMENTS = Part(
             example=[10, 10],
         ),
         "positions": Key(
-            "Places",
-            "x, y of one element after the other.",
+            "Positions",
+            "x, y of each element.",
             _MM,
             kind=tuple[tuple[float, float], ...],
             example=[[0.03, 0.03], [0.07, 0.03], [0.03, 0.07], [0.07, 0.07]],
         ),
         "dead": Key(
             "Dead",
-            "Numbers of the elements that never read anything, from 0.",
+            "Numbers of the elements without readings, from 0.",
             kind=tuple[int, ...],
             default=(),
             example=[0],
         ),
         "gage_length": Key(
-            "Gage length", "A gage reads the mean along so much.", _MM, 0.0, example=0.001
+            "Gage length",
+            "A gage measures the mean curvature along this length.",
+            _MM,
+            0.0,
+            example=0.001,
         ),
     },
     (SensorLayout,),
@@ -208,8 +212,8 @@ ELECTRONICS = Part(
     "Electronics",
     {
         "like": Key(
-            "Built like",
-            "The electronics that all the rest differs from.",
+            "Electronics",
+            "The electronics whose values apply unless given below.",
             kind=str,
             default="modern",
             choices=_choices(modern="Modern", second="Second prototype", first="First prototype"),
@@ -224,17 +228,17 @@ BRIDGE = Part(
         "substrate_thickness": Key("Substrate", "Thickness between the gages.", _UM, 0.0),
         "gage_thickness": Key("Gage thickness", "Thickness of a gage.", _UM, 0.0),
         "excitation": Key("Excitation", "Voltage across a half-bridge.", _VOLT, 0.0),
-        "gage_resistance": Key("Gage", "Resistance of a gage that is not bent.", _OHM, 0.0),
+        "gage_resistance": Key("Gage", "Resistance of an unstrained gage.", _OHM, 0.0),
         "gage_mismatch": Key(
             "Mismatch",
-            "By what share the lower gage of a pair exceeds the upper one.",
+            "Relative difference of the lower gage of a pair to the upper one.",
             least=-1.0,
             most=1.0,
             example=0.0001,
         ),
         "dummy_resistance": Key("Dummy", "Lower arm of the dummy half-bridge.", _OHM, 0.0),
         "balance_voltage": Key(
-            "Balance", "Where the middle of the dummy stands.", _VOLT, 0.0, example=2.5
+            "Balance", "Voltage of the middle of the dummy.", _VOLT, 0.0, example=2.5
         ),
     },
     (HalfBridge,),
@@ -264,9 +268,9 @@ CONVERTER = Part(
     "Converter",
     {
         "bits": Key("Resolution", "Bits of a reading.", Unit.same("bits"), 8, 24, comment=""),
-        "full_scale": Key("Full scale", "Reads between minus and plus this.", _VOLT, 0.0),
-        "offset": Key("Offset", "What it reads of no voltage.", _VOLT),
-        "conversion_time": Key("Conversion", "Time that it takes for one channel.", _US, 0.0),
+        "full_scale": Key("Full scale", "Input range, from minus to plus this.", _VOLT, 0.0),
+        "offset": Key("Offset", "Reading at zero input.", _VOLT),
+        "conversion_time": Key("Conversion", "Conversion time of one channel.", _US, 0.0),
     },
     (Converter,),
 )
@@ -348,8 +352,8 @@ TOUCH = Part(
     {
         "what": Key(
             "What",
-            "What presses: a load is given, of a rigid object the skin finds how it lies against "
-            "it.",
+            "The load or the object. For a load the pressure is given; for a rigid object it is "
+            "computed.",
             kind=str,
             offered=False,
         ),
@@ -357,43 +361,46 @@ TOUCH = Part(
         "y": _length("y", "From the corner x = y = 0, across the skin.", -math.inf),
         "x0": _length("x of one end", "From the corner x = y = 0.", -math.inf),
         "y0": _length("y of one end", "From the corner x = y = 0.", -math.inf),
-        "x1": _length("x of the other", "From the corner x = y = 0.", -math.inf),
-        "y1": _length("y of the other", "From the corner x = y = 0.", -math.inf),
+        "x1": _length("x of the other end", "From the corner x = y = 0.", -math.inf),
+        "y1": _length("y of the other end", "From the corner x = y = 0.", -math.inf),
         "force": Key(
             "Force",
-            "How hard it presses at most.",
+            "Largest force.",
             _NEWTON,
             kind=float,
             limits=Within(-1e6, 1e6, "N"),
         ),
         "displacement": _length(
-            "Displacement", "As hard as moves the skin below it so far.", -math.inf, example=0.002
+            "Displacement",
+            "Displacement of the skin below the load, instead of a force.",
+            -math.inf,
+            example=0.002,
         ),
         "depth": Key(
-            *("Depth", "How deep it is pressed in, however hard that is.", _MM, 0.0),
+            *("Depth", "Depth of indentation, instead of a force.", _MM, 0.0),
             kind=float,
             example=0.002,
         ),
-        "radius": _length("Radius", "Radius of what presses."),
-        "sd": _length("Spread", "Standard deviation of the force about its centre."),
-        "length": _length("Length", "Along x, before it is turned."),
-        "width": _length("Width", "Along y, before it is turned."),
+        "radius": _length("Radius", "Radius of the load or object."),
+        "sd": _length("Standard deviation", "Of the force about its centre."),
+        "length": _length("Length", "Along x, before rotation."),
+        "width": _length("Width", "Along y, before rotation."),
         "height": _length("Height", "Along y."),
-        "angle": Key("Angle", "Between the flanks of the edge.", _DEGREE, 0.0, math.pi),
-        "tip_radius": _length("Tip radius", "To which the edge is rounded.", example=0.001),
+        "angle": Key("Angle", "Angle between the flanks of the edge.", _DEGREE, 0.0, math.pi),
+        "tip_radius": _length("Tip radius", "Radius of the rounded edge.", example=0.001),
         "turn": Key(
-            "Turned by",
+            "Rotation",
             "About the skin's normal, from x to y.",
             _DEGREE,
             kind=float,
             default=0.0,
             example=0.7853982,
         ),
-        "relief": _length("Relief", "From its lowest to its highest place."),
-        "file": Key("File", "Its name, in the folder of the scene.", kind=str),
+        "relief": _length("Relief", "Height from the lowest to the highest point."),
+        "file": Key("File", "Name of the file, in the folder of the scene.", kind=str),
         "unit": Key(
             "Unit of length",
-            "How many metres one unit of the file is.",
+            "Length of one unit of the file in metres.",
             least=0.0,
             kind=float,
             default=1.0,
@@ -401,12 +408,12 @@ TOUCH = Part(
         ),
         "orbit": Key(
             "Motion in a circle",
-            "It goes round its place, pressing all the time.",
+            "Moves on a circle around the position under constant load.",
             example={"radius": 0.01, "period": 4.0},
         ),
         "path": Key(
             "Motion in steps",
-            "It presses, holds, slides and so on, again and again.",
+            "Presses, holds, slides and so on, repeatedly.",
             example=[
                 {"step": "press", "seconds": 0.5},
                 {"step": "hold", "seconds": 1.0},
@@ -427,8 +434,8 @@ TOUCH = Part(
 ORBIT = Part(
     "Motion in a circle",
     {
-        "radius": Key("Radius", "Of the circle that it goes round.", _MM, 0.0, example=0.01),
-        "period": Key("Once in", "Time of one round.", _SECOND, 0.0, example=4.0),
+        "radius": Key("Radius", "Radius of the circle.", _MM, 0.0, example=0.01),
+        "period": Key("Period", "Time of one revolution.", _SECOND, 0.0, example=4.0),
     },
     (Orbit,),
 )
@@ -438,23 +445,23 @@ STEP = Part(
     {
         "step": Key(
             "Step",
-            "Press until the force or depth is reached; hold; release; slide or roll aside, "
-            "pressing as before; turn about the skin's normal; tap, ending lifted.",
+            "Press until the force or depth is reached; hold; release; slide or roll under "
+            "constant load; turn about the skin's normal; tap, and lift at the end.",
             kind=str,
             offered=False,
         ),
-        "seconds": Key("Takes", "How long the step takes.", _SECOND, 0.0),
-        "by": Key("By", "How far along x and along y.", _MM),
+        "seconds": Key("Duration", "Duration of the step.", _SECOND, 0.0),
+        "by": Key("By", "Distance along x and y.", _MM),
         "to": Key(
             "To share",
-            "The share of the force or depth that it presses to.",
+            "Final share of the force or depth.",
             Unit("", "of full"),
             0.0,
         ),
-        "times": Key("Times", "How many taps.", Unit("", "times"), 1, 1000),
+        "times": Key("Times", "Number of taps.", Unit("", "times"), 1, 1000),
         "ease": Key(
             "Ease",
-            "Smooth: it begins and ends at rest without a jerk.",
+            "Smooth: the motion starts and ends at rest, without a step in acceleration.",
             kind=str,
             default=next(iter(EASES)),
             example="linear",
@@ -482,8 +489,8 @@ CYLINDERS = Part(
     "Cylinders",
     {
         "dwell": Key(
-            "On each for",
-            "How long the skin lies on each cylinder.",
+            "Dwell time",
+            "Time on each cylinder.",
             _SECOND,
             kind=float,
             default=1.0,
@@ -492,7 +499,7 @@ CYLINDERS = Part(
         ),
         "radii": Key(
             "Radii",
-            "Of the cylinders it is laid on; eight from 100 to 13 mm when left out.",
+            "Radii of the cylinders; eight from 100 to 13 mm when left out.",
             _MM,
             kind=tuple[float, ...],
             default=(),
@@ -500,8 +507,8 @@ CYLINDERS = Part(
             limits=Within(1e-4, 1e3, "m"),
         ),
         "hold": Key(
-            "First stay for",
-            "On the smallest cylinder, to see its creep.",
+            "First hold",
+            "Time on the smallest cylinder at the start, to measure creep.",
             _SECOND,
             kind=float,
             default=0.0,
@@ -513,23 +520,23 @@ CYLINDERS = Part(
 
 
 _EFFECT_KEYS: dict[str, dict[str, Key]] = {
-    "strain-limit": {"share": Key("Share", "Of what goes beyond that stays.")},
+    "strain-limit": {"share": Key("Share", "Share of the excess strain that remains.")},
     "hysteresis": {
         "like": Key(
-            "Loops of",
-            "Of which prototype.",
+            "Prototype",
+            "The prototype that has this hysteresis.",
             kind=str,
             choices=_choices(second="Second prototype", first="First prototype"),
         ),
-        "thresholds": Key("Thresholds", "Of the plays.", Unit.same("1/m")),
-        "weights": Key("Weights", "Of the plays."),
+        "thresholds": Key("Thresholds", "Thresholds of the play operators.", Unit.same("1/m")),
+        "weights": Key("Weights", "Weights of the play operators."),
     },
-    "creep": {"share": Key("Share", "Of a reading that goes in time.")},
+    "creep": {"share": Key("Share", "Share of a reading that relaxes.")},
     "intermittent": {
-        "on": Key("There for", "On average, at a time."),
-        "off": Key("Away for", "On average, at a time."),
+        "on": Key("Time on", "Mean duration with readings."),
+        "off": Key("Time off", "Mean duration without readings."),
     },
-    "cross-talk": {"share": Key("Share", "That a channel keeps of the one before.")},
+    "cross-talk": {"share": Key("Share", "Share of the previous channel in a reading.")},
 }
 """Keys that mean something else in one effect than in others."""
 
@@ -557,24 +564,30 @@ EFFECT = Part(
             offered=False,
         ),
         "on": _named("On", "Effects that are simulated in any case."),
-        "off": _named("Off", "Effects that are left out in any case."),
-        "time_constant": Key("Time constant", "Time to within a third of the end.", _SECOND),
-        "elements": Key("Elements", "Their numbers, from 0."),
+        "off": _named("Off", "Effects that are omitted in any case."),
+        "time_constant": Key("Time constant", "Time to 63 % of the change.", _SECOND),
+        "elements": Key("Elements", "Numbers of the elements, from 0."),
         "rms": Key("RMS", "Root mean square of the noise."),
-        "share": Key("Share", "Of all frames."),
-        "rise": Key("Rise", "How much warmer the skin becomes."),
-        "offset": Key("Offset", "Curvature that a reading is off by for each kelvin."),
-        "spread": Key("Offset spread", "Of the offsets, as a share of their mean.", example=0.3),
+        "share": Key("Share", "Share of all frames."),
+        "rise": Key("Rise", "Rise of the skin's temperature."),
+        "offset": Key("Offset", "Error of a reading for each kelvin."),
+        "spread": Key(
+            "Offset spread",
+            "Standard deviation of the offsets, as a share of their mean.",
+            example=0.3,
+        ),
         "gain": Key("Gain", "Change of the gage factor for each kelvin.", example=1e-4),
-        "seed": Key("Seed", "The skin's own: another one draws another skin."),
+        "seed": Key("Seed", "Start of the skin's random numbers; another seed gives another skin."),
         "gain_sd": Key("Gain spread", "Standard deviation of the gains about 1."),
         "offset_sd": Key("Offset spread", "Standard deviation of the offsets about 0."),
-        "amplitude": Key("Amplitude", "Of the hum."),
-        "frequency": Key("Frequency", "Of the mains."),
-        "asymmetry": Key("Asymmetry", "How many times wider loops are on positive curvature."),
-        "low": Key("From frequency", "Where the band of the noise begins."),
-        "high": Key("To frequency", "Where the band of the noise ends."),
-        "since": Key("Since", "Stuck from then on.", example=1.0),
+        "amplitude": Key("Amplitude", "Amplitude of the hum."),
+        "frequency": Key("Frequency", "Frequency of the mains."),
+        "asymmetry": Key(
+            "Asymmetry", "Ratio of the loop widths at positive and negative curvature."
+        ),
+        "low": Key("Lowest frequency", "Lower limit of the noise band."),
+        "high": Key("Highest frequency", "Upper limit of the noise band."),
+        "since": Key("Since", "Time of the failure.", example=1.0),
     },
     kinds={effect.name: _kind_of(effect) for effect in EFFECTS.values() if effect.example},
 )

@@ -68,7 +68,7 @@ def test_in_a_list_of_effects_one_is_forced_by_being_in_it() -> None:
 def test_comments_and_order_stay() -> None:
     text = text_of("pencil")
     changed = forced(shifted(text, 0, 0.001, -0.002), "saturation", OFF)
-    assert "# frames/s: a rigid object takes milliseconds to find its place" in changed
+    assert "# frames/s: a rigid object takes milliseconds to compute" in changed
     there = [line for line in text.splitlines() if not line.startswith(("x =", "y ="))]
     left = iter(changed.splitlines())
     assert all(line in left for line in there)
