@@ -30,16 +30,16 @@ from kappaskin.cli.common import FAILED, REFUSED
 from kappaskin.errors import Refusal
 from kappaskin.scenes import SCENES, load_scene, write_scene
 from kappaskin.studies import EffectCost, accuracy_verdict, cost_rows, effect_rows, settings_to_try
-from kappaskin.studies.compare.comparison import ComparisonRow
+from kappaskin.studies.compare import ComparisonRow
 from kappaskin.studies.cost.bench import costs
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.study import STUDIES
-from kappaskin.studies.drills.run import DRILLS, row_of
+from kappaskin.studies.drills import DRILLS, row_of
 from kappaskin.studies.drills.stand import Drill, DrillOutcome, opened
 from kappaskin.studies.regions import REGIONS
 from kappaskin.studies.regions import measured as run_region
+from kappaskin.studies.stability import rows_of
 from kappaskin.studies.stability.gallery import gallery
-from kappaskin.studies.stability.verdicts import rows_of
 
 STORED = Path(__file__).with_name("outside_names.json")
 STUDY = """

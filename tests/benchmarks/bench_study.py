@@ -9,8 +9,8 @@ import psutil
 from kappaskin import LeastSquares, Simulator, SineBasis, load_scene
 from kappaskin.pipeline import reconstruct
 from kappaskin.studies import StudyFolder, run_study
+from kappaskin.studies.design import processes
 from kappaskin.studies.design.results import BlockTask, run_task, version
-from kappaskin.studies.design.run import processes
 from kappaskin.studies.design.study import read_study
 
 TEXT = """

@@ -17,8 +17,9 @@ from kappaskin.cli import main
 from kappaskin.sources import BAUD_RATES, information
 from kappaskin.sources.wire import Fault, Information, Operation, Reply, Samples
 from kappaskin.studies import drills_text, run_drills
+from kappaskin.studies.drills import DRILLS, row_of
 from kappaskin.studies.drills.line import DEVICE_DRILLS as OF_DEVICES
-from kappaskin.studies.drills.relay import (
+from kappaskin.studies.drills.line import (
     ClockShift,
     CutScans,
     FlippedBits,
@@ -27,7 +28,6 @@ from kappaskin.studies.drills.relay import (
     received_at,
     without_information,
 )
-from kappaskin.studies.drills.run import DRILLS, row_of
 from kappaskin.studies.drills.stand import (
     Device,
     Drill,

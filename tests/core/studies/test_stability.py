@@ -18,9 +18,9 @@ from kappaskin.estimation import METHODS, singular_values
 from kappaskin.estimation.fit import DenseUncertainty
 from kappaskin.estimation.least_squares import AsPrinted
 from kappaskin.studies import run_stability
+from kappaskin.studies.stability import rows_of
 from kappaskin.studies.stability.gallery import CaseKind, gallery
 from kappaskin.studies.stability.reference import least_squares, reference_of
-from kappaskin.studies.stability.verdicts import rows_of
 
 pytestmark = pytest.mark.slow
 

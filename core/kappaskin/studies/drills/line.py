@@ -1,26 +1,179 @@
 """Drills on the line and the device: noise, wrong baud rates, stalls, restarts, unplugging."""
 
+import json
 import math
 import os
 import signal
+import struct
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kappaskin.sources import BAUD_RATES, wire
-from kappaskin.studies.drills.relay import (
-    ClockShift,
-    CutScans,
-    FlippedBits,
-    Garbage,
-    InformationChange,
-    OtherBaudRate,
+from kappaskin.studies.drills.stand import (
+    Drill,
+    DrillOutcome,
+    ProcessResources,
     Spoil,
+    Stand,
     clean,
-    speed_code,
-    without_information,
 )
-from kappaskin.studies.drills.stand import Drill, DrillOutcome, ProcessResources, Stand
+
+# Faults of messages, before they are numbered
+
+_ANSWER = struct.Struct("<Qh")  # as to a ping: when it came in us, how warm it is
+
+
+@dataclass
+class ClockShift:
+    """As from a device whose clock is `ahead` s fast; no time is before 0."""
+
+    ahead: float
+
+    def __call__(self, message: wire.FromDevice) -> list[wire.FromDevice]:
+        if (
+            isinstance(message, wire.Reply)
+            and message.operation == wire.Operation.PING
+            and not message.fault
+        ):
+            received_us, temperature = _ANSWER.unpack(message.data)
+            received_us = max(0, received_us + round(self.ahead * 1e6))
+            message = message._replace(data=_ANSWER.pack(received_us, temperature))
+        return [message._replace(time=max(0.0, message.time + self.ahead))]
+
+
+@dataclass
+class InformationChange:
+    """As from a device that reports `value` under `key` of its description."""
+
+    key: str
+    value: str
+
+    def __call__(self, message: wire.FromDevice) -> list[wire.FromDevice]:
+        if not isinstance(message, wire.Information):
+            return [message]
+        return [
+            message._replace(text=json.dumps(json.loads(message.text) | {self.key: self.value}))
+        ]
+
+
+def without_information(message: wire.FromDevice) -> list[wire.FromDevice]:
+    """As from a device that does not describe itself."""
+    return [] if isinstance(message, wire.Information) else [message]
+
+
+# Faults of bytes under way
+
+_BURST = 64  # bytes, the mean of a burst of garbage
+_KIND = 3  # the place of a message's kind
+
+
+@dataclass
+class Garbage:
+    """Bursts of noise in the place of `share` of the bytes, or as many between them, at random."""
+
+    share: float
+    rng: np.random.Generator
+
+    def __call__(self, data: bytes) -> bytes:
+        spoilt = bytearray(data)
+        for _ in range(self.rng.poisson(self.share * len(data) / _BURST)):
+            length = int(self.rng.geometric(1 / _BURST))
+            at = int(self.rng.integers(len(spoilt) + 1))
+            over = length if self.rng.random() < 0.5 else 0
+            spoilt[at : at + over] = self.rng.bytes(length)
+        return bytes(spoilt)
+
+
+@dataclass
+class FlippedBits:
+    """One bit in `every` so many turned over, at random."""
+
+    every: int
+    rng: np.random.Generator
+
+    def __call__(self, data: bytes) -> bytes:
+        spoilt = bytearray(data)
+        for place in self.rng.integers(
+            8 * len(data), size=self.rng.poisson(8 * len(data) / self.every)
+        ):
+            spoilt[place // 8] ^= 1 << (place % 8)
+        return bytes(spoilt)
+
+
+@dataclass
+class CutScans:
+    """Every second scan is broken off, one byte later each time; `cuts` counts them."""
+
+    cuts: int = 0
+    length: int = 1
+    whole: bool = True
+
+    def __call__(self, data: bytes) -> bytes:
+        if data[_KIND] != wire.MessageKind.SAMPLES:
+            return data
+        self.whole, self.length = not self.whole, len(data)
+        if self.whole:
+            return data
+        self.cuts += 1
+        return data[: (self.cuts - 1) % len(data)]
+
+
+@dataclass
+class OtherBaudRate:
+    """The line is read at another baud rate than it is sent at."""
+
+    sent_at: float
+    read_at: float
+
+    def __call__(self, data: bytes) -> bytes:
+        return received_at(data, self.sent_at, self.read_at)
+
+
+# A receiver at another baud rate
+
+
+def _levels(data: bytes) -> NDArray[np.uint8]:
+    """The line while `data` passes, a level for each bit: start, eight data bits, stop."""
+    bits = np.unpackbits(np.frombuffer(data, np.uint8), bitorder="little").reshape(-1, 8)
+    framed = np.ones((len(data), 10), np.uint8)
+    framed[:, 0], framed[:, 1:9] = 0, bits
+    return framed.ravel()
+
+
+def received_at(data: bytes, sent_at: float, read_at: float) -> bytes:
+    """What a receiver at the baud rate `read_at` takes for bytes when `data` is sent at another.
+
+    It waits for the line to fall, samples the middle of eight bits, lowest first, and of a stop
+    bit; whether that is one is not checked, as systems do by default.
+    """
+    line = np.append(_levels(data), np.ones(10, np.uint8))
+    step = sent_at / read_at  # bits of the sender per bit of the receiver
+    falls = np.flatnonzero(np.diff(line.astype(np.int8), prepend=1) < 0)
+    middles = ((np.arange(1, 9) + 0.5) * step).astype(np.intp)
+    sampled = np.minimum(falls[:, None] + middles, len(line) - 1)
+    values = np.packbits(line[sampled], axis=1, bitorder="little").ravel().tolist()
+    # A line that is still low in the middle of the stop bit must rise before it can fall again.
+    following = np.searchsorted(falls, falls + 9.5 * step).tolist()
+    made, at = bytearray(), 0
+    while at < len(values):
+        made.append(values[at])
+        at = following[at]
+    return bytes(made)
+
+
+def speed_code(baud_rate: int) -> int:
+    """How the system numbers a baud rate."""
+    import termios
+
+    return getattr(termios, f"B{baud_rate}", baud_rate)
+
+
+# Drills on the line and the device: noise, wrong baud rates, stalls, restarts, unplugging
 
 # The bytes under way
 

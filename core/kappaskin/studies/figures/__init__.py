@@ -9,18 +9,18 @@ from typing import Any
 from kappaskin.errors import Refusal
 
 
-def _draw(module: str) -> Callable[[Any], None]:
-    """What draws the figure of that module, which is imported when it is first drawn."""
-    return lambda figure: import_module(f"{__name__}.{module}").draw(figure)
+def _drawn_by(module: str, name: str) -> Callable[[Any], None]:
+    """The function of that `name`, whose module is imported when the figure is first drawn."""
+    return lambda figure: getattr(import_module(f"{__name__}.{module}"), name)(figure)
 
 
 FIGURES = {
-    "fig1": _draw("fig1"),
-    "fig2": _draw("fig2"),
-    "fig6": _draw("fig6"),
-    "fig8": _draw("fig8"),
-    "fig9": _draw("fig9"),
-    "initial-curvature": _draw("initial_curvature"),
+    "fig1": _drawn_by("skins", "draw_strip"),
+    "fig2": _drawn_by("skins", "draw_patch"),
+    "fig6": _drawn_by("reconstruction", "draw_square"),
+    "fig8": _drawn_by("hysteresis", "draw_loops"),
+    "fig9": _drawn_by("reconstruction", "draw_fingertip"),
+    "initial-curvature": _drawn_by("hysteresis", "draw_initial_curvature"),
 }
 """What draws each figure on an empty matplotlib.figure.Figure; fig1 to fig9 are the paper's."""
 

@@ -13,8 +13,9 @@ from kappaskin import GaussianLoad, Patch, Plate, SineBasis, load_scene
 from kappaskin.cli import main
 from kappaskin.cli.common import REFUSED
 from kappaskin.studies import compared, compared_text
-from kappaskin.studies.compare.comparison import WITHIN, errors_text
-from kappaskin.studies.compare.solvers import (
+from kappaskin.studies.compare import (
+    WITHIN,
+    errors_text,
     lsqr_solver,
     lstsq_solver,
     pinv_solver,

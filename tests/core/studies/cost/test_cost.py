@@ -39,8 +39,8 @@ from kappaskin.studies import (
     settings_to_try,
     write_plot,
 )
+from kappaskin.studies.cost import ALIKE, cheapest
 from kappaskin.studies.cost.bench import Bench, costs
-from kappaskin.studies.cost.settings import ALIKE, cheapest
 from kappaskin.studies.paper import fingertip_scene, table_1
 
 pytestmark = pytest.mark.slow

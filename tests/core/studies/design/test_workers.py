@@ -14,8 +14,8 @@ import pytest
 
 from kappaskin import Refusal
 from kappaskin.studies import StudyFolder, run_study
+from kappaskin.studies.design import cluster, processes, worker_kind
 from kappaskin.studies.design.results import BlockTask, run_task, version
-from kappaskin.studies.design.run import cluster, processes, worker_kind
 
 pytestmark = pytest.mark.slow
 

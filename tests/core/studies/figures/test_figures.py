@@ -17,8 +17,10 @@ from kappaskin import Refusal, load_scene
 from kappaskin.cli import main
 from kappaskin.sensing import SECOND_GENERATION
 from kappaskin.studies import FIGURES, write_figures
-from kappaskin.studies.figures import fig2, fig9, style
-from kappaskin.studies.figures.initial_curvature import initial_curvature
+from kappaskin.studies.figures import style
+from kappaskin.studies.figures.hysteresis import initial_curvature
+from kappaskin.studies.figures.reconstruction import SEED
+from kappaskin.studies.figures.skins import patch_run
 
 pytestmark = pytest.mark.slow
 
@@ -220,8 +222,8 @@ def test_fig2_tells_the_tensor_of_one_of_its_elements(drawn) -> None:
 
 
 def test_fig2_is_as_curved_as_its_truth_within_the_error_bars() -> None:
-    found = fig2.run()
-    exact = fig2.run(noise=1e-9)
+    found = patch_run()
+    exact = patch_run(noise=1e-9)
 
     error = found.principal[0] - exact.principal[0]
     assert np.all(np.abs(error) < 3 * found.principal_sd)
@@ -303,7 +305,7 @@ def test_fig8_tells_errors_on_cylinders_that_were_not_calibrated_on(drawn) -> No
 
 def test_fig9_draws_what_least_squares_makes_of_ten_readings(drawn) -> None:
     """From Eqs. 10 and 11 as corrected; pinned ends decide the first function."""
-    rng = np.random.default_rng(fig9.SEED)
+    rng = np.random.default_rng(SEED)
     theta, k = (np.arange(10) + 0.5) * math.pi / 10, np.arange(1, 9)
     free = np.vstack([np.where(k % 2, -1 / k, 0)[1:], np.eye(7)])
     bends = (1 - k**2) / R0**2 * np.sin(np.outer(theta, k)) @ free

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kappaskin.scenes.effects import FIRST_GENERATION_LOOPS, Creep, Hysteresis
-from kappaskin.studies.figures.initial_curvature import SHARES, initial_curvature
+from kappaskin.studies.figures.hysteresis import SHARES, initial_curvature
 
 R0 = 12.9e-3
 THETA = math.pi * (np.arange(10) + 0.5) / 10

@@ -1,14 +1,101 @@
-"""The paper's Fig. 9: a fingertip's arc at rest, pressed, and as ten noisy readings give it."""
+"""Figs. 6 and 9 of the paper: a square skin and a fingertip, reconstructed from noisy readings."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.bases import basis_for
+from kappaskin.bases import SineBasis, basis_for
 from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
+from kappaskin.scenes import load_scene
 from kappaskin.studies.figures import style
 from kappaskin.studies.paper import APPLIED, RADIUS, fingertip_scene
+
+_SIDE = 101  # points along each edge, as Table 1's RMS takes them
+_MESH = 5  # of which every fifth is drawn as a line, with the load on one
+
+
+@dataclass(frozen=True, eq=False)
+class _SquareRun:
+    """One draw of Table 1's noise: surfaces (101, 101) in mm on `x`, `y` (101,) in mm."""
+
+    x: Array
+    y: Array
+    reference: Array
+    fitted: Array
+    elements: Array
+
+    @property
+    def error(self) -> Array:
+        return self.fitted - self.reference
+
+    @property
+    def at_load(self) -> float:
+        return float(self.error[_SIDE // 2, _SIDE // 2])
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.error**2)))
+
+
+def square_run() -> _SquareRun:
+    """10 x 10 elements with the scene's noise, 8 x 8 functions fitted to a truth of 15 x 15."""
+    scene = load_scene("centre")
+    patch, layout, reference = scene.plate.patch, scene.layout, scene.basis
+    truth = scene.plate.deflection(scene.loads, reference)
+    curvature = (layout.curvature_operator(reference) @ truth.ravel()).reshape(3, -1)
+    rng = np.random.default_rng(scene.seed)
+    for effect in scene.reading_effects:
+        curvature = effect.start(curvature.shape, rng)(curvature, 0.0)
+    basis, grid = SineBasis(patch, 8, 8), patch.grid(_SIDE, _SIDE)
+    c = LeastSquares(basis, layout)(curvature).coefficients
+    w, fitted = reference.on_grid(*grid)(truth), basis.on_grid(*grid)(c)
+    return _SquareRun(*(1e3 * part for part in (*grid, w, fitted, layout.positions)))
+
+
+def draw_square(figure: style.Figure) -> None:
+    """Both surfaces on one scale, then their difference with the elements on it."""
+    found = square_run()
+    style.resize(figure, style.DOUBLE, 58)
+    style.letter(figure, 1, 57, "a", "reference:\n15 × 15 functions")
+    style.letter(figure, 58, 57, "b", "8 × 8 functions fitted to\n300 readings with noise")
+    errors = f"{1e3 * found.at_load:+.0f} µm at the load, RMS {1e3 * found.rms:.1f} µm"
+    style.letter(figure, 117, 57, "c", f"error of the fit:\n{errors}")
+    for left, w in ((0, found.reference), (57, found.fitted)):
+        _draw_surface(style.place(figure, (left, -2, 51, 54), projection="3d"), found, w)
+    _draw_error(figure, style.place(figure, (126, 10, 33, 33)), found)
+
+
+def _draw_surface(axes: style.Axes, found: _SquareRun, w: Array) -> None:
+    x, y, z = (each[::_MESH, ::_MESH] for each in (*np.meshgrid(found.x, found.y), w))
+    style.mesh(axes, np.stack([x, y, z], axis=-1), z, (0, 5))
+    style.space(axes)
+    axes.set(xlim=(0, 100), ylim=(0, 100), zlim=(0, 5), zticks=range(6))
+    axes.set(xticks=(0, 50, 100), yticks=(50, 100))  # y = 0 is where x = 100 is
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="w [mm]")
+
+
+def _draw_error(figure: style.Figure, axes: style.Axes, found: _SquareRun) -> None:
+    span = float(np.max(np.abs(found.error)))
+    step = 1e-3 * (found.x[1] - found.x[0])
+    extent = (-step / 2, 100 + step / 2, -step / 2, 100 + step / 2)
+    image = axes.imshow(
+        1e3 * found.error,
+        cmap=style.colour_map(style.DIVERGING),
+        vmin=-1e3 * span,
+        vmax=1e3 * span,
+        origin="lower",
+        extent=extent,
+    )
+    axes.plot(*found.elements.T, ".", color=style.INK, ms=1.5, label="elements")
+    axes.set(xlim=(0, 100), ylim=(0, 100), xticks=(0, 50, 100), yticks=(0, 50, 100))
+    axes.set(xlabel="x [mm]", ylabel="y [mm]")
+    axes.yaxis.labelpad = -2
+    bar = style.place(figure, (161, 10, 1.6, 33))
+    figure.colorbar(image, cax=bar, label="error [µm]")
+
+
+# The paper's Fig. 9: a fingertip's arc at rest, pressed, and as ten noisy readings give it
 
 NOISE = 4.5
 """RMS of a reading's noise in 1/m (Table 2)."""
@@ -17,7 +104,7 @@ _ELEMENT = {"ls": "", "marker": "o", "color": style.BLUE, "mec": "white", "mew":
 
 
 @dataclass(frozen=True, eq=False)
-class _Load:
+class _FingertipRun:
     """One load: inward deflections in m at `theta` (181,), true, fitted, and its sd."""
 
     theta: Array
@@ -42,7 +129,7 @@ class _Load:
         return float(np.sqrt(np.mean((self.fitted - self.true) ** 2)))
 
 
-def run(applied: float, rng: np.random.Generator) -> _Load:
+def fingertip_run(applied: float, rng: np.random.Generator) -> _FingertipRun:
     """Table 2's strip with a load that moves it by `applied` mm, 8 functions fitted to it."""
     scene = fingertip_scene(applied)
     patch, layout, (noise,) = scene.plate.patch, scene.layout, scene.reading_effects
@@ -53,7 +140,7 @@ def run(applied: float, rng: np.random.Generator) -> _Load:
     fit = LeastSquares(basis, layout, sigma=NOISE)(readings)
     s = np.column_stack([np.linspace(0, patch.a, 181), np.full(181, patch.b / 2)])
     at, c = basis.at(s), fit.coefficients.ravel()
-    return _Load(
+    return _FingertipRun(
         s[:, 0] / patch.radius,
         scene.basis.at(s) @ truth,
         at @ c,
@@ -69,12 +156,12 @@ def _arc(theta: Array, inward: Array) -> tuple[Array, Array]:
     return -r * np.cos(theta), r * np.sin(theta)
 
 
-def draw(figure: style.Figure) -> None:
+def draw_fingertip(figure: style.Figure) -> None:
     """Three loads side by side: above the skin, true to scale, below its deflection inward."""
     rng = np.random.default_rng(SEED)
     style.resize(figure, style.DOUBLE, 88)
     for column, applied in enumerate(APPLIED):
-        load = run(applied, rng)
+        load = fingertip_run(applied, rng)
         left = 12 + 55 * column
         shape = style.place(figure, (left, 50, 48, 30))
         shown = style.place(figure, (left, 16, 48, 25))
@@ -87,7 +174,7 @@ def draw(figure: style.Figure) -> None:
             style.key(figure, shape, 3)
 
 
-def _draw_shape(axes: style.Axes, load: _Load) -> None:
+def _draw_shape(axes: style.Axes, load: _FingertipRun) -> None:
     rest = _arc(load.theta, np.zeros_like(load.theta))
     axes.plot(*rest, color=style.FAINT, lw=0.7, ls=(0, (4, 2)), label="at rest")
     axes.plot(*_arc(load.theta, load.true), color=style.INK, lw=0.9, label="true")
@@ -106,7 +193,7 @@ def _draw_shape(axes: style.Axes, load: _Load) -> None:
     axes.text(0, 5, text, ha="center", va="center", linespacing=1.5)
 
 
-def _draw_deflection(axes: style.Axes, load: _Load) -> None:
+def _draw_deflection(axes: style.Axes, load: _FingertipRun) -> None:
     degrees, low, high = np.degrees(load.theta), *(1e3 * edge for edge in load.band)
     axes.axhline(0, color=style.LINE, lw=0.6)
     axes.fill_between(degrees, low, high, color=style.BLUE, alpha=0.25)
