@@ -1,4 +1,4 @@
-"""The command `kappaskin`: its subcommands in groups, a module for each group."""
+"""The command `kappaskin`: its subcommands in groups, and the modules of these."""
 
 import os
 import sys
@@ -21,14 +21,14 @@ app = App(
     help_format="plaintext",  # of the list; a parser of Markdown takes as long as all else
     group_commands=Group("Options", sort_key=9),
 )
-# A panel of the help for each group: its module, which holds its commands and loads no room before
+# A panel of the help for each group: the module that holds its commands and loads no room before
 # one of them runs, and their names.
 _PANELS = {
     "Live": ("live", "publish listen"),
     "Recordings": ("record", "record info verify repair export reconstruct"),
     "Sensor": ("sensor", "calibrate tare press monitor device"),
     "Studies": ("study", "plan simulate cost compare stability regions study report"),
-    "Paper": ("paper", "tables figures"),
+    "Paper": ("study", "tables figures"),
     "System": ("system", "doctor drill"),
 }
 _GROUPS = {panel: Group(panel, sort_key=place) for place, panel in enumerate(_PANELS, 1)}
