@@ -182,15 +182,6 @@ _SAME = 5  # reports in a row
 _MEMORY = "/dev/shm"
 
 
-def _pumped(stand: Stand, done: Callable[[], object], within: float) -> bool:
-    """Let the relay work until `done`; whether it was within so many s."""
-    end = time.monotonic() + within
-    while not done() and time.monotonic() < end:
-        stand.relay.pump()
-        time.sleep(0.002)
-    return bool(done())
-
-
 def _shows(engine: Engine, after: int) -> bool:
     """Whether the newest estimate is of the message `after` or of one after it."""
     status = engine.status()
@@ -201,7 +192,7 @@ def _shows(engine: Engine, after: int) -> bool:
 def _recovery(stand: Stand, engine: Engine, within: float) -> float:
     """How long it took in s until a frame sent from now on is shown, infinite if it never was."""
     began, first = time.monotonic(), stand.relay.sequence
-    shown = _pumped(stand, lambda: _shows(engine, first), within)
+    shown = stand.until(lambda: _shows(engine, first), within, stand.pump)
     return time.monotonic() - began if shown else float("inf")
 
 
@@ -232,7 +223,7 @@ def _outcome(
 
 def _streaming(stand: Stand, engine: Engine) -> bool:
     engine.connect(stand.relay.port)
-    return _pumped(stand, lambda: _shows(engine, 0), _START)
+    return stand.until(lambda: _shows(engine, 0), _START, stand.pump)
 
 
 def _suspend(stand: Stand) -> DrillOutcome:
@@ -242,7 +233,7 @@ def _suspend(stand: Stand) -> DrillOutcome:
         span = _drained(stand, engine).span - stand.relay.spent  # some were sent before it listened
         _kill(engine.pid, signal.SIGSTOP)
         try:
-            _pumped(stand, lambda: False, 5.0 if stand.long else 1.0)
+            stand.until(lambda: False, 5.0 if stand.long else 1.0, stand.pump)
         finally:
             _kill(engine.pid, signal.SIGCONT)
         recovered = _recovery(stand, engine, _WITHIN)
@@ -261,8 +252,8 @@ def _killed(stand: Stand) -> DrillOutcome:
     with Engine() as engine:
         streaming, was = _streaming(stand, engine), engine.pid
         _kill(was, signal.SIGKILL)
-        noticed = _pumped(stand, lambda: engine.status().state == LOST, _NOTICED)
-        _pumped(stand, lambda: engine.revive() or engine.pid != was, _START)
+        noticed = stand.until(lambda: engine.status().state == LOST, _NOTICED, stand.pump)
+        stand.until(lambda: engine.revive() or engine.pid != was, _START, stand.pump)
         recovered = _recovery(stand, engine, _RESTARTED)
         reported = any(event.kind == "engine" for event in engine.status().events)
         return _outcome(
@@ -285,12 +276,16 @@ def _orphaned(stand: Stand) -> DrillOutcome:
     ) as parent:
         pid = int(parent.stdout.readline() if parent.stdout else 0)
         blocks = _blocks_of(pid)
-        streaming = _pumped(stand, lambda: stand.relay.empty and stand.relay.spent > 50, _START)
+        streaming = stand.until(
+            lambda: stand.relay.empty and stand.relay.spent > 50, _START, stand.pump
+        )
         parent.kill()
         began = time.monotonic()
-        ended = _pumped(stand, lambda: _gone(pid), _WITHIN)
+        ended = stand.until(lambda: _gone(pid), _WITHIN, stand.pump)
         took = time.monotonic() - began
-        clean = _pumped(stand, lambda: not any(block.exists() for block in blocks), _WITHIN)
+        clean = stand.until(
+            lambda: not any(block.exists() for block in blocks), _WITHIN, stand.pump
+        )
     failures = [
         (streaming, "no frames came"),
         (ended, f"the live process is still there after {took:.1f} s"),

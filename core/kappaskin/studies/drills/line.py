@@ -183,39 +183,19 @@ _SEARCH = 12.0  # s to find one of seven baud rates
 
 def _spoilt(make: Callable[[Stand], Spoil], stand: Stand) -> DrillOutcome:
     """Spoil what passes for some time."""
-    stand.settle()
-    stand.relay.spoil = make(stand)
-    stand.run(10.0 if stand.long else 0.8)
-    stand.heal()
-    stand.recover(_WITHIN)
+    with stand.fault(_WITHIN):
+        stand.relay.spoil = make(stand)
+        stand.run(10.0 if stand.long else 0.8)
     spoilt = stand.source.accounting().bytes_discarded
     return stand.outcome((spoilt > 0, "nothing was spoilt"))
 
 
-def _garbage(share: float, stand: Stand) -> DrillOutcome:
-    return _spoilt(lambda stand: Garbage(share, stand.rng), stand)
-
-
-def _flips(stand: Stand) -> DrillOutcome:
-    return _spoilt(lambda stand: FlippedBits(20_000, stand.rng), stand)
-
-
-def _misread(rate: float, stand: Stand) -> DrillOutcome:
-    return _spoilt(lambda _: OtherBaudRate(BAUD_RATES[0], rate), stand)
-
-
 def _cuts(stand: Stand) -> DrillOutcome:
     """Break messages off at every byte of the longest, and let a whole one follow each."""
-    stand.settle()
     cut = CutScans()
-
-    def many(message: wire.FromDevice) -> list[wire.FromDevice]:
-        return [message] * 4
-
-    stand.relay.rewrite, stand.relay.spoil = many, cut
-    done = stand.until(lambda: cut.cuts >= cut.length, 60.0)
-    stand.heal()
-    stand.recover(_WITHIN)
+    with stand.fault(_WITHIN):
+        stand.relay.rewrite, stand.relay.spoil = (lambda message: [message] * 4), cut
+        done = stand.until(lambda: cut.cuts >= cut.length, 60.0)
     lost = stand.source.accounting().lost
     return stand.outcome(
         (done, f"only {cut.cuts} of {cut.length} cuts were made within 60 s"),
@@ -248,7 +228,7 @@ GARBAGE = [
     Drill(
         f"garbage {100 * share:.0f} %",
         f"bursts of noise over and between {100 * share:.0f} % of the bytes",
-        partial(_garbage, share),
+        partial(_spoilt, lambda stand, share=share: Garbage(share, stand.rng)),
         _WITHIN,
     )
     for share in (0.01, 0.05, 0.2)
@@ -256,18 +236,23 @@ GARBAGE = [
 
 BYTE_DRILLS = [
     *GARBAGE,
-    Drill("bits", "one bit in 20,000 turned over", _flips, _WITHIN),
+    Drill(
+        "bits",
+        "one bit in 20,000 turned over",
+        partial(_spoilt, lambda stand: FlippedBits(20_000, stand.rng)),
+        _WITHIN,
+    ),
     Drill("cuts", "messages broken off after every byte, and begun again", _cuts, _WITHIN),
     Drill(
         "baud rate too low",
         "bits at 2,000,000 baud read at 921,600",
-        partial(_misread, 921_600),
+        partial(_spoilt, lambda _: OtherBaudRate(BAUD_RATES[0], 921_600)),
         _WITHIN,
     ),
     Drill(
         "baud rate too high",
         "bits at 2,000,000 baud read at 5,000,000",
-        partial(_misread, 5e6),
+        partial(_spoilt, lambda _: OtherBaudRate(BAUD_RATES[0], 5e6)),
         _WITHIN,
     ),
     Drill(
@@ -298,35 +283,28 @@ def _nothing_lost(stand: Stand) -> DrillOutcome:
 
 def _stall(stand: Stand) -> DrillOutcome:
     """Stop in the middle of a message, and go on with the rest of it."""
-    stand.settle()
-    stand.relay.held = True
-    stand.until(lambda: not stand.relay.empty, _WITHIN)
-    stand.relay.flush(most=100)
-    stand.run(4.0 if stand.long else 1.0)
-    stand.heal()
-    stand.recover(_WITHIN)
+    with stand.fault(_WITHIN):
+        stand.relay.held = True
+        stand.until(lambda: not stand.relay.empty, _WITHIN)
+        stand.relay.flush(most=100)
+        stand.run(4.0 if stand.long else 1.0)
     return _nothing_lost(stand)
 
 
 def _flood(stand: Stand) -> DrillOutcome:
-    stand.settle()
-    stand.relay.rewrite = lambda message: [message] * 10
-    stand.run(20.0 if stand.long else 1.5)
-    stand.heal()
-    # It is over once it has passed the line, for which a busy machine takes its time.
-    stand.until(lambda: stand.relay.empty, _START)
-    stand.recover(_WITHIN)
+    with stand.fault(_WITHIN):
+        stand.relay.rewrite = lambda message: [message] * 10
+        stand.run(20.0 if stand.long else 1.5)
+        stand.heal()
+        # It is over once it has passed the line, for which a busy machine takes its time.
+        stand.until(lambda: stand.relay.empty, _START)
     return stand.outcome()
 
 
 def _not_read(stand: Stand) -> DrillOutcome:
     """Let nobody ask for frames; the thread that reads goes on."""
-    stand.settle()
-    end = time.monotonic() + (10.0 if stand.long else 1.5)
-    while time.monotonic() < end:
-        stand.relay.pump()
-        time.sleep(0.002)
-    stand.recover(_WITHIN)
+    with stand.fault(_WITHIN):
+        stand.until(lambda: False, 10.0 if stand.long else 1.5, stand.pump)
     return _nothing_lost(stand)
 
 
@@ -350,11 +328,9 @@ def _deaf(stand: Stand) -> DrillOutcome:
 
 
 def _twice(stand: Stand) -> DrillOutcome:
-    stand.settle()
-    stand.relay.spoil = lambda data: data * 2
-    stand.run(10.0 if stand.long else 0.5)
-    stand.heal()
-    stand.recover(_WITHIN)
+    with stand.fault(_WITHIN):
+        stand.relay.spoil = lambda data: data * 2
+        stand.run(10.0 if stand.long else 0.5)
     twice = stand.source.accounting().duplicate
     return stand.outcome((twice > 0, "no message was reported as a duplicate"))
 

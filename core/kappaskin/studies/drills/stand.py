@@ -12,7 +12,7 @@ import time
 import tty
 from collections import deque
 from collections.abc import Callable, Generator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -259,27 +259,18 @@ def opened(source: str | None, seed: int) -> Generator[Device]:
     """The device on a port; the simulated one where `source` is None."""
     rng = np.random.default_rng(seed)
     if source is not None:
-        line = SerialConnection(source)
-        try:
+        with closing(SerialConnection(source)) as line:
             yield Device(line, None, rng)
-        finally:
-            line.close()
         return
-    process = subprocess.Popen(
-        [sys.executable, "-m", "kappaskin", "device", "centre", "--rate", str(RATE)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    try:
-        line = SerialConnection(_port_of(process))
+    command = [sys.executable, "-m", "kappaskin", "device", "centre", "--rate", str(RATE)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as process:
         try:
-            yield Device(line, process, rng)
+            with closing(SerialConnection(_port_of(process))) as line:
+                yield Device(line, process, rng)
         finally:
-            line.close()
-    finally:
-        process.kill()
-        process.communicate()
+            process.kill()
 
 
 def _port_of(process: "subprocess.Popen[str]") -> str:
@@ -334,9 +325,7 @@ class Stand:
         self.wrong += counts is None or not np.array_equal(counts, frame.counts)
 
     def run(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            self.step()
+        self.until(lambda: False, seconds)
 
     def longest_read(self, seconds: float) -> float:
         """Go on for so long: how long a read takes at the longest, again and again, in s.
@@ -350,12 +339,19 @@ class Stand:
             parts.append(self.slowest)
         return min(parts)
 
-    def until(self, done: Callable[[], object], within: float) -> bool:
-        """Go on until `done`; whether it was within so many s."""
+    def until(
+        self, done: Callable[[], object], within: float, step: Callable[[], object] | None = None
+    ) -> bool:
+        """Go on, by `step` or as usual, until `done`; whether it was within so many s."""
         end = time.monotonic() + within
         while not done() and time.monotonic() < end:
-            self.step()
+            (step or self.step)()
         return bool(done())
+
+    def pump(self) -> None:
+        """Let the relay work while the source reads nothing."""
+        self.relay.pump()
+        time.sleep(0.002)
 
     def settle(self) -> None:
         """Go on until frames come."""
@@ -366,6 +362,14 @@ class Stand:
         """End the fault: from now on all that is sent is good."""
         self.relay.rewrite, self.relay.spoil = unchanged, clean
         self.relay.held = self.relay.deaf = False
+
+    @contextmanager
+    def fault(self, within: float) -> Generator[None]:
+        """Once frames come, the fault inside; then its end, and recovery within so many s."""
+        self.settle()
+        yield
+        self.heal()
+        self.recover(within)
 
     def recover(self, within: float) -> None:
         """Go on until the first frame that was sent from now on; how long that takes is noted."""
