@@ -20,7 +20,7 @@ from kappaskin.mechanics import GaussianLoad, Plate
 from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.bench import medians_in_turn, seconds, traced
+from kappaskin.studies.cost.bench import medians_in_turn, points_on, seconds, traced
 from kappaskin.studies.paper import LoadCase, fingertip_scene
 
 
@@ -304,15 +304,15 @@ _SLOPES: dict[str, _MakesSolver] = {"scikit-fem, slopes route": slopes_solver}
 def _read(name: str, scene: Scene, N: int, makers: Mapping[str, _MakesSolver]) -> Comparison:
     """The shape of a scene from its readings, with N functions along each side."""
     case = LoadCase.of(scene, "least-squares", (N, N))
-    surface = np.stack(np.meshgrid(*case.grid), axis=-1).reshape(-1, 2)
+    points = np.vstack([points_on(scene.plate.patch), scene.loads[0].centre()])
     return Comparison(
         name,
         {by: partial(make, case) for by, make in makers.items()},
         case.curvature,
         case.noisy(),
         True,
-        np.vstack([surface, scene.loads[0].centre()]),
-        np.append(case.true_surface, case.true_at_load) / 1e3,
+        points,
+        scene.basis.at(points) @ case.truth[0],
     )
 
 

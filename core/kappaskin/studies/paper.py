@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 
 from kappaskin.bases import SineBasis, basis_for
 from kappaskin.errors import Refusal
@@ -17,6 +16,7 @@ from kappaskin.scenes import Scene, Stimulus, load_scene, scaled_to
 from kappaskin.scenes.effects import UniformNoise
 from kappaskin.sensing import NormalCurvature, SensorLayout
 from kappaskin.skin import Patch
+from kappaskin.studies.cost.bench import covered, rms_distance
 
 DRAWS = 200
 RADIUS = 12.9e-3
@@ -47,58 +47,42 @@ EXPERIMENT = {"0.63": (1.13, 0.49), "1.27": (1.53, 0.26), "1.90": (1.79, -0.11)}
 
 @dataclass(frozen=True)
 class LoadCase:
-    """A load case with everything that its rows share; displacements in mm."""
+    """A load case with everything that its rows share.
+
+    `truth` (1, Nr) in m are the true coefficients, `curvature` (3, P) in 1/m the readings.
+    """
 
     scene: Scene
     method: str
     fit: Estimator
-    grid: tuple[Array, Array]
-    true_at_load: float
-    true_surface: Array
+    truth: Array
     curvature: Array
 
     @classmethod
     def of(cls, scene: Scene, method: str, functions: tuple[int, int]) -> "LoadCase":
         patch, reference = scene.plate.patch, scene.basis
-        truth = scene.plate.deflection(scene.loads, reference)
-        at_load = reference.at(scene.loads[0].centre()[None])[0] @ truth.ravel()
+        truth = scene.plate.deflection(scene.loads, reference).reshape(1, -1)
         Ni, Nj = functions
         basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
-        grid = patch.grid(101, 2 if patch.strip else 101)
-        return cls(
-            scene,
-            method,
-            estimator_for(method, basis, scene.layout),
-            grid,
-            1e3 * float(at_load),
-            1e3 * reference.on_grid(*grid)(truth),
-            (scene.layout.curvature_operator(reference) @ truth.ravel()).reshape(3, -1),
-        )
+        read = (truth @ scene.layout.curvature_operator(reference).T).reshape(3, -1)
+        return cls(scene, method, estimator_for(method, basis, scene.layout), truth, read)
+
+    @property
+    def true_at_load(self) -> float:
+        """The true displacement at the load in mm."""
+        at = self.scene.basis.at(self.scene.loads[0].centre()[None])
+        return 1e3 * float(np.vecdot(at, self.truth)[0])
 
     def errors(self, fit: Fit) -> tuple[Array, Array]:
         """Signed error at the load and RMS over the skin, (T,) each in mm."""
-        basis, c = self.fit.basis, fit.coefficients
-        at = basis.at(self.scene.loads[0].centre()[None])[0]
-        e = 1e3 * c.reshape(len(c), -1) @ at - self.true_at_load
-        w = 1e3 * basis.on_grid(*self.grid)(c)
-        return e, np.sqrt(np.mean((w - self.true_surface) ** 2, axis=(1, 2)))
-
-    def covered(self, fit: Fit) -> float:
-        """The share of the skin, over all frames, that lies within the 95 % bands of the fits."""
-        x, y = (along[5:-5:5] for along in self.grid)
-        if self.scene.plate.patch.strip:
-            y = self.grid[1][:1]
-        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        truth = self.scene.plate.deflection(self.scene.loads, self.scene.basis)
-        off = fit.coefficients.reshape(len(fit.coefficients), -1) @ self.fit.basis.at(points).T
-        off -= self.scene.basis.at(points) @ truth.ravel()
-        reach = scipy.special.stdtrit(np.maximum(fit.spare, 1), 0.975)
-        return float(np.mean(np.abs(off) < np.reshape(reach, (-1, 1)) * fit.surface_sd(points)))
+        basis, c = self.fit.basis, fit.coefficients.reshape(len(fit.coefficients), -1)
+        e = 1e3 * c @ basis.at(self.scene.loads[0].centre()[None])[0] - self.true_at_load
+        return e, 1e3 * rms_distance(basis, c, self.scene.basis, self.truth)
 
     def on_slopes(self) -> Array:
         """What gages read (1, 3, P) that sense the bent surface's own curvature, without noise."""
-        truth = self.scene.plate.deflection(self.scene.loads, self.scene.basis)
-        return NormalCurvature(self.scene.basis, self.scene.layout)(truth)[None]
+        shape = self.truth.reshape(self.scene.basis.shape)
+        return NormalCurvature(self.scene.basis, self.scene.layout)(shape)[None]
 
     def noisy(self) -> Array:
         """`DRAWS` frames of curvature (T, 3, P) with the scene's noise, seeded."""
@@ -125,7 +109,7 @@ def _row(table: int, case: LoadCase, noise: bool, paper: dict[str, float | None]
     }
     if noise:
         row["e_max_sd_mm"] = float(e.std(ddof=1))
-        row["covered_95"] = case.covered(fit)
+        row["covered_95"] = float(np.mean(covered(fit, case.scene.basis, case.truth)))
     elif not case.scene.plate.patch.base_curvature:
         e, rms = case.errors(case.fit(case.on_slopes()))
         row |= {"slopes_e_max_mm": float(e[0]), "slopes_rms_mm": float(rms[0])}

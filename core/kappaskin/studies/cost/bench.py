@@ -5,16 +5,17 @@ import time
 import tracemalloc
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import cycle, islice
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
+import scipy
 
 from kappaskin._processes import BackgroundProcess
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import Refusal
-from kappaskin.estimation import METHODS, Estimator, estimator_for
+from kappaskin.estimation import METHODS, Estimator, Fit, estimator_for
 from kappaskin.frames import Array
 from kappaskin.scenes import (
     AppliedLoads,
@@ -44,6 +45,7 @@ from kappaskin.studies.simulation import costs_of
 SETTLING, DRAWS = 8, 40
 """Frames that methods with a memory are given to settle, and those that are judged after them."""
 _POINTS = 101  # of the surface along each side, edges included, as in Table 1
+_BAND_SIDE = 21  # points along each side at which error bars are judged, less those on the edges
 _TURNS, _BUDGET = (7, 41), 10e-3  # least and most of them that are timed, and about how long in s
 _CALLS, _SLOW = 5, 1e-3  # in a turn; one of a method whose frame takes longer, in s
 _Made = TypeVar("_Made")
@@ -62,45 +64,42 @@ class _Skin:
         return self.sensor.layout
 
 
-@dataclass(frozen=True, eq=False)
-class _Judge:
-    """Coefficients to errors, for one basis.
+@lru_cache(8)
+def _lengths(basis: Basis, reference: Basis) -> tuple[Array, Array, Array]:
+    """A (N, N), B (Nr, N) and C (Nr, Nr) with |c A - w B|^2 + |w C|^2 the surfaces' distance^2.
 
-    The surface of c is S c on G points; with S = Q R its distance from the true w is the hypotenuse
-    of R c - Q'w and of what no c can reach, w - Q Q'w.
+    By RMS over the skin. The functions of both on G points are Q R, and Q changes no lengths.
     """
-
-    basis: Basis
-    at_load: Array
-    true_at_load: Array
-    R: Array
-    reached: Array
-    left: Array
-    points: int
-
-    @classmethod
-    def of(cls, basis: Basis, points: Array, truth: "_Truth") -> "_Judge":
-        Q, R = np.linalg.qr(basis.at(points))
-        reached = truth.surface @ Q
-        left = np.linalg.norm(truth.surface - reached @ Q.T, axis=1)
-        at_load = basis.at(truth.contact)
-        return cls(basis, at_load, truth.at_load, R, reached, left, len(points))
-
-    def __call__(self, coefficients: Array) -> tuple[Array, Array]:
-        """Signed error at the load and RMS over the skin, (T,) each in m."""
-        c = coefficients.reshape(len(coefficients), -1).astype(float)
-        rms = np.hypot(np.linalg.norm(c @ self.R.T - self.reached, axis=1), self.left)
-        return np.vecdot(self.at_load, c) - self.true_at_load, rms / np.sqrt(self.points)
+    points, N = points_on(basis.patch), basis.size
+    functions = np.hstack([basis.at(points), reference.at(points)]) / np.sqrt(len(points))
+    R = cast("Array", np.linalg.qr(functions, mode="r")).T
+    return R[:N, :N].copy(), R[N:, :N].copy(), R[N:, N:].copy()
 
 
-@dataclass(frozen=True, eq=False)
-class _Truth:
-    """What the skin does: coefficients (T, Ri, Rj), surface (T, G), contact (T, 2), all in m."""
+def rms_distance(basis: Basis, fitted: Array, reference: Basis, true: Array) -> Array:
+    """The distance of surfaces by RMS over the skin, (T,) in m.
 
-    coefficients: Array
-    surface: Array
-    contact: Array
-    at_load: Array
+    Of coefficients `fitted` (T, N) of the functions of `basis`, and `true` (T, Nr) or (1, Nr) of
+    those of the `reference`, in m.
+    """
+    A, B, C = _lengths(basis, reference)
+    inside, outside = fitted @ A - true @ B, true @ C
+    return np.sqrt(np.vecdot(inside, inside) + np.vecdot(outside, outside))
+
+
+def covered(fit: Fit, reference: Basis, true: Array) -> Array:
+    """The share of the skin that lies within the 95 % bands of a fit, (T,).
+
+    `true` (T, Nr) or (1, Nr) in m are coefficients of the functions of the `reference`.
+    """
+    patch, c = reference.patch, fit.coefficients
+    x, y = (along[1:-1] for along in patch.grid(_BAND_SIDE, 3 if patch.strip else _BAND_SIDE))
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    points = points[patch.contains(points)]
+    fitted = c.reshape(len(c), -1) @ fit.estimator.basis.at(points).T
+    reach = scipy.special.stdtrit(np.maximum(fit.spare, 1), 0.975)
+    bands = np.reshape(reach, (-1, 1)) * fit.surface_sd(points)
+    return np.mean(np.abs(fitted - true @ reference.at(points).T) <= bands, axis=1)
 
 
 def points_on(patch: Patch) -> Array:
@@ -150,7 +149,6 @@ class Bench:
         # Planned once: what stands still calls for no skew, but the whole scene is to be judged.
         self.scene = planned(scene)
         self._skins: dict[tuple[int, int] | None, _Skin] = {}
-        self._judges: dict[tuple[int, int], _Judge] = {}
 
     @property
     def contact(self) -> Array:
@@ -158,18 +156,10 @@ class Bench:
         return self._pressed[len(self._times) // 2].contact
 
     @cached_property
-    def _points(self) -> Array:
-        return points_on(self.scene.plate.patch)
-
-    @cached_property
-    def _truth(self) -> _Truth:
-        scene, basis = self.scene, self.scene.basis
-        compliance = scene.plate.compliance(basis)
-        contact = np.array([pressed.contact for pressed in self._pressed])
-        shapes = np.array([compliance(pressed.force) for pressed in self._pressed])
-        c = shapes.reshape(len(shapes), -1)
-        at_load = np.vecdot(basis.at(contact), c)
-        return _Truth(shapes, c @ basis.at(self._points).T, contact, at_load)
+    def _truth(self) -> Array:
+        """Coefficients (T, Nr) in m of what the skin does."""
+        compliance = self.scene.plate.compliance(self.scene.basis)
+        return np.array([compliance(pressed.force).ravel() for pressed in self._pressed])
 
     def _skin(self, elements: tuple[int, int] | None) -> _Skin:
         if elements not in self._skins:
@@ -184,15 +174,8 @@ class Bench:
             simulator.change(scene.touched_by(*pressed.loads))
             read.append(sensor.nominal(simulator.scanned(sensor.scan(), n, t, lambda: 0.0)))
         operator = scene.layout.curvature_operator(scene.basis)
-        exact = self._truth.coefficients.reshape(len(read), -1) @ operator.T
         shape = (len(read), 3, len(scene.layout))
-        return _Skin(sensor, exact.reshape(shape), np.reshape(read, shape))
-
-    def _judge(self, functions: tuple[int, int]) -> _Judge:
-        if functions not in self._judges:
-            basis = basis_for(self.scene.plate.patch, self.scene.edge, *functions)
-            self._judges[functions] = _Judge.of(basis, self._points, self._truth)
-        return self._judges[functions]
+        return _Skin(sensor, (self._truth @ operator.T).reshape(shape), np.reshape(read, shape))
 
     def __call__(self, setting: Setting) -> Cost | Refused:
         """What `setting` costs, or why it gives no answer."""
@@ -209,14 +192,15 @@ class Bench:
         return layout, skin.sensor.scan(np.flatnonzero(np.tile(elements, 3)))
 
     def _cost(self, setting: Setting) -> Cost:
-        skin, judge = self._skin(setting.elements), self._judge(setting.functions)
+        skin = self._skin(setting.elements)
+        basis = basis_for(self.scene.plate.patch, self.scene.edge, *setting.functions)
         layout, scan = self._scanned(setting, skin)
         exact, read = (
             np.where(layout.live, curvature, np.nan) for curvature in (skin.exact, skin.read)
         )
 
         def started(curvature: Array) -> Estimator:
-            fit = estimator_for(setting.method, judge.basis, layout, dtype=setting.precision)
+            fit = estimator_for(setting.method, basis, layout, dtype=setting.precision)
             fit(curvature[0])
             return fit
 
@@ -225,8 +209,10 @@ class Bench:
         fit = started(read)
         setup_time = time.perf_counter() - begun
         time_per_frame, lstsq_time = _medians(fit, layout, exact, read)
-        e_exact, rms_exact = _judged(judge, exactly, exact)
-        e, rms = _judged(judge, fit, read)
+        e_exact, rms_exact = self._errors(exactly, exact)
+        e, rms = self._errors(fit, read)
+        reference, w = self.scene.basis, self._truth[SETTLING:]
+        shape = rms_distance(reference, np.zeros_like(w), reference, w)
         return Cost(
             setting,
             len(layout),
@@ -241,16 +227,24 @@ class Bench:
             float(e.mean()),
             float(e.std(ddof=1)),
             float(rms.mean()),
-            float(np.sqrt(np.mean(self._truth.surface[SETTLING:] ** 2))),
+            float(np.sqrt(np.mean(shape**2))),
         )
 
+    def _errors(self, fit: Estimator, curvature: Array) -> tuple[Array, Array]:
+        """Errors (DRAWS,) at the load and over the skin in m, of the frames after the settling."""
+        c = fit(curvature).coefficients.reshape(len(curvature), -1).astype(float)[SETTLING:]
+        contact = np.array([pressed.contact for pressed in self._pressed[SETTLING:]])
+        reference, w = self.scene.basis, self._truth[SETTLING:]
+        e = np.vecdot(fit.basis.at(contact), c) - np.vecdot(reference.at(contact), w)
+        rms = rms_distance(fit.basis, c, reference, w)
+        check_finite(e, rms)
+        return e, rms
 
-def _judged(judge: _Judge, fit: Estimator, curvature: Array) -> tuple[Array, Array]:
-    """Errors (DRAWS,) at the load and over the skin in m, of the frames after the settling."""
-    e, rms = (error[SETTLING:] for error in judge(fit(curvature).coefficients))
-    if not (np.isfinite(e).all() and np.isfinite(rms).all()):
+
+def check_finite(*values: Array) -> None:
+    """Raise a `Refusal` where something computed from coefficients is no number."""
+    if not all(np.isfinite(each).all() for each in values):
         raise Refusal("the coefficients are not finite: the arithmetic overflowed")
-    return e, rms
 
 
 def traced(made: Callable[[], _Made]) -> tuple[_Made, int]:
@@ -386,8 +380,8 @@ def effect_costs(scene: Scene, setting: Setting) -> tuple[EffectCost, ...]:
         rms: tuple[float, float] | tuple[None, None] = (None, None)
         if not isinstance(effect, DroppedFrames | CorruptedFrames):
             other = judge.answer(_without(scene, effect), kept ^ {name})
-            has, has_not = (now, other) if entry.kept else (other, now)
-            rms = judge.rms(has, has), judge.rms(has_not, has)
+            (has, true), (has_not, _) = (now, other) if entry.kept else (other, now)
+            rms = judge.rms(has, true), judge.rms(has_not, true)
         bound = None if effect.authored else entry.size.error
         found.append(EffectCost(name, entry.kept, seconds[name], bound, *rms))
     return tuple(found)
@@ -406,30 +400,24 @@ def _without(scene: Scene, effect: Effect) -> Scene:
     return scene
 
 
-@dataclass(frozen=True, eq=False)
-class _Answer:
-    """Coefficients of the true shapes (T, Ri, Rj) and of those fitted (T, Ni, Nj), in m."""
-
-    true: Array
-    fitted: Array
-
-
 class _EffectJudge:
     """What a setting makes of a whole scene, and its errors."""
 
     def __init__(self, scene: Scene, setting: Setting, contact: Array) -> None:
         self._setting = setting
         self._basis = basis_for(scene.plate.patch, scene.edge, *setting.functions)
-        points = points_on(scene.plate.patch)
-        self._at, self._true_at = self._basis.at(points), scene.basis.at(points)
+        self._reference = scene.basis
         self._scanned = SCANS[setting.scanned](scene.layout, contact)
         frames = np.arange(SETTLING + _EACH) / scene.rate
         # One after the other, however short the scene.
         apart = max(survey_duration(scene) / _PLACES, len(frames) / scene.rate)
         self._times = np.add.outer(apart * np.arange(_PLACES), frames)
 
-    def answer(self, scene: Scene, names: frozenset[str]) -> _Answer:
-        """The frames judged of `scene` with the effects of these `names`."""
+    def answer(self, scene: Scene, names: frozenset[str]) -> tuple[Array, Array]:
+        """Coefficients in m, fitted (T, N) and true (T, Nr), of the frames judged of `scene`.
+
+        It has the effects of these `names`.
+        """
         scene = replace(scene, choice=EffectSelection(off=frozenset(EFFECTS) - names))
         simulator, scan = Simulator(scene), scene.sensor().scan()
         shapes, read = list[Array](), list[Array]()
@@ -443,7 +431,7 @@ class _EffectJudge:
             electronics = scene.transduction
             curvature[electronics.saturated(electronics.counts(curvature))] = np.nan
         fitted = self._fitted(scene.layout, curvature)
-        return _Answer(self._judged(np.array(shapes)), self._judged(fitted))
+        return self._judged(fitted), self._judged(np.array(shapes))
 
     def _fitted(self, layout: SensorLayout, curvature: Array) -> Array:
         """The coefficients (T, Ni, Nj) of `curvature` (T, 3 P), of which some is not scanned."""
@@ -452,18 +440,16 @@ class _EffectJudge:
         K = np.where(live, curvature.reshape(-1, *live.shape), np.nan)
         with np.errstate(all="ignore"):  # what is not finite is refused
             fitted = fit(K).coefficients.astype(float)
-        if not np.isfinite(fitted).all():
-            raise Refusal("the coefficients are not finite: the arithmetic overflowed")
+        check_finite(fitted)
         return fitted
 
     def _judged(self, each: Array) -> Array:
         """Of something for every frame, that of those after the settling, flat."""
         return each.reshape(*self._times.shape, -1)[:, SETTLING:].reshape(FRAMES, -1)
 
-    def rms(self, answer: _Answer, truth: _Answer) -> float:
-        """RMS error of the shapes fitted in `answer` from the true ones of `truth`, in m."""
-        error = answer.fitted @ self._at.T - truth.true @ self._true_at.T
-        return float(np.sqrt(np.mean(error**2, axis=1)).mean())
+    def rms(self, fitted: Array, true: Array) -> float:
+        """RMS error of the shapes, in m."""
+        return float(rms_distance(self._basis, fitted, self._reference, true).mean())
 
 
 # Costs measured in a background process of one thread
@@ -491,7 +477,7 @@ def _measured(
     yield from found
 
 
-class CostMeasurement:
+class CostMeasurement(BackgroundProcess[Cost | Refused]):
     """Measures `settings` on a `scene` in a process of one thread; no call here but `wait` waits.
 
     What the scene's effects cost with the setting `effects_with` comes after the first cost, and is
@@ -504,39 +490,15 @@ class CostMeasurement:
     ) -> None:
         Bench(scene)  # or refused here
         self.effects: dict[Setting, EffectCosts] = {}
-        self._process = BackgroundProcess(
-            "kappaskin-cost", _measured, scene, settings, effects_with
-        )
+        measured = cast("Callable[..., Iterable[Cost | Refused]]", _measured)
+        super().__init__("kappaskin-cost", measured, scene, settings, effects_with)
 
-    @property
-    def done(self) -> bool:
-        return self._process.done
-
-    def poll(self) -> list[Cost | Refused]:
-        """What has been measured since the last call.
-
-        Raises a `Refusal` when the process has died, once all that it measured is returned.
-        """
-        return list(self._costs(self._process.poll()))
-
-    def wait(self) -> Generator[Cost | Refused]:
-        """Each cost as soon as it is measured, to the end."""
-        yield from self._costs(self._process.wait())
-
-    def _costs(self, items: Iterable[_Item]) -> Generator[Cost | Refused]:
-        """The costs among `items`; those of effects go to `effects`."""
-        for one in items:
+    def _next(self) -> list[Cost | Refused]:
+        """The next cost; what the effects cost goes to `effects`."""
+        costs = list[Cost | Refused]()
+        for one in cast("list[_Item]", super()._next()):
             if isinstance(one, tuple):
                 self.effects |= [one]
             else:
-                yield one
-
-    def close(self) -> None:
-        """Stop measuring and end the process."""
-        self._process.close()
-
-    def __enter__(self) -> "CostMeasurement":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+                costs.append(one)
+        return costs

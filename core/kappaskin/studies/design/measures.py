@@ -6,15 +6,14 @@ import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import cast
 
 import numpy as np
-import scipy
 
-from kappaskin.bases import Basis, basis_for
+from kappaskin.bases import basis_for
 from kappaskin.contact import ContactObject, ObjectFinder, PointContact
 from kappaskin.errors import Refusal
 from kappaskin.estimation import (
+    PLACEMENTS,
     Estimator,
     Fit,
     check_placement,
@@ -26,24 +25,10 @@ from kappaskin.estimation import (
 from kappaskin.frames import Array, Contact, Mask, Truth
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects
-from kappaskin.scenes.effects import Hysteresis
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.bench import points_on
-from kappaskin.studies.design.setup import PlacementSettings, PointSetup
+from kappaskin.studies.cost.bench import covered, points_on, rms_distance
 
 # Blocks of frames: what was true, what was read, what was fitted
-
-
-@lru_cache(8)
-def _lengths(basis: Basis, reference: Basis) -> tuple[Array, Array, Array]:
-    """A (N, N), B (Nr, N) and C (Nr, Nr) with |c A - w B|^2 + |w C|^2 the surfaces' distance^2.
-
-    By RMS over the skin. The functions of both on G points are Q R, and Q changes no lengths.
-    """
-    points, N = points_on(basis.patch), basis.size
-    functions = np.hstack([basis.at(points), reference.at(points)]) / np.sqrt(len(points))
-    R = cast("Array", np.linalg.qr(functions, mode="r")).T
-    return R[:N, :N].copy(), R[N:, :N].copy(), R[N:, N:].copy()
 
 
 @lru_cache(2)
@@ -101,19 +86,13 @@ class FrameBlock:
 
     def forces(self) -> Array:
         """What pressed in all, (T,) in N or (1,)."""
-        times = _times(self.scene, len(self.truths)).tolist()
+        times = frame_times(self.scene, len(self.truths)).tolist()
         return np.array([sum(load.force for load in self.simulator.loads(t)) for t in times])
 
     def rms_error(self) -> Array:
         """RMS over the skin of what was fitted less what was true, (T,) in m."""
-        A, B, C = _lengths(self.estimator.basis, self.scene.basis)
-        inside, outside = self.coefficients @ A - self.true @ B, self.true @ C
-        return np.sqrt(np.vecdot(inside, inside) + np.vecdot(outside, outside))
-
-    def errors_at(self, points: Array) -> Array:
-        """What was fitted less what was true at `points` (G, 2), (T, G) in m."""
-        fitted = self.coefficients @ self.estimator.basis.at(points).T
-        return fitted - self.true @ self.scene.basis.at(points).T
+        basis, reference = self.estimator.basis, self.scene.basis
+        return rms_distance(basis, self.coefficients, reference, self.true)
 
     @cached_property
     def contacts(self) -> list[Contact]:
@@ -128,35 +107,13 @@ class FrameBlock:
             yield find(K, float(fit.noise), contact)
 
 
-def _times(scene: Scene, frames: int) -> Array:
+def frame_times(scene: Scene, frames: int) -> Array:
     return np.arange(frames) / scene.rate
-
-
-def block_of(setup: PointSetup, estimator: Estimator, seed: int) -> FrameBlock:
-    """`setup.measure.frames` frames, spoilt as `seed` decides."""
-    scene = replace(setup.scene, layout=estimator.layout, seed=seed)
-    simulator, times = Simulator(scene), _times(scene, setup.measure.frames)
-    truths, read = simulator.readings(scene.sensor().scan(), times)
-    if setup.fit.compensate:
-        read = _compensated(scene, read)
-    read[:, ~scene.layout.live.ravel()] = np.nan
-    known = [truth for truth in truths if truth is not None]
-    return FrameBlock(simulator, estimator, known, read.reshape(len(times), 3, -1))
-
-
-def _compensated(scene: Scene, read: Array) -> Array:
-    """Readings (T, 3 P) in 1/m, one after the other, with the scene's loops undone."""
-    loops = [effect for effect in kept_effects(scene) if isinstance(effect, Hysteresis)]
-    if not loops:
-        raise Refusal("expected a scene with hysteresis to compensate, got none of it")
-    undo = loops[0].operator(read.shape[1]).inverse.start()
-    return np.array([undo(frame) for frame in read])
 
 
 # The measures
 
 _CALLS = 21  # of a fit that is timed
-_BAND_SIDE = 21  # points along each side at which error bars are judged, less those on the edges
 
 
 @dataclass(frozen=True)
@@ -213,13 +170,7 @@ def _radius(block: FrameBlock) -> Array:
 
 def _covered(block: FrameBlock) -> Array:
     """The share of the skin that lies within the 95 % bands, (T,)."""
-    patch = block.scene.plate.patch
-    x, y = (along[1:-1] for along in patch.grid(_BAND_SIDE, 3 if patch.strip else _BAND_SIDE))
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    points = points[patch.contains(points)]
-    reach = scipy.special.stdtrit(np.maximum(block.fit.spare, 1), 0.975)
-    bands = np.reshape(reach, (-1, 1)) * block.fit.surface_sd(points)
-    held = np.mean(np.abs(block.errors_at(points)) <= bands, axis=1)
+    held = covered(block.fit, block.scene.basis, block.true)
     return np.where(np.isnan(block.fit.noise), np.nan, held)  # which makes no bands
 
 
@@ -279,6 +230,15 @@ _SIDE = 41  # points along each side of the maps
 _BLOCK, _MOST = 250, 5_000  # frames at a time, and in all
 
 
+def placed_estimator(
+    scene: Scene, functions: tuple[int, int], by: str, apart: float, method: str
+) -> Estimator:
+    """The estimator of a `method` for the elements placed `by` a name, `apart` in m or more."""
+    patch, (Ni, Nj) = scene.plate.patch, functions
+    basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
+    return estimator_for(method, basis, place_elements(scene.layout, basis, by, apart))
+
+
 @dataclass(frozen=True)
 class Design:
     """A `scene` with its elements placed `by` one of `PLACEMENTS`.
@@ -291,18 +251,15 @@ class Design:
     by: str = "scene"
 
     def __post_init__(self) -> None:
-        PlacementSettings(self.by)  # for its refusal
+        if self.by not in PLACEMENTS:
+            raise Refusal(f"expected by among {', '.join(PLACEMENTS)}, got {self.by!r}")
 
     def estimator(self) -> Estimator:
         """The estimator with the elements placed; raises a `Refusal` where they cannot be."""
-        scene, patch = self.scene, self.scene.plate.patch
-        check_placement(scene.layout, self.by)
-        Ni, Nj = self.functions
-        basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
-        spacing = _SPACING * math.sqrt(patch.a * patch.b / len(scene.layout))
-        return estimator_for(
-            "least-squares", basis, place_elements(scene.layout, basis, self.by, spacing)
-        )
+        layout, patch = self.scene.layout, self.scene.plate.patch
+        check_placement(layout, self.by)
+        spacing = _SPACING * math.sqrt(patch.a * patch.b / len(layout))
+        return placed_estimator(self.scene, self.functions, self.by, spacing, "least-squares")
 
 
 def _shares(on: Mask) -> Array:

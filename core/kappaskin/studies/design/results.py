@@ -7,7 +7,7 @@ import os
 import sys
 import threading
 from collections import deque
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property, lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -17,10 +17,20 @@ import numpy as np
 import scipy
 
 from kappaskin.errors import Refusal
+from kappaskin.estimation import Estimator
 from kappaskin.frames import Array
-from kappaskin.studies.design.measures import MEASURES, block_of
-from kappaskin.studies.design.setup import PointSetup, estimator_of, setup_of
-from kappaskin.studies.design.study import Point, Study, read_study, with_values
+from kappaskin.scenes import Scene, Simulator, kept_effects
+from kappaskin.scenes.effects import Hysteresis
+from kappaskin.studies.design.measures import MEASURES, FrameBlock, frame_times
+from kappaskin.studies.design.study import (
+    Point,
+    PointSetup,
+    Study,
+    estimator_of,
+    read_study,
+    setup_of,
+    with_values,
+)
 
 # Tasks
 
@@ -90,9 +100,30 @@ class BlockTask:
         return int(self._digest(json.dumps(content | {"measure": None}, sort_keys=True))[:16], 16)
 
 
+def block_of(setup: PointSetup, estimator: Estimator, seed: int) -> FrameBlock:
+    """`setup.measure.frames` frames, spoilt as `seed` decides."""
+    scene = replace(setup.scene, layout=estimator.layout, seed=seed)
+    simulator, times = Simulator(scene), frame_times(scene, setup.measure.frames)
+    truths, read = simulator.readings(scene.sensor().scan(), times)
+    if setup.fit.compensate:
+        read = _compensated(scene, read)
+    read[:, ~scene.layout.live.ravel()] = np.nan
+    known = [truth for truth in truths if truth is not None]
+    return FrameBlock(simulator, estimator, known, read.reshape(len(times), 3, -1))
+
+
+def _compensated(scene: Scene, read: Array) -> Array:
+    """Readings (T, 3 P) in 1/m, one after the other, with the scene's loops undone."""
+    loops = [effect for effect in kept_effects(scene) if isinstance(effect, Hysteresis)]
+    if not loops:
+        raise Refusal("expected a scene with hysteresis to compensate, got none of it")
+    undo = loops[0].operator(read.shape[1]).inverse.start()
+    return np.array([undo(frame) for frame in read])
+
+
 @lru_cache(4)
 def _setup(document: str) -> PointSetup:
-    return setup_of(json.loads(document), MEASURES)
+    return setup_of(json.loads(document))
 
 
 def _drawn(task: BlockTask) -> tuple[dict[str, Any], PointSetup]:
@@ -102,7 +133,7 @@ def _drawn(task: BlockTask) -> tuple[dict[str, Any], PointSetup]:
         return content, setup
     rng = np.random.default_rng(task.seed)
     content = with_values(content, {place: draw(rng) for place, draw in setup.draws})
-    return content, setup_of(content, MEASURES)
+    return content, setup_of(content)
 
 
 def run_task(task: BlockTask) -> BlockMoments:

@@ -13,18 +13,19 @@ from kappaskin import Refusal
 from kappaskin.estimation import PLACEMENTS
 from kappaskin.studies import load_study
 from kappaskin.studies.design.measures import MEASURES
-from kappaskin.studies.design.setup import (
+from kappaskin.studies.design.study import (
     KINDS,
+    STUDIES,
     FitSettings,
     LogUniform,
     MeasureSettings,
     Normal,
     PlacementSettings,
     Some,
+    Stop,
     Uniform,
     Whole,
 )
-from kappaskin.studies.design.study import STUDIES, Stop
 
 TWO = """
 [[vary]]
